@@ -1,0 +1,1 @@
+"""Differentiable dynamics of rolling-bearing cages."""

@@ -1,0 +1,13 @@
+"""Array types of the public signatures (jaxtyping; checked at run time in the tests only)."""
+
+from typing import TypeAlias
+
+import numpy as np
+from jaxtyping import Array, Float
+
+
+Scalar: TypeAlias = Float[Array, ""] | Float[np.ndarray, ""] | np.floating | float | int
+"""A real number: a zero-dimensional array (traced or not) or a Python number."""
+
+State: TypeAlias = tuple[Scalar, ...]
+"""Coordinates, velocities or a whole state as a tuple of scalars, so that lanes stay innermost under `vmap`."""

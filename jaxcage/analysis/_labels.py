@@ -1,0 +1,48 @@
+"""What a lane does, judged from its strobe states and exponents.
+
+Labels are given in this order: `failed`, `periodic-k`, `chaotic`, `quasi-periodic`, `undecided`.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+
+CLOSING_TOLERANCE = 1e-4
+"""A strobe orbit counts as closed if it returns to within this fraction of the system's scale (the clearance)."""
+LONGEST_PERIOD = 8
+CHAOS_THRESHOLD = 0.02
+"""Exponent per revolution that must be exceeded by two standard errors."""
+TORUS_THRESHOLD = 0.005
+
+
+def closing_period(
+    strobe: Float[np.ndarray, "*lanes keep dim"], scale: Float[np.ndarray, "*#lanes dim"]
+) -> Int[np.ndarray, "*lanes"]:
+    """Smallest k <= 8 for which every kept strobe state returns after k revolutions; 0 where there is none.
+
+    Only coordinates, the first half of the state, and velocities alike are compared in units of `scale`.
+    """
+    states = strobe / scale[..., None, :]
+    period = np.zeros(strobe.shape[:-2], dtype=np.int64)
+    longest = min(LONGEST_PERIOD, strobe.shape[-2] // 2)
+    for k in range(longest, 0, -1):
+        apart = np.linalg.norm(states[..., k:, :] - states[..., :-k, :], axis=-1)
+        closed = np.all(apart <= CLOSING_TOLERANCE, axis=-1)  # false for NaN
+        period = np.where(closed, k, period)
+    return period
+
+
+def label_lanes(
+    failed: Shaped[np.ndarray, "*lanes"],
+    period: Int[np.ndarray, "*lanes"],
+    exponent: Float[np.ndarray, "*lanes"],
+    standard_error: Float[np.ndarray, "*lanes"],
+) -> Shaped[np.ndarray, "*lanes"]:
+    """Labels from the outcome, the closing period and the largest exponent per revolution with its standard error."""
+    labels = np.full(np.shape(period), "undecided", dtype="<U14")
+    labels[np.abs(exponent) <= np.maximum(2 * standard_error, TORUS_THRESHOLD)] = "quasi-periodic"
+    labels[exponent - 2 * standard_error > CHAOS_THRESHOLD] = "chaotic"
+    for k in range(1, LONGEST_PERIOD + 1):
+        labels[period == k] = f"periodic-{k}"
+    labels[np.asarray(failed, dtype=bool)] = "failed"
+    return labels

@@ -1,0 +1,97 @@
+"""What the paper publishes: cases (Table 2), their zones (section 4), axis limits of its figures.
+
+Source: L. Chen, X. Xia, H. Zheng, M. Qiu, "Chaotic Dynamics of Cage Behavior in a High-Speed
+Cylindrical Roller Bearing", Shock and Vibration 2016, article 9120505,
+http://dx.doi.org/10.1155/2016/9120505, open access under the Creative Commons Attribution License
+(CC BY). The numbers are taken from it; the readings of its misprints are ours.
+"""
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class PublishedCase:
+    """One row of Table 2 with its chaotic zones.
+
+    Speeds are w_co, cage relative to rib, as section 4 calls them. Table 2 heads the eccentricity
+    "(mm)", impossible in a gap of 0.45 mm: it is read in micrometres. VG is read as mm^2/s at 40 C.
+    """
+
+    name: str
+    guidance_gap_mm: float
+    eccentricity_um: float
+    viscosity_grade: float
+    zone_1_onset_rpm: float
+    zone_1_exit_rpm: float
+    zone_2_onset_rpm: float
+
+    @property
+    def zone_1_width_rpm(self) -> float:
+        """Exit less onset of zone 1 [rpm]."""
+        return self.zone_1_exit_rpm - self.zone_1_onset_rpm
+
+    @property
+    def steady_width_rpm(self) -> float:
+        """Width of the steady zone between the two chaotic ones [rpm]."""
+        return self.zone_2_onset_rpm - self.zone_1_exit_rpm
+
+
+PUBLISHED_CASES: dict[str, PublishedCase] = {
+    case.name: case
+    for case in (
+        PublishedCase("1a", 0.45, 23.0, 56.0, 9100.0, 12000.0, 25500.0),
+        PublishedCase("1b", 0.60, 23.0, 56.0, 7100.0, 22000.0, 26000.0),
+        PublishedCase("2a", 0.45, 35.0, 56.0, 7600.0, 14000.0, 22500.0),
+        PublishedCase("2b", 0.45, 57.0, 56.0, 7800.0, 13000.0, 19800.0),
+        PublishedCase("3a", 0.45, 42.0, 78.0, 7650.0, 13400.0, 21000.0),
+        PublishedCase("3b", 0.45, 42.0, 32.0, 7650.0, 13400.0, 21000.0),
+    )
+}
+"""The cases by name."""
+
+PUBLISHED_SPEED_RANGE_RPM = (2500.0, 27500.0)
+"""Speed axis of fig. 7. Read as w_co its end means a shaft at 68500 rpm; the limit is 12000 rpm."""
+
+
+def published_case(name: str) -> PublishedCase:
+    """The published case `name`.
+
+    **Raises:** `ValueError` that names the cases there are.
+    """
+    if name not in PUBLISHED_CASES:
+        raise ValueError(
+            f"Argument `name` must be one of {', '.join(PUBLISHED_CASES)}, but {name!r} was given."
+        )
+    return PUBLISHED_CASES[name]
+
+
+@dataclasses.dataclass(frozen=True)
+class FigureAxis:
+    """Limits of one axis of a published figure: the motion stays within, they are not its peaks."""
+
+    figure: str
+    quantity: str
+    unit: str
+    lower: float
+    upper: float
+
+
+FIGURE_AXES: tuple[FigureAxis, ...] = (
+    FigureAxis("5", "time", "s", 0.0, 6e-4),
+    FigureAxis("5", "cage-roller contact force", "N", -40.0, 120.0),
+    FigureAxis("7", "speed", "rpm", *PUBLISHED_SPEED_RANGE_RPM),
+    FigureAxis("7", "vertical displacement", "mm", -0.3, 0.3),
+    FigureAxis("8a", "speed", "rpm", 7000.0, 22000.0),
+    FigureAxis("8a", "vertical displacement", "mm", -0.08, 0.02),
+    FigureAxis("8b", "speed", "rpm", 7500.0, 14000.0),
+    FigureAxis("8b", "vertical displacement", "mm", -0.03, 0.06),
+    FigureAxis("8c", "speed", "rpm", 7500.0, 14000.0),
+    FigureAxis("8c", "vertical displacement", "mm", -0.04, 0.05),
+    FigureAxis("9", "vertical displacement", "mm", -0.3, 0.2),
+    FigureAxis("9", "vertical velocity", "mm/s", -400.0, 400.0),
+    FigureAxis("9c", "vertical displacement", "mm", -0.2, 0.1),
+    FigureAxis("9c", "vertical velocity", "mm/s", -300.0, 300.0),
+)
+"""The caption of fig. 7 says X_C where its axis says vertical. Fig. 9 is at 8500 rpm, revolutions 4
+to 4000, with the transients of the paper's start; the axes of panel c (smaller eccentricity) are
+narrower than those of the others. Panel a lies outside zone 1 of case 1a."""

@@ -1,0 +1,39 @@
+"""Positive numbers at the entry points: `ValueError` where the value is known, else `error_if`."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array
+
+from .._types import Scalar
+
+
+def is_concrete(*values: Scalar) -> bool:
+    """Whether every one of `values` is a known number, so that Python may compare it."""
+    return not any(isinstance(value, Tracer) for value in values)
+
+
+def _require(array: Array, holds: Array, message: str) -> Array:
+    if isinstance(holds, Tracer):
+        return eqx.error_if(array, ~holds, f"{message}.")
+    if not np.all(np.asarray(holds)):
+        # Under `grad` without `jit` the comparison is concrete while the value is still traced.
+        given = "" if isinstance(array, Tracer) else f", but {float(array):g} was given"
+        raise ValueError(f"{message}{given}.")
+    return array
+
+
+def require_positive(name: str, value: Scalar) -> Array:
+    """`value` as an array, checked to be above zero (NaN is not).
+
+    **Raises:** `ValueError` that names the argument; when traced, an error as the computation runs.
+    """
+    array = jnp.asarray(value, dtype=float)
+    return _require(array, array > 0, f"Argument `{name}` must be positive")
+
+
+def require_not_negative(name: str, value: Scalar) -> Array:
+    """`value` as an array, checked to be zero or above (NaN is not). **Raises:** as above."""
+    array = jnp.asarray(value, dtype=float)
+    return _require(array, array >= 0, f"Argument `{name}` must not be negative")

@@ -1,0 +1,169 @@
+"""Oil film between cage and guiding rib: short-bearing (Ocvirk) forces, paper eqs. (25)-(28).
+
+With the clearance c as unit of length, r = (x, y) the cage centre, v its velocity, n = (cos, sin) the direction to a
+point of the rib and H = 1 - r.n the film thickness there, the short-bearing pressure is proportional to P.n / H^3 with
+    P = 2 v/c - omega (-y, x),
+the squeeze plus half the entrainment of the film. The force of one land on the cage is then
+    F = -(S/2) M P,   M = integral over the pressurised arc of n n^T / H^3,   S = mu R L (L/c)^2,
+and the three film models differ only in the arc: the fixed half circle behind the line of centres (the paper's (27)),
+the half circle in which the pressure is positive, or the whole circle. M is symmetric and positive definite, so the
+damping matrix (S/c) M never feeds energy in. The film's velocity coefficients are its entries: the force is linear in
+velocity for a fixed arc, and the moving ends of the positive arc contribute nothing because the pressure vanishes
+there.
+"""
+
+from typing import Literal, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._parameters import choice, count, parameter
+from .._types import Scalar
+
+
+FilmModel = Literal["fixed_half", "positive_pressure", "full"]
+
+
+class Resistance(NamedTuple):
+    """The symmetric matrix M = integral of n n^T / H^3 over the pressurised arc, dimensionless."""
+
+    xx: Array
+    xy: Array
+    yy: Array
+
+
+def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scalar) -> Array:
+    """S = mu R L (L/c)^2 [N s]: the film force of one land per unit of speed, (27) with its misprint corrected.
+
+    The paper prints (R_c/C_r)^2 in the tangential force; the short-bearing solution has (l_c/C_r)^2 in both.
+
+    **Arguments:** dynamic viscosity [Pa s], land radius [m], width of one land [m], radial clearance [m].
+    """
+    return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
+
+
+def fixed_half_resistance(x: Scalar, y: Scalar, smoothing: Scalar) -> Resistance:
+    """M over the half circle that trails the line of centres (alpha from 0 to pi), as in (27).
+
+    **Arguments:** position over clearance, and a small length over clearance that keeps the value differentiable at the
+    centre, where the arc loses its direction.
+    """
+    eps2 = x * x + y * y
+    inverse = 1 / (1 - eps2)
+    root = jnp.sqrt(inverse)
+    isotropic = (jnp.pi / 2) * inverse * root
+    radial = 3 * isotropic * inverse
+    skew = 2 * inverse * inverse / jnp.sqrt(eps2 + smoothing * smoothing)
+    return Resistance(
+        isotropic + radial * x * x + 2 * skew * x * y,
+        radial * x * y - skew * (x * x - y * y),
+        isotropic + radial * y * y - 2 * skew * x * y,
+    )
+
+
+def full_resistance(x: Scalar, y: Scalar) -> Resistance:
+    """M over the whole circle: pressure of both signs (full Sommerfeld condition)."""
+    inverse = 1 / (1 - (x * x + y * y))
+    isotropic = jnp.pi * inverse * jnp.sqrt(inverse)
+    radial = 3 * isotropic * inverse
+    return Resistance(isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y)
+
+
+def half_circle_resistance(x: Scalar, y: Scalar, ux: Scalar, uy: Scalar) -> Resistance:
+    """M over the half circle centred on the unit vector u = (ux, uy), in closed form.
+
+    It is half the Hessian, with respect to a = r.u and b = r x u, of the Sommerfeld integral
+    G = (2/D) (pi/2 + arctan(a/D)), D^2 = 1 - a^2 - b^2.
+    """
+    a, b = x * ux + y * uy, y * ux - x * uy
+    inverse = 1 / (1 - (x * x + y * y))
+    root = jnp.sqrt(inverse)
+    arc = 1 / (1 - b * b)
+    g = 2 * root * (jnp.pi / 2 + jnp.arctan(a * root))
+    v = (2 + a * g) * inverse
+    m_aa = 0.5 * (g + 3 * a * v) * inverse
+    m_ab = 0.5 * b * (3 * v - 2 * arc) * inverse
+    q = (2 * a * arc + g) * inverse
+    slope = 2 * inverse * (2 * a * arc * (inverse + arc) + g * inverse)  # (dq/db - q/D^2) / b
+    m_bb = 0.5 * (q + b * b * (slope + q * inverse))
+    return Resistance(
+        m_aa * ux * ux - 2 * m_ab * ux * uy + m_bb * uy * uy,
+        (m_aa - m_bb) * ux * uy + m_ab * (ux * ux - uy * uy),
+        m_aa * uy * uy + 2 * m_ab * ux * uy + m_bb * ux * ux,
+    )
+
+
+def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> tuple[Array, Array]:
+    """P = 2 v - omega (-y, x): squeeze and entrainment, in clearances per second."""
+    return jnp.asarray(2 * vx + omega * y), jnp.asarray(2 * vy - omega * x)
+
+
+def film_resistance(
+    model: FilmModel, x: Scalar, y: Scalar, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
+) -> Resistance:
+    """M of one of the three film models at position (x, y) over clearance, for the drive P = (px, py).
+
+    `smoothing` is a small length over clearance; times `omega` it also regularises the direction of P where P = 0.
+    """
+    if model == "fixed_half":
+        return fixed_half_resistance(x, y, smoothing)
+    if model == "full":
+        return full_resistance(x, y)
+    norm = jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
+    return half_circle_resistance(x, y, px / norm, py / norm)
+
+
+def supply_force(
+    model: FilmModel, x: Scalar, y: Scalar, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
+) -> tuple[Array, Array]:
+    """Thrust -2 u of a uniform gauge pressure on the pressurised half circle centred on u, in units of R L p_0.
+
+    The paper's last term of (27): +2 R L p_0 along +phi, since the fixed half is centred on -phi. Zero for `full`.
+    """
+    if model == "full":
+        return jnp.zeros_like(jnp.asarray(x)), jnp.zeros_like(jnp.asarray(x))
+    if model == "fixed_half":
+        norm = jnp.sqrt(x * x + y * y + smoothing * smoothing)
+        return -2 * y / norm, 2 * x / norm
+    norm = jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
+    return -2 * px / norm, -2 * py / norm
+
+
+def short_film_force(
+    model: FilmModel, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar, smoothing: Scalar = 1e-9
+) -> tuple[Array, Array]:
+    """Force of the film in units of S = mu R L^3 / c^2, times 1/s: -(1/2) M P.
+
+    **Arguments:** `model`; position and velocity of the cage centre over clearance [-, 1/s]; cage speed [rad/s];
+    `smoothing`, a small length over clearance.
+
+    **Returns:** (F_x, F_y) / S [1/s].
+    """
+    px, py = film_drive(x, y, vx, vy, omega)
+    m = film_resistance(model, x, y, px, py, omega, smoothing)
+    return -(m.xx * px + m.xy * py) / 2, -(m.xy * px + m.yy * py) / 2
+
+
+def film_pressure(
+    alpha: Scalar, z: Scalar, eps: Scalar, eps_rate: Scalar, phi_rate: Scalar, omega: Scalar, factor: Scalar
+) -> Array:
+    """Short-bearing pressure (26) in clean form, at angle `alpha` from the widest gap and axial place `z` over width.
+
+    p = factor (1/4 - z^2) [(omega - 2 phi') eps sin(alpha) - 2 eps' cos(alpha)] / (1 + eps cos(alpha))^3, with
+    factor = 3 mu L^2 / c^2 [Pa s]. The paper prints 1 + eps cos^3(alpha) and drops mu and the squeeze term.
+
+    **Returns:** gauge pressure [Pa]; of both signs: the film models differ in what they keep of it.
+    """
+    drive = (omega - 2 * phi_rate) * eps * jnp.sin(alpha) - 2 * eps_rate * jnp.cos(alpha)
+    return factor * (0.25 - z * z) * drive / (1 + eps * jnp.cos(alpha)) ** 3
+
+
+class RibFilm(eqx.Module):
+    """The oil film of the guiding lands: how many, how wide, and which film model."""
+
+    land_width: Array = parameter("m", 1e-4, 0.05, "width of one guiding land")
+    smoothing: Array = parameter("m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9)
+    supply_pressure: Array = parameter("Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", default=0.0)
+    n_lands: int = count(1, 4, "number of guiding lands, each a film of its own", default=2)
+    model: FilmModel = choice("fixed_half", "positive_pressure", "full", text="film model", default="fixed_half")

@@ -1,0 +1,98 @@
+"""How roller impacts act on the cage: as the paper's synchronous force (15), or roller by roller."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .._parameters import count, parameter
+from .._types import Scalar
+from ._pocket_impact import PocketImpact, approach_speed, impact_history, impact_time_scale
+
+
+def synchronous_amplitude(omega: Scalar, amplitude: Scalar, reference_speed: Scalar, exponent: Scalar) -> Array:
+    """A(omega) = A_ref (omega/omega_ref)^n [N]; only A = 2 Q cos(theta) of (15) matters."""
+    return jnp.asarray(amplitude * (omega / reference_speed) ** exponent)
+
+
+def synchronous_force(tau: Scalar, amplitude: Scalar) -> tuple[Array, Array]:
+    """(15): f_x = Q [sin tau + sin(pi - tau)] cos(theta) = A sin tau, and f_y = 0 identically [N]."""
+    f_x = amplitude * jnp.sin(tau)
+    return f_x, jnp.zeros_like(f_x)
+
+
+class SynchronousImpact(eqx.Module):
+    """The paper's (15): one horizontal force at cage frequency that grows as a power of speed."""
+
+    amplitude: Array = parameter("N", 0.0, 1e5, "amplitude A at the reference speed")
+    exponent: Array = parameter("1", 0.0, 4.0, "power n of speed; 20/19 for a Hertz impact on a stiff bar")
+    reference_speed: Array = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
+
+
+class RollerPassImpact(eqx.Module):
+    """A pulse Q_cw(t) each time a roller enters or leaves the loaded zone, kept as a Fourier series in the pass angle."""
+
+    oscillator: PocketImpact
+    harmonics: int = count(1, 128, "harmonics of the roller-pass frequency that are kept", default=24)
+
+
+class PulseTrain(NamedTuple):
+    """Force of all roller passes as Fourier coefficients: f = sum over k of a_k cos(k Z tau) + b_k sin(k Z tau) [N]."""
+
+    a_x: Float[Array, " harmonics"]
+    b_x: Float[Array, " harmonics"]
+    a_y: Float[Array, " harmonics"]
+    b_y: Float[Array, " harmonics"]
+
+
+def pulse_spectrum(
+    impact: RollerPassImpact, omega: Scalar, n_rollers: int, roller_mass: Scalar, pocket_clearance: Scalar
+) -> tuple[Float[Array, " harmonics"], Float[Array, " harmonics"]]:
+    """Cosine and sine coefficients [N] of the train of pulses that starts at tau = 0 and repeats every 2 pi / Z.
+
+    Pulses that last longer than the time between two rollers add up: summing shifted pulses and sampling the spectrum of
+    one pulse at the multiples of Z are the same thing (Poisson).
+    """
+    v0 = approach_speed(impact.oscillator.approach_ratio, omega, pocket_clearance)
+    duration = 8 * impact_time_scale(impact.oscillator, roller_mass, v0)
+    history = impact_history(impact.oscillator, roller_mass, v0, duration)
+    k = jnp.arange(impact.harmonics + 1) * float(n_rollers)
+    phase = omega * jnp.outer(k, history.time)
+    rate = n_rollers * omega / (2 * jnp.pi)
+    weight = jnp.where(k == 0, 1.0, 2.0) * rate
+    cosine = weight * jnp.trapezoid(history.contact_force[None, :] * jnp.cos(phase), history.time, axis=1)
+    sine = weight * jnp.trapezoid(history.contact_force[None, :] * jnp.sin(phase), history.time, axis=1)
+    return cosine, sine
+
+
+def pulse_train(
+    impact: RollerPassImpact,
+    omega: Scalar,
+    half_angle: Scalar,
+    n_rollers: int,
+    roller_mass: Scalar,
+    pocket_clearance: Scalar,
+) -> PulseTrain:
+    """Force of the rollers on the cage: +Q along the motion where they enter the loaded zone, -Q where they leave it.
+
+    The zone is centred on -y with half angle theta; rollers turn counter-clockwise, enter at -pi/2 - theta, where the
+    direction of motion is (cos theta, -sin theta), and leave at -pi/2 + theta, where it is (cos theta, sin theta).
+    """
+    cosine, sine = pulse_spectrum(impact, omega, n_rollers, roller_mass, pocket_clearance)
+    k = jnp.arange(impact.harmonics + 1) * float(n_rollers)
+
+    def shifted(start: Scalar) -> tuple[Array, Array]:
+        c, s = jnp.cos(k * start), jnp.sin(k * start)
+        return cosine * c - sine * s, cosine * s + sine * c
+
+    (a_in, b_in), (a_out, b_out) = shifted(-jnp.pi / 2 - half_angle), shifted(-jnp.pi / 2 + half_angle)
+    across, down = jnp.cos(half_angle), -jnp.sin(half_angle)
+    return PulseTrain(across * (a_in - a_out), across * (b_in - b_out), down * (a_in + a_out), down * (b_in + b_out))
+
+
+def pulse_train_force(tau: Scalar, train: PulseTrain, n_rollers: int) -> tuple[Array, Array]:
+    """Force of the pulse train at phase tau [N]."""
+    k = jnp.arange(train.a_x.shape[0]) * float(n_rollers)
+    c, s = jnp.cos(k * tau), jnp.sin(k * tau)
+    return jnp.sum(train.a_x * c + train.b_x * s), jnp.sum(train.a_y * c + train.b_y * s)

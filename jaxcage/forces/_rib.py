@@ -1,0 +1,29 @@
+"""The rib that guides the cage: rigid, or a mass on its own elastic support."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._parameters import parameter
+from .._types import Scalar
+
+
+def rib_force(
+    x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, stiffness: Scalar, damping: Scalar, cubic: Scalar
+) -> tuple[Array, Array]:
+    """-(K_O + K_O3 |r|^2) r - B_O r' [N]: what holds an elastic rib in place."""
+    hardening = stiffness + cubic * (x * x + y * y)
+    return jnp.asarray(-hardening * x - damping * vx), jnp.asarray(-hardening * y - damping * vy)
+
+
+class RigidRib(eqx.Module):
+    """A rib that does not move: the cage has two coordinates."""
+
+
+class ElasticRib(eqx.Module):
+    """A rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
+
+    mass: Array = parameter("kg", 1e-3, 100.0, "rib mass M_O")
+    stiffness: Array = parameter("N/m", 1.0, 1e12, "rib stiffness K_O")
+    damping: Array = parameter("N s/m", 0.0, 1e8, "rib damping B_O")
+    cubic_stiffness: Array = parameter("N/m^3", 0.0, 1e24, "cubic rib stiffness K_O3", default=0.0)

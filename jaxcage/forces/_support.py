@@ -1,0 +1,52 @@
+"""Elastic support between cage and rib, paper eqs. (16) and (20): springs, a cubic term, damping, cross-coupling."""
+
+from typing import Literal
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._parameters import choice, parameter
+from .._types import Scalar
+
+
+Cross = Literal["circulatory", "as_printed"]
+Cubic = Literal["absolute", "dimensionless"]
+
+
+def spring_force(
+    x: Scalar, y: Scalar, stiffness_x: Scalar, stiffness_y: Scalar, cubic: Scalar
+) -> tuple[Array, Array]:
+    """-(K + K_3 |r|^2) r [N]: our isotropic form of the paper's cubic stiffness, with K_x and K_y of its fig. 6."""
+    hardening = cubic * (x * x + y * y)
+    return jnp.asarray(-(stiffness_x + hardening) * x), jnp.asarray(-(stiffness_y + hardening) * y)
+
+
+def cross_force(cross: Cross, x: Scalar, y: Scalar, linear: Scalar, cubic: Scalar) -> tuple[Array, Array]:
+    """Cross-coupling force [N].
+
+    `circulatory`: K_xy (-y, x), which pumps energy into whirl. `as_printed` in (20): -K_xy (y, x) - K'_xy (y^3, x^3),
+    whose linear part is conservative.
+    """
+    if cross == "circulatory":
+        return jnp.asarray(-linear * y), jnp.asarray(linear * x)
+    return -(linear * y + cubic * y**3), -(linear * x + cubic * x**3)
+
+
+def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffness: Scalar, clearance: Scalar) -> Array:
+    """K_3 [N/m^3]: given as such, or as alpha K_s / c^2 with a dimensionless alpha, so that a larger gap softens it."""
+    return jnp.asarray(absolute if reading == "absolute" else relative * stiffness / clearance**2)
+
+
+class Support(eqx.Module):
+    """Stiffness and damping between cage and rib; none of the values is printed in the paper."""
+
+    stiffness_x: Array = parameter("N/m", 0.0, 1e9, "support stiffness K_x")
+    stiffness_y: Array = parameter("N/m", 0.0, 1e9, "support stiffness K_y")
+    damping: Array = parameter("N s/m", 0.0, 1e5, "support damping B_s")
+    cubic_stiffness: Array = parameter("N/m^3", 0.0, 1e18, "cubic stiffness K_3, for cubic = absolute", default=0.0)
+    cubic_ratio: Array = parameter("1", 0.0, 1e4, "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless", default=0.0)
+    cross_stiffness: Array = parameter("N/m", -1e8, 1e8, "cross-coupling stiffness K_xy", default=0.0)
+    cross_cubic: Array = parameter("N/m^3", -1e18, 1e18, "cubic cross-coupling K'_xy, for cross = as_printed", default=0.0)
+    cross: Cross = choice("circulatory", "as_printed", text="form of the cross-coupling", default="circulatory")
+    cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")

@@ -1,0 +1,172 @@
+"""Methods: a diffrax solver together with how it chooses its steps, and the advance through a part of a revolution."""
+
+import abc
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import diffrax as dfx
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._types import Scalar, State
+from ..models import AbstractField, AbstractForcedSystem, ESCAPE, ScaledField
+from ._newmark import NewmarkBeta
+from ._results import RESULTS
+from ._rosenbrock import Rodas3, Rodas4
+
+
+REVOLUTION = 2 * math.pi
+
+
+class Stretch(NamedTuple):
+    """A part of a revolution: where it ended, how far out it went on the way, and how it went."""
+
+    y: State
+    peak: Scalar
+    result: RESULTS
+
+
+def _evaluate(tau: Scalar, y: State, field: AbstractField) -> State:
+    return field(tau, y)
+
+
+TERM = dfx.ODETerm(_evaluate)
+"""The diffrax term of every field: the field itself travels as `args`, where solvers can use its structure."""
+
+
+class AbstractMethod(eqx.Module):
+    """How to integrate a field over a part of a revolution."""
+
+    @abc.abstractmethod
+    def advance(
+        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+    ) -> Stretch:
+        """Go one `parts`-th of a revolution from state `y` at `phase`; `scale` is the magnitude of the components."""
+
+
+def _worse(first: RESULTS, second: RESULTS) -> RESULTS:
+    """The first thing that went wrong."""
+    return RESULTS.where(first == RESULTS.successful, second, first)  # pyright: ignore[reportReturnType]
+
+
+def judge(result: Any, y: State, excursion: Scalar, limit: float) -> RESULTS:
+    """What to say of a state that a solver returned with one of diffrax's results."""
+    finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
+    state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)
+    return _worse(RESULTS.promote(result), RESULTS.where(finite, state, RESULTS.not_finite))  # pyright: ignore
+
+
+class FixedSteps(AbstractMethod):
+    """A number of equal steps per revolution: every lane of a batch does the same work."""
+
+    solver: dfx.AbstractSolver
+    steps: int = eqx.field(static=True)
+
+    def __check_init__(self):
+        if self.steps < 1:
+            raise ValueError(f"Argument `steps` must be at least 1 per revolution, but {self.steps} was given.")
+
+    def advance(
+        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+    ) -> Stretch:
+        del scale
+        if self.steps % parts:
+            raise ValueError(f"Argument `parts` must divide the {self.steps} steps per revolution, but it is {parts}.")
+        h = REVOLUTION / self.steps
+
+        def step(i: Array, carry: tuple) -> tuple:
+            y, peak, result, state = carry
+            t0 = phase + i * h
+            y, _, _, state, outcome = self.solver.step(TERM, t0, t0 + h, y, field, state, False)
+            excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
+            result = _worse(result, judge(outcome, y, excursion, ESCAPE))
+            return y, jnp.maximum(peak, excursion), result, state
+
+        state = self.solver.init(TERM, phase, phase + h, y, field)
+        start = (y, jnp.zeros(()), RESULTS.successful, state)
+        y, peak, result, _ = jax.lax.fori_loop(0, self.steps // parts, step, start)
+        return Stretch(y, peak, result)
+
+
+class AdaptiveSteps(AbstractMethod):
+    """Steps chosen by an error estimate relative to the state and to the system's own scale."""
+
+    solver: dfx.AbstractAdaptiveSolver
+    rtol: float = eqx.field(static=True, default=1e-6)
+    atol: float = eqx.field(static=True, default=1e-6)
+    max_steps: int = eqx.field(static=True, default=100_000)
+
+    def advance(
+        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+    ) -> Stretch:
+        scaled = tuple(c / s for c, s in zip(y, scale, strict=True))
+        solution = dfx.diffeqsolve(
+            TERM,
+            self.solver,
+            t0=phase,
+            t1=phase + REVOLUTION / parts,
+            dt0=REVOLUTION / 512,
+            y0=scaled,
+            args=ScaledField(field, scale),
+            stepsize_controller=dfx.PIDController(rtol=self.rtol, atol=self.atol, pcoeff=0.3, icoeff=0.4),
+            adjoint=dfx.ForwardMode(),
+            max_steps=self.max_steps,
+            throw=False,
+        )
+        assert solution.ys is not None
+        y = tuple(c[-1] * s for c, s in zip(solution.ys, scale, strict=True))
+        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
+        return Stretch(y, excursion, judge(solution.result, y, excursion, ESCAPE))
+
+
+def _implicit(solver: Any) -> Callable[[], dfx.AbstractSolver]:
+    return lambda: solver(root_finder=dfx.VeryChord(rtol=1e-6, atol=1e-9))
+
+
+_FIXED: dict[str, Callable[[], dfx.AbstractSolver]] = {
+    "rodas3": Rodas3,
+    "rodas4": Rodas4,
+    "newmark": NewmarkBeta,
+    "tsit5": dfx.Tsit5,
+    "kvaerno3": _implicit(dfx.Kvaerno3),
+    "kvaerno5": _implicit(dfx.Kvaerno5),
+    "kencarp4": _implicit(dfx.KenCarp4),
+}
+_ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
+    "rodas3": Rodas3,
+    "rodas4": Rodas4,
+    "tsit5": dfx.Tsit5,
+    "kvaerno3": dfx.Kvaerno3,
+    "kvaerno5": dfx.Kvaerno5,
+    "kencarp4": dfx.KenCarp4,
+}
+DEFAULT_SOLVER = "rodas4"
+DEFAULT_STEPS = 128
+
+
+def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
+    """An integration method by name.
+
+    **Arguments:**
+
+    - `solver`: `rodas3`, `rodas4` (ours, structured), `newmark` (the paper's), `tsit5`, `kvaerno3`, `kvaerno5`,
+        `kencarp4` (diffrax's).
+    - `steps`: equal steps per revolution; the default is what `benchmarks/convergence.py` settled.
+    - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
+        system's own scale.
+
+    **Raises:** `ValueError` for a name that is not known, or both `steps` and `tolerance`.
+    """
+    table = _FIXED if tolerance is None else _ADAPTIVE
+    if solver not in table:
+        raise ValueError(f"Argument `solver` must be one of {', '.join(table)}, but '{solver}' was given.")
+    if tolerance is None:
+        return FixedSteps(_FIXED[solver](), DEFAULT_STEPS if steps is None else steps)
+    if steps is not None:
+        raise ValueError("Arguments `steps` and `tolerance` must not both be given: steps are fixed or adaptive.")
+    if not 0 < tolerance < 1:
+        raise ValueError(f"Argument `tolerance` must lie between 0 and 1, but {tolerance} was given.")
+    return AdaptiveSteps(_ADAPTIVE[solver](), tolerance, tolerance)

@@ -1,0 +1,35 @@
+"""How an integration ended: diffrax's outcomes and our own, each a sentence with the cure."""
+
+import diffrax as dfx
+import jax.numpy as jnp
+from jaxtyping import Array, Int
+
+
+class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
+    """Outcome of an integration; `successful` and the rest of diffrax's outcomes are inherited."""
+
+    not_finite = "The state became infinite or undefined: use more steps per revolution, or a smaller tolerance."
+    outside = (
+        "The state started outside, or went far outside, what the model holds for (a cage: eps > 1 at the start, eps > 2 "
+        "later): start inside the clearance, or use a stiffer contact or more steps per revolution."
+    )
+
+
+OUTCOMES = (
+    "successful",
+    "not_finite",
+    "outside",
+    "max_steps_reached",
+    "nonlinear_divergence",
+    "dt_min_reached",
+    "other",
+)
+"""Names of outcomes in the order of the integer codes that sweeps store."""
+
+
+def outcome_code(result: RESULTS) -> Int[Array, ""]:
+    """The place of `result` in `OUTCOMES`."""
+    code = jnp.full((), len(OUTCOMES) - 1, dtype=jnp.int32)
+    for i, name in enumerate(OUTCOMES[:-1]):
+        code = jnp.where(result == getattr(RESULTS, name), jnp.int32(i), code)
+    return code

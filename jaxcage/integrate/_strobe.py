@@ -1,0 +1,44 @@
+"""The strobe (Poincare) map: one revolution of a forced system, from phase 0 to phase 2 pi.
+
+Simulation, sweeps, exponents, orbits and gradients all advance through it, so that a solver or a speed-up is written
+once. It is differentiable (forward mode) with respect to state, speed and every parameter of the system.
+"""
+
+import diffrax as dfx
+import equinox as eqx
+
+from .._types import Scalar, State
+from ..models import AbstractField, AbstractForcedSystem
+from ._method import AbstractMethod, judge, method as make_method, REVOLUTION, Stretch
+from ._results import RESULTS
+
+
+class StrobeMap(eqx.Module):
+    """The strobe map of a system at one speed, with all that depends on the speed worked out once."""
+
+    field: AbstractField
+    system: AbstractForcedSystem
+    scale: State
+    method: AbstractMethod
+
+    def __call__(self, y: State) -> Stretch:
+        """One revolution from `y`: state after it, largest excursion on the way, outcome."""
+        return self.part(y, 0, 1)
+
+    def part(self, y: State, i: Scalar, parts: int) -> Stretch:
+        """The `i`-th of `parts` equal parts of a revolution."""
+        phase = i * (REVOLUTION / parts)
+        return self.method.advance(self.field, self.system, self.scale, y, phase, parts)
+
+    def admit(self, y: State) -> RESULTS:
+        """Whether a lane may start from `y`."""
+        return judge(dfx.RESULTS.successful, y, self.system.excursion(y), 1.0)
+
+
+def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
+    """The strobe map of `system` at `speed` [rad/s].
+
+    **Arguments:** system; speed; integration method, by default the library's own (`jaxcage.method()`).
+    """
+    chosen = make_method() if method is None else method
+    return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

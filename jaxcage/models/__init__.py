@@ -1,0 +1,27 @@
+"""Systems that can be integrated and analysed.
+
+| module            | responsibility                                                                  |
+|-------------------|---------------------------------------------------------------------------------|
+| `_system`         | the forced-system protocol; wrappers for a user's function, first or second order |
+| `_field`          | dy/dtau at one speed, its linearisation, elimination of positions                |
+| `_cage`           | the cage in its rib: parameters                                                  |
+| `_cage_at_speed`  | the cage in its rib: forces at one speed                                         |
+| `_cases`          | the paper's six cases as models                                                  |
+"""
+
+from ._cage import CageModel as CageModel
+from ._cage_at_speed import CageAtSpeed as CageAtSpeed, CageForces as CageForces
+from ._cases import case as case
+from ._field import (
+    AbstractField as AbstractField,
+    AbstractLinearisation as AbstractLinearisation,
+    FirstOrderField as FirstOrderField,
+    ScaledField as ScaledField,
+    SecondOrderField as SecondOrderField,
+)
+from ._system import (
+    AbstractForcedSystem as AbstractForcedSystem,
+    ESCAPE as ESCAPE,
+    ForcedOscillator as ForcedOscillator,
+    ForcedSystem as ForcedSystem,
+)

@@ -1,0 +1,91 @@
+"""The cage in its guiding rib, driven by unbalance and roller impacts: paper eqs. (16)-(32) in the form
+    M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin tau) - M g y.
+"""
+
+from typing import Literal
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._parameters import choice, parameter
+from .._types import Scalar, State
+from ..bearing import Bearing, Lubricant
+from ..forces import ElasticRib, LandContact, RibFilm, RigidRib, RollerPassImpact, Support, SynchronousImpact
+from ..forces import smooth_norm, UnbalanceReading
+from ._cage_at_speed import CageAtSpeed, ElasticRibLaw, RigidRibLaw
+from ._field import AbstractField, SecondOrderField
+from ._system import AbstractForcedSystem
+
+
+ClearanceReading = Literal["as_printed", "radial"]
+
+
+class CageModel(AbstractForcedSystem):
+    """A cylindrical-roller-bearing cage guided by the outer-ring rib.
+
+    State: (x_C, y_C, x_C', y_C') with a rigid rib, (x_C, y_C, x_O, y_O, velocities) with an elastic one; metres and
+    metres per second, y up, rotation counter-clockwise. `speed` is the cage's speed relative to the rib [rad/s].
+    """
+
+    bearing: Bearing
+    lubricant: Lubricant
+    film: RibFilm
+    contact: LandContact
+    support: Support
+    impact: SynchronousImpact | RollerPassImpact
+    cage_mass: Array = parameter("kg", 1e-3, 100.0, "cage mass M")
+    guidance_gap: Array = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib")
+    eccentricity: Array = parameter("m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre")
+    rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
+    gravity: Array = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
+    load: Array = parameter("N", 0.0, 1e7, "shaft load F", default=4450.0)
+    printed_unit: Array = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
+    clearance_reading: ClearanceReading = choice(
+        "as_printed", "radial", text="radial clearance c = C_r (as printed) or C_r/2", default="as_printed"
+    )
+    unbalance: UnbalanceReading = choice(
+        "physical", "as_printed", text="eccentricity as given, or as (20) prints it", default="physical"
+    )
+
+    @property
+    def dimension(self) -> int:
+        return 4 if isinstance(self.rib, RigidRib) else 8
+
+    @property
+    def clearance(self) -> Array:
+        """Radial clearance c [m]: (12) defines C_r as diametral, (13) and (25)-(27) use it as radial."""
+        return self.guidance_gap if self.clearance_reading == "as_printed" else self.guidance_gap / 2
+
+    @property
+    def land_radius(self) -> Array:
+        """Radius of the cage's guiding land R = (d_g - C_r)/2 [m]."""
+        return (self.bearing.rib_diameter - self.guidance_gap) / 2
+
+    def cage_at(self, speed: Scalar) -> CageAtSpeed:
+        """The cage's force laws at `speed` [rad/s]."""
+        return CageAtSpeed.of(self, speed)
+
+    def at_speed(self, speed: Scalar) -> AbstractField:
+        cage = self.cage_at(speed)
+        law = RigidRibLaw(cage) if isinstance(self.rib, RigidRib) else ElasticRibLaw(cage, self.rib, self.gravity)
+        return SecondOrderField(law, speed)
+
+    def scale(self, speed: Scalar) -> State:
+        n = self.dimension // 2
+        return (self.clearance,) * n + (self.clearance * speed,) * n
+
+    def starts(self, speed: Scalar) -> tuple[State, ...]:
+        """The paper's start, cage at rest on the rib (X = 0, Y = -C_r/2), and two more inside the clearance."""
+        c, zero = self.clearance, jnp.zeros_like(self.clearance)
+        rib = (zero,) * (self.dimension // 2 - 2)
+        return (
+            (zero, -jnp.minimum(self.guidance_gap / 2, self.contact.onset * c), *rib, zero, zero, *rib),
+            (0.4 * c, 0.3 * c, *rib, zero, zero, *rib),
+            (-0.6 * c, 0.1 * c, *rib, 0.2 * c * speed, -0.3 * c * speed, *rib),
+        )
+
+    def excursion(self, y: State) -> Scalar:
+        """Eccentricity ratio eps of the cage centre in its clearance circle; 1 where the surfaces would overlap."""
+        x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
+        return smooth_norm(x, dy, self.film.smoothing) / self.clearance

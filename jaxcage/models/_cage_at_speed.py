@@ -1,0 +1,203 @@
+"""The cage's forces at one speed, with everything that does not change during a revolution worked out once."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._types import Scalar, State
+from ..bearing import load_distribution
+from ..forces import (
+    contact_force,
+    Cross,
+    cross_force,
+    cubic_stiffness,
+    effective_eccentricity,
+    ElasticRib,
+    film_drive,
+    film_resistance,
+    film_scale,
+    FilmModel,
+    pulse_train,
+    pulse_train_force,
+    PulseTrain,
+    restitution_damping,
+    rib_force,
+    RollerPassImpact,
+    smooth_norm,
+    smooth_plus,
+    spring_force,
+    supply_force,
+    synchronous_amplitude,
+    synchronous_force,
+    unbalance_force,
+    weight,
+)
+
+
+if TYPE_CHECKING:
+    from ._cage import CageModel
+
+
+Vector = tuple[Array, Array]
+
+
+class CageForces(NamedTuple):
+    """Each force on the cage as (F_x, F_y) [N]."""
+
+    film: Vector
+    contact: Vector
+    support: Vector
+    impact: Vector
+    unbalance: Vector
+    weight: Vector
+
+
+class CageAtSpeed(eqx.Module):
+    """Numbers that stay constant during a revolution, in SI units, and the force laws on them."""
+
+    omega: Scalar
+    mass: Scalar
+    clearance: Scalar
+    eccentricity: Scalar
+    film_scale: Scalar
+    supply_scale: Scalar
+    damping_number: Scalar
+    stiffness_x: Scalar
+    stiffness_y: Scalar
+    support_damping: Scalar
+    cubic_stiffness: Scalar
+    cross_stiffness: Scalar
+    cross_cubic: Scalar
+    contact_stiffness: Scalar
+    contact_onset: Scalar
+    contact_approach_speed: Scalar
+    contact_smoothing: Scalar
+    film_smoothing: Scalar
+    gravity: Scalar
+    impact: Array | PulseTrain
+    n_rollers: int = eqx.field(static=True)
+    film_model: FilmModel = eqx.field(static=True)
+    cross: Cross = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, model: "CageModel", omega: Scalar) -> "CageAtSpeed":
+        """Work out the constants of `model` at cage speed `omega` [rad/s]."""
+        film, contact, support = model.film, model.contact, model.support
+        c, radius = model.clearance, model.land_radius
+        stiffness = (support.stiffness_x + support.stiffness_y) / 2
+        return cls(
+            omega=omega,
+            mass=model.cage_mass,
+            clearance=c,
+            eccentricity=effective_eccentricity(
+                model.unbalance, model.eccentricity, model.guidance_gap, model.printed_unit
+            ),
+            film_scale=film.n_lands * film_scale(model.lubricant.dynamic_viscosity, radius, film.land_width, c),
+            supply_scale=film.n_lands * radius * film.land_width * film.supply_pressure,
+            damping_number=restitution_damping(contact.restitution),
+            stiffness_x=support.stiffness_x,
+            stiffness_y=support.stiffness_y,
+            support_damping=support.damping,
+            cubic_stiffness=cubic_stiffness(
+                support.cubic, support.cubic_stiffness, support.cubic_ratio, stiffness, c
+            ),
+            cross_stiffness=support.cross_stiffness,
+            cross_cubic=support.cross_cubic,
+            contact_stiffness=contact.stiffness,
+            contact_onset=contact.onset,
+            contact_approach_speed=contact.approach_speed,
+            contact_smoothing=contact.smoothing / c,
+            film_smoothing=film.smoothing / c,
+            gravity=model.gravity,
+            impact=_impact(model, omega),
+            n_rollers=model.bearing.n_rollers,
+            film_model=film.model,
+            cross=support.cross,
+        )
+
+    def land_forces(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Vector, Vector]:
+        """Film and contact force for the cage centre at (x, y) [m] from the rib centre, moving at (vx, vy) [m/s]."""
+        c = self.clearance
+        x, y, vx, vy = x / c, y / c, vx / c, vy / c
+        eps = smooth_norm(x, y, self.film_smoothing)
+        excess = smooth_plus(eps - self.contact_onset, self.contact_smoothing)
+        px, py = film_drive(x, y, vx, vy, self.omega)
+        kept = 1 - excess / eps  # the film's coefficients stay at their value at the onset of contact
+        m = film_resistance(self.film_model, kept * x, kept * y, px, py, self.omega, self.film_smoothing)
+        half = -self.film_scale / 2
+        film = half * (m.xx * px + m.xy * py), half * (m.xy * px + m.yy * py)
+        thrust = supply_force(self.film_model, x, y, px, py, self.omega, self.film_smoothing)
+        film = film[0] + self.supply_scale * thrust[0], film[1] + self.supply_scale * thrust[1]
+        rate = (x * vx + y * vy) / eps
+        normal = contact_force(
+            c * excess, c * rate, self.contact_stiffness, self.damping_number, self.contact_approach_speed
+        )
+        return film, (-normal * x / eps, -normal * y / eps)
+
+    def support_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Vector:
+        """Force of the elastic support for the same relative motion."""
+        spring = spring_force(x, y, self.stiffness_x, self.stiffness_y, self.cubic_stiffness)
+        cross = cross_force(self.cross, x, y, self.cross_stiffness, self.cross_cubic)
+        return (
+            spring[0] + cross[0] - self.support_damping * vx,
+            spring[1] + cross[1] - self.support_damping * vy,
+        )
+
+    def impact_force(self, tau: Scalar) -> Vector:
+        """Force of the rollers on the cage at phase tau."""
+        if isinstance(self.impact, PulseTrain):
+            return pulse_train_force(tau, self.impact, self.n_rollers)
+        return synchronous_force(tau, self.impact)
+
+    def forces(self, tau: Scalar, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> CageForces:
+        """Every force on the cage, for the cage centre at (x, y) from the rib centre."""
+        film, contact = self.land_forces(x, y, vx, vy)
+        return CageForces(
+            film=film,
+            contact=contact,
+            support=self.support_force(x, y, vx, vy),
+            impact=self.impact_force(tau),
+            unbalance=unbalance_force(tau, self.mass, self.eccentricity, self.omega),
+            weight=weight(self.mass, self.gravity),
+        )
+
+
+def _impact(model: "CageModel", omega: Scalar) -> Array | PulseTrain:
+    if not isinstance(model.impact, RollerPassImpact):
+        law = model.impact
+        return synchronous_amplitude(omega, law.amplitude, law.reference_speed, law.exponent)
+    bearing = model.bearing
+    zone = load_distribution(bearing, model.load)
+    return pulse_train(
+        model.impact, omega, zone.half_angle, bearing.n_rollers, bearing.roller_mass, bearing.pocket_clearance
+    )
+
+
+class RigidRibLaw(eqx.Module):
+    """Acceleration of a cage in a rib that does not move."""
+
+    cage: CageAtSpeed
+
+    def __call__(self, tau: Scalar, q: State, v: State) -> State:
+        f = self.cage.forces(tau, *q, *v)
+        return sum(p[0] for p in f) / self.cage.mass, sum(p[1] for p in f) / self.cage.mass
+
+
+class ElasticRibLaw(eqx.Module):
+    """Acceleration of cage and rib: film, contact and support act on their difference and react on the rib."""
+
+    cage: CageAtSpeed
+    rib: ElasticRib
+    gravity: Scalar
+
+    def __call__(self, tau: Scalar, q: State, v: State) -> State:
+        (xc, yc, xo, yo), (uc, wc, uo, wo) = q, v
+        f = self.cage.forces(tau, xc - xo, yc - yo, uc - uo, wc - wo)
+        rib = self.rib
+        held = rib_force(xo, yo, uo, wo, rib.stiffness, rib.damping, rib.cubic_stiffness)
+        down = weight(rib.mass, self.gravity)
+        on_cage = [sum(p[i] for p in f) for i in (0, 1)]
+        on_rib = [held[i] + down[i] - (f.film[i] + f.contact[i] + f.support[i]) for i in (0, 1)]
+        return (*(c / self.cage.mass for c in on_cage), *(c / rib.mass for c in on_rib))

@@ -1,0 +1,160 @@
+"""The forced-system protocol: any y' = f(tau, y; speed) that is 2 pi-periodic in its phase tau = speed * t.
+
+Everything above this layer (integration, analysis, design) works on `AbstractForcedSystem` and knows nothing of cages.
+`ForcedSystem` and `ForcedOscillator` wrap a user's function; `CageModel` is one of our own.
+"""
+
+import abc
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from .._types import Scalar, State
+from ._field import AbstractField, FirstOrderField, SecondOrderField
+
+
+ESCAPE = 2.0
+"""Excursion beyond which a lane has left the model for good."""
+
+
+class AbstractForcedSystem(eqx.Module):
+    """What integration and analysis ask of a system."""
+
+    @property
+    @abc.abstractmethod
+    def dimension(self) -> int:
+        """Number of state components; a second-order system has its velocities behind its coordinates."""
+
+    @abc.abstractmethod
+    def at_speed(self, speed: Scalar) -> AbstractField:
+        """The field dy/dtau at `speed` [rad/s], with all that depends on the speed alone worked out once."""
+
+    @abc.abstractmethod
+    def scale(self, speed: Scalar) -> State:
+        """Characteristic magnitude of each state component: tolerances and tangent vectors are measured in it."""
+
+    @abc.abstractmethod
+    def starts(self, speed: Scalar) -> tuple[State, ...]:
+        """Initial states a sweep runs from unless told otherwise, the conventional one first."""
+
+    @abc.abstractmethod
+    def excursion(self, y: State) -> Scalar:
+        """How far the state is towards the edge of what the model holds for, 1 at the edge (a cage: eps).
+
+        A lane must start at 1 or less, is flagged when it goes beyond 1, and fails beyond `ESCAPE`. A system without
+        such an edge returns 0.
+        """
+
+
+def _default_starts(dimension: int) -> tuple[State, ...]:
+    """Three distinct states of order one: no symmetry of the system should map one to another."""
+    patterns = ((0.1, 0.2, -0.1, 0.15), (0.9, -0.4, 0.3, 0.7), (-0.6, 0.8, -0.5, -0.2))
+    return tuple(tuple(jnp.asarray(p[i % 4] * (1 + i // 4)) for i in range(dimension)) for p in patterns)
+
+
+def _scales(scale: float | tuple[float, ...], dimension: int) -> State:
+    values = scale if isinstance(scale, tuple) else (scale,) * dimension
+    return tuple(jnp.asarray(s, dtype=float) for s in values)
+
+
+class ForcedSystem(AbstractForcedSystem):
+    """A first-order system from a function `rates(tau, y, speed) -> dy/dt`, all tuples of scalars."""
+
+    rates: Callable[[Scalar, State, Scalar], State]
+    _dimension: int = eqx.field(static=True)
+    _scale: float | tuple[float, ...] = eqx.field(static=True)
+    _starts: tuple[Any, ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        rates: Callable[[Scalar, State, Scalar], State],
+        dimension: int,
+        scale: float | tuple[float, ...] = 1.0,
+        starts: tuple[tuple[float, ...], ...] = (),
+    ):
+        """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
+        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps.
+        """
+        self.rates, self._dimension, self._scale, self._starts = rates, dimension, scale, starts
+
+    @property
+    def dimension(self) -> int:
+        return self._dimension
+
+    def at_speed(self, speed: Scalar) -> AbstractField:
+        return FirstOrderField(_Bound(self.rates, speed), speed)
+
+    def scale(self, speed: Scalar) -> State:
+        del speed
+        return _scales(self._scale, self.dimension)
+
+    def starts(self, speed: Scalar) -> tuple[State, ...]:
+        del speed
+        given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
+        return given or _default_starts(self.dimension)
+
+    def excursion(self, y: State) -> Scalar:
+        del y
+        return 0.0
+
+
+class ForcedOscillator(AbstractForcedSystem):
+    """A second-order system from a function `acceleration(tau, q, v, speed) -> d2q/dt2`, all tuples of scalars.
+
+    !!! example
+        def duffing(tau, q, v, speed):
+            (x,), (u,) = q, v
+            return (-0.25 * u + x - x**3 + 0.4 * jnp.cos(tau),)
+
+        system = jc.ForcedOscillator(duffing, coordinates=1)
+    """
+
+    acceleration: Callable[[Scalar, State, State, Scalar], State]
+    coordinates: int = eqx.field(static=True)
+    _scale: float | tuple[float, ...] = eqx.field(static=True)
+    _starts: tuple[Any, ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        acceleration: Callable[[Scalar, State, State, Scalar], State],
+        coordinates: int,
+        scale: float | tuple[float, ...] = 1.0,
+        starts: tuple[tuple[float, ...], ...] = (),
+    ):
+        """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
+        parameters), with velocities v = dq/dt; number of coordinates; characteristic magnitude of the state components
+        (coordinates first); initial states (q, v) for sweeps.
+        """
+        self.acceleration, self.coordinates, self._scale, self._starts = acceleration, coordinates, scale, starts
+
+    @property
+    def dimension(self) -> int:
+        return 2 * self.coordinates
+
+    def at_speed(self, speed: Scalar) -> AbstractField:
+        return SecondOrderField(_Bound(self.acceleration, speed), speed)
+
+    def scale(self, speed: Scalar) -> State:
+        del speed
+        return _scales(self._scale, self.dimension)
+
+    def starts(self, speed: Scalar) -> tuple[State, ...]:
+        del speed
+        given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
+        return given or _default_starts(self.dimension)
+
+    def excursion(self, y: State) -> Scalar:
+        del y
+        return 0.0
+
+
+class _Bound(eqx.Module):
+    """A user's law with its last argument, the speed, filled in."""
+
+    law: Callable[..., State]
+    speed: Scalar
+
+    def __call__(self, *state: Any) -> State:
+        return self.law(*state, self.speed)

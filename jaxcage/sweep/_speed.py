@@ -1,0 +1,128 @@
+"""Sweeps over speed from several starts."""
+
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import require_x64
+from .._types import State
+from ..analysis import Plan, Sweep
+from ..integrate import AbstractMethod, method as make_method
+from ..models import AbstractForcedSystem
+from ._engine import Progress, run_lanes
+
+
+def rpm(first: float, last: float | None = None, count: int | None = None) -> Float[np.ndarray, "..."]:
+    """Speeds given in revolutions per minute, in rad/s: one, or `count` from `first` to `last`."""
+    values = np.asarray(first) if last is None else np.linspace(first, last, count or 2)
+    return values * np.pi / 30
+
+
+def _checked_speeds(speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"]) -> np.ndarray:
+    speed = np.atleast_1d(np.asarray(speeds, dtype=float))
+    if speed.size == 0:
+        raise ValueError("Argument `speeds` must hold at least one speed, but it is empty.")
+    if not np.all(np.isfinite(speed)) or np.any(speed <= 0):
+        bad = speed[~(np.isfinite(speed) & (speed > 0))][0]
+        raise ValueError(f"Argument `speeds` must be positive and finite, but it holds {bad} rad/s.")
+    if np.any(np.diff(speed) <= 0):
+        raise ValueError("Argument `speeds` must be in ascending order without repetition, but it is not.")
+    return speed
+
+
+def _plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
+    if discard < 0 or revolutions < 1:
+        raise ValueError(
+            "Arguments `discard` and `revolutions` must be at least 0 and 1, but are "
+            f"{discard} and {revolutions}."
+        )
+    if not 0 <= exponents <= dimension:
+        raise ValueError(f"Argument `exponents` must lie between 0 and {dimension}, but {exponents} was given.")
+    if revolutions % blocks:
+        raise ValueError(f"Argument `blocks` must divide the {revolutions} revolutions, but it is {blocks}.")
+    return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
+
+
+def _state_array(y: State) -> np.ndarray:
+    return np.array([float(c) for c in y])
+
+
+def sweep(
+    system: AbstractForcedSystem,
+    speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    *,
+    starts: Sequence[State] | None = None,
+    discard: int = 300,
+    revolutions: int = 300,
+    exponents: int = 1,
+    blocks: int = 20,
+    keep: int = 64,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Run a forced system over speed from several starts: strobe states, Lyapunov exponents, labels.
+
+    **Arguments:**
+
+    - `system`: any `AbstractForcedSystem`.
+    - `speeds`: ascending speeds [rad/s]; `jaxcage.rpm` makes them from revolutions per minute.
+    - `starts`: initial states, each a tuple of numbers; by default the system's own.
+    - `discard`, `revolutions`: revolutions left out at the beginning, and observed after that.
+    - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
+    - `blocks`: blocks of revolutions from whose scatter the standard error comes.
+    - `keep`: number of strobe states kept, the last ones.
+    - `method`: integration method, by default the library's own.
+    - `progress`: called with lanes done and lanes in all.
+
+    **Returns:** `Sweep`. Lanes that fail are NaN with an outcome and leave their neighbours untouched.
+
+    **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
+    `RuntimeError` without double precision.
+    """
+    require_x64()
+    speed = _checked_speeds(speeds)
+    chosen = make_method() if method is None else method
+    plan = _plan(discard, revolutions, blocks, keep, exponents, system.dimension)
+    y0 = _initial_states(system, speed, starts)
+    lanes = y0.reshape(-1, system.dimension)
+    seen = run_lanes(system, chosen, plan, np.repeat(speed, y0.shape[1]), lanes, progress)
+    shape = y0.shape[:2]
+    return Sweep(
+        speed=speed,
+        strobe=np.moveaxis(seen.strobe, -1, 0).reshape(*shape, plan.keep, system.dimension),
+        last=np.moveaxis(seen.last, -1, 0).reshape(*shape, system.dimension),
+        block_growth=np.moveaxis(seen.growth, -1, 0).reshape(*shape, plan.blocks, plan.exponents),
+        peak=np.asarray(seen.peak).reshape(shape),
+        outcome=np.asarray(seen.outcome).reshape(shape),
+        scale=_scales(system, speed),
+        discard=discard,
+        revolutions=revolutions,
+        settings=_settings(chosen),
+    )
+
+
+def _initial_states(
+    system: AbstractForcedSystem, speed: np.ndarray, starts: Sequence[State] | None
+) -> Float[np.ndarray, "speeds starts dim"]:
+    if starts is None:
+        table = jax.vmap(lambda s: jnp.stack([jnp.stack([jnp.asarray(c) for c in y]) for y in system.starts(s)]))
+        return np.asarray(table(jnp.asarray(speed)))
+    rows = [_state_array(y) for y in starts]
+    if not rows or any(row.shape != (system.dimension,) for row in rows):
+        raise ValueError(f"Argument `starts` must hold states of {system.dimension} numbers, but holds {starts}.")
+    return np.broadcast_to(np.stack(rows), (speed.size, len(rows), system.dimension)).copy()
+
+
+def _scales(system: AbstractForcedSystem, speed: np.ndarray) -> Float[np.ndarray, "speeds dim"]:
+    table = eqx.filter_vmap(lambda s: jnp.stack([jnp.asarray(c) for c in system.scale(s)]))
+    return np.asarray(table(jnp.asarray(speed)))
+
+
+def _settings(method: AbstractMethod) -> dict[str, str]:
+    packages = ("jaxcage", "jax", "diffrax", "equinox", "numpy")
+    return {"method": str(method).replace("\n", " "), **{f"version_{p}": version(p) for p in packages}}

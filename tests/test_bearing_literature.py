@@ -1,0 +1,211 @@
+"""Statics, kinematics and masses against numbers of physics.md section 3, the paper, handbooks.
+
+Palmgren's law is a handbook number; the rows for bearing 209 (Harris's example) and NU2310 were
+computed by independent code for discrete rollers, one of them at the bottom.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.special import beta
+
+import jaxcage.bearing as jb
+from jaxcage._parameters import replace
+
+
+RPM = np.pi / 30
+
+
+def crb209(clearance):
+    """Roller bearing 209 of Harris: 14 rollers of 10 mm x 9.6 mm, pitch diameter 65 mm."""
+    return jb.Bearing(
+        bore=45e-3,
+        outside_diameter=85e-3,
+        width=19e-3,
+        n_rollers=14,
+        roller_diameter=10e-3,
+        roller_length=9.6e-3,
+        rib_diameter=70e-3,
+        inner_raceway_diameter=55e-3,
+        radial_clearance=clearance,
+        pocket_clearance=0.2e-3,
+    )
+
+
+@pytest.mark.parametrize(
+    "clearance, load, max_load, shift, half_angle",
+    [
+        (0.0, 4450.0, 1401.0, 3.73e-6, 90.0),
+        (40e-6, 4450.0, 2420.0, 26.1e-6, 40.0),
+    ],
+)
+def test_nu2310_load_distribution(clearance, load, max_load, shift, half_angle):
+    bearing = replace(jb.nu2310(), radial_clearance=clearance)
+    result = jb.load_distribution(bearing, load)
+    assert float(result.max_load) == pytest.approx(max_load, rel=1e-3)
+    assert float(result.shaft_shift) == pytest.approx(shift, rel=1e-3)
+    assert float(result.half_angle) * 180 / np.pi == pytest.approx(half_angle, rel=1e-3)
+    elastic = shift - clearance / 2
+    assert float(result.elastic_approach) == pytest.approx(elastic, abs=0.02e-6)
+
+
+@pytest.mark.parametrize(
+    "bearing, load, expected",
+    [
+        (jb.nu2310, 4450.0, [2420.0, 1146.0, 0.0]),
+        (jb.nu2310, 18.6e3, [7868.0, 5762.0, 464.0, 0.0]),
+        (lambda: crb209(0.0), 4450.0, [1298.8]),
+        (lambda: crb209(41e-6), 4450.0, [1967.0, 1378.0, 0.0]),
+    ],
+)
+def test_roller_loads(bearing, load, expected):
+    loads = jb.load_distribution(bearing(), load).inner_loads
+    np.testing.assert_allclose(loads[: len(expected)], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("clearance, shift", [(0.0, 7.974e-6), (41e-6, 32.09e-6)])
+def test_crb209_shift(clearance, shift):
+    result = jb.load_distribution(crb209(clearance), 4450.0)
+    assert float(result.shaft_shift) == pytest.approx(shift, rel=1e-3)
+
+
+def test_load_factor_of_13_rollers_and_of_the_continuous_integral():
+    continuous = 2 * np.pi / beta(0.5, (10 / 9 + 2) / 2)
+    assert continuous == pytest.approx(4.0850, abs=5e-5)
+    discrete = jb.load_distribution(replace(jb.nu2310(), radial_clearance=0.0), 4450.0)
+    assert float(discrete.max_load) * 13 / 4450 == pytest.approx(4.0931, abs=5e-5)
+    dense = jb.Bearing(0.05, 0.11, 0.04, 400, 5e-4, 0.027, 0.0921, 0.065, 0.0, 3e-4)
+    factor = float(jb.load_distribution(dense, 4450.0).max_load) * 400 / 4450
+    assert factor == pytest.approx(continuous, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "bearing, raceway, series",
+    [(jb.nu2310, 1.509e6, 6.985e5), (lambda: crb209(0.0), None, 2.786e5)],
+)
+def test_contact_stiffness(bearing, raceway, series):
+    per_millimetre = 1e3 ** (10 / 9)
+    assert float(bearing().contact_stiffness) / per_millimetre == pytest.approx(series, rel=1e-3)
+    if raceway is not None:
+        assert float(bearing().raceway_stiffness) / per_millimetre == pytest.approx(
+            raceway, rel=1e-3
+        )
+
+
+def test_palmgren_constant_is_the_inverse_of_his_deflection_law():
+    # delta = 3.84e-5 Q^0.9 / l^0.8 in N and mm, for Q = 1000 N and l = 10 mm.
+    deflection = 3.84e-5 * 1000**0.9 / 10**0.8
+    stiffness = jb.line_contact_stiffness(jb.PALMGREN_CONSTANT, 10e-3)
+    assert float(jb.line_contact_approach(stiffness, 1000.0)) * 1e3 == pytest.approx(
+        deflection, rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("rpm, force", [(3000, 27.2), (6700, 135.9), (12000, 435.9)])
+def test_roller_centrifugal_force(rpm, force):
+    found = float(jb.nu2310().roller_centrifugal_force(rpm * RPM))
+    assert found == pytest.approx(force, rel=2e-3)
+
+
+def test_sizes_that_follow_from_table_1():
+    bearing = jb.nu2310()
+    assert float(bearing.pitch_diameter) == pytest.approx(81e-3)
+    assert float(bearing.outer_raceway_diameter) == pytest.approx(97e-3)
+    assert float(bearing.land_width_limit) == pytest.approx(6.5e-3)
+    assert float(bearing.roller_mass) == pytest.approx(42.3e-3, abs=0.05e-3)
+    assert float(bearing.cage_speed_ratio) == pytest.approx(0.4012, abs=5e-5)
+
+
+def test_end_of_the_published_speed_axis_as_shaft_speed():
+    shaft = float(jb.nu2310().shaft_speed(jb.PUBLISHED_SPEED_RANGE_RPM[1] * RPM)) / RPM
+    assert shaft == pytest.approx(68500, rel=1e-3)
+    assert shaft > 5 * jb.NU2310_RATINGS.limiting_speed_rpm
+
+
+def test_cage_mass_of_plausible_cages():
+    default = float(jb.cage_mass(jb.nu2310(), 0.45e-3))
+    assert default == pytest.approx(0.25495, rel=1e-4)
+    light = jb.CageGeometry(inner_diameter=76e-3, cage_width=34e-3)
+    heavy = jb.CageGeometry(inner_diameter=73e-3, cage_width=36e-3)
+    assert float(jb.cage_mass(jb.nu2310(), 0.45e-3, light)) == pytest.approx(0.22, abs=0.006)
+    assert float(jb.cage_mass(jb.nu2310(), 0.45e-3, heavy)) == pytest.approx(0.30, abs=0.006)
+
+
+def test_pocket_area_against_counting_points():
+    inner, outer, pocket, pitch = 37.5e-3, 45.825e-3, 8.15e-3, 40.5e-3
+    x, y = np.meshgrid(
+        np.linspace(pitch - pocket, pitch + pocket, 1501), np.linspace(-pocket, pocket, 1501)
+    )
+    radius = np.hypot(x, y)
+    inside = (np.hypot(x - pitch, y) < pocket) & (radius > inner) & (radius < outer)
+    counted = inside.mean() * (2 * pocket) ** 2
+    found = float(jb.clipped_pocket_area(inner, outer, pocket, pitch))
+    assert found == pytest.approx(counted, rel=2e-3)
+    whole = float(jb.clipped_pocket_area(0.01, 0.06, pocket, pitch))
+    assert whole == pytest.approx(np.pi * pocket**2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "guidance, expected", [("outer_rib", 225e-6), ("inner_rib", 251.1e-6), ("roller", 326.1e-6)]
+)
+def test_static_cage_displacement(guidance, expected):
+    bearing = jb.nu2310()
+    found = jb.static_cage_displacement(
+        guidance,
+        guidance_gap=0.45e-3,
+        pocket_clearance=bearing.pocket_clearance,
+        radial_clearance=bearing.radial_clearance,
+        elastic_approach=jb.load_distribution(bearing, 4450.0).elastic_approach,
+    )
+    assert float(found) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("outer_speed", [0.0, 35.0])
+def test_cage_speed_is_rolling_between_the_raceway_speeds(outer_speed):
+    bearing, inner_speed = jb.nu2310(), 200.0
+    inner = jb.raceway_surface_speed(inner_speed, bearing.inner_raceway_diameter)
+    outer = jb.raceway_surface_speed(outer_speed, bearing.outer_raceway_diameter)
+    cage = jb.cage_speed(inner_speed, outer_speed, 16e-3, 81e-3)
+    assert float(cage) * 40.5e-3 == pytest.approx(float(inner + outer) / 2, rel=1e-12)
+    assert float(jb.relative_cage_speed(cage, outer_speed)) == pytest.approx(
+        (inner_speed - outer_speed) * 65 / 162, rel=1e-12
+    )
+
+
+def test_gap_radius_and_relative_eccentricity():
+    gap = jb.guidance_gap(92.1e-3, 91.65e-3)
+    assert float(gap) == pytest.approx(0.45e-3, rel=1e-10)
+    assert float(jb.guiding_radius(92.1e-3, gap)) == pytest.approx(45.825e-3, rel=1e-12)
+    assert float(jb.relative_mass_eccentricity(23e-6, gap)) == pytest.approx(0.0511, rel=1e-3)
+
+
+def test_published_table_2():
+    cases = jb.PUBLISHED_CASES
+    assert list(cases) == ["1a", "1b", "2a", "2b", "3a", "3b"]
+    assert [c.zone_1_width_rpm for c in cases.values()] == [2900, 14900, 6400, 5200, 5750, 5750]
+    # Conclusion 3: the steady zone narrows as the eccentricity grows from 35 to 57 um.
+    assert (cases["2a"].steady_width_rpm, cases["2b"].steady_width_rpm) == (8500, 6800)
+    assert jb.published_case("2b").eccentricity_um == 57
+    low, high = jb.PUBLISHED_SPEED_RANGE_RPM
+    for case in cases.values():
+        edges = case.zone_1_onset_rpm, case.zone_1_exit_rpm, case.zone_2_onset_rpm
+        assert low < edges[0] < edges[1] < edges[2] < high
+        assert case.eccentricity_um * 1e-3 < case.guidance_gap_mm / 2
+
+
+def test_published_axes():
+    axes = {(a.figure, a.unit): (a.lower, a.upper) for a in jb.FIGURE_AXES}
+    assert axes["5", "N"] == (-40, 120)
+    assert axes["7", "mm"] == (-0.3, 0.3)
+    assert axes["8b", "mm"] == (-0.03, 0.06)
+    assert axes["9", "mm/s"] == (-400, 400)
+    # Fig. 9a at 8500 rpm is outside zone 1 of its case.
+    assert jb.published_case("1a").zone_1_onset_rpm > 8500
+
+
+def test_materials():
+    assert float(jb.brass().density) == 8430.0
+    assert float(jb.bearing_steel().youngs_modulus) == 210e9
+    shear = jb.bearing_steel().youngs_modulus / (2 * (1 + jb.bearing_steel().poisson_ratio))
+    # Lucefin's card for 100Cr6 gives a modulus of 80 GPa in shear.
+    assert float(jnp.asarray(shear)) == pytest.approx(80e9, rel=0.02)
