@@ -1,1 +1,85 @@
-"""Differentiable dynamics of rolling-bearing cages."""
+"""Differentiable dynamics of rolling-bearing cages.
+
+| layer        | responsibility                                                                      |
+|--------------|-------------------------------------------------------------------------------------|
+| `bearing`    | geometry, materials, lubricant, kinematics, statics, catalogue, published cases     |
+| `forces`     | rib film, land contact, pocket impact, support, unbalance, gravity: one law a file  |
+| `models`     | the forced-system protocol, the cage in its rib                                     |
+| `integrate`  | stiff solvers as diffrax solvers, time histories, the strobe map                    |
+| `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
+| `sweep`      | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
+| `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
+| `cli`        | the `jaxcage` command                                                               |
+
+SI units inside, always; y points up and rotation is positive counter-clockwise.
+"""
+
+from ._xla import configure as _configure
+
+
+_configure()  # before anything below lets JAX compile
+
+from ._parameters import (
+    parameter_info as parameter_info,
+    parameters as parameters,
+    replace as replace,
+)
+from .analysis import (
+    Edge as Edge,
+    Sweep as Sweep,
+    Zone as Zone,
+    Zones as Zones,
+    zones as zones,
+)
+from .bearing import (
+    Bearing as Bearing,
+    cage_mass as cage_mass,
+    load_distribution as load_distribution,
+    Lubricant as Lubricant,
+    nu2310 as nu2310,
+    published_case as published_case,
+    PUBLISHED_CASES as PUBLISHED_CASES,
+    static_cage_displacement as static_cage_displacement,
+    vg as vg,
+)
+from .forces import (
+    ElasticRib as ElasticRib,
+    LandContact as LandContact,
+    PocketImpact as PocketImpact,
+    RibFilm as RibFilm,
+    RigidRib as RigidRib,
+    RollerPassImpact as RollerPassImpact,
+    Support as Support,
+    SynchronousImpact as SynchronousImpact,
+)
+from .integrate import (
+    AdaptiveSteps as AdaptiveSteps,
+    FixedSteps as FixedSteps,
+    method as method,
+    NewmarkBeta as NewmarkBeta,
+    OUTCOMES as OUTCOMES,
+    ramp as ramp,
+    RESULTS as RESULTS,
+    Rodas3 as Rodas3,
+    Rodas4 as Rodas4,
+    simulate as simulate,
+    strobe_map as strobe_map,
+    StrobeMap as StrobeMap,
+    Trajectory as Trajectory,
+)
+from .models import (
+    AbstractForcedSystem as AbstractForcedSystem,
+    CageModel as CageModel,
+    case as case,
+    ForcedOscillator as ForcedOscillator,
+    ForcedSystem as ForcedSystem,
+)
+from .sweep import (
+    Hysteresis as Hysteresis,
+    rpm as rpm,
+    run_up_down as run_up_down,
+    sweep as sweep,
+)
+
+
+__version__ = "0.1.0"

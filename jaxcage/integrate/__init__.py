@@ -28,4 +28,5 @@ from ._rosenbrock import (
     rosenbrock_step as rosenbrock_step,
     RosenbrockTableau as RosenbrockTableau,
 )
+from ._simulate import ramp as ramp, simulate as simulate, Trajectory as Trajectory
 from ._strobe import strobe_map as strobe_map, StrobeMap as StrobeMap

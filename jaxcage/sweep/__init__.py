@@ -7,4 +7,5 @@
 | `_carried` | run-up and run-down with the state carried along   |
 """
 
+from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down
 from ._speed import rpm as rpm, sweep as sweep

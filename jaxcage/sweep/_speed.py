@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -23,7 +24,7 @@ def rpm(first: float, last: float | None = None, count: int | None = None) -> Fl
     return values * np.pi / 30
 
 
-def _checked_speeds(speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"]) -> np.ndarray:
+def checked_speeds(speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"]) -> np.ndarray:
     speed = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speed.size == 0:
         raise ValueError("Argument `speeds` must hold at least one speed, but it is empty.")
@@ -35,7 +36,7 @@ def _checked_speeds(speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds
     return speed
 
 
-def _plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
+def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
     if discard < 0 or revolutions < 1:
         raise ValueError(
             "Arguments `discard` and `revolutions` must be at least 0 and 1, but are "
@@ -85,28 +86,40 @@ def sweep(
     `RuntimeError` without double precision.
     """
     require_x64()
-    speed = _checked_speeds(speeds)
+    speed = checked_speeds(speeds)
     chosen = make_method() if method is None else method
-    plan = _plan(discard, revolutions, blocks, keep, exponents, system.dimension)
-    y0 = _initial_states(system, speed, starts)
+    plan = make_plan(discard, revolutions, blocks, keep, exponents, system.dimension)
+    y0 = initial_states(system, speed, starts)
     lanes = y0.reshape(-1, system.dimension)
     seen = run_lanes(system, chosen, plan, np.repeat(speed, y0.shape[1]), lanes, progress)
-    shape = y0.shape[:2]
+    return assemble(system, speed, chosen, plan, seen, y0.shape[:2])
+
+
+def assemble(
+    system: AbstractForcedSystem,
+    speed: Float[np.ndarray, " speeds"],
+    method: AbstractMethod,
+    plan: Plan,
+    seen: tuple[Any, ...],
+    shape: tuple[int, ...],
+) -> Sweep:
+    """A `Sweep` from the fields of an `Observation` whose lanes are laid out as `shape` = (speeds, starts)."""
+    strobe, growth, last, peak, outcome = (np.moveaxis(np.asarray(x), -1, 0) for x in seen)
     return Sweep(
         speed=speed,
-        strobe=np.moveaxis(seen.strobe, -1, 0).reshape(*shape, plan.keep, system.dimension),
-        last=np.moveaxis(seen.last, -1, 0).reshape(*shape, system.dimension),
-        block_growth=np.moveaxis(seen.growth, -1, 0).reshape(*shape, plan.blocks, plan.exponents),
-        peak=np.asarray(seen.peak).reshape(shape),
-        outcome=np.asarray(seen.outcome).reshape(shape),
+        strobe=strobe.reshape(*shape, plan.keep, system.dimension),
+        last=last.reshape(*shape, system.dimension),
+        block_growth=growth.reshape(*shape, plan.blocks, plan.exponents),
+        peak=peak.reshape(shape),
+        outcome=outcome.reshape(shape),
         scale=_scales(system, speed),
-        discard=discard,
-        revolutions=revolutions,
-        settings=_settings(chosen),
+        discard=plan.discard,
+        revolutions=plan.block * plan.blocks,
+        settings=_settings(method),
     )
 
 
-def _initial_states(
+def initial_states(
     system: AbstractForcedSystem, speed: np.ndarray, starts: Sequence[State] | None
 ) -> Float[np.ndarray, "speeds starts dim"]:
     if starts is None:

@@ -1,0 +1,97 @@
+"""One glossary of outputs: name, symbol, SI unit, words, and the unit in which people read it.
+
+It feeds the axes of plots, the attributes of data sets, the heads of tables and of CSV columns.
+"""
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """An output: how it is called and written, its SI unit, and the unit and factor it is shown in."""
+
+    name: str
+    symbol: str
+    unit: str
+    text: str
+    shown_in: str = ""
+    factor: float = 1.0
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit on axes and in tables."""
+        return self.shown_in or self.unit
+
+    @property
+    def label(self) -> str:
+        """Axis label with the unit it is shown in."""
+        unit = f" [{self.shown_unit}]" if self.shown_unit != "1" else ""
+        return f"{self.text[:1].upper()}{self.text[1:]} {self.symbol}{unit}"
+
+
+_MM = ("mm", 1e3)
+_MM_S = ("mm/s", 1e3)
+_MS = ("ms", 1e3)
+_RPM = ("rpm", 30 / np.pi)
+
+_QUANTITIES = (
+    Quantity("speed", r"$\omega$", "rad/s", "cage speed", *_RPM),
+    Quantity("speed_rpm", r"$n$", "rpm", "cage speed"),
+    Quantity("time", r"$t$", "s", "time", *_MS),
+    Quantity("tau", r"$\tau$", "rad", "phase"),
+    Quantity("x_C", r"$X_C$", "m", "horizontal displacement", *_MM),
+    Quantity("y_C", r"$Y_C$", "m", "vertical displacement", *_MM),
+    Quantity("x_O", r"$X_O$", "m", "horizontal rib displacement", *_MM),
+    Quantity("y_O", r"$Y_O$", "m", "vertical rib displacement", *_MM),
+    Quantity("vx_C", r"$X_C'$", "m/s", "horizontal velocity", *_MM_S),
+    Quantity("vy_C", r"$Y_C'$", "m/s", "vertical velocity", *_MM_S),
+    Quantity("vx_O", r"$X_O'$", "m/s", "horizontal rib velocity", *_MM_S),
+    Quantity("vy_O", r"$Y_O'$", "m/s", "vertical rib velocity", *_MM_S),
+    Quantity("strobe", "", "SI", "strobe states, the last ones of each lane"),
+    Quantity("last", "", "SI", "state at the end of the run"),
+    Quantity("scale", "", "SI", "characteristic magnitude of each state component"),
+    Quantity("block_growth", "", "1", "mean logarithmic growth per revolution in each block"),
+    Quantity("exponent", r"$\lambda$", "1", "Lyapunov exponent per revolution"),
+    Quantity("largest_exponent", r"$\lambda_1$", "1", "largest exponent per revolution"),
+    Quantity("standard_error", r"$s_\lambda$", "1", "standard error of the exponents"),
+    Quantity("peak", r"$\epsilon$", "1", "largest excursion (cage: eccentricity ratio) observed"),
+    Quantity("outcome", "", "1", "how the integration of each lane ended"),
+    Quantity("label", "", "1", "what each lane does"),
+    Quantity("chaotic_share", "", "1", "share of the finished starts that are chaotic"),
+    Quantity("order", r"$f/f_c$", "1", "frequency over cage rotation"),
+    Quantity("amplitude", r"$|Y_C|$", "m", "amplitude", "µm", 1e6),
+    Quantity("force", r"$F$", "N", "force"),
+    Quantity("contact_force", r"$Q_{cw}$", "N", "roller-bar contact force"),
+    Quantity("bar_force", r"$K_c \delta_c$", "N", "bar force"),
+    Quantity("whirl_ratio", "", "1", "whirl speed over cage speed"),
+    Quantity("rms_displacement", "", "m", "rms displacement", *_MM),
+    Quantity("peak_displacement", "", "m", "peak displacement", *_MM),
+    Quantity("velocity_scatter", r"$\sigma_v/\bar v$", "1", "velocity scatter over mean velocity"),
+    Quantity("minimum_film", "", "m", "minimum film thickness", "µm", 1e6),
+    Quantity("peak_land_force", "", "N", "peak force on the guiding lands"),
+    Quantity("peak_impact_force", "", "N", "peak impact force"),
+    Quantity("impact_impulse", "", "N s", "impact impulse per revolution"),
+    Quantity("film_drag_power", "", "W", "film drag power"),
+)
+
+GLOSSARY: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
+"""Outputs by name."""
+
+
+def quantity(name: str) -> Quantity:
+    """What is known of the output `name`; a name that is not listed stands for itself, without a unit."""
+    return GLOSSARY.get(name, Quantity(name, "", "1", name.replace("_", " ")))
+
+
+_COMPONENTS = {
+    4: ("x_C", "y_C", "vx_C", "vy_C"),
+    8: ("x_C", "y_C", "x_O", "y_O", "vx_C", "vy_C", "vx_O", "vy_O"),
+}
+
+
+def component_names(dimension: int, cage: bool = True) -> tuple[str, ...]:
+    """Names of the state components of a cage; those of another system are numbered."""
+    numbered = tuple(f"y{i}" for i in range(dimension))
+    return _COMPONENTS.get(dimension, numbered) if cage else numbered

@@ -1,0 +1,135 @@
+"""Zones and their edges, as found in a sweep.
+
+Two kinds of edge are never mixed. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower than
+a stated width are closed: it is statistical, and no more certain than the grid. A **synchronous-loss edge** is where the
+stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Bool
+
+from ._sweep import Sweep
+
+
+CLOSE_BELOW_RPM = 500.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Edge:
+    """One end of a zone."""
+
+    speed_rpm: float
+    uncertainty_rpm: float
+    kind: str
+    """`chaotic` or `synchronous-loss`."""
+    mechanism: str = "unknown"
+    """`period-doubling`, `torus`, `fold`, `crisis` or `unknown`."""
+
+    def __str__(self) -> str:
+        return f"{self.speed_rpm:.0f} +- {self.uncertainty_rpm:.0f} rpm"
+
+
+@dataclasses.dataclass(frozen=True)
+class Zone:
+    """A range of speed; an edge is None where the zone runs past the swept range."""
+
+    kind: str
+    onset: Edge | None
+    exit: Edge | None
+    share: float
+    """Mean share of the starts, over the zone's speeds, that do what the zone is named for."""
+
+    @property
+    def width_rpm(self) -> float | None:
+        """Exit less onset, None for an open zone."""
+        return None if self.onset is None or self.exit is None else self.exit.speed_rpm - self.onset.speed_rpm
+
+
+@dataclasses.dataclass(frozen=True)
+class Zones:
+    """What a sweep says about its speed range, at the resolution of its grid."""
+
+    zones: tuple[Zone, ...]
+    """Chaotic zones, ascending."""
+    synchronous: tuple[Zone, ...]
+    """Stretches in which a stable period-1 orbit was met; their ends are synchronous-loss edges."""
+    resolution_rpm: float
+    close_below_rpm: float
+
+    def __str__(self) -> str:
+        rows = [f"Chaotic zones at a resolution of {self.resolution_rpm:.0f} rpm"]
+        for i, zone in enumerate(self.zones, start=1):
+            width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.0f} rpm wide"
+            rows.append(
+                f"  zone {i}: {zone.onset or 'below the range'} to {zone.exit or 'above the range'}, {width}, "
+                f"{zone.share:.0%} of starts chaotic"
+            )
+        return "\n".join(rows if self.zones else [*rows, "  none"])
+
+
+def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
+    """First and last index of each run of true values."""
+    padded = np.concatenate([[False], mask, [False]]).astype(int)
+    changes = np.diff(padded)
+    return list(zip(np.flatnonzero(changes == 1).tolist(), (np.flatnonzero(changes == -1) - 1).tolist(), strict=True))
+
+
+def close_windows(
+    rpm: np.ndarray, chaotic: Bool[np.ndarray, " speeds"], close_below_rpm: float
+) -> list[tuple[int, int]]:
+    """Runs of chaotic speeds, joined where the window between them is narrower than `close_below_rpm`.
+
+    The width of a window is the distance between the chaotic speeds at its two sides.
+    """
+    joined: list[tuple[int, int]] = []
+    for first, last in runs(chaotic):
+        if joined and rpm[first] - rpm[joined[-1][1]] < close_below_rpm:
+            first = joined.pop()[0]
+        joined.append((first, last))
+    return joined
+
+
+def _edge(rpm: np.ndarray, known: np.ndarray, inner: int, step: int, kind: str) -> Edge | None:
+    """The edge between the zone's end at `inner` and the first speed beyond it of which something is known."""
+    outer = inner + step
+    while 0 <= outer < rpm.size and not known[outer]:
+        outer += step
+    if not 0 <= outer < rpm.size:
+        return None
+    apart = abs(float(rpm[outer] - rpm[inner]))
+    return Edge((float(rpm[inner]) + float(rpm[outer])) / 2, apart, kind)
+
+
+def _zones(
+    sweep: Sweep, known: np.ndarray, share: np.ndarray, spans: Sequence[tuple[int, int]], kind: str
+) -> tuple[Zone, ...]:
+    edge: Callable[[int, int], Edge | None] = lambda i, step: _edge(sweep.rpm, known, i, step, kind)
+    return tuple(Zone(kind, edge(a, -1), edge(b, 1), float(np.nanmean(share[a : b + 1]))) for a, b in spans)
+
+
+def zones(sweep: Sweep, close_below_rpm: float = CLOSE_BELOW_RPM) -> Zones:
+    """Chaotic zones of a sweep, and the stretches in which the synchronous orbit was met.
+
+    A speed counts as chaotic if any start is. Where no start is chaotic but some failed, nothing is known: such speeds
+    are neither in a zone nor outside, and an edge next to them is as uncertain as their gap is wide.
+
+    **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm].
+
+    **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty.
+    """
+    label = sweep.label
+    chaotic = np.any(label == "chaotic", axis=1)
+    known = chaotic | ~np.any(sweep.failed, axis=1)
+    synchronous = np.any(label == "periodic-1", axis=1)
+    settled = synchronous | ~np.any(sweep.failed, axis=1)
+    share_1 = np.mean(label == "periodic-1", axis=1)
+    spans = close_windows(sweep.rpm, chaotic, close_below_rpm)
+    return Zones(
+        _zones(sweep, known, sweep.chaotic_share, spans, "chaotic"),
+        _zones(sweep, settled, share_1, runs(synchronous), "synchronous-loss"),
+        sweep.resolution_rpm,
+        close_below_rpm,
+    )

@@ -1,0 +1,171 @@
+"""Time histories at constant speed and through a speed ramp, both made of parts of the strobe map's revolution."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from .._checks import require_x64
+from .._types import Scalar, State
+from ..models import AbstractForcedSystem
+from ._method import AbstractMethod, method as make_method, REVOLUTION
+from ._results import outcome_code, OUTCOMES
+from ._strobe import strobe_map
+
+
+@dataclasses.dataclass(frozen=True)
+class Trajectory:
+    """States at equally spaced phases."""
+
+    time: Float[np.ndarray, " n"]
+    """Time from the first sample [s]."""
+    tau: Float[np.ndarray, " n"]
+    """Phase [rad], 0 at the beginning of the run (before any discarded revolutions)."""
+    state: Float[np.ndarray, "n dim"]
+    """State in SI units; NaN from the sample after a failure."""
+    speed: Float[np.ndarray, " n"]
+    """Speed at each sample [rad/s]."""
+    samples: int
+    """Samples per revolution."""
+    peak: float
+    """Largest excursion at any step, between the samples too; for a cage eps."""
+    outcome: str
+    """`successful`, or the name of what went wrong."""
+
+    @property
+    def rpm(self) -> Float[np.ndarray, " n"]:
+        """Speed in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    def __str__(self) -> str:
+        revolutions = self.time.size / self.samples
+        return (
+            f"Trajectory of {revolutions:g} revolutions, {self.samples} samples each, "
+            f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, largest excursion {self.peak:.3f}"
+        )
+
+
+@eqx.filter_jit
+def _run(
+    system: AbstractForcedSystem,
+    method: AbstractMethod,
+    speeds: Float[Array, " revolutions"],
+    rise: Scalar,
+    y0: State,
+    samples: int,
+) -> tuple[Float[Array, "revolutions samples dim"], Float[Array, " revolutions"], Int[Array, ""]]:
+    """Whole revolutions one after the other; within one the speed rises by `rise`, in `samples` small steps."""
+
+    def part(carry: tuple, i: Array, first: Array) -> tuple[tuple, Array]:
+        y, peak, outcome = carry
+        strobe = strobe_map(system, first + rise * (i + 0.5) / samples, method)
+        stretch = strobe.part(y, i, samples)
+        code = jnp.where(outcome == 0, outcome_code(stretch.result), outcome)
+        y1 = tuple(jnp.where(code == 0, c, jnp.nan) for c in stretch.y)
+        return (y1, jnp.maximum(peak, stretch.peak), code), jnp.stack(y)
+
+    def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, Array]]:
+        carry = (carry[0], jnp.zeros(()), carry[2])
+        carry, states = jax.lax.scan(lambda c, i: part(c, i, first), carry, jnp.arange(samples))
+        return carry, (states, carry[1])
+
+    admitted = outcome_code(strobe_map(system, speeds[0], method).admit(y0))
+    y0 = tuple(jnp.where(admitted == 0, c, jnp.nan) for c in y0)
+    (_, _, code), (states, peaks) = jax.lax.scan(revolution, (y0, jnp.zeros(()), admitted), speeds)
+    return states, peaks, code
+
+
+def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> State:
+    y0 = system.starts(jnp.asarray(speed))[0] if start is None else start
+    if len(y0) != system.dimension:
+        raise ValueError(f"Argument `start` must be a state of {system.dimension} numbers, but has {len(y0)}.")
+    return tuple(jnp.asarray(c, dtype=float) for c in y0)
+
+
+def _check(speed: float, revolutions: int, samples: int, discard: int = 0) -> None:
+    if not (np.isfinite(speed) and speed > 0):
+        raise ValueError(f"Argument `speed` must be positive and finite, but {speed} rad/s was given.")
+    if revolutions < 1 or samples < 1 or discard < 0:
+        raise ValueError(
+            "Arguments `revolutions`, `samples` and `discard` must be at least 1, 1 and 0, but are "
+            f"{revolutions}, {samples} and {discard}."
+        )
+
+
+def _trajectory(
+    states: Array, speeds: np.ndarray, rise: float, peaks: Array, code: Array, samples: int, discard: int
+) -> Trajectory:
+    grid = np.arange(samples) / samples
+    speed = (speeds[:, None] + rise * grid).ravel()[discard * samples :]
+    tau = REVOLUTION * (np.arange(speeds.size)[:, None] + grid).ravel()[discard * samples :]
+    step = REVOLUTION / samples
+    time = np.concatenate([[0.0], np.cumsum(step / (speed[:-1] + 0.5 * rise / samples))])
+    state = np.asarray(states).reshape(-1, states.shape[-1])[discard * samples :]
+    peak = float(np.max(np.asarray(peaks)[discard:]))
+    return Trajectory(time, tau, state, speed, samples, peak, OUTCOMES[int(code)])
+
+
+def simulate(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    *,
+    revolutions: int,
+    samples: int = 64,
+    discard: int = 0,
+    start: State | None = None,
+    method: AbstractMethod | None = None,
+) -> Trajectory:
+    """Time history at one speed.
+
+    **Arguments:** system; speed [rad/s]; revolutions recorded and discarded before; samples per revolution (they must
+    divide the steps per revolution of a method with fixed steps); initial state, by default the system's first start;
+    integration method.
+
+    **Returns:** `Trajectory`; a run that fails is NaN from there on and says why in `outcome`.
+
+    **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
+    """
+    require_x64()
+    value = float(speed)
+    _check(value, revolutions, samples, discard)
+    chosen = make_method() if method is None else method
+    speeds = np.full(discard + revolutions, value)
+    states, peaks, code = _run(
+        system, chosen, jnp.asarray(speeds), jnp.asarray(0.0), _start(system, value, start), samples
+    )
+    return _trajectory(states, speeds, 0.0, peaks, code, samples, discard)
+
+
+def ramp(
+    system: AbstractForcedSystem,
+    first: Scalar,
+    last: Scalar,
+    *,
+    revolutions: int,
+    samples: int = 64,
+    start: State | None = None,
+    method: AbstractMethod | None = None,
+) -> Trajectory:
+    """Time history of a true speed ramp: the speed changes all the time, by the same amount in every revolution.
+
+    Within a revolution the speed rises in `samples` steps. The tangential force M e dw/dt of the unbalance is left out:
+    its ratio to M e w^2 is the relative change of speed in one radian.
+
+    **Arguments:** system; first and last speed [rad/s]; number of revolutions of the whole ramp; the rest as in
+    `simulate`.
+
+    **Returns:** `Trajectory` with the speed of each sample.
+    """
+    require_x64()
+    low, high = float(first), float(last)
+    _check(min(low, high), revolutions, samples)
+    chosen = make_method() if method is None else method
+    rise = (high - low) / revolutions
+    speeds = low + rise * np.arange(revolutions)
+    states, peaks, code = _run(
+        system, chosen, jnp.asarray(speeds), jnp.asarray(rise), _start(system, low, start), samples
+    )
+    return _trajectory(states, speeds, rise, peaks, code, samples, 0)

@@ -1,0 +1,87 @@
+"""What a configuration may hold, read off the fields of the modules: tables, keys, units, ranges, options."""
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Iterator
+from typing import Any
+
+import equinox as eqx
+
+from .._parameters import ParameterInfo
+from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
+from ._units import to_si
+
+
+KINDS: dict[str, type[eqx.Module]] = {
+    "synchronous": SynchronousImpact,
+    "roller_pass": RollerPassImpact,
+    "rigid": RigidRib,
+    "elastic": ElasticRib,
+}
+"""Names in a configuration for the laws between which a table chooses with `kind`."""
+
+
+class ConfigError(ValueError):
+    """A configuration that is refused; the message is one sentence that names the key and what it may be."""
+
+
+def module_types(annotation: Any) -> tuple[type[eqx.Module], ...]:
+    """The modules that a field's annotation admits: none for a number, several where there is a choice of laws."""
+    union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+    members = typing.get_args(annotation) if union else (annotation,)
+    return tuple(m for m in members if isinstance(m, type) and issubclass(m, eqx.Module))
+
+
+def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
+    """Field name -> the modules it admits, for the fields of `kind` that are tables of their own."""
+    hints = typing.get_type_hints(kind)
+    found = {field.name: module_types(hints[field.name]) for field in dataclasses.fields(kind)}
+    return {name: options for name, options in found.items() if options}
+
+
+def values(kind: type[eqx.Module]) -> Iterator[dataclasses.Field]:
+    """The fields of `kind` that are parameters, choices or counts."""
+    for field in dataclasses.fields(kind):
+        if {"parameter", "choice", "count"} & set(field.metadata):
+            yield field
+
+
+def read_value(name: str, value: Any, field: dataclasses.Field) -> Any:
+    """`value` as the configuration gives it, checked against the declaration of `field`.
+
+    **Raises:** `ConfigError`.
+    """
+    if "choice" in field.metadata:
+        return _read_choice(name, value, field.metadata["choice"])
+    if "count" in field.metadata:
+        return _read_count(name, value, *field.metadata["count"])
+    return _read_number(name, value, field.metadata["parameter"])
+
+
+def _read_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
+    if value not in options:
+        raise ConfigError(f"`{name}` must be one of {', '.join(options)}, but is {value!r}.")
+    return value
+
+
+def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
+        raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {value!r}.")
+    return value
+
+
+def _read_number(name: str, value: Any, info: ParameterInfo) -> float:
+    unit = "" if info.unit == "1" else f" {info.unit}"
+    allowed = f"`{name}` must be a number from {info.lower:g} to {info.upper:g}{unit}"
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ConfigError(f"{allowed}, but is {value!r}.")
+    try:
+        number = to_si(value, info.unit) if isinstance(value, str) else float(value)
+    except ValueError as error:
+        raise ConfigError(f"{allowed}, but {error}.") from error
+    if not math.isfinite(number) or not info.lower <= number <= info.upper:
+        given = f' (given as "{value}")' if isinstance(value, str) else ""
+        raise ConfigError(f"{allowed}, but is {number:g}{unit}{given}.")
+    return number
