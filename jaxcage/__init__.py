@@ -53,6 +53,7 @@ from .forces import (
     SynchronousImpact as SynchronousImpact,
 )
 from .integrate import (
+    AbstractMethod as AbstractMethod,
     AdaptiveSteps as AdaptiveSteps,
     FixedSteps as FixedSteps,
     method as method,

@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """An output: how it is called and written, its SI unit, and the unit and factor it is shown in."""
+    """An output: name, symbol, SI unit, words, and the unit and factor in which it is shown."""
 
     name: str
     symbol: str
@@ -65,15 +65,6 @@ _QUANTITIES = (
     Quantity("force", r"$F$", "N", "force"),
     Quantity("contact_force", r"$Q_{cw}$", "N", "roller-bar contact force"),
     Quantity("bar_force", r"$K_c \delta_c$", "N", "bar force"),
-    Quantity("whirl_ratio", "", "1", "whirl speed over cage speed"),
-    Quantity("rms_displacement", "", "m", "rms displacement", *_MM),
-    Quantity("peak_displacement", "", "m", "peak displacement", *_MM),
-    Quantity("velocity_scatter", r"$\sigma_v/\bar v$", "1", "velocity scatter over mean velocity"),
-    Quantity("minimum_film", "", "m", "minimum film thickness", "µm", 1e6),
-    Quantity("peak_land_force", "", "N", "peak force on the guiding lands"),
-    Quantity("peak_impact_force", "", "N", "peak impact force"),
-    Quantity("impact_impulse", "", "N s", "impact impulse per revolution"),
-    Quantity("film_drag_power", "", "W", "film drag power"),
 )
 
 GLOSSARY: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
@@ -81,7 +72,9 @@ GLOSSARY: dict[str, Quantity] = {quantity.name: quantity for quantity in _QUANTI
 
 
 def quantity(name: str) -> Quantity:
-    """What is known of the output `name`; a name that is not listed stands for itself, without a unit."""
+    """What is known of the output `name`; a name that is not listed stands for itself, without a
+    unit.
+    """
     return GLOSSARY.get(name, Quantity(name, "", "1", name.replace("_", " ")))
 
 

@@ -83,18 +83,42 @@ def parameter_info(module: eqx.Module) -> dict[str, ParameterInfo]:
     return {name: infos[path] for name, path in parameter_paths(module).items()}
 
 
+def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
+    """Dotted name -> path of every static choice and count, e.g. `film.model`."""
+    found = [path for path, field in walk(module) if "parameter" not in field.metadata]
+    return {".".join(path): path for path in found}
+
+
+def _with_static(module: Any, path: tuple[str, ...], value: Any) -> Any:
+    """A copy of `module` with the static field at `path` set."""
+    name, *rest = path
+    inner = _with_static(getattr(module, name), tuple(rest), value) if rest else value
+    return dataclasses.replace(module, **{name: inner})
+
+
 def replace(module: M, **values: PyTree) -> M:
-    """A copy of `module` with the named parameters replaced (SI units).
+    """A copy of `module` with named parts replaced.
 
-    **Arguments:** parameters by name, e.g. `replace(model, guidance_gap=0.5e-3)`; dotted names through a dictionary:
-    `replace(model, **{"rib.mass": 1.0})`.
+    **Arguments:** parameters by name in SI units, e.g. `replace(model, guidance_gap=0.5e-3)`; choices and counts by
+    dotted name through a dictionary, `replace(model, **{"film.model": "positive_pressure"})`; and whole parts of the
+    model, `replace(model, rib=ElasticRib(...))`.
 
-    **Raises:** `ValueError` for a name the module does not have.
+    **Raises:** `ValueError` for a name the module does not have, or an option a choice does not offer.
     """
-    paths = parameter_paths(module)
-    for name in values:
-        if name not in paths:
-            raise ValueError(f"Argument `{name}` must be a parameter of the model, one of: {', '.join(paths)}.")
-    where = lambda m: [get(m, paths[name]) for name in values]
-    leaves = [jax.tree.map(_as_leaf, v) for v in values.values()]
-    return eqx.tree_at(where, module, leaves)
+    leaves, choices = parameter_paths(module), choice_paths(module)
+    parts = {f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)}
+    fields = {path: field for path, field in walk(module)}
+    for name, value in values.items():
+        if name in parts:
+            module = dataclasses.replace(module, **{name: value})
+        elif name in leaves:
+            module = eqx.tree_at(lambda m: get(m, leaves[name]), module, jax.tree.map(_as_leaf, value))
+        elif name in choices:
+            offered = fields[choices[name]].metadata.get("choice")
+            if offered and value not in offered:
+                raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
+            module = _with_static(module, choices[name], value)
+        else:
+            known = ", ".join([*leaves, *choices, *sorted(parts)])
+            raise ValueError(f"Argument `{name}` must name a part of the model, one of: {known}.")
+    return module

@@ -1,1 +1,15 @@
-"""."""
+"""The `jaxcage` command.
+
+| module      | responsibility                                                              |
+|-------------|-----------------------------------------------------------------------------|
+| `_main`     | entry point: parse, carry out, exit status                                  |
+| `_options`  | commands and their options, without heavy imports                           |
+| `_errors`   | bad input in one sentence                                                   |
+| `_console`  | progress and warnings on standard error                                     |
+| `_report`   | result as tables or as JSON                                                 |
+| `_inputs`   | case or TOML file, integration method, output folder                        |
+| `_sweep`, `_zones`, `_poincare`, `_simulate`, `_statics`, `_impact` | one command each    |
+| `_zone_report` | zones found beside zones published                                       |
+"""
+
+from ._main import main as main

@@ -7,6 +7,7 @@ started with the roller approaching at v_0. The paper prints d_w'' in the second
 
 import diffrax as dfx
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -92,5 +93,5 @@ def impact_history(
     )
     assert solution.ys is not None
     d_w, d_c, u_w, u_c = solution.ys
-    q = _contact(solution.ys, impact)
+    q = jax.vmap(lambda *y: _contact(y, impact))(*solution.ys)
     return ImpactHistory(grid * duration, q, impact.bar_stiffness * d_c, d_w, d_c, u_w, u_c)

@@ -79,7 +79,7 @@ class FixedSteps(AbstractMethod):
 
         def step(i: Array, carry: tuple) -> tuple:
             y, peak, result, state = carry
-            t0 = phase + i * h
+            t0 = phase + i.astype(float) * h
             y, _, _, state, outcome = self.solver.step(TERM, t0, t0 + h, y, field, state, False)
             excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
             result = _worse(result, judge(outcome, y, excursion, ESCAPE))
@@ -144,7 +144,7 @@ _ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
     "kencarp4": dfx.KenCarp4,
 }
 DEFAULT_SOLVER = "rodas4"
-DEFAULT_STEPS = 128
+DEFAULT_STEPS = 256
 
 
 def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:

@@ -61,7 +61,7 @@ def _run(
 
     def part(carry: tuple, i: Array, first: Array) -> tuple[tuple, Array]:
         y, peak, outcome = carry
-        strobe = strobe_map(system, first + rise * (i + 0.5) / samples, method)
+        strobe = strobe_map(system, first + rise * (i.astype(float) + 0.5) / samples, method)
         stretch = strobe.part(y, i, samples)
         code = jnp.where(outcome == 0, outcome_code(stretch.result), outcome)
         y1 = tuple(jnp.where(code == 0, c, jnp.nan) for c in stretch.y)

@@ -6,6 +6,7 @@ once. It is differentiable (forward mode) with respect to state, speed and every
 
 import diffrax as dfx
 import equinox as eqx
+import jax.numpy as jnp
 
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
@@ -27,7 +28,7 @@ class StrobeMap(eqx.Module):
 
     def part(self, y: State, i: Scalar, parts: int) -> Stretch:
         """The `i`-th of `parts` equal parts of a revolution."""
-        phase = i * (REVOLUTION / parts)
+        phase = jnp.asarray(i, dtype=float) * (REVOLUTION / parts)
         return self.method.advance(self.field, self.system, self.scale, y, phase, parts)
 
     def admit(self, y: State) -> RESULTS:

@@ -1,1 +1,36 @@
-"""."""
+"""Files in and out, units at the door.
+
+| module          | responsibility                                                            |
+|-----------------|---------------------------------------------------------------------------|
+| `_units`        | texts with a unit to SI numbers                                           |
+| `_schema`       | what a configuration may hold, from the fields of the modules             |
+| `_config`       | TOML to `CageModel`, with every value checked                             |
+| `_write_config` | `CageModel` to nested mapping or TOML                                     |
+| `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
+| `_csv`          | time histories as CSV                                                     |
+| `_files`        | whole files or none; is a folder writable                                 |
+"""
+
+from ._config import load_model as load_model, model_from as model_from
+from ._csv import (
+    read_columns as read_columns,
+    trajectory_columns as trajectory_columns,
+    write_columns as write_columns,
+    write_trajectory as write_trajectory,
+)
+from ._dataset import (
+    from_dataset as from_dataset,
+    load_sweep as load_sweep,
+    open_sweep as open_sweep,
+    save_sweep as save_sweep,
+    stored_configuration as stored_configuration,
+    to_dataset as to_dataset,
+)
+from ._files import check_writable as check_writable, replacing as replacing
+from ._schema import ConfigError as ConfigError
+from ._units import to_si as to_si
+from ._write_config import (
+    configuration as configuration,
+    save_model as save_model,
+    toml_text as toml_text,
+)

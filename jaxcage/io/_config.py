@@ -1,18 +1,18 @@
 """TOML -> `CageModel`: tables mirror the modules, every value is checked against its declaration.
 
-    base = "1a"                  # optional: start from a published case and change what is listed
-    guidance_gap = "0.5 mm"      # numbers are SI, texts carry their unit
-    eccentricity = 30e-6
+base = "1a"                  # optional: start from a published case and change what is listed
+guidance_gap = "0.5 mm"      # numbers are SI, texts carry their unit
+eccentricity = 30e-6
 
-    [lubricant]
-    grade = 68                   # or density, viscosity_1, temperature_1, viscosity_2, temperature_2
-    temperature = "70 degC"
+[lubricant]
+grade = 68                   # or density, viscosity_1, temperature_1, viscosity_2, temperature_2
+temperature = "70 degC"
 
-    [impact]
-    kind = "roller_pass"         # or "synchronous"
+[impact]
+kind = "roller_pass"         # or "synchronous"
 
-    [impact.oscillator]
-    bar_mass = "4 g"
+[impact.oscillator]
+bar_mass = "4 g"
 """
 
 import dataclasses
@@ -24,10 +24,10 @@ from typing import Any
 import equinox as eqx
 
 from .._checks import require_x64
-from ..bearing import nu2310, PUBLISHED_CASES, vg
+from ..bearing import PUBLISHED_CASES, nu2310, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
-from ._schema import ConfigError, KINDS, read_value, submodules, values
+from ._schema import KINDS, ConfigError, read_value, submodules, values
 
 
 _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
@@ -40,14 +40,16 @@ _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
 def load_model(path: str | Path) -> CageModel:
     """The model that the TOML file at `path` describes.
 
-    **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the key,
-    what was given and what is allowed; `RuntimeError` without double precision.
+    **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the
+    key, what was given and what is allowed; `RuntimeError` without double precision.
     """
     try:
         with open(path, "rb") as file:
             table = tomllib.load(file)
     except OSError as error:
-        raise ConfigError(f"File '{path}' must be a readable TOML file, but: {error.strerror}.") from error
+        raise ConfigError(
+            f"File '{path}' must be a readable TOML file, but: {error.strerror}."
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         reason = str(error).rstrip(".")
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
@@ -64,8 +66,10 @@ def model_from(table: Mapping[str, Any]) -> CageModel:
     start = None
     if "base" in rest:
         name = rest.pop("base")
-        if name not in PUBLISHED_CASES:
-            raise ConfigError(f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {name!r}.")
+        if not isinstance(name, str) or name not in PUBLISHED_CASES:
+            raise ConfigError(
+                f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {name!r}."
+            )
         start = case(name)
     model = _build(CageModel, rest, start, ())
     assert isinstance(model, CageModel)
@@ -74,14 +78,23 @@ def model_from(table: Mapping[str, Any]) -> CageModel:
 
 
 def _build(
-    kind: type[eqx.Module], table: Mapping[str, Any], start: eqx.Module | None, path: tuple[str, ...]
+    kind: type[eqx.Module],
+    table: Mapping[str, Any],
+    start: eqx.Module | None,
+    path: tuple[str, ...],
 ) -> eqx.Module:
-    """A module of `kind` from its table; what the table leaves out comes from `start`, or from the defaults."""
+    """A module of `kind` from its table; what the table leaves out comes from `start`, or from the
+    defaults.
+    """
     table = dict(table)
     start = _ready_made(table, start, path)
     nested, fields = submodules(kind), list(values(kind))
     _refuse_unknown(table, [f.name for f in fields], list(nested), path)
-    arguments = {f.name: read_value(_dotted(path, f.name), table[f.name], f) for f in fields if f.name in table}
+    arguments = {
+        f.name: read_value(_dotted(path, f.name), table[f.name], f)
+        for f in fields
+        if f.name in table
+    }
     for name, options in nested.items():
         if name in table:
             below = getattr(start, name, None)
@@ -92,7 +105,10 @@ def _build(
 
 
 def _build_chosen(
-    options: tuple[type[eqx.Module], ...], table: Any, start: eqx.Module | None, path: tuple[str, ...]
+    options: tuple[type[eqx.Module], ...],
+    table: Any,
+    start: eqx.Module | None,
+    path: tuple[str, ...],
 ) -> eqx.Module:
     """A sub-table, which chooses its law with `kind` where there are several."""
     if not isinstance(table, Mapping):
@@ -104,7 +120,9 @@ def _build_chosen(
         given = table.pop("kind", None if start is None else kind_name(start))
         if given not in names:
             given = "missing" if given is None else f"{given!r}"
-            raise ConfigError(f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}.")
+            raise ConfigError(
+                f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}."
+            )
         kind = KINDS[given]
     return _build(kind, table, start if isinstance(start, kind) else None, path)
 
@@ -114,14 +132,16 @@ def kind_name(module: eqx.Module) -> str:
     return next(name for name, law in KINDS.items() if type(module) is law)
 
 
-def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[str, ...]) -> eqx.Module:
+def _construct(
+    kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[str, ...]
+) -> eqx.Module:
     if "oscillator" in submodules(kind):
         arguments.setdefault("oscillator", PocketImpact())
     required = [f.name for f in dataclasses.fields(kind) if _has_no_default(f)]
     missing = [_dotted(path, name) for name in required if name not in arguments]
     if missing:
-        hint = "" if path else ', or `base = "1a"` must fill them in'
-        raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}, but {_are(missing)} missing.")
+        hint = "" if path else ', unless `base = "1a"` or the like gives the rest'
+        raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
     try:
         return kind(**arguments)
     except ValueError as error:
@@ -130,10 +150,6 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
 
 def _has_no_default(field: dataclasses.Field) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-
-
-def _are(names: list[str]) -> str:
-    return "are" if len(names) > 1 else "is"
 
 
 def _dotted(path: tuple[str, ...], name: str = "") -> str:
@@ -158,34 +174,39 @@ def _ready_made(table: dict, start: eqx.Module | None, path: tuple[str, ...]) ->
 
 def _designated(given: Any) -> eqx.Module:
     if given != "NU2310":
-        raise ConfigError(f"`bearing.designation` must be NU2310, the bearing in the catalogue, but is {given!r}.")
+        raise ConfigError(
+            f"`bearing.designation` must be NU2310, the bearing in the catalogue, but is {given!r}."
+        )
     return nu2310()
 
 
 def _grade(given: Any) -> float:
     if isinstance(given, bool) or not isinstance(given, int | float) or not 2 <= given <= 10000:
         raise ConfigError(
-            f"`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), but is {given!r}."
+            "`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), "
+            f"but is {given!r}."
         )
     return float(given)
 
 
 def _check_together(model: CageModel) -> None:
     """What ranges of single values cannot see."""
-    gap, eccentricity = float(model.guidance_gap), float(model.eccentricity)
+    gap, eccentricity = 1e3 * float(model.guidance_gap), 1e3 * float(model.eccentricity)
     if eccentricity >= gap:
         raise ConfigError(
-            f"`eccentricity` must be smaller than `guidance_gap`, but is {1e3 * eccentricity:g} mm in a gap of "
-            f"{1e3 * gap:g} mm."
+            "`eccentricity` must be smaller than `guidance_gap`, "
+            f"but is {eccentricity:g} mm in a gap of {gap:g} mm."
         )
-    width, limit = float(model.film.land_width), float(model.bearing.land_width_limit)
+    width, limit = 1e3 * float(model.film.land_width), 1e3 * float(model.bearing.land_width_limit)
     if width > limit:
         raise ConfigError(
-            f"`film.land_width` must fit beside the rollers, in {1e3 * limit:g} mm, but is {1e3 * width:g} mm."
+            f"`film.land_width` must fit beside the rollers, in {limit:g} mm, but is {width:g} mm."
         )
-    for name, length in (("contact", model.contact.smoothing), ("film", model.film.smoothing)):
-        if float(length) > 0.1 * float(model.clearance):
+    clearance = 1e3 * float(model.clearance)
+    for name, law in (("contact", model.contact), ("film", model.film)):
+        length = 1e3 * float(law.smoothing)
+        if length > 0.1 * clearance:
             raise ConfigError(
-                f"`{name}.smoothing` must be at most a tenth of the clearance, {1e3 * float(model.clearance):g} mm, "
-                f"but is {1e3 * float(length):g} mm."
+                f"`{name}.smoothing` must be at most a tenth of the clearance, {clearance:g} mm, "
+                f"but is {length:g} mm."
             )

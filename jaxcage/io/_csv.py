@@ -15,7 +15,9 @@ def write_columns(path: str | Path, columns: Mapping[str, Float[np.ndarray, " ro
     """Write columns of one length under their names; nothing is left behind if that fails."""
     table = np.column_stack([np.asarray(column) for column in columns.values()])
     with replacing(path) as temporary:
-        np.savetxt(temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
+        np.savetxt(
+            temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments=""
+        )
     return Path(path)
 
 
@@ -30,7 +32,9 @@ def read_columns(path: str | Path) -> dict[str, Float[np.ndarray, " rows"]]:
 def trajectory_columns(
     trajectory: Trajectory, forces: Mapping[str, Float[np.ndarray, "samples 2"]] | None = None
 ) -> dict[str, Float[np.ndarray, " samples"]]:
-    """Time, phase, state and each force of a trajectory in SI units, heads such as `y_C [m]` and `film_y [N]`."""
+    """Time, phase, state and each force of a trajectory in SI units, heads such as `y_C [m]` and
+    `film_y [N]`.
+    """
     columns = {"time [s]": trajectory.time, "tau [rad]": trajectory.tau}
     for i, name in enumerate(component_names(trajectory.state.shape[1])):
         columns[f"{name} [{quantity(name).unit}]"] = trajectory.state[:, i]

@@ -10,14 +10,18 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary place beside `path` to write a file or a folder to; it takes the place of `path` at the end.
+    """A temporary place beside `path` to write a file or a folder to; it takes the place of `path`
+    at the end.
 
-    If the body raises, or the process dies in it, `path` is what it was. A folder cannot be replaced
-    in one step: the earlier one moves aside for an instant and comes back if the new one cannot move in.
+    If the body raises, or the process dies in it, `path` is what it was. A folder cannot be
+    replaced in one step: the earlier one moves aside for an instant and comes back if the new one
+    cannot move in.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    workplace = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
+    workplace = Path(
+        tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent)
+    )
     try:
         yield workplace / target.name
         _move_in(workplace / target.name, target, workplace / "earlier")
@@ -41,7 +45,8 @@ def _move_in(new: Path, target: Path, aside: Path) -> None:
 def check_writable(folder: str | Path) -> Path:
     """Make `folder` and make sure that files can be written in it.
 
-    **Raises:** `ValueError` with the reason, so that nobody computes for minutes to lose the result.
+    **Raises:** `ValueError` with the reason, so that nobody computes for minutes to lose the
+    result.
     """
     path = Path(folder)
     try:
@@ -51,6 +56,6 @@ def check_writable(folder: str | Path) -> Path:
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise ValueError(
-            f"Output folder '{folder}' must be a folder that can be written to, but it is not: {reason}."
+            f"Output folder '{folder}' must be a folder that can be written to, but: {reason}."
         ) from error
     return path

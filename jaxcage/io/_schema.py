@@ -1,4 +1,6 @@
-"""What a configuration may hold, read off the fields of the modules: tables, keys, units, ranges, options."""
+"""What a configuration may hold, read off the fields of the modules: tables, keys, units, ranges,
+options.
+"""
 
 import dataclasses
 import math
@@ -24,18 +26,22 @@ KINDS: dict[str, type[eqx.Module]] = {
 
 
 class ConfigError(ValueError):
-    """A configuration that is refused; the message is one sentence that names the key and what it may be."""
+    """A configuration that is refused; the message is one sentence that names the key and what it
+    may be.
+    """
 
 
 def module_types(annotation: Any) -> tuple[type[eqx.Module], ...]:
-    """The modules that a field's annotation admits: none for a number, several where there is a choice of laws."""
+    """The modules that a field's annotation admits: none for a number, several where there is a
+    choice of laws.
+    """
     union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
     members = typing.get_args(annotation) if union else (annotation,)
     return tuple(m for m in members if isinstance(m, type) and issubclass(m, eqx.Module))
 
 
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
-    """Field name -> the modules it admits, for the fields of `kind` that are tables of their own."""
+    """Field name -> the modules it admits, for the fields of `kind` that are tables."""
     hints = typing.get_type_hints(kind)
     found = {field.name: module_types(hints[field.name]) for field in dataclasses.fields(kind)}
     return {name: options for name, options in found.items() if options}
@@ -68,7 +74,9 @@ def _read_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
 
 def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
-        raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {value!r}.")
+        raise ConfigError(
+            f"`{name}` must be a whole number from {lower} to {upper}, but is {value!r}."
+        )
     return value
 
 

@@ -1,4 +1,6 @@
-"""Units at the door: text such as "0.45 mm" becomes a number in SI. pint is loaded only when a text is met."""
+"""Units at the door: text such as "0.45 mm" becomes a number in SI. pint is loaded only when a text
+is met.
+"""
 
 import functools
 import re
@@ -20,7 +22,8 @@ def _registry() -> "pint.UnitRegistry":
 
 
 def to_si(text: str, unit: str) -> float:
-    """The number in `text`, e.g. "0.45 mm" or "40 degC", expressed in `unit` ("1" for a pure number).
+    """The number in `text`, e.g. "0.45 mm" or "40 degC", expressed in `unit` ("1" for a pure
+    number).
 
     A bare number is taken to be in `unit`. Frequencies in Hz are refused where an angular speed is
     wanted: units alone cannot tell a revolution from a radian, so write rpm or rad/s.

@@ -12,13 +12,17 @@ from ._schema import submodules, values
 
 
 def configuration(model: CageModel) -> dict[str, Any]:
-    """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML file."""
+    """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML
+    file.
+    """
     return _table(model)
 
 
 def _table(module: eqx.Module) -> dict[str, Any]:
     fields = list(values(type(module)))
-    table = {f.name: _plain(getattr(module, f.name), "parameter" in f.metadata) for f in fields}
+    table: dict[str, Any] = {
+        f.name: _plain(getattr(module, f.name), "parameter" in f.metadata) for f in fields
+    }
     for name, options in submodules(type(module)).items():
         below = getattr(module, name)
         kind = {"kind": kind_name(below)} if len(options) > 1 else {}
@@ -43,7 +47,9 @@ def _literal(value: float | int | str) -> str:
 
 
 def save_model(path: str | Path, model: CageModel) -> Path:
-    """Write `model` as a TOML file that `load_model` reads; an earlier file stays whole if that fails."""
+    """Write `model` as a TOML file that `load_model` reads; an earlier file stays whole if that
+    fails.
+    """
     with replacing(path) as temporary:
         temporary.write_text(toml_text(configuration(model)) + "\n", encoding="utf-8")
     return Path(path)

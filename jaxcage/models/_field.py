@@ -51,6 +51,11 @@ def lu_solve(lu: Matrix, r: State) -> State:
     return tuple(x)
 
 
+def _shifted(shift: Scalar, a: Matrix) -> Matrix:
+    """shift I - a."""
+    return tuple(tuple(shift - c if i == j else -c for j, c in enumerate(row)) for i, row in enumerate(a))
+
+
 class AbstractLinearisation(eqx.Module):
     """A field near one point: value, phase derivative, and solves with shift I - Jacobian."""
 
@@ -70,8 +75,7 @@ class DenseLinearisation(AbstractLinearisation):
     jacobian: Matrix
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
-        a = tuple(tuple(shift * (i == j) - c for j, c in enumerate(row)) for i, row in enumerate(self.jacobian))
-        lu = lu_factor(a)
+        lu = lu_factor(_shifted(shift, self.jacobian))
         return lambda r: lu_solve(lu, r)
 
 
@@ -89,10 +93,10 @@ class SecondOrderLinearisation(AbstractLinearisation):
         lever = rate / shift
         n = len(self.a_q)
         a = tuple(
-            tuple(shift * (i == j) - rate * (self.a_v[i][j] + lever * self.a_q[i][j]) for j in range(n))
-            for i in range(n)
+            tuple(rate * (v + lever * q) for v, q in zip(*rows, strict=True))
+            for rows in zip(self.a_v, self.a_q, strict=True)
         )
-        lu = lu_factor(a)
+        lu = lu_factor(_shifted(shift, a))
 
         def solve(r: State) -> State:
             r_q, r_v = r[:n], r[n:]

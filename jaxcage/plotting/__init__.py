@@ -1,1 +1,36 @@
-"""."""
+"""Figures: free functions, axes in and axes out; matplotlib is imported here and nowhere else.
+
+| module           | responsibility                                                          |
+|------------------|-------------------------------------------------------------------------|
+| `_style`         | colours, frames, figures without global state                           |
+| `_marks`         | zones shaded and published edges marked on a speed axis                 |
+| `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
+| `_section`       | strobe section                                                          |
+| `_history`       | time history, orbit in the clearance circle, each force                 |
+| `_impact`        | impact of a roller on a cage bar                                        |
+| `_statics`       | load of every roller                                                    |
+| `_waterfall`     | spectra over speed                                                      |
+"""
+
+from ._history import (
+    force_history as force_history,
+    orbit as orbit,
+    simulation_figure as simulation_figure,
+    time_history as time_history,
+)
+from ._impact import impact_forces as impact_forces
+from ._marks import (
+    mark_published as mark_published,
+    published_edges as published_edges,
+    shade_zones as shade_zones,
+)
+from ._orbit_diagram import (
+    exponent_strip as exponent_strip,
+    orbit_diagram as orbit_diagram,
+    sweep_figure as sweep_figure,
+    zoomed_diagram as zoomed_diagram,
+)
+from ._section import strobe_section as strobe_section
+from ._statics import load_bars as load_bars
+from ._style import enlarge_dots as enlarge_dots, new_figure as new_figure
+from ._waterfall import waterfall_map as waterfall_map

@@ -49,15 +49,11 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
-def _state_array(y: State) -> np.ndarray:
-    return np.array([float(c) for c in y])
-
-
 def sweep(
     system: AbstractForcedSystem,
     speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
-    starts: Sequence[State] | None = None,
+    starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
     exponents: int = 1,
@@ -72,7 +68,8 @@ def sweep(
 
     - `system`: any `AbstractForcedSystem`.
     - `speeds`: ascending speeds [rad/s]; `jaxcage.rpm` makes them from revolutions per minute.
-    - `starts`: initial states, each a tuple of numbers; by default the system's own.
+    - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; by default the
+        system's own.
     - `discard`, `revolutions`: revolutions left out at the beginning, and observed after that.
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
@@ -120,14 +117,24 @@ def assemble(
 
 
 def initial_states(
-    system: AbstractForcedSystem, speed: np.ndarray, starts: Sequence[State] | None
+    system: AbstractForcedSystem,
+    speed: np.ndarray,
+    starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None,
 ) -> Float[np.ndarray, "speeds starts dim"]:
+    """A state for each speed and start: the system's own, the same ones at every speed, or as given."""
     if starts is None:
         table = jax.vmap(lambda s: jnp.stack([jnp.stack([jnp.asarray(c) for c in y]) for y in system.starts(s)]))
         return np.asarray(table(jnp.asarray(speed)))
-    rows = [_state_array(y) for y in starts]
+    wanted = f"states of {system.dimension} numbers"
+    if isinstance(starts, np.ndarray):
+        if starts.ndim != 3 or starts.shape[::2] != (speed.size, system.dimension):
+            raise ValueError(
+                f"Argument `starts` must hold {wanted} for each of {speed.size} speeds, but has shape {starts.shape}."
+            )
+        return starts
+    rows = [np.array([float(c) for c in y]) for y in starts]
     if not rows or any(row.shape != (system.dimension,) for row in rows):
-        raise ValueError(f"Argument `starts` must hold states of {system.dimension} numbers, but holds {starts}.")
+        raise ValueError(f"Argument `starts` must hold {wanted}, but holds {starts}.")
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), system.dimension)).copy()
 
 

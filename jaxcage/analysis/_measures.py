@@ -1,0 +1,202 @@
+"""What a cage designer reads off a trajectory: forces, whirl, scatter, film thickness, power.
+
+Motion is that of the cage centre relative to the rib (C - O). Averages are over time, sample by
+sample: with evenly spaced phases and whole revolutions the sum is as good as the integral.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..integrate import Trajectory
+from ..models import CageForces, CageModel
+
+
+BATCH = 256
+"""Samples whose forces are worked out at a time where the speed changes from sample to sample."""
+
+
+def relative_state(
+    model: CageModel, state: Float[np.ndarray, "n dim"]
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
+    """Position [m] and velocity [m/s] of the cage centre relative to the rib.
+
+    **Raises:** `ValueError` for states of another model.
+    """
+    dim = model.dimension
+    if state.shape[-1] != dim:
+        raise ValueError(
+            f"Argument `state` must have {dim} components, but it has {state.shape[-1]}."
+        )
+    q, v = state[:, : dim // 2], state[:, dim // 2 :]
+    if dim == 4:
+        return q, v
+    return q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:]
+
+
+@eqx.filter_jit
+def _forces_at_one_speed(
+    model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
+) -> CageForces:
+    cage = model.cage_at(speed)
+    return jax.vmap(lambda t, m: cage.forces(t, *m))(tau, motion)
+
+
+@eqx.filter_jit
+def _forces(
+    model: CageModel, speed: Float[Array, " n"], tau: Float[Array, " n"], motion: Float[Array, "n 4"]
+) -> CageForces:
+    def at(sample: tuple[Array, Array, Array]) -> CageForces:
+        omega, t, m = sample
+        return model.cage_at(omega).forces(t, *m)
+
+    return jax.lax.map(at, (speed, tau, motion), batch_size=BATCH)
+
+
+def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, "n 2"]]:
+    """Every force on the cage along a trajectory of `model`.
+
+    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance` and `weight`, each (F_x, F_y) [N]
+    at every sample, at the speed of that sample.
+    """
+    position, velocity = relative_state(model, trajectory.state)
+    motion = jax.numpy.asarray(np.concatenate([position, velocity], axis=1))
+    tau, speed = jax.numpy.asarray(trajectory.tau), jax.numpy.asarray(trajectory.speed)
+    if np.all(trajectory.speed == trajectory.speed[0]):
+        forces = _forces_at_one_speed(model, speed[0], tau, motion)
+    else:
+        forces = _forces(model, speed, tau, motion)
+    n = len(trajectory.tau)
+    columns = {name: [np.broadcast_to(f, n) for f in pair] for name, pair in forces._asdict().items()}
+    return {name: np.stack(pair, axis=1) for name, pair in columns.items()}
+
+
+def film_drag_power(
+    model: CageModel, speed: Float[np.ndarray, " n"], eps: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Power [W] that shearing the film in all lands costs: torque times speed.
+
+    Torque of one land 2 pi mu omega R^3 L/(c sqrt(1 - eps^2)), the short bearing's; as the film
+    force, it keeps its value beyond the onset of contact.
+
+    **Arguments:** model; speed [rad/s] and eccentricity ratio at each sample.
+    """
+    film, radius = model.film, float(model.land_radius)
+    kept = np.minimum(eps, float(model.contact.onset))
+    shear = float(model.lubricant.dynamic_viscosity) * radius**3 * float(film.land_width)
+    torque = 2 * np.pi * shear * speed / (float(model.clearance) * np.sqrt(1 - kept**2))
+    return film.n_lands * torque * speed
+
+
+def winding(position: Float[np.ndarray, "n 2"], centre: Float[np.ndarray, " 2"]) -> float:
+    """Angle [rad] by which the motion has gone around `centre`, counter-clockwise.
+
+    Steps of half a turn and more between samples are ambiguous: the samples must be dense, and an
+    orbit that runs through the centre has no winding.
+    """
+    x, y = (position - centre).T
+    turned = np.unwrap(np.arctan2(y, x))
+    return float(turned[-1] - turned[0])
+
+
+def _measure(unit: str, text: str) -> float:
+    return dataclasses.field(metadata={"unit": unit, "text": text})
+
+
+@dataclasses.dataclass(frozen=True)
+class OrbitMeasures:
+    """Measures of one orbit of the cage centre in its rib; printed, a table with units."""
+
+    whirl_ratio: float = _measure("1", "whirl speed about the mean centre / cage speed")
+    """Mean angular velocity about the mean centre over the mean cage speed, positive in the sense of
+    rotation; NaN where the centre stands still. 1 is synchronous, near 0.5 oil whirl."""
+    rib_whirl_ratio: float = _measure("1", "whirl speed about the rib centre / cage speed")
+    """The same about the rib centre: 0 for an orbit that does not go around it."""
+    rms: float = _measure("m", "rms displacement about the mean")
+    """Root of the mean square distance from the mean centre [m]."""
+    peak_displacement: float = _measure("m", "largest displacement about the mean")
+    """[m], at the samples."""
+    largest_eps: float = _measure("1", "largest eccentricity ratio")
+    """At any step of the integration; above 1 the surfaces overlap."""
+    minimum_film_thickness: float = _measure("m", "smallest film thickness")
+    """c (1 - eps) at the largest eps, not below 0 [m]."""
+    velocity_scatter: float = _measure("1", "scatter of the centre's speed / mean speed")
+    """Standard deviation of |v| over its mean (Ghaisas et al. 2004): small is steady; 0 for a circle,
+    NaN where the centre stands still."""
+    peak_contact_force: float = _measure("N", "largest land contact force")
+    """[N], at the samples."""
+    mean_contact_force: float = _measure("N", "mean land contact force")
+    """Mean of |F_contact| [N]."""
+    contact_impulse: float = _measure("N s", "land contact impulse per revolution")
+    """Integral of |F_contact| over the time of a revolution [N s]; wear of the lands follows it."""
+    peak_impact_force: float = _measure("N", "largest impact force")
+    """[N], at the samples."""
+    impact_impulse: float = _measure("N s", "impact impulse per revolution")
+    """Integral of |F_impact| over the time of a revolution [N s]; wear of the pockets follows it
+    (Archard)."""
+    drag_power: float = _measure("W", "power to shear the film")
+    """Mean of `film_drag_power` [W]."""
+    film_power: float = _measure("W", "power the film takes from the centre's motion")
+    """Mean of -F_film . v [W]; negative where the rotation drives the whirl through the film."""
+
+    def __str__(self) -> str:
+        lines = []
+        for field in dataclasses.fields(self):
+            unit = "" if field.metadata["unit"] == "1" else field.metadata["unit"]
+            value = getattr(self, field.name)
+            lines.append(f"{field.metadata['text']:<48s} {value:12.5g} {unit}".rstrip())
+        return "\n".join(lines)
+
+
+def _magnitude(force: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    return np.hypot(force[:, 0], force[:, 1])
+
+
+def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
+    """Measures of a trajectory of `model`, best over whole revolutions without the transient.
+
+    **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples.
+    """
+    if trajectory.outcome != "successful" or len(trajectory.tau) < 3:
+        raise ValueError(
+            "Argument `trajectory` must be a run that succeeded, of at least 3 samples, "
+            f"but this one has {len(trajectory.tau)} and ended with: {trajectory.outcome}."
+        )
+    position, velocity = relative_state(model, trajectory.state)
+    speed, c = trajectory.speed, float(model.clearance)
+    weights = (1 / speed) / np.sum(1 / speed)  # samples are even in phase: time of each
+
+    def mean(f: Float[np.ndarray, " n"]) -> float:
+        return float(np.sum(weights * f))
+
+    def impulse(f: Float[np.ndarray, " n"]) -> float:
+        return float(2 * np.pi * np.mean(f / speed))
+
+    centre = np.sum(weights[:, None] * position, axis=0)
+    away = _magnitude(position - centre)
+    pace = _magnitude(velocity)
+    phase = trajectory.tau[-1] - trajectory.tau[0]
+    moves = np.max(away) > 1e-9 * c
+    eps = _magnitude(position) / c
+    largest = max(float(np.max(eps)), trajectory.peak)
+    forces = cage_forces(model, trajectory)
+    contact, impact = _magnitude(forces["contact"]), _magnitude(forces["impact"])
+    return OrbitMeasures(
+        whirl_ratio=winding(position, centre) / float(phase) if moves else float("nan"),
+        rib_whirl_ratio=winding(position, np.zeros(2)) / float(phase),
+        rms=float(np.sqrt(mean(away**2))),
+        peak_displacement=float(np.max(away)),
+        largest_eps=largest,
+        minimum_film_thickness=max(c * (1 - largest), 0.0),
+        velocity_scatter=float(np.std(pace, ddof=1) / np.mean(pace)) if moves else float("nan"),
+        peak_contact_force=float(np.max(contact)),
+        mean_contact_force=mean(contact),
+        contact_impulse=impulse(contact),
+        peak_impact_force=float(np.max(impact)),
+        impact_impulse=impulse(impact),
+        drag_power=mean(film_drag_power(model, speed, eps)),
+        film_power=mean(-np.sum(forces["film"] * velocity, axis=1)),
+    )

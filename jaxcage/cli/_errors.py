@@ -1,0 +1,48 @@
+"""What the command says when it cannot go on: one sentence and an exit status."""
+
+import contextlib
+import math
+from collections.abc import Iterator
+
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class UsageError(Exception):
+    """Bad input, in one sentence that names what was given and what is allowed."""
+
+
+class ComputationError(Exception):
+    """A computation without a result, in one sentence that says why."""
+
+
+@contextlib.contextmanager
+def refusing() -> Iterator[None]:
+    """Around code that checks what the user gave: its `ValueError` is the user's error."""
+    try:
+        yield
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def require_speed(option: str, rpm: float) -> float:
+    """A speed above zero."""
+    if not (math.isfinite(rpm) and rpm > 0):
+        raise UsageError(f"Option {option} must be a speed above 0 rpm, but {rpm:g} was given.")
+    return rpm
+
+
+def require_at_least(option: str, value: int, least: int) -> int:
+    """A count that is not too small."""
+    if value < least:
+        raise UsageError(f"Option {option} must be at least {least}, but {value} was given.")
+    return value
+
+
+def require_blocks(option: str, revolutions: int) -> int:
+    """Revolutions that can be cut into equal blocks. **Returns:** the number of blocks."""
+    if revolutions < 10 or revolutions % 10:
+        raise UsageError(
+            f"Option {option} must be a multiple of 10 above 0, but {revolutions} was given."
+        )
+    return 10 if revolutions % 20 else 20

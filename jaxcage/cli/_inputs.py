@@ -1,0 +1,82 @@
+"""What commands start from: a case or TOML file, an integration method, a folder to write to."""
+
+import dataclasses
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
+from ..integrate import AbstractMethod, FixedSteps, method
+from ..io import check_writable, load_model, replacing
+from ..models import CageModel, case
+from ._console import say
+from ._errors import UsageError, refusing
+from ._options import IntegrationOptions, Options
+
+
+@dataclasses.dataclass(frozen=True)
+class Subject:
+    """The model that a command is about."""
+
+    name: str
+    """Name of the case, or of the TOML file without its ending."""
+    model: CageModel
+    published: PublishedCase | None
+
+
+def subject(options: Options) -> Subject:
+    """The case or the model in the TOML file that the options name; a broken design rule is said on
+    standard error.
+    """
+    given = options.case
+    if given in PUBLISHED_CASES:
+        found = Subject(given, case(given), PUBLISHED_CASES[given])
+    elif Path(given).suffix.lower() == ".toml" or Path(given).exists():
+        with refusing():
+            found = Subject(Path(given).stem, load_model(given), None)
+    else:
+        known = ", ".join(PUBLISHED_CASES)
+        raise UsageError(
+            f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file."
+        )
+    broken = design_rule_violations(found.model.bearing, found.model.guidance_gap)
+    if broken:
+        say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
+    return found
+
+
+def integration(options: IntegrationOptions) -> AbstractMethod:
+    """The integration method that the options ask for."""
+    try:
+        if options.solver is None:
+            return method(steps=options.steps, tolerance=options.tolerance)
+        return method(options.solver, options.steps, options.tolerance)
+    except ValueError as error:
+        raise UsageError(_as_options(str(error))) from error
+
+
+def _as_options(sentence: str) -> str:
+    """A library's sentence about arguments, said of the options with the same names."""
+    for name in ("solver", "steps", "tolerance"):
+        sentence = sentence.replace(f"`{name}`", f"--{name}")
+    return sentence.replace("Argument", "Option", 1)
+
+
+def samples_per_revolution(chosen: AbstractMethod, most: int = 64) -> int:
+    """Samples that a method can give: of equal steps, they must divide the number."""
+    if not isinstance(chosen, FixedSteps):
+        return most
+    return max(n for n in range(1, min(most, chosen.steps) + 1) if chosen.steps % n == 0)
+
+
+def output_folder(options: Options) -> Path:
+    """The folder to write to, tried out before anything is computed."""
+    with refusing():
+        return check_writable(options.out)
+
+
+def save_figure(figure: Figure, path: Path) -> str:
+    """Write a figure, whole or not at all. **Returns:** its path as text."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary)
+    return str(path)

@@ -1,0 +1,124 @@
+"""Commands and their options. Nothing heavy is imported here, so that `--help` and typing errors
+answer at once.
+"""
+
+import dataclasses
+from typing import Annotated, ClassVar
+
+import tyro
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What every command takes."""
+
+    implementation: ClassVar[str] = ""
+    """Module of this package whose `run` carries the command out."""
+
+    case: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CASE")]
+    """A published case (1a, 1b, 2a, 2b, 3a, 3b) or the path of a TOML file."""
+    json: bool = False
+    """Print one JSON document on standard output instead of tables."""
+    out: str = "out"
+    """Folder for figures and data; it is made if need be."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class IntegrationOptions(Options):
+    """How to integrate."""
+
+    solver: str | None = None
+    """Integration method: rodas3, rodas4, newmark, tsit5, kvaerno3, kvaerno5, kencarp4."""
+    steps: int | None = None
+    """Equal steps per revolution."""
+    tolerance: float | None = None
+    """Adaptive steps with this tolerance instead of equal ones."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SweepOptions(IntegrationOptions):
+    """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones."""
+
+    implementation: ClassVar[str] = "_sweep"
+
+    first: float = 2500.0
+    """First cage speed [rpm]."""
+    last: float = 27500.0
+    """Last cage speed [rpm]."""
+    count: int = 251
+    """Number of speeds; with one, only the first speed is run."""
+    discard: int = 300
+    """Revolutions left out at the beginning."""
+    revolutions: int = 300
+    """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
+    exponents: int = 1
+    """Number of Lyapunov exponents."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ZonesOptions(SweepOptions):
+    """Chaotic zones of a case over speed, beside the published ones."""
+
+    implementation: ClassVar[str] = "_zones"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PoincareOptions(IntegrationOptions):
+    """Strobe section at one speed, from three starts."""
+
+    implementation: ClassVar[str] = "_poincare"
+
+    speed: float
+    """Cage speed [rpm]."""
+    discard: int = 300
+    """Revolutions left out at the beginning."""
+    revolutions: int = 1000
+    """Revolutions shown, a multiple of 10 (the error bars come from blocks of them)."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SimulateOptions(IntegrationOptions):
+    """Time history, orbit and each force at one speed."""
+
+    implementation: ClassVar[str] = "_simulate"
+
+    speed: float
+    """Cage speed [rpm]."""
+    revolutions: int = 20
+    """Revolutions recorded."""
+    discard: int = 0
+    """Revolutions left out at the beginning."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StaticsOptions(Options):
+    """Load of every roller, loaded zone, static displacement of the cage, kinematics."""
+
+    implementation: ClassVar[str] = "_statics"
+
+    load: float | None = None
+    """Shaft load [N]; the case's own if left out."""
+    shaft_speed: float = 0.0
+    """Shaft speed [rpm], for the centrifugal load of the rollers and for the kinematics."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ImpactOptions(Options):
+    """Impact of one roller on a cage bar: history of both forces."""
+
+    implementation: ClassVar[str] = "_impact"
+
+    speed: float
+    """Cage speed [rpm]."""
+    duration: float = 0.6
+    """Length of the history [ms]."""
+
+
+Command = (
+    Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
+    | Annotated[SweepOptions, tyro.conf.subcommand("sweep")]
+    | Annotated[ZonesOptions, tyro.conf.subcommand("zones")]
+    | Annotated[PoincareOptions, tyro.conf.subcommand("poincare")]
+    | Annotated[StaticsOptions, tyro.conf.subcommand("statics")]
+    | Annotated[ImpactOptions, tyro.conf.subcommand("impact")]
+)

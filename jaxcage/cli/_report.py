@@ -1,0 +1,82 @@
+"""What a command has to say, apart from how it is shown: tables for people, one document for
+programs.
+"""
+
+import dataclasses
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """A titled table of texts; numbers are aligned to the right."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Report:
+    """Result of a command."""
+
+    document: Mapping[str, Any]
+    tables: Sequence[Table] = ()
+    notes: Sequence[str] = ()
+    """Lines below the tables."""
+
+
+def show(report: Report, as_json: bool) -> None:
+    """Print a report on standard output: one JSON document, or tables (plain text when piped)."""
+    if as_json:
+        print(json.dumps(plain(report.document), indent=2, allow_nan=False))
+        return
+    for table in report.tables:
+        _show_rich(table) if sys.stdout.isatty() else _show_plain(table)
+    for note in report.notes:
+        print(note)
+
+
+def plain(value: Any) -> Any:
+    """Numbers of NumPy and JAX as JSON has them; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if hasattr(value, "tolist") and not isinstance(value, float):
+        return plain(value.tolist())
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
+def _show_rich(table: Table) -> None:
+    import rich.box
+    import rich.console
+    import rich.table
+
+    drawn = rich.table.Table(title=table.title, title_justify="left", box=rich.box.SIMPLE_HEAD)
+    for i, column in enumerate(table.columns):
+        drawn.add_column(column, justify="left" if i == 0 else "right")
+    for row in table.rows:
+        drawn.add_row(*row)
+    rich.console.Console().print(drawn)
+
+
+def _show_plain(table: Table) -> None:
+    lines = [list(table.columns), *map(list, table.rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(table.columns))]
+    print(table.title)
+    for line in lines:
+        first, *rest = (f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True))
+        print("  ".join([f"{line[0]:<{len(first)}}", *rest]).rstrip())
+    print()
+
+
+def number(value: float | None, digits: int = 0, nothing: str = "-") -> str:
+    """A number for a table."""
+    return nothing if value is None or not math.isfinite(value) else f"{value:.{digits}f}"

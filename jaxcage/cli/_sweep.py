@@ -1,0 +1,135 @@
+"""`jaxcage sweep`: orbit diagram, exponents and zones of a case over speed."""
+
+import collections
+import dataclasses
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis import Sweep, zones
+from ..integrate import OUTCOMES
+from ..io import save_sweep
+from ..plotting import sweep_figure
+from ..sweep import rpm, sweep
+from ._console import progress, say
+from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
+from ._inputs import Subject, integration, output_folder, save_figure, subject
+from ._options import SweepOptions
+from ._report import Report, Table
+from ._zone_report import zones_document, zones_table
+
+
+@dataclasses.dataclass(frozen=True)
+class Swept:
+    """A sweep that is done and stored."""
+
+    subject: Subject
+    sweep: Sweep
+    folder: Path
+    data: str
+    seconds: float
+
+
+def _check(options: SweepOptions) -> None:
+    require_speed("--first", options.first)
+    require_speed("--last", options.last)
+    require_at_least("--count", options.count, 1)
+    if options.count > 1 and options.last <= options.first:
+        raise UsageError(
+            "Option --last must be above --first, "
+            f"but the range is {options.first:g} to {options.last:g} rpm."
+        )
+    require_at_least("--discard", options.discard, 0)
+    require_at_least("--exponents", options.exponents, 1)
+
+
+def sweep_case(options: SweepOptions) -> Swept:
+    """Check everything, run the sweep that the options describe, and store it."""
+    _check(options)
+    blocks = require_blocks("--revolutions", options.revolutions)
+    chosen = integration(options)
+    about = subject(options)
+    if options.exponents > about.model.dimension:
+        raise UsageError(
+            f"Option --exponents must be at most {about.model.dimension}, "
+            f"but {options.exponents} was given."
+        )
+    folder = output_folder(options)
+    speeds = np.atleast_1d(rpm(options.first, options.last, options.count))
+    began = time.perf_counter()
+    with progress(f"sweep {about.name}") as bar:
+        found = sweep(
+            about.model,
+            speeds[: options.count],
+            discard=options.discard,
+            revolutions=options.revolutions,
+            exponents=options.exponents,
+            blocks=blocks,
+            method=chosen,
+            progress=bar,
+        )
+    seconds = time.perf_counter() - began
+    if np.all(found.failed):
+        names = ", ".join(sorted({OUTCOMES[code] for code in found.outcome.ravel()}))
+        raise ComputationError(
+            f"All {found.outcome.size} lanes failed ({names}): try more --steps."
+        )
+    data = save_sweep(folder / f"sweep_{about.name}.zarr", found, about.model)
+    return Swept(about, found, folder, str(data), seconds)
+
+
+def run(options: SweepOptions) -> Report:
+    """Carry out `jaxcage sweep`."""
+    swept = sweep_case(options)
+    about, found = swept.subject, swept.sweep
+    edges = zones(found)
+    figure = sweep_figure(found, edges, about.published, _title(swept))
+    path = save_figure(figure, swept.folder / f"sweep_{about.name}.png")
+    counts = collections.Counter(found.label.ravel().tolist())
+    document = zones_document(about.name, edges, about.published) | {
+        "labels": dict(sorted(counts.items())),
+        "failed": failed_lanes(found),
+        "beyond_clearance": int(np.sum(found.peak > 1)),
+        "seconds": round(swept.seconds, 2),
+        "figure": path,
+        "data": swept.data,
+    }
+    zone_table = zones_table(about.name, edges, about.published)
+    return Report(document, [_label_table(found, counts), zone_table], _notes(document))
+
+
+def failed_lanes(found: Sweep) -> dict[str, int]:
+    """How many lanes failed, by what went wrong."""
+    codes = collections.Counter(found.outcome[found.failed].tolist())
+    return {OUTCOMES[code]: n for code, n in sorted(codes.items())}
+
+
+def _title(swept: Swept) -> str:
+    published, model = swept.subject.published, swept.subject.model
+    what = f"Case {swept.subject.name}" if published is not None else swept.subject.name
+    gap, e = 1e3 * float(model.guidance_gap), 1e6 * float(model.eccentricity)
+    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm"
+
+
+def _label_table(found: Sweep, counts: collections.Counter) -> Table:
+    speeds, starts = found.outcome.shape
+    length = f"{found.discard} + {found.revolutions} revolutions"
+    title = f"Lanes: {speeds} speeds x {starts} starts, {length}"
+    rows = [(label, str(n), f"{n / found.outcome.size:.1%}") for label, n in sorted(counts.items())]
+    return Table(title, ("label", "lanes", "share"), rows)
+
+
+def _notes(document: dict[str, Any]) -> list[str]:
+    failed = ", ".join(f"{n} {name}" for name, n in document["failed"].items())
+    beyond = document["beyond_clearance"]
+    if beyond:
+        say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
+    return [
+        f"Failed lanes: {failed or 'none'}",
+        f"Lanes beyond eps = 1: {beyond}",
+        f"Time: {document['seconds']:.1f} s",
+        f"Figure: {document['figure']}",
+        f"Data: {document['data']}",
+    ]

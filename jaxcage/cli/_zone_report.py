@@ -1,0 +1,104 @@
+"""Zones found in a sweep beside the published ones, as document and as table."""
+
+from typing import Any
+
+from ..analysis import Edge, Zone, Zones
+from ..bearing import PublishedCase
+from ._report import Table, number
+
+
+Span = tuple[float, float | None]
+
+
+def published_zones(published: PublishedCase | None) -> list[Span]:
+    """Onset and exit [rpm] of the published zones; the second has no published exit."""
+    if published is None:
+        return []
+    return [
+        (published.zone_1_onset_rpm, published.zone_1_exit_rpm),
+        (published.zone_2_onset_rpm, None),
+    ]
+
+
+def zone_document(zone: Zone) -> dict[str, Any]:
+    """A zone for programs; null where it runs past the swept range."""
+    onset, exit_ = zone.onset, zone.exit
+    known = [edge.mechanism for edge in (onset, exit_) if edge is not None]
+    return {
+        "kind": zone.kind,
+        "onset_rpm": onset and onset.speed_rpm,
+        "exit_rpm": exit_ and exit_.speed_rpm,
+        "onset_uncertainty_rpm": onset and onset.uncertainty_rpm,
+        "exit_uncertainty_rpm": exit_ and exit_.uncertainty_rpm,
+        "mechanism": known[0] if known else None,
+        "onset_mechanism": onset and onset.mechanism,
+        "exit_mechanism": exit_ and exit_.mechanism,
+        "width_rpm": zone.width_rpm,
+        "share": zone.share,
+    }
+
+
+def zones_document(name: str, zones: Zones, published: PublishedCase | None) -> dict[str, Any]:
+    """All zones of a case for programs."""
+    return {
+        "case": name,
+        "resolution_rpm": zones.resolution_rpm,
+        "close_below_rpm": zones.close_below_rpm,
+        "zones": [zone_document(zone) for zone in zones.zones],
+        "published": [
+            {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
+            for i, (onset, exit_) in enumerate(published_zones(published), start=1)
+        ],
+    }
+
+
+def zones_table(name: str, zones: Zones, published: PublishedCase | None) -> Table:
+    """Zones found, each published zone beside the one it shares most speeds with, or in a row of
+    its own.
+    """
+    spans = published_zones(published)
+    partner = {i: _partner(span, zones) for i, span in enumerate(spans)}
+    rows = []
+    for i, zone in enumerate(zones.zones):
+        beside = [spans[k] for k, found in partner.items() if found == i]
+        rows.append((str(i + 1), *_zone_cells(zone), *_published_cells(beside)))
+    rows += [
+        ("-", *5 * ("-",), *_published_cells([spans[k]]))
+        for k, found in partner.items()
+        if found is None
+    ]
+    if not rows:
+        rows = [("none", *7 * ("-",))]
+    title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm"
+    columns = ("zone", "onset", "exit", "width", "mechanism", "starts chaotic")
+    return Table(title, (*columns, "published onset", "published exit"), rows)
+
+
+def _zone_cells(zone: Zone) -> tuple[str, ...]:
+    known = [edge.mechanism for edge in (zone.onset, zone.exit) if edge is not None]
+    mechanism = " / ".join(dict.fromkeys(known)) or "-"
+    width = number(zone.width_rpm, nothing="open")
+    return _edge_cell(zone.onset), _edge_cell(zone.exit), width, mechanism, f"{zone.share:.0%}"
+
+
+def _edge_cell(edge: Edge | None) -> str:
+    return "past range" if edge is None else f"{edge.speed_rpm:.0f} ± {edge.uncertainty_rpm:.0f}"
+
+
+def _published_cells(spans: list[Span]) -> tuple[str, str]:
+    onsets = ", ".join(number(onset) for onset, _ in spans)
+    exits = ", ".join(number(exit_, nothing="open") for _, exit_ in spans)
+    return onsets or "-", exits or "-"
+
+
+def _partner(span: Span, zones: Zones) -> int | None:
+    """The zone that shares most speeds with a published one; None if none does."""
+    onset, exit_ = span[0], float("inf") if span[1] is None else span[1]
+    best, widest = None, 0.0
+    for i, zone in enumerate(zones.zones):
+        low = 0.0 if zone.onset is None else zone.onset.speed_rpm
+        high = 1e9 if zone.exit is None else zone.exit.speed_rpm
+        shared = min(high, exit_) - max(low, onset)
+        if shared > widest:
+            best, widest = i, shared
+    return best

@@ -1,0 +1,21 @@
+"""`jaxcage zones`: chaotic zones of a case, beside the published ones."""
+
+from ..analysis import zones
+from ._options import ZonesOptions
+from ._report import Report
+from ._sweep import failed_lanes, sweep_case
+from ._zone_report import zones_document, zones_table
+
+
+def run(options: ZonesOptions) -> Report:
+    """Carry out `jaxcage zones`."""
+    swept = sweep_case(options)
+    edges, about = zones(swept.sweep), swept.subject
+    failed = failed_lanes(swept.sweep)
+    document = zones_document(about.name, edges, about.published) | {
+        "failed": failed,
+        "data": swept.data,
+    }
+    return Report(
+        document, [zones_table(about.name, edges, about.published)], [f"Data: {swept.data}"]
+    )

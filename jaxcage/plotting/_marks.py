@@ -1,0 +1,61 @@
+"""What is laid over diagrams with a speed axis: zones found, edges published."""
+
+from matplotlib.axes import Axes
+
+from ..analysis import Zones
+from ..bearing import PublishedCase
+from ._style import BLACK, ZONE
+
+
+def shade_zones(ax: Axes, zones: Zones) -> Axes:
+    """Shade the chaotic zones; an open zone reaches to the end of the axis."""
+    low, high = ax.get_xlim()
+    for i, zone in enumerate(zones.zones):
+        first = low if zone.onset is None else zone.onset.speed_rpm
+        last = high if zone.exit is None else zone.exit.speed_rpm
+        label = "chaotic zone" if i == 0 else "_chaotic zone"
+        ax.axvspan(first, last, color=ZONE, linewidth=0, zorder=0, label=label)
+    ax.set_xlim(low, high)
+    return ax
+
+
+def published_edges(published: PublishedCase) -> dict[str, float]:
+    """The published edges of a case [rpm] by name."""
+    return {
+        "zone 1 onset": published.zone_1_onset_rpm,
+        "zone 1 exit": published.zone_1_exit_rpm,
+        "zone 2 onset": published.zone_2_onset_rpm,
+    }
+
+
+def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axes:
+    """Mark the published edges inside the axis with dotted lines, and triangles with their speed
+    above the frame.
+
+    A triangle points into the zone: right at an onset, left at an exit.
+    """
+    low, high = ax.get_xlim()
+    inside = {name: rpm for name, rpm in published_edges(published).items() if low <= rpm <= high}
+    above = ax.get_xaxis_transform()
+    for i, (name, rpm) in enumerate(inside.items()):
+        ax.axvline(
+            rpm,
+            color=BLACK,
+            linewidth=0.9,
+            linestyle=(0, (1, 2)),
+            label="published edge" if i == 0 else None,
+        )
+        if text:
+            marker = "<" if name.endswith("exit") else ">"
+            ax.plot(rpm, 1.0, marker, color=BLACK, markersize=5, transform=above, clip_on=False)
+            ax.annotate(
+                f"{rpm:.0f}",
+                (rpm, 1.0),
+                (0, 5),
+                xycoords=above,
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=8,
+            )
+    return ax

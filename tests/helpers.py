@@ -1,0 +1,43 @@
+"""Ready-made objects and tools for the tests."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import pint
+
+import jaxcage as jc
+from jaxcage._parameters import get, parameter_info, parameter_paths
+
+
+UNITS = pint.UnitRegistry()
+
+
+def unit_exponents(unit: str) -> dict[str, float]:
+    """Exponents of mass, length and time in a parameter's unit."""
+    dims = UNITS.parse_units("dimensionless" if unit == "1" else unit).dimensionality
+    return {name: float(dims.get(f"[{name}]", 0)) for name in ("mass", "length", "time")}
+
+
+def in_other_units(model: jc.CageModel, base: str, factor: float) -> jc.CageModel:
+    """The same model with the unit of `base` (mass, length or time) made `factor` times smaller."""
+    info = parameter_info(model)
+    paths = list(parameter_paths(model).items())
+    leaves = [get(model, path) * factor ** unit_exponents(info[name].unit)[base] for name, path in paths]
+    return eqx.tree_at(lambda m: [get(m, path) for _, path in paths], model, leaves)
+
+
+def elastic(model: jc.CageModel, mass: float = 1.0, stiffness: float = 5e7, damping: float = 500.0) -> jc.CageModel:
+    """The model with an elastic rib."""
+    return jc.replace(model, rib=jc.ElasticRib(mass=mass, stiffness=stiffness, damping=damping, cubic_stiffness=1e14))
+
+
+def roller_pass(model: jc.CageModel) -> jc.CageModel:
+    """The model with impacts roller by roller."""
+    return jc.replace(model, impact=jc.RollerPassImpact(jc.PocketImpact()))
+
+
+def unforced(model: jc.CageModel) -> jc.CageModel:
+    """Film, contact and weight only: no support, no impact, no unbalance."""
+    zero = ("stiffness_x", "stiffness_y", "support.damping", "cubic_stiffness", "cross_stiffness", "amplitude", "eccentricity")
+    names = parameter_paths(model)
+    chosen = [n if n in names else n.split(".")[-1] for n in zero]
+    return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})

@@ -1,0 +1,189 @@
+"""The land contact: restitution delivered by its law, smoothness, never adhesive."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from jaxcage.forces import contact_force, power_10_9, restitution_damping, smooth_plus
+from jaxcage.models import case
+
+
+# Requested restitution and the damping number that delivers it, by root finding on the exact law.
+EXACT = {0.9: 0.166482, 0.7: 0.634828, 0.5: 1.432751, 0.3: 3.087082}
+
+
+@pytest.mark.parametrize("restitution", EXACT)
+def test_damping_number(restitution):
+    chi = float(restitution_damping(restitution))
+    assert chi == pytest.approx(EXACT[restitution], abs=1e-6)
+    defect = np.log((1 + chi) / (1 - chi * restitution)) - chi * (1 + restitution)
+    assert abs(defect) < 1e-11
+
+
+def test_damping_number_near_elastic_contact():
+    """chi = (3/2)(1 - e) + O((1 - e)^2), down to e = 1, with its slope."""
+    assert abs(float(restitution_damping(1.0))) < 1e-12
+    assert float(restitution_damping(1 - 1e-4)) == pytest.approx(1.5e-4, rel=2e-4)
+    assert float(jax.grad(restitution_damping)(1.0)) == pytest.approx(-1.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("restitution", EXACT)
+def test_damping_number_is_differentiable(restitution):
+    slope = float(jax.grad(restitution_damping)(restitution))
+    chi = float(restitution_damping(restitution))
+    # Implicit differentiation of ln(1 + chi) - ln(1 - chi e) = chi (1 + e).
+    by_chi = 1 / (1 + chi) + restitution / (1 - chi * restitution) - (1 + restitution)
+    by_e = chi / (1 - chi * restitution) - chi
+    assert slope == pytest.approx(-by_e / by_chi, rel=1e-9)
+
+
+def leaving_speed(force, mass, v0, depth):
+    """Speed ratio after a body that enters at v0 has left the contact."""
+
+    def rates(_, y):
+        return [y[1], -force(y[0], y[1]) / mass]
+
+    def left(_, y):
+        return y[0]
+
+    left.terminal, left.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
+    end = 200 * depth / v0
+    options = dict(method="DOP853", rtol=1e-11, atol=[1e-12 * depth, 1e-12 * v0], events=left)
+    solution = solve_ivp(rates, (0.0, end), [0.0, v0], **options)
+    assert solution.status == 1, "the body did not leave the contact"
+    return -solution.y[1, -1] / v0
+
+
+@pytest.mark.parametrize("restitution", EXACT)
+@pytest.mark.parametrize("exponent", [10 / 9, 1.5])
+def test_delivered_restitution(restitution, exponent):
+    """m dv/dt = -K p^n (1 + chi v/v_0): the law does not depend on the exponent."""
+    mass, stiffness, v0 = 0.2, 3e8, 0.1
+    chi = float(restitution_damping(restitution))
+
+    def force(p, v):
+        return stiffness * max(p, 0.0) ** exponent * (1 + chi * v / v0)
+
+    depth = (mass * v0**2 / stiffness) ** (1 / (exponent + 1))
+    assert leaving_speed(force, mass, v0, depth) == pytest.approx(restitution, abs=1e-5)
+
+
+@pytest.mark.parametrize("restitution", EXACT)
+def test_delivered_restitution_of_the_contact_force(restitution):
+    mass, stiffness, v0 = 0.2, 3e8, 0.1
+    chi = float(restitution_damping(restitution))
+    normal = jax.jit(lambda p, v: contact_force(p, v, stiffness, chi, v0))
+
+    def force(p, v):
+        return float(normal(jnp.asarray(max(p, 0.0)), jnp.asarray(v)))
+
+    depth = (mass * v0**2 / stiffness) ** (9 / 19)
+    assert leaving_speed(force, mass, v0, depth) == pytest.approx(restitution, abs=1e-5)
+
+
+@pytest.mark.parametrize("restitution", [0.05, 0.1, 0.2])
+def test_weak_restitution_is_delivered(restitution):
+    """Down to the lower limit of the parameter, where the force all but vanishes on the way out."""
+    mass, stiffness, v0 = 0.2, 3e8, 0.1
+    chi = float(restitution_damping(restitution))
+    normal = jax.jit(lambda p, v: contact_force(p, v, stiffness, chi, v0))
+
+    def force(p, v):
+        return float(normal(jnp.asarray(max(p, 0.0)), jnp.asarray(v)))
+
+    depth = (mass * v0**2 / stiffness) ** (9 / 19)
+    assert leaving_speed(force, mass, v0, depth) == pytest.approx(restitution, rel=0.1)
+
+
+def test_land_contact_of_the_cage_delivers_restitution():
+    """Through `CageModel`: the regularised onset costs of the order of its share of the depth."""
+    model = case("1a")
+    where = lambda m: (m.contact.restitution, m.contact.smoothing, m.contact.approach_speed)
+    model = eqx.tree_at(where, model, tuple(jnp.asarray(v) for v in (0.5, 1e-9, 0.2)))
+    cage = model.cage_at(1000.0)
+    c, onset = float(cage.clearance), float(cage.contact_onset)
+
+    @jax.jit
+    def normal(p, v):
+        film, contact = cage.land_forces(onset * c + p, 0.0 * p, v, 0.0 * v)
+        return -contact[0]
+
+    def force(p, v):
+        return float(normal(jnp.asarray(p), jnp.asarray(v)))
+
+    found = leaving_speed(force, float(cage.mass), 0.2, 1e-5)
+    assert found == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [-1e3, -1.0, -0.1, 0.0, 0.1, 10.0])
+@pytest.mark.parametrize("restitution", [0.2, 0.5, 0.9, 1.0])
+def test_contact_never_pulls(rate, restitution):
+    chi = float(restitution_damping(restitution))
+    depths = jnp.concatenate([jnp.zeros(1), jnp.geomspace(1e-15, 1e-3, 50)])
+    forces = jax.vmap(lambda p: contact_force(p, rate, 1e8, chi, 0.1))(depths)
+    assert np.all(np.asarray(forces) >= 0)
+    assert float(forces[0]) == 0.0
+    elastic = 1e8 * np.asarray(depths) ** (10 / 9)
+    factor = 1 + chi * rate / 0.1
+    if factor > 0.05:
+        np.testing.assert_allclose(forces, factor * elastic, rtol=1e-12)
+    elif factor < -0.05:
+        np.testing.assert_array_equal(forces, 0.0)
+
+
+def derivatives(f, order):
+    chain = [f]
+    for _ in range(order):
+        chain.append(jax.grad(chain[-1]))
+    return chain
+
+
+WIDTH = 2e-7
+
+
+@pytest.mark.parametrize("joint", [-WIDTH, WIDTH])
+def test_smooth_plus_joins_with_three_continuous_derivatives(joint):
+    h = 1e-6
+    below, above = joint - h * WIDTH, joint + h * WIDTH
+    for order, f in enumerate(derivatives(lambda u: smooth_plus(u, WIDTH), 3)):
+        unit = WIDTH ** (1 - order)
+        # The first derivative that jumps is the fourth, of order 60 / (2 width)^3.
+        assert float(f(below)) == pytest.approx(float(f(above)), abs=100 * h * unit)
+        assert float(f(joint)) == pytest.approx(float(f(above)), abs=100 * h * unit)
+    third = derivatives(lambda u: smooth_plus(u, WIDTH), 3)[-1]
+    inside = float(third(0.5 * WIDTH))
+    assert abs(inside) * WIDTH**2 > 1.0  # it is not zero everywhere
+
+
+def test_smooth_plus_is_exact_outside_and_close_inside():
+    u = np.linspace(-3, 3, 601) * WIDTH
+    found = np.asarray(jax.vmap(lambda x: smooth_plus(x, WIDTH))(jnp.asarray(u)))
+    exact = np.maximum(u, 0.0)
+    outside = np.abs(u) >= 1.001 * WIDTH
+    np.testing.assert_array_equal(found[outside], exact[outside])
+    excess = found - exact
+    assert np.all(excess >= -1e-22) and np.all(np.diff(found) >= 0)
+    assert excess.max() == pytest.approx(5 / 32 * WIDTH, rel=1e-12)
+
+
+def test_power_is_exact_with_finite_derivatives_at_touch():
+    p = np.geomspace(1e-12, 1.0, 25)
+    np.testing.assert_allclose(jax.vmap(power_10_9)(jnp.asarray(p)), p ** (10 / 9), rtol=1e-14)
+    for order, f in enumerate(derivatives(power_10_9, 3)):
+        assert float(f(0.0)) == 0.0, order
+        assert float(f(-1.0)) == 0.0, order
+    slope, curvature = derivatives(power_10_9, 2)[1:]
+    assert float(slope(0.3)) == pytest.approx(10 / 9 * 0.3 ** (1 / 9), rel=1e-13)
+    assert float(curvature(0.3)) == pytest.approx(10 / 81 * 0.3 ** (-8 / 9), rel=1e-13)
+
+
+def test_regularised_contact_sets_in_with_three_continuous_derivatives():
+    """p^(10/9) after `smooth_plus` is of order 40/9 in the distance from the joint."""
+    chain = derivatives(lambda u: power_10_9(smooth_plus(u, 1.0)), 3)
+    for order, f in enumerate(chain):
+        assert float(f(-1.0)) == 0.0
+        near, nearer = float(f(-1.0 + 1e-3)), float(f(-1.0 + 1e-4))
+        assert np.log10(near / nearer) == pytest.approx(40 / 9 - order, abs=2e-3)

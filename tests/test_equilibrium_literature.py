@@ -1,0 +1,307 @@
+"""Equilibrium and whirl of a short bearing against published closed forms and printed digits.
+
+Frame mapping. Friswell et al. (Dynamics of Rotating Machines, 2010, p. 177) take u across the load
+and v on the load line, with the rotation from u to v. Ours: x to the right, y up, load along -y,
+rotation counter-clockwise, from x to y. So u = x and v = y, and their matrices are ours entry by
+entry; turning both axes by half a turn changes nothing, so it does not matter whether v counts up
+or down, while mirroring one of them would change the sign of the cross terms. ROSS
+(`CylindricalBearing`) prints the same matrices.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxcage._parameters import replace
+from jaxcage.analysis._equilibrium import (
+    attitude_angle,
+    dimensional,
+    eccentricity_ratio,
+    equilibrium,
+    film_coefficients,
+    film_whirl_speed,
+    LARGEST_WHIRLING,
+    load_number,
+    stability_chart,
+    whirl_threshold,
+)
+from jaxcage.forces import ElasticRib, film_scale, RibFilm
+from jaxcage.models import case
+
+
+# eps, N, attitude angle [deg], Kxx, Kxy, Kyx, Kyy, Cxx, Cxy = Cyx, Cyy, omega sqrt(c/g), whirl ratio
+TABLE = """
+0.1 0.080383 82.708 2.5308 9.7577 -10.3811 1.3284 19.7905 -2.5325 20.4872 2.7413 0.5029
+0.2 0.172547 75.431 2.4849 4.5203  -5.7631 1.4978  9.5869 -2.4916 10.9798 2.6814 0.5106
+0.3 0.292375 68.178 2.4126 2.6246  -4.4825 1.7949  6.0612 -2.4270  8.1530 2.6058 0.5194
+0.4 0.466837 60.940 2.3189 1.5715  -4.0478 2.2493  4.2164 -2.3430  7.0221 2.5446 0.5238
+0.5 0.750381 53.680 2.2099 0.8577  -3.9766 2.9233  3.0539 -2.2450  6.6148 2.5417 0.5146
+0.6 1.27263  46.321 2.0917 0.3071  -4.1377 3.9512  2.2389 -2.1380  6.6507 2.7010 0.4740
+0.7 2.41405  38.704 1.9695 -0.1734 -4.5347 5.6594  1.6240 -2.0267  7.0987 3.6278 0.3446
+"""
+ROWS = [tuple(float(v) for v in line.split()) for line in TABLE.strip().splitlines()]
+
+
+def friswell(eps):
+    """Friswell et al. (2010), p. 177, with v against the load: K c/W and C c omega/W."""
+    q = 1 - eps**2
+    h = 1 / (np.pi**2 * q + 16 * eps**2) ** 1.5
+    p2 = np.pi**2
+    kxx = 4 * h * (p2 * (2 - eps**2) + 16 * eps**2)
+    kxy = h * np.pi * (p2 * q**2 - 16 * eps**4) / (eps * np.sqrt(q))
+    kyx = -h * np.pi * (p2 * q * (1 + 2 * eps**2) + 32 * eps**2 * (1 + eps**2)) / (eps * np.sqrt(q))
+    kyy = 4 * h * (p2 * (1 + 2 * eps**2) + 32 * eps**2 * (1 + eps**2) / q)
+    cxx = h * 2 * np.pi * np.sqrt(q) * (p2 * (1 + 2 * eps**2) - 16 * eps**2) / eps
+    cxy = -8 * h * (p2 * (1 + 2 * eps**2) - 16 * eps**2)
+    cyy = h * 2 * np.pi * (p2 * q**2 + 48 * eps**2) / (eps * np.sqrt(q))
+    return np.array([[kxx, kxy], [kyx, kyy]]), np.array([[cxx, cxy], [cxy, cyy]])
+
+
+def threshold(eps):
+    c = film_coefficients(eps)
+    return whirl_threshold(c.stiffness, c.damping)
+
+
+@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
+@pytest.mark.parametrize("eps", [1e-3, 0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95])
+def test_autodiff_coefficients_are_friswells_closed_forms(eps, film):
+    ours = film_coefficients(eps, film)
+    stiffness, damping = friswell(eps)
+    np.testing.assert_allclose(ours.stiffness, stiffness, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(ours.damping, damping, rtol=1e-8, atol=1e-8)
+    assert float(ours.load_number) == pytest.approx(float(load_number(eps)), rel=1e-12)
+    assert float(ours.attitude_angle) == pytest.approx(float(attitude_angle(eps)), rel=1e-12)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=[str(row[0]) for row in ROWS])
+def test_table_of_the_short_bearing(row):
+    eps, number, angle, kxx, kxy, kyx, kyy, cxx, cxy, cyy, speed, ratio = row
+    c = film_coefficients(eps)
+    assert float(load_number(eps)) == pytest.approx(number, rel=6e-6)
+    assert np.degrees(attitude_angle(eps)) == pytest.approx(angle, abs=6e-4)
+    np.testing.assert_allclose(c.stiffness, [[kxx, kxy], [kyx, kyy]], atol=6e-5)
+    np.testing.assert_allclose(c.damping, [[cxx, cxy], [cxy, cyy]], atol=6e-5)
+    assert float(threshold(eps).speed) == pytest.approx(speed, abs=6e-5)
+    assert float(threshold(eps).whirl_ratio) == pytest.approx(ratio, abs=6e-5)
+
+
+def test_sommerfeld_number_of_the_table():
+    """S (L/D)^2 = mu n_s D L (R/c)^2 (L/D)^2/W = 1/(4 pi N), n_s in revolutions per second."""
+    printed = [0.98998, 0.46119, 0.27218, 0.17046, 0.10605, 0.06253, 0.03296]
+    ours = [1 / (4 * np.pi * float(load_number(row[0]))) for row in ROWS]
+    np.testing.assert_allclose(ours, printed, atol=6e-6)
+
+
+def test_printed_digits_of_ocvirks_solution():
+    """Independent program: eps = 0.5 gives N = 0.750381081812 and 53.68020060 deg."""
+    assert float(load_number(0.5)) == pytest.approx(0.750381081812, abs=6e-13)
+    assert np.degrees(attitude_angle(0.5)) == pytest.approx(53.68020060, abs=6e-9)
+
+
+@pytest.mark.parametrize(
+    "load, speed_rpm, viscosity, eps, angle, thickness_um",
+    [
+        (1000.0, 3000.0, 0.02, 0.6757879254, 40.58502207, 32.421207),
+        (500.0, 3000.0, 0.02, 0.5596683869, 49.30861855, 44.033161),
+        (1000.0, 6000.0, 0.02, 0.5596683869, 49.30861855, 44.033161),
+        (1000.0, 3000.0, 0.04, 0.5596683869, 49.30861855, 44.033161),
+    ],
+)
+def test_bearing_of_50_mm_radius(load, speed_rpm, viscosity, eps, angle, thickness_um):
+    """R 50, L 25 mm, c 100 um: digits printed by an independent program."""
+    scale = film_scale(viscosity, 0.05, 0.025, 1e-4)
+    ours = eccentricity_ratio(load / (scale * speed_rpm * np.pi / 30))
+    assert float(ours) == pytest.approx(eps, abs=6e-11)
+    assert np.degrees(attitude_angle(ours)) == pytest.approx(angle, abs=6e-9)
+    assert 100 * (1 - float(ours)) == pytest.approx(thickness_um, abs=6e-7)
+
+
+def test_ross_doctest():
+    """ROSS `CylindricalBearing`: W 525 N, L 30, D 100, c 0.1 mm, 0.1 Pa s, 1500 rpm; N/m, rounded.
+
+    Its attitude angle has a misplaced bracket and is not compared.
+    """
+    speed = 1500 * np.pi / 30
+    eps = eccentricity_ratio(525 / (film_scale(0.1, 0.05, 0.03, 1e-4) * speed))
+    assert float(eps) == pytest.approx(0.266298, abs=6e-7)
+    stiffness, damping = dimensional(
+        film_coefficients(eps), load=525.0, clearance=1e-4, speed=speed
+    )
+    printed = [[12807959, 16393593], [-25060393, 8815302]]
+    np.testing.assert_allclose(stiffness, printed, atol=1.0)
+    np.testing.assert_allclose(damping, friswell(float(eps))[1] * 525 / (1e-4 * speed), rtol=1e-10)
+
+
+@pytest.mark.parametrize("eps", [1e-8, 1e-3, 0.2, 0.5, 0.9, 0.999])
+def test_eccentricity_ratio_inverts_the_load_number(eps):
+    assert float(eccentricity_ratio(load_number(eps))) == pytest.approx(eps, rel=1e-12)
+    slope = jax.grad(eccentricity_ratio)(load_number(eps))
+    assert float(slope * jax.grad(load_number)(eps)) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_load_number_must_be_positive():
+    with pytest.raises(Exception, match="`load_number` must be positive"):
+        eccentricity_ratio(0.0)
+
+
+def test_threshold_of_a_vanishing_load():
+    """omega sqrt(c/g) = sqrt(24/pi), whirl at half speed, K_xx = 8/pi, K_yy = 4/pi as eps -> 0."""
+    small = threshold(1e-6)
+    assert float(small.speed) == pytest.approx(np.sqrt(24 / np.pi), rel=1e-10)
+    assert float(small.whirl_ratio) == pytest.approx(0.5, rel=1e-10)
+    c = film_coefficients(1e-6)
+    np.testing.assert_allclose(np.diag(c.stiffness), [8 / np.pi, 4 / np.pi], rtol=1e-8)
+
+
+def test_smallest_threshold():
+    chart = stability_chart(np.linspace(0.4, 0.5, 10001))
+    place = np.argmin(chart.threshold)
+    assert chart.threshold[place] == pytest.approx(2.53171, abs=6e-6)
+    assert chart.eccentricity_ratio[place] == pytest.approx(0.45697, abs=2e-5)
+    slope = jax.grad(lambda e: threshold(e).speed)(chart.eccentricity_ratio[place])
+    assert abs(float(slope)) < 1e-3
+
+
+def test_no_whirl_from_the_largest_eccentricity_on():
+    assert LARGEST_WHIRLING == pytest.approx(0.756030, abs=6e-7)
+    assert float(threshold(LARGEST_WHIRLING - 1e-9).speed) > 1e4
+    chart = stability_chart(np.linspace(LARGEST_WHIRLING + 1e-12, 0.99, 50))
+    assert np.all(np.isinf(chart.threshold)) and np.all(np.isnan(chart.whirl_ratio))
+
+
+def test_full_film_whirls_at_every_speed_at_half_speed():
+    c = film_coefficients(0.5, "full")
+    assert np.degrees(c.attitude_angle) == pytest.approx(90.0)
+    assert float(c.load_number) == pytest.approx(np.pi * 0.5 / (2 * 0.75**1.5), rel=1e-12)
+    found = whirl_threshold(c.stiffness, c.damping)
+    assert float(found.speed) < 1e-6
+
+
+@pytest.mark.parametrize("eps", [0.02, 0.3, 0.6, 0.74])
+def test_eigenvalues_cross_the_axis_at_rouths_threshold(eps):
+    c, found = film_coefficients(eps), threshold(eps)
+    for factor, sign in ((0.99, -1), (1.0, 0), (1.01, 1)):
+        m = (factor * found.speed) ** 2
+        matrix = np.block(
+            [[np.zeros((2, 2)), np.eye(2)], [-c.stiffness / m, -c.damping / m]]
+        )
+        values = np.linalg.eigvals(matrix)
+        worst = values[np.argmax(values.real)]
+        if sign == 0:
+            assert abs(worst.real) < 1e-10
+            assert abs(worst.imag) == pytest.approx(float(found.whirl_ratio), rel=1e-9)
+        else:
+            assert np.sign(worst.real) == sign and abs(worst.real) > 1e-6
+
+
+def test_default_chart_holds_together():
+    chart = stability_chart()
+    assert np.all(np.diff(chart.load_number) > 0) and np.all(np.diff(chart.attitude_angle) < 0)
+    assert np.nanmin(chart.threshold) == pytest.approx(2.5317, abs=1e-4)
+    finite = np.isfinite(chart.threshold)
+    assert np.array_equal(finite, chart.eccentricity_ratio < LARGEST_WHIRLING)
+    assert np.all(chart.whirl_ratio[chart.eccentricity_ratio < 0.5] >= 0.5)
+
+
+# The cage in its film, without support.
+
+
+def cage_in_film(**changes):
+    names = ("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness")
+    return replace(case("1a"), **(dict.fromkeys(names, 0.0) | changes))
+
+
+@pytest.mark.parametrize("mass", [1e-3, 0.05, 0.15, 0.212])
+def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
+    model = cage_in_film(cage_mass=mass)
+    speed = film_whirl_speed(model)
+    at = equilibrium(model, speed)
+    eps = at.eccentricity_ratio
+    assert float(speed) == pytest.approx(
+        float(threshold(eps).speed) * np.sqrt(9.81 / 0.45e-3), rel=1e-8
+    )
+    assert float(at.attitude_angle) == pytest.approx(float(attitude_angle(eps)), rel=1e-8)
+    assert abs(float(at.growth_rate)) < 1e-6
+    ratio = float(at.whirl_frequency / speed)
+    assert ratio == pytest.approx(float(threshold(eps).whirl_ratio), rel=1e-6)
+    assert float(equilibrium(model, 0.99 * speed).growth_rate) < -0.03
+    assert float(equilibrium(model, 1.01 * speed).growth_rate) > 0.03
+
+
+@pytest.mark.parametrize(
+    "gap_mm, highest", [(0.225, 5511), (0.30, 4773), (0.45, 3897), (0.60, 3375)]
+)
+def test_whirl_speed_of_a_light_cage_in_rpm(gap_mm, highest):
+    """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as one over the root of the gap."""
+    model = cage_in_film(cage_mass=1e-6, guidance_gap=gap_mm * 1e-3)
+    assert float(film_whirl_speed(model)) * 30 / np.pi == pytest.approx(highest, abs=0.6)
+
+
+def test_whirl_speed_depends_on_mass_over_cube_of_land_width():
+    model = cage_in_film()
+    slope = lambda name: jax.grad(lambda v: film_whirl_speed(replace(model, **{name: v})))
+    mass, width, gap = model.cage_mass, model.film.land_width, model.guidance_gap
+    by_mass = mass * slope("cage_mass")(mass)
+    by_width = width * slope("land_width")(width)
+    assert float(by_mass) > 1.0
+    assert float(by_width) == pytest.approx(-3 * float(by_mass), rel=1e-9)
+    up, down = (film_whirl_speed(replace(model, guidance_gap=gap * k)) for k in (1 + 1e-5, 1 - 1e-5))
+    difference = float(up - down) / 2e-5
+    assert float(gap * slope("guidance_gap")(gap)) == pytest.approx(difference, rel=1e-7)
+
+
+def test_heavy_cage_on_a_weak_film_never_whirls():
+    model = cage_in_film(cage_mass=100.0, land_width=1e-4)
+    assert np.isinf(film_whirl_speed(model))
+    with pytest.raises(ValueError, match="'full'"):
+        full = eqx.tree_at(lambda m: m.film, model, RibFilm(land_width=1e-4, model="full"))
+        film_whirl_speed(full)
+
+
+@pytest.mark.parametrize("rpm", [2500.0, 9000.0, 27500.0])
+@pytest.mark.parametrize("name", ["1a", "2b"])
+def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
+    model, speed = case(name), rpm * np.pi / 30
+    at = equilibrium(model, speed)
+    zero = jnp.zeros(())
+    forces = model.cage_at(speed).forces(zero, *at.coordinates, zero, zero)
+    for i in (0, 1):
+        rest = sum(f[i] for f in (forces.film, forces.contact, forces.support, forces.weight))
+        assert abs(float(rest)) < 1e-9 * float(model.cage_mass) * 9.81
+    assert 0 < float(at.eccentricity_ratio) < 0.1  # the support carries most of the weight
+    assert float(at.growth_rate) < 0 and at.eigenvalues.shape == (4,)
+
+
+def test_light_support_adds_its_stiffness_to_the_eigenvalues():
+    """Without weight and film the cage is two oscillators: w^2 = K/M - (B/2M)^2."""
+    model = replace(
+        case("1a"), gravity=0.0, land_width=1e-7, cross_stiffness=0.0, stiffness_y=9000.0
+    )
+    at = equilibrium(model, 500.0, start=jnp.array([1e-6, 2e-6]))
+    np.testing.assert_allclose(at.coordinates, 0.0, atol=1e-12)
+    mass, rate = 0.212227, 3.3136 / (2 * 0.212227)
+    np.testing.assert_allclose(at.eigenvalues.real, -rate, rtol=1e-6)
+    expected = [np.sqrt(k / mass - rate**2) for k in (9000.0, 37402.4)]
+    np.testing.assert_allclose(np.sort(np.abs(at.eigenvalues.imag))[::2], expected, rtol=1e-6)
+
+
+def test_gradient_of_the_growth_rate_is_that_of_differences():
+    model, speed = cage_in_film(cage_mass=0.1), 450.0
+    rate = lambda v: equilibrium(replace(model, guidance_gap=v), speed).growth_rate
+    gap = model.guidance_gap
+    difference = (rate(gap * (1 + 1e-5)) - rate(gap * (1 - 1e-5))) / (2e-5 * gap)
+    assert float(jax.grad(rate)(gap)) == pytest.approx(float(difference), rel=1e-6)
+
+
+def test_elastic_rib_sinks_under_both_weights_and_the_cage_with_it():
+    model = case("1a")
+    elastic = eqx.tree_at(
+        lambda m: m.rib, model, ElasticRib(mass=1.0, stiffness=1e7, damping=50.0)
+    )
+    rigid, soft = equilibrium(model, 800.0), equilibrium(elastic, 800.0)
+    assert soft.eigenvalues.shape == (8,) and float(soft.growth_rate) < 0
+    rib = np.asarray(soft.coordinates[2:])
+    np.testing.assert_allclose(rib, [0.0, -(1.0 + 0.212227) * 9.81 / 1e7], rtol=1e-8, atol=1e-15)
+    np.testing.assert_allclose(soft.coordinates[:2] - rib, rigid.coordinates, rtol=1e-8)

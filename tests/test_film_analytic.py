@@ -1,0 +1,371 @@
+"""The rib film against tables, quadrature of the pressure (26), closed forms and limits."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from jaxcage._parameters import replace
+from jaxcage.forces import (
+    RibFilm,
+    film_drive,
+    film_pressure,
+    film_resistance,
+    half_circle_resistance,
+    short_film_force,
+    supply_force,
+)
+from jaxcage.models import case
+
+
+MODELS = "fixed_half", "positive_pressure", "full"
+SMOOTHING = 1e-9
+
+
+def force(model, r, v, omega=1.0, smoothing=SMOOTHING):
+    return jnp.stack(short_film_force(model, r[0], r[1], v[0], v[1], omega, smoothing))
+
+
+def polar_state(eps, phi, eps_rate, phi_rate):
+    """Position and velocity over clearance, unit vectors along the radius and along +phi."""
+    radial = np.array([np.cos(phi), np.sin(phi)])
+    tangential = np.array([-np.sin(phi), np.cos(phi)])
+    return eps * radial, eps_rate * radial + eps * phi_rate * tangential, radial, tangential
+
+
+# Unit mu omega R L^3 / c^2, outward radial and tangential, at eps = 0.5.
+TABLE = {
+    (0.0, 0.0): {
+        "fixed_half": (-0.444444, 0.604600),
+        "positive_pressure": (-0.444444, 0.604600),
+        "full": (0.0, 1.209200),
+    },
+    (0.1, 0.0): {
+        "fixed_half": (-0.928124, 0.782378),
+        "positive_pressure": (-1.069483, 0.764804),
+        "full": (-0.967360, 1.209200),
+    },
+    (0.1, 0.5): {
+        "fixed_half": (-0.483680, 0.177778),
+        "positive_pressure": (-0.911573, 0.0),
+        "full": (-0.967360, 0.0),
+    },
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("point", TABLE)
+@pytest.mark.parametrize("phi", [0.0, 2.1])
+def test_regression_table(model, point, phi):
+    r, v, radial, tangential = polar_state(0.5, phi, *point)
+    f = np.asarray(force(model, r, v))
+    np.testing.assert_allclose((f @ radial, f @ tangential), TABLE[point][model], atol=1e-6)
+
+
+def random_states(count=12):
+    """Eccentricity ratio, angle and their rates."""
+    rng = np.random.default_rng(20160912)
+    eps, phi = rng.uniform(0.02, 0.96, count), rng.uniform(-np.pi, np.pi, count)
+    rates = rng.normal(scale=0.4, size=count), rng.normal(scale=0.8, size=count)
+    return [tuple(map(float, state)) for state in zip(eps, phi, *rates, strict=True)]
+
+
+def pressure(alpha, eps, eps_rate, phi_rate, omega):
+    """(26) in clean form, integrated over the land width; forces have the unit mu R L^3 / c^2."""
+    drive = (omega - 2 * phi_rate) * eps * np.sin(alpha) - 2 * eps_rate * np.cos(alpha)
+    return 0.5 * drive / (1 + eps * np.cos(alpha)) ** 3
+
+
+def arcs(model, eps, eps_rate, phi_rate, omega):
+    if model == "fixed_half":
+        return [(0.0, np.pi)]
+    if model == "full":
+        return [(0.0, np.pi), (np.pi, 2 * np.pi)]
+    # The drive is a sine wave in alpha: it is positive over the half circle after its zero.
+    start = np.arctan2(2 * eps_rate, (omega - 2 * phi_rate) * eps)
+    return [(start, start + np.pi / 2), (start + np.pi / 2, start + np.pi)]
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("state", random_states())
+def test_force_is_the_integral_of_the_pressure(model, state):
+    eps, phi, eps_rate, phi_rate = state
+    omega = 1.3
+    ends = arcs(model, eps, eps_rate, phi_rate, omega)
+    if model == "positive_pressure":
+        inside = np.linspace(ends[0][0], ends[-1][1], 101)[1:-1]
+        assert np.all(pressure(inside, eps, eps_rate, phi_rate, omega) > 0)
+        outside = inside + np.pi
+        assert np.all(pressure(outside, eps, eps_rate, phi_rate, omega) < 0)
+
+    def integral(direction):
+        def push(alpha):  # counted from the widest gap, opposite to the displacement
+            return -pressure(alpha, eps, eps_rate, phi_rate, omega) * direction(alpha + phi + np.pi)
+
+        return sum(quad(push, a, b, epsabs=0, epsrel=1e-12, limit=200)[0] for a, b in ends)
+
+    r, v, *_ = polar_state(eps, phi, eps_rate, phi_rate)
+    expected = np.array([integral(np.cos), integral(np.sin)])
+    found = np.asarray(force(model, r, v, omega))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.linalg.norm(expected))
+
+
+def test_pressure_solves_the_short_bearing_equation():
+    """d/dz (h^3 dp/dz) = 6 mu (omega - 2 phi') dh/dalpha + 12 mu dh/dt, zero at the land's ends."""
+    mu, width, c, eps, eps_rate, phi_rate, omega = 0.05, 4e-3, 4e-4, 0.6, 30.0, 110.0, 900.0
+    factor = 3 * mu * (width / c) ** 2
+
+    def p(alpha, z):
+        return film_pressure(alpha, z / width, eps, eps_rate, phi_rate, omega, factor)
+
+    for alpha in (0.3, 1.9, 4.0):
+        h = c * (1 + eps * np.cos(alpha))
+        slope, rate = -c * eps * np.sin(alpha), c * eps_rate * np.cos(alpha)
+        curvature = jax.grad(jax.grad(p, argnums=1), argnums=1)(alpha, 0.7e-3)
+        expected = (6 * mu * (omega - 2 * phi_rate) * slope + 12 * mu * rate) / h**3
+        assert float(curvature) == pytest.approx(expected, rel=1e-10)
+        assert float(p(alpha, width / 2)) == 0.0 == float(p(alpha, -width / 2))
+        # The mean over the width is the integrand of the force.
+        mean = quad(lambda z: float(p(alpha, z)), -width / 2, width / 2)[0] / width
+        unit = mu * (width / c) ** 2
+        assert mean / unit == pytest.approx(pressure(alpha, eps, eps_rate, phi_rate, omega))
+
+
+def matrix(model, r, v, omega=1.0, smoothing=SMOOTHING):
+    px, py = film_drive(r[0], r[1], v[0], v[1], omega)
+    m = film_resistance(model, r[0], r[1], px, py, omega, smoothing)
+    return np.array([[m.xx, m.xy], [m.xy, m.yy]], dtype=float)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("state", random_states())
+def test_velocity_coefficients_are_the_derivative_and_positive_definite(model, state):
+    r, v, *_ = polar_state(*state)
+    m = matrix(model, r, v)
+    derivative = np.asarray(jax.jacfwd(force, argnums=2)(model, r, v))
+    np.testing.assert_allclose(derivative, -m, rtol=0, atol=1e-10 * np.abs(m).max())
+    assert np.all(np.linalg.eigvalsh(m) > 0)
+
+
+@pytest.mark.parametrize("model, share", [("fixed_half", 0.5), ("full", 1.0)])
+@pytest.mark.parametrize("state", random_states(4))
+def test_velocity_coefficients_of_fixed_arcs_in_closed_form(model, share, state):
+    """The damping matrix read off (27): radial, cross and tangential."""
+    r, v, radial, tangential = polar_state(*state)
+    eps2 = state[0] ** 2
+    m = matrix(model, r, v)
+    skew = -2 * state[0] / (1 - eps2) ** 2 if model == "fixed_half" else 0.0
+    isotropic = share * np.pi / (1 - eps2) ** 1.5
+    expected = isotropic * (1 + 2 * eps2) / (1 - eps2), skew, isotropic
+    found = radial @ m @ radial, radial @ m @ tangential, tangential @ m @ tangential
+    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-9)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("angle", [0.4, np.pi / 2, -2.5])
+def test_rotation_of_the_state_rotates_the_force(model, angle):
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    for state in random_states(4):
+        r, v, *_ = polar_state(*state)
+        f = np.asarray(force(model, r, v))
+        turned = np.asarray(force(model, turn @ r, turn @ v))
+        np.testing.assert_allclose(turned, turn @ f, rtol=0, atol=1e-12 * np.linalg.norm(f))
+
+
+def test_models_relate_through_half_circles():
+    """Two opposite half circles make the whole; the fixed half trails the line of centres."""
+    for eps, phi, *_ in random_states(6):
+        x, y = eps * np.cos(phi), eps * np.sin(phi)
+        whole = np.array(film_resistance("full", x, y, 1.0, 0.0, 1.0, SMOOTHING))
+        ux, uy = np.cos(1.1), np.sin(1.1)
+        halves = [np.array(half_circle_resistance(x, y, s * ux, s * uy)) for s in (1.0, -1.0)]
+        np.testing.assert_allclose(halves[0] + halves[1], whole, rtol=1e-11)
+        fixed = np.array(film_resistance("fixed_half", x, y, 1.0, 0.0, 1.0, SMOOTHING))
+        behind = np.array(half_circle_resistance(x, y, np.sin(phi), -np.cos(phi)))
+        np.testing.assert_allclose(behind, fixed, rtol=1e-11, atol=1e-11 * np.abs(fixed).max())
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_no_entrainment_takes_energy_out(model):
+    rng = np.random.default_rng(4)
+    for eps in (0.1, 0.5, 0.9, 0.999):
+        phi, v = rng.uniform(-np.pi, np.pi), rng.normal(size=2)
+        r = eps * np.array([np.cos(phi), np.sin(phi)])
+        power = float(force(model, r, v, omega=0.0) @ v)
+        assert power < -0.1 * float(v @ v)
+
+
+def test_fixed_half_pulls_where_positive_pressure_does_not():
+    """Half-speed whirl with the gap closing at the far side: suction on the fixed arc."""
+    r, v, radial, _ = polar_state(0.5, 0.0, -0.3, 0.5)
+    pulled = float(force("fixed_half", r, v) @ radial)
+    pushed = float(force("positive_pressure", r, v) @ radial)
+    assert pulled == pytest.approx(0.3 * np.pi / 2 * 1.5 / 0.75**2.5, rel=1e-9)
+    assert 0 < pushed < 0.3 * pulled
+
+
+CENTRE = np.zeros(2)
+VELOCITY = np.array([0.3, -0.2])
+J = np.array([[0.0, 1.0], [-1.0, 0.0]])  # dP/dr over omega
+
+
+@pytest.mark.parametrize("model, share", [(m, 1.0 if m == "full" else 0.5) for m in MODELS])
+def test_force_at_the_centre_is_the_limit(model, share):
+    centre = force(model, CENTRE, VELOCITY)
+    np.testing.assert_allclose(centre, -share * np.pi * VELOCITY, rtol=1e-12)
+    for angle in (0.0, 1.0, 4.0):
+        near = 1e-7 * np.array([np.cos(angle), np.sin(angle)])
+        np.testing.assert_allclose(force(model, near, VELOCITY), centre, rtol=0, atol=1e-6)
+
+
+def test_gradients_at_the_centre_in_closed_form():
+    gradient = {m: np.asarray(jax.jacfwd(force, argnums=1)(m, CENTRE, VELOCITY)) for m in MODELS}
+    np.testing.assert_allclose(gradient["full"], -np.pi / 2 * J, atol=1e-12)
+    # The trailing half turns with the displacement: its part of the slope averages to zero.
+    np.testing.assert_allclose(gradient["fixed_half"], -np.pi / 4 * J, atol=1e-9)
+    speed = np.linalg.norm(VELOCITY)
+    along = np.outer(VELOCITY, VELOCITY) / speed**2
+    # -1/2 of n (n.omega J r + 6 (v.n) (n.r)) over the half circle about v, on which
+    # cos^3 gives 4/3 and cos sin^2 gives 2/3.
+    squeeze = 6 * speed * (4 / 3 * along + 2 / 3 * (np.eye(2) - along))
+    expected = -0.5 * (np.pi / 2 * J + squeeze)
+    np.testing.assert_allclose(gradient["positive_pressure"], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_gradient_at_the_centre_is_the_mean_of_opposite_limits(model):
+    slope = jax.jacfwd(force, argnums=1)
+    for angle in (0.3, 1.7):
+        d = 1e-6 * np.array([np.cos(angle), np.sin(angle)])
+        ahead, behind = slope(model, d, VELOCITY), slope(model, -d, VELOCITY)
+        # What is left of the mean is of the order of the distance, with coefficients below 10.
+        centre = slope(model, CENTRE, VELOCITY)
+        np.testing.assert_allclose(centre, (ahead + behind) / 2, atol=1e-5)
+        jump = np.abs(ahead - behind).max()
+        assert jump > 0.5 if model == "fixed_half" else jump < 1e-4
+
+
+@pytest.mark.parametrize("model", ["positive_pressure", "full"])
+def test_second_derivative_at_the_centre_against_differences(model):
+    slope = jax.jacfwd(force, argnums=1)
+    second = np.asarray(jax.jacfwd(slope, argnums=1)(model, CENTRE, VELOCITY))
+    h = 1e-5
+    for k in range(2):
+        d = h * np.eye(2)[k]
+        difference = (slope(model, d, VELOCITY) - slope(model, -d, VELOCITY)) / (2 * h)
+        np.testing.assert_allclose(second[..., k], difference, atol=1e-6)
+    assert np.abs(second).max() > 0.1
+
+
+def test_second_derivative_of_the_fixed_half_is_bounded_by_its_smoothing():
+    """Its slope jumps at the centre; regularised over a length s, the curvature is jump over s."""
+    s = 1e-3
+    second = jax.jacfwd(jax.jacfwd(force, argnums=1), argnums=1)
+    found = np.asarray(second("fixed_half", CENTRE, VELOCITY, 1.0, s))
+    vx, vy = VELOCITY
+    # -M v with the turning part M = (2/s) [[2 x y, y^2 - x^2], [., -2 x y]]
+    expected_x = -2 / s * np.array([[-2 * vy, 2 * vx], [2 * vx, 2 * vy]])
+    expected_y = -2 / s * np.array([[-2 * vx, -2 * vy], [-2 * vy, 2 * vx]])
+    # What is left is the smooth part of the film: 9/2 pi and the drive's slope, of order ten.
+    np.testing.assert_allclose(found, [expected_x, expected_y], atol=20.0)
+    assert np.abs(expected_x).max() > 1e3
+
+
+def test_positive_arc_is_differentiable_where_there_is_no_drive():
+    r = np.array([0.3, 0.1])
+    v = np.array([-r[1], r[0]]) / 2  # half-speed whirl: P = 0
+    np.testing.assert_allclose(force("positive_pressure", r, v), 0.0, atol=1e-15)
+    slope = np.asarray(jax.jacfwd(force, argnums=2)("positive_pressure", r, v))
+    steady = np.array([half_circle_resistance(*r, *u) for u in ((1.0, 0.0), (-1.0, 0.0))]).sum(0)
+    # The mean of the two opposite limits: half of the whole film.
+    whole = np.array([[steady[0], steady[1]], [steady[1], steady[2]]])
+    step = 1e-4 * np.array([0.6, 0.8])
+    two_sided = force("positive_pressure", r, v + step) - force("positive_pressure", r, v - step)
+    np.testing.assert_allclose(two_sided, -whole @ step, rtol=1e-6)
+    assert np.all(np.isfinite(slope))
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("state", random_states(3))
+def test_supply_pressure_pushes_with_its_projected_area(model, state):
+    """Thrust 2 R L p_0 of (27): a uniform pressure over the half circle that carries the film."""
+    omega = 1.3
+    r, v, *_ = polar_state(*state)
+    px, py = film_drive(*r, *v, omega)
+    thrust = np.array(supply_force(model, *r, px, py, omega, SMOOTHING))
+    eps, phi, eps_rate, phi_rate = state
+    ends = arcs(model, eps, eps_rate, phi_rate, omega)
+    lo, hi = ends[0][0] + phi + np.pi, ends[-1][1] + phi + np.pi
+    expected = -np.array([np.sin(hi) - np.sin(lo), np.cos(lo) - np.cos(hi)])
+    np.testing.assert_allclose(thrust, expected, atol=1e-12)
+    assert np.linalg.norm(thrust) == pytest.approx(0.0 if model == "full" else 2.0, abs=1e-12)
+
+
+def test_supply_pressure_in_the_cage_is_2_R_L_p0_for_each_land():
+    model = case("1a")
+    pressed = replace(model, supply_pressure=3e4)
+    point = 1e-4, -0.5e-4, 0.01, 0.02
+    (film, _), (plain, _) = (m.cage_at(900.0).land_forces(*point) for m in (pressed, model))
+    difference = np.array(film) - np.array(plain)
+    size = 2 * 2 * float(model.land_radius) * float(model.film.land_width) * 3e4
+    tangential = np.array([0.5, 1.0]) / np.hypot(1.0, 0.5)
+    np.testing.assert_allclose(difference, size * tangential, rtol=1e-9)
+
+
+def with_film(name):
+    model = case("1a")
+    film = RibFilm(land_width=model.film.land_width, model=name)
+    return eqx.tree_at(lambda m: m.film, model, film)
+
+
+EPS = np.linspace(0.0, 1.5, 1501)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("angle", [0.0, 2.2])
+def test_land_force_at_rest_is_finite_and_monotone_through_contact(model, angle):
+    cage = with_film(model).cage_at(1000.0)
+    x, y = np.cos(angle), np.sin(angle)
+
+    def both(eps):
+        r = eps * cage.clearance
+        film, contact = cage.land_forces(r * x, r * y, 0.0, 0.0)
+        return jnp.stack([jnp.stack(film), jnp.stack(contact)])
+
+    film, contact = np.moveaxis(np.asarray(jax.vmap(both)(jnp.asarray(EPS))), 1, 0)
+    size = np.linalg.norm(film + contact, axis=-1)
+    assert np.all(np.isfinite(size))
+    assert np.all(np.diff(size) > 0)
+    inward = -(film + contact) @ np.array([x, y])
+    assert np.all(np.diff(inward) >= (0.0 if model != "full" else -1e-12))
+    onset = float(cage.contact_onset)
+    assert np.all(contact[onset - 1e-3 > EPS] == 0)
+    # Beyond the onset the film grows with the drive alone, in proportion to eps.
+    there = np.linalg.norm(film, axis=-1) / EPS.clip(1e-9)
+    np.testing.assert_allclose(there[onset + 1e-3 < EPS], there[-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_film_in_the_cage_is_the_short_film_and_its_damping_saturates(model):
+    cage = with_film(model).cage_at(1000.0)
+    c, onset = float(cage.clearance), float(cage.contact_onset)
+    drive = np.array([40.0, -60.0])  # the same at every eps, because the positive arc follows it
+
+    def film(v, eps):
+        return jnp.stack(cage.land_forces(c * eps * 0.6, c * eps * 0.8, c * v[0], c * v[1])[0])
+
+    def velocity(eps):
+        return drive + 500.0 * eps * np.array([-0.8, 0.6])
+
+    for eps in (0.2, onset - 1e-3):
+        v = velocity(eps)
+        expected = force(model, eps * np.array([0.6, 0.8]), v, 1000.0, float(cage.film_smoothing))
+        np.testing.assert_allclose(film(v, eps), float(cage.film_scale) * expected, rtol=1e-10)
+    damping = jax.jacfwd(film)
+    at = onset * np.array([0.6, 0.8]), velocity(onset), 1000.0, float(cage.film_smoothing)
+    at_onset = -float(cage.film_scale) * matrix(model, *at)
+    for eps in (onset + 1e-3, 1.0, 1.4):
+        # The positive arc's direction is a unit vector to (smoothing omega / |P|)^2 = 2e-10.
+        np.testing.assert_allclose(damping(velocity(eps), eps), at_onset, rtol=3e-8)

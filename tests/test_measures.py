@@ -1,0 +1,247 @@
+"""Measures of orbits whose every measure is known."""
+
+import dataclasses
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcage.integrate as ji
+from jaxcage._parameters import replace
+from jaxcage.analysis._equilibrium import equilibrium
+from jaxcage.analysis._measures import (
+    cage_forces,
+    film_drag_power,
+    orbit_measures,
+    relative_state,
+    winding,
+)
+from jaxcage.forces import ElasticRib, PocketImpact, RollerPassImpact, RibFilm
+from jaxcage.models import case
+
+
+SPEED = 1000.0
+GAP = 0.45e-3
+MASS = 0.212227
+
+
+def orbit(
+    radius=1e-4, ratio=1.0, centre=(0.0, 0.0), flatten=1.0, revolutions=8, samples=64, speed=SPEED
+):
+    """Centre on an ellipse at `ratio` times the cage speed."""
+    tau = 2 * np.pi * np.arange(revolutions * samples) / samples
+    a, w = ratio * tau, ratio * speed
+    position = [centre[0] + radius * np.cos(a), centre[1] + flatten * radius * np.sin(a)]
+    velocity = [-radius * w * np.sin(a), flatten * radius * w * np.cos(a)]
+    return trajectory(tau, np.stack(position + velocity, axis=1), speed, samples)
+
+
+def trajectory(tau, state, speed=SPEED, samples=64, peak=0.0, outcome="successful"):
+    speed = np.broadcast_to(np.asarray(speed, dtype=float), tau.shape).copy()
+    return ji.Trajectory(
+        time=tau / speed,
+        tau=tau,
+        state=state,
+        speed=speed,
+        samples=samples,
+        peak=peak,
+        outcome=outcome,
+    )
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.5, -0.25])
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (2e-5, -3e-5)])
+def test_circular_orbit(ratio, centre):
+    m = orbit_measures(case("1a"), orbit(ratio=ratio, centre=centre))
+    assert m.whirl_ratio == pytest.approx(ratio, rel=1e-9)
+    assert m.rms == pytest.approx(1e-4, rel=1e-9)
+    assert m.peak_displacement == pytest.approx(1e-4, rel=1e-9)
+    assert m.velocity_scatter < 1e-12
+
+
+def test_whirl_about_the_rib_centre_needs_to_go_around_it():
+    inside = orbit_measures(case("1a"), orbit(radius=1e-4, centre=(0.0, -5e-5)))
+    outside = orbit_measures(case("1a"), orbit(radius=4e-5, centre=(0.0, -5e-5)))
+    assert inside.rib_whirl_ratio == pytest.approx(1.0, abs=0.02)
+    assert outside.rib_whirl_ratio == pytest.approx(0.0, abs=0.02)
+    assert outside.whirl_ratio == pytest.approx(1.0, rel=1e-9)
+
+
+def test_ellipse_and_its_velocity_scatter():
+    """rms^2 = (a^2 + b^2)/2; |v| = a w sqrt(sin^2 + k^2 cos^2) with k = b/a."""
+    m = orbit_measures(case("1a"), orbit(flatten=0.5, samples=256))
+    assert m.rms == pytest.approx(1e-4 * np.sqrt(1.25 / 2), rel=1e-9)
+    assert m.whirl_ratio == pytest.approx(1.0, abs=1e-3)
+    a = np.linspace(0, 2 * np.pi, 100001)[:-1]
+    pace = np.sqrt(np.sin(a) ** 2 + 0.25 * np.cos(a) ** 2)
+    assert m.velocity_scatter == pytest.approx(np.std(pace) / np.mean(pace), rel=1e-3)
+    assert m.peak_displacement == pytest.approx(1e-4, rel=1e-9)
+
+
+def test_centre_that_stands_still_has_no_whirl():
+    still = orbit(radius=0.0, centre=(0.0, -1e-4))
+    m = orbit_measures(case("1a"), still)
+    assert np.isnan(m.whirl_ratio) and np.isnan(m.velocity_scatter)
+    assert m.rms == 0.0 and m.largest_eps == pytest.approx(1e-4 / GAP)
+    assert m.film_power == 0.0
+
+
+@pytest.mark.parametrize("peak, eps", [(0.0, 0.5), (0.8, 0.8), (1.1, 1.1)])
+def test_film_thickness_uses_the_largest_eps_of_any_step(peak, eps):
+    run = dataclasses.replace(orbit(radius=0.5 * GAP), peak=peak)
+    m = orbit_measures(case("1a"), run)
+    assert m.largest_eps == pytest.approx(eps)
+    assert m.minimum_film_thickness == pytest.approx(max(GAP * (1 - eps), 0.0), abs=1e-18)
+
+
+def test_synchronous_impact_and_its_impulse():
+    """A |sin tau|: peak A, impulse 4 A/omega in a revolution."""
+    m = orbit_measures(case("1a"), orbit(samples=256))
+    assert m.peak_impact_force == pytest.approx(109.9051, rel=1e-12)
+    assert m.impact_impulse == pytest.approx(4 * 109.9051 / SPEED, rel=1e-4)
+    assert m.peak_contact_force == 0.0 and m.contact_impulse == 0.0
+
+
+def test_steady_contact_force_and_its_impulse():
+    """Whirl at a constant penetration of 0.01 c: K p^(10/9), no damping at restitution 1."""
+    model = case("1a")
+    m = orbit_measures(model, orbit(radius=0.98 * GAP))
+    expected = 68992.2 / GAP ** (10 / 9) * (0.01 * GAP) ** (10 / 9)
+    assert m.peak_contact_force == pytest.approx(expected, rel=1e-3)
+    assert m.mean_contact_force == pytest.approx(m.peak_contact_force, rel=1e-9)
+    assert m.contact_impulse == pytest.approx(m.mean_contact_force * 2 * np.pi / SPEED, rel=1e-9)
+
+
+@pytest.mark.parametrize("eps, kept", [(0.0, 0.0), (0.5, 0.5), (0.99, 0.97)])
+def test_drag_power_is_that_of_the_sheared_film(eps, kept):
+    model = case("1a")
+    radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
+    one = 2 * np.pi * viscosity * SPEED**2 * radius**3 * width / (GAP * np.sqrt(1 - kept**2))
+    power = film_drag_power(model, np.full(3, SPEED), np.full(3, eps))
+    np.testing.assert_allclose(power, 2 * one, rtol=1e-3)
+    m = orbit_measures(model, orbit(radius=eps * GAP))
+    assert m.drag_power == pytest.approx(power[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio, sign", [(0.25, -1), (0.5, 0), (1.0, 1)])
+def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
+    """-F . v = -2 S (omega - 2 phi') g(eps) c eps phi' on a circle: zero at half speed."""
+    model = case("1a")
+    eps = 0.4
+    m = orbit_measures(model, orbit(radius=eps * GAP, ratio=ratio))
+    radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
+    scale = 2 * viscosity * radius * width * (width / GAP) ** 2
+    tangential = scale * SPEED * (1 - 2 * ratio) * np.pi * eps / (4 * (1 - eps**2) ** 1.5)
+    assert m.film_power == pytest.approx(-tangential * eps * GAP * ratio * SPEED, rel=1e-3, abs=1e-9)
+    assert sign == 0 or np.sign(m.film_power) == sign
+
+
+def test_forces_of_a_simulation_are_its_acceleration():
+    """M r'' from the recorded velocities, by a spectral derivative of a synchronous orbit."""
+    model, speed = case("1a"), 16000 * np.pi / 30
+    run = ji.simulate(model, speed, revolutions=1, discard=400, samples=128)
+    spectrum = np.fft.rfft(run.state[:, 2:], axis=0)
+    order = np.arange(len(spectrum))[:, None]
+    acceleration = np.fft.irfft(1j * order * speed * spectrum, len(run.tau), axis=0)
+    total = sum(cage_forces(model, run).values())
+    size = np.max(np.abs(total))
+    np.testing.assert_allclose(total, MASS * acceleration, atol=2e-3 * size)
+
+
+def test_energy_balance_of_a_synchronous_orbit():
+    """On a closed orbit the impacts and the unbalance put in what film and support take out."""
+    model, speed = case("1a"), 16000 * np.pi / 30
+    run = ji.simulate(model, speed, revolutions=4, discard=400, samples=128)
+    forces, velocity = cage_forces(model, run), run.state[:, 2:]
+    power = {name: float(np.mean(np.sum(f * velocity, axis=1))) for name, f in forces.items()}
+    assert power["impact"] + power["unbalance"] > 1.0
+    assert sum(power.values()) == pytest.approx(0.0, abs=1e-3 * abs(power["impact"]))
+    assert abs(power["weight"]) < 1e-4
+    m = orbit_measures(model, run)
+    assert m.film_power == pytest.approx(-power["film"], rel=1e-9)
+    assert m.whirl_ratio == pytest.approx(1.0, abs=0.01)
+
+
+def test_forces_vanish_in_sum_at_the_equilibrium():
+    model = replace(case("1a"), amplitude=0.0, eccentricity=0.0)
+    q = np.asarray(equilibrium(model, SPEED).coordinates)
+    tau = np.linspace(0, 6, 5)
+    forces = cage_forces(model, trajectory(tau, np.tile([*q, 0.0, 0.0], (5, 1))))
+    assert set(forces) == {"film", "contact", "support", "impact", "unbalance", "weight"}
+    np.testing.assert_allclose(sum(forces.values()), 0.0, atol=1e-9)
+    np.testing.assert_allclose(forces["weight"], np.tile([0.0, -MASS * 9.81], (5, 1)))
+
+
+@pytest.mark.parametrize("impact", ["synchronous", "roller_pass"])
+def test_speed_of_each_sample_counts(impact):
+    model = case("1a")
+    if impact == "roller_pass":
+        oscillator = PocketImpact(
+            contact_stiffness=1e8, bar_stiffness=1e7, bar_mass=0.02, approach_ratio=0.1
+        )
+        model = eqx.tree_at(
+            lambda m: m.impact, model, RollerPassImpact(oscillator=oscillator, harmonics=4)
+        )
+    run = orbit(revolutions=1, samples=8)
+    speeds = np.linspace(400, 1400, 8)
+    ramped = cage_forces(model, trajectory(run.tau, run.state, speeds, 8))
+    for i in (0, 3, 7):
+        steady = cage_forces(model, trajectory(run.tau, run.state, speeds[i], 8))
+        for name, force in steady.items():
+            np.testing.assert_allclose(ramped[name][i], force[i], rtol=1e-9, atol=1e-12)
+    assert ramped["unbalance"][7, 0] != pytest.approx(ramped["unbalance"][0, 0])
+
+
+def test_means_of_a_ramp_are_over_time():
+    """Twice as fast in the second half: those samples last half as long."""
+    still = orbit(radius=0.0, centre=(0.9 * GAP, 0.0), revolutions=2)
+    n = len(still.tau) // 2
+    state = still.state.copy()
+    state[n:, 0] = 0.0
+    speeds = np.repeat([500.0, 1000.0], n)
+    m = orbit_measures(case("1a"), trajectory(still.tau, state, speeds))
+    mean = 2 / 3 * 0.9 * GAP
+    assert m.rms == pytest.approx(0.9 * GAP * np.sqrt(2 / 9), rel=1e-9)
+    assert m.peak_displacement == pytest.approx(mean, rel=1e-9)
+
+
+def test_elastic_rib_motion_is_taken_out():
+    elastic = eqx.tree_at(
+        lambda m: m.rib, case("1a"), ElasticRib(mass=1.0, stiffness=1e8, damping=100.0)
+    )
+    run = orbit(ratio=0.5)
+    rib = orbit(radius=3e-5, ratio=1.7, centre=(1e-5, 1e-5)).state
+    q, v = run.state[:, :2] + rib[:, :2], run.state[:, 2:] + rib[:, 2:]
+    both = np.concatenate([q, rib[:, :2], v, rib[:, 2:]], axis=1)
+    moved = orbit_measures(elastic, trajectory(run.tau, both))
+    fixed = orbit_measures(case("1a"), run)
+    np.testing.assert_allclose(
+        dataclasses.astuple(moved), dataclasses.astuple(fixed), rtol=1e-8, atol=1e-12
+    )
+    np.testing.assert_allclose(relative_state(elastic, both)[0], run.state[:, :2], atol=1e-18)
+
+
+@pytest.mark.parametrize("turns", [2.0, -1.5])
+def test_winding_counts_turns(turns):
+    a = np.linspace(0, 2 * np.pi * turns, 100)
+    circle = np.stack([3 + np.cos(a), 1 + np.sin(a)], axis=1)
+    assert winding(circle, np.array([3.2, 1.1])) == pytest.approx(2 * np.pi * turns, abs=1.0)
+    assert winding(circle, np.array([3.0, 1.0])) == pytest.approx(2 * np.pi * turns)
+    assert abs(winding(circle, np.array([5.0, 1.0]))) < np.pi
+
+
+def test_table_names_every_measure_with_its_unit():
+    m = orbit_measures(case("1a"), orbit(radius=0.5 * GAP, ratio=0.5))
+    lines = str(m).splitlines()
+    assert len(lines) == len(dataclasses.fields(m))
+    assert lines[0].split()[-1] == "0.5"
+    assert lines[5].endswith(" m") and "0.000225" in lines[5]
+
+
+def test_runs_that_failed_and_states_of_other_models_are_refused():
+    model, run = case("1a"), orbit()
+    with pytest.raises(ValueError, match="Argument `trajectory` must .* outside"):
+        orbit_measures(model, dataclasses.replace(run, outcome="outside"))
+    with pytest.raises(ValueError, match="Argument `state` must have 4 components"):
+        relative_state(model, np.zeros((5, 8)))

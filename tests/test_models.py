@@ -1,0 +1,143 @@
+"""The cage model as a whole: thresholds, limits, scaling identities, derivatives."""
+
+import equinox as eqx
+import helpers
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from jaxcage._parameters import get, parameter_paths, parameters
+
+
+MODELS = {
+    "rigid": lambda: jc.case("2a"),
+    "elastic": lambda: helpers.elastic(jc.case("1b")),
+    "roller-pass": lambda: helpers.roller_pass(jc.case("3b")),
+    "dimensionless cubic": lambda: jc.replace(
+        jc.case("1a"), cubic_ratio=50.0, **{"support.cubic": "dimensionless"}
+    ),
+    "printed unbalance": lambda: jc.replace(jc.case("1a"), unbalance="as_printed"),
+    "positive pressure": lambda: jc.replace(jc.case("1a"), **{"film.model": "positive_pressure"}),
+    "restitution": lambda: jc.replace(jc.case("1a"), restitution=0.5),
+}
+METHOD = jc.method("rodas4", steps=64)
+
+
+@eqx.filter_jit
+def revolve(model: jc.CageModel, speed, y):
+    return jnp.stack(jc.strobe_map(model, speed, METHOD)(tuple(y)).y)
+
+
+def state(model: jc.CageModel, speed: float):
+    y = model.starts(jnp.asarray(speed))[2]
+    return jnp.stack([jnp.asarray(c) for c in y])
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("base", ["mass", "length", "time"])
+def test_strobe_map_does_not_depend_on_units(name: str, base: str):
+    """Exact scaling identity: every dimensional constant must be a parameter with the right unit."""
+    model, speed, factor = MODELS[name](), 1000.0, 1.7
+    other = helpers.in_other_units(model, base, factor)
+    dim = model.dimension
+    power = {"mass": [0.0] * dim, "length": [1.0] * dim, "time": [0.0] * (dim // 2) + [-1.0] * (dim // 2)}[base]
+    units = factor ** np.array(power)
+    rate = factor ** (-1.0 if base == "time" else 0.0)
+    y = state(model, speed)
+    here = revolve(model, jnp.asarray(speed), y)
+    there = revolve(other, jnp.asarray(speed * rate), y * units)
+    scale = np.array([float(c) for c in model.scale(jnp.asarray(speed))])
+    assert np.max(np.abs(there / units - here) / scale) < 1e-8
+
+
+@pytest.mark.parametrize("name", ["rigid", "elastic", "restitution"])
+def test_strobe_map_derivatives_match_finite_differences(name: str):
+    """jacfwd with respect to every parameter against central differences, in elasticities; none is NaN."""
+    model, speed = MODELS[name](), jnp.asarray(900.0)
+    y = state(model, 900.0)
+    scale = jnp.stack([jnp.asarray(c) for c in model.scale(speed)])
+    names = list(parameters(model))
+    paths = [parameter_paths(model)[n] for n in names]
+    values = jnp.stack([get(model, p) for p in paths])
+
+    @jax.jit
+    def scaled_map(shares):
+        changed = eqx.tree_at(lambda m: [get(m, p) for p in paths], model, list(values * shares))
+        return jnp.stack(jc.strobe_map(changed, speed, METHOD)(tuple(y)).y) / scale
+
+    ones = jnp.ones(len(names))
+    exact = np.asarray(jax.jacfwd(scaled_map)(ones))
+    assert np.all(np.isfinite(exact))
+    h = 1e-6
+    for i, key in enumerate(names):
+        if key == "restitution" and float(values[i]) == 1.0:  # at the end of its range, where it cannot be raised
+            continue
+        step = h * np.eye(len(names))[i]
+        central = np.asarray(scaled_map(ones + step) - scaled_map(ones - step)) / (2 * h)
+        assert np.max(np.abs(central - exact[:, i])) < 1e-5 * np.max(np.abs(exact[:, i])) + 1e-7, key
+    assert np.sum(np.max(np.abs(exact), axis=0) > 1e-5) >= 10
+
+
+def test_stiff_heavy_rib_is_the_rigid_rib():
+    """Same cage, rib on a spring of 1e10 N/m: the strobe state agrees to the rib's static deflection."""
+    model, speed = jc.case("1a"), jnp.asarray(1500.0)
+    held = helpers.elastic(model, mass=50.0, stiffness=1e11, damping=1e5)
+    rigid, moving = revolve(model, speed, state(model, 1500.0)), revolve(held, speed, state(held, 1500.0))
+    cage = np.asarray(moving)[[0, 1, 4, 5]]
+    scale = np.array([float(c) for c in model.scale(speed)])
+    assert np.max(np.abs(cage - rigid) / scale) < 1e-5
+    assert np.max(np.abs(moving[2:4])) < 1e-8
+
+
+def test_forces_on_cage_and_rib_are_opposite():
+    """Momentum of cage and rib together changes only by weight, unbalance, impact and what holds the rib."""
+    model = helpers.elastic(jc.case("1a"))
+    assert isinstance(model.rib, jc.ElasticRib)
+    speed, tau = jnp.asarray(1200.0), jnp.asarray(0.7)
+    q = tuple(map(jnp.asarray, (1e-4, -2e-4, 2e-6, -3e-6)))
+    v = tuple(map(jnp.asarray, (0.1, 0.05, 0.01, -0.02)))
+    cage, rib = model.cage_at(speed), model.rib
+    rates = model.at_speed(speed)(tau, (*q, *v))[4:]
+    total = [float(speed * (model.cage_mass * rates[i] + rib.mass * rates[i + 2])) for i in (0, 1)]
+    f = cage.forces(tau, q[0] - q[2], q[1] - q[3], v[0] - v[2], v[1] - v[3])
+    hold = rib.stiffness + rib.cubic_stiffness * (q[2] ** 2 + q[3] ** 2)
+    for i in (0, 1):
+        outside = f.impact[i] + f.unbalance[i] + f.weight[i] - hold * q[2 + i] - rib.damping * v[2 + i]
+        outside = outside - (rib.mass * model.gravity if i else 0.0)
+        assert total[i] == pytest.approx(float(outside), rel=1e-10)
+
+
+def test_clearance_readings():
+    model = jc.case("1b")
+    radial = jc.replace(model, clearance_reading="radial")
+    assert float(model.clearance) == pytest.approx(0.60e-3) and float(radial.clearance) == pytest.approx(0.30e-3)
+    assert float(model.land_radius) == pytest.approx((92.1e-3 - 0.60e-3) / 2)
+    # the paper's start, at rest on the rib: half the clearance as printed, the contact's onset in the radial reading
+    start = [float(m.starts(jnp.asarray(1.0))[0][1]) for m in (model, radial)]
+    assert start == pytest.approx([-0.30e-3, -0.97 * 0.30e-3])
+
+
+@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
+@pytest.mark.parametrize("share, grows", [(0.99, False), (1.01, True)])
+def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool):
+    """A rigid cage in its film under gravity alone, held at eps = 0.5: omega sqrt(c/g) = 2.5417 at the threshold, whirl
+    at 0.5146 omega there (Routh on the short-bearing coefficients)."""
+    eps, load_number, attitude, threshold = 0.5, 0.750381081812, np.deg2rad(53.68020060), 2.54170
+    base = jc.replace(helpers.unforced(jc.case("1a")), **{"film.model": film})
+    c, g = float(base.clearance), float(base.gravity)
+    speed = share * threshold * np.sqrt(g / c)
+    weight = float(base.cage_mass) * g
+    viscosity = weight * c**2 / (load_number * speed * float(base.land_radius) * float(base.film.land_width) ** 3 * 2)
+    density = viscosity / float(base.lubricant.kinematic_viscosity)
+    model = eqx.tree_at(lambda m: m.lubricant.density, base, jnp.asarray(density))
+    place = -np.pi / 2 + attitude  # from the load line in the sense of rotation
+    rest = eps * c * np.array([np.cos(place), np.sin(place)])
+    start = (*(rest + np.array([1e-3, 0.0]) * c), 0.0, 0.0)
+    run = jc.simulate(model, speed, revolutions=400, samples=8, start=start, method=jc.method("rodas4", steps=64))
+    away = np.hypot(*(run.state[:, :2] - rest).T).reshape(-1, 80)
+    late = np.max(away[-4:]) / np.max(away[8:12])
+    assert late > 1.5 if grows else late < 0.67
+    turns = np.unwrap(np.arctan2(*(run.state[800:, :2] - rest).T[::-1]))
+    assert abs(turns[-1] - turns[0]) / (run.tau[-1] - run.tau[800]) == pytest.approx(0.5146, abs=0.01)

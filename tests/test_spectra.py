@@ -1,0 +1,134 @@
+"""Spectra by orders against signals whose lines are known."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcage.integrate as ji
+from jaxcage.analysis._spectra import (
+    dominant_orders,
+    order_spectrum,
+    OrderSpectrum,
+    waterfall,
+    whirl_spectrum,
+)
+from jaxcage.models import ForcedOscillator
+
+
+def trajectory(signals, revolutions=20, samples=64, extra=0, speed=500.0):
+    """Columns from functions of the phase."""
+    tau = 2 * np.pi * np.arange(revolutions * samples + extra) / samples
+    state = np.stack([f(tau) for f in signals], axis=1)
+    return ji.Trajectory(
+        time=tau / speed,
+        tau=tau,
+        state=state,
+        speed=np.full(len(tau), speed),
+        samples=samples,
+        peak=0.0,
+        outcome="successful",
+    )
+
+
+@pytest.mark.parametrize("window", ["hann", "flattop", "boxcar"])
+@pytest.mark.parametrize("extra", [0, 1, 17])
+def test_sine_at_order_one_shows_its_amplitude(window, extra):
+    spectrum = order_spectrum(
+        trajectory([lambda t: 3e-4 * np.sin(t + 0.3) + 2e-3], extra=extra), window=window
+    )
+    assert spectrum.at(1) == pytest.approx(3e-4, rel=1e-10)
+    assert spectrum.at(0) == pytest.approx(2e-3, rel=1e-10)
+    assert spectrum.at(3) < 1e-15
+    assert spectrum.order[-1] == 32
+    assert spectrum.resolution == pytest.approx(1 / 20)
+
+
+def test_amplitude_at_half_the_sampling_rate():
+    spectrum = order_spectrum(trajectory([lambda t: 0.7 * np.cos(4 * t)], samples=8))
+    assert spectrum.order[-1] == 4
+    assert spectrum.amplitude[-1] == pytest.approx(0.7, rel=1e-12)
+
+
+def test_line_between_bins_reads_as_the_windows_say():
+    halfway = 1 + 0.5 / 20
+    run = trajectory([lambda t: np.sin(halfway * t)])
+    hann, flat, box = (
+        np.max(order_spectrum(run, window=w).amplitude) for w in ("hann", "flattop", "boxcar")
+    )
+    assert hann == pytest.approx(0.849, abs=2e-3)  # sinc(1/2)/(1 - 1/4)
+    assert flat == pytest.approx(1.0, abs=2e-3)
+    assert box == pytest.approx(2 / np.pi, abs=0.03)
+
+
+@pytest.mark.parametrize("order", [0.5, 0.487, 1.013, 2.23791])
+def test_dominant_order_is_interpolated_between_bins(order):
+    run = trajectory([lambda t: 0.02 * np.sin(order * t) + 5.0], revolutions=64)
+    (line,) = dominant_orders(order_spectrum(run), 1)
+    assert line.order == pytest.approx(order, abs=2e-5)
+    assert line.amplitude == pytest.approx(0.02, rel=1e-3)
+
+
+def test_dominant_orders_are_ranked_and_the_mean_left_out():
+    run = trajectory(
+        [lambda t: 9.0 + np.sin(t) + 2 * np.cos(0.5 * t) + 0.3 * np.sin(3 * t) + 1e-3 * np.sin(7 * t)]
+    )
+    lines = dominant_orders(order_spectrum(run))
+    np.testing.assert_allclose([p.order for p in lines], [0.5, 1, 3], atol=1e-6)
+    np.testing.assert_allclose([p.amplitude for p in lines], [2, 1, 0.3], rtol=1e-6)
+    assert dominant_orders(order_spectrum(run), floor=1e-4)[-1].order == pytest.approx(7)
+    assert dominant_orders(OrderSpectrum(np.arange(9.0), np.zeros(9), "hann")) == ()
+
+
+def test_whirl_spectrum_tells_forward_from_backward():
+    x = lambda t: 2e-5 * np.cos(0.5 * t) + 1e-5 * np.cos(t) + 3e-5
+    y = lambda t: 2e-5 * np.sin(0.5 * t) - 1e-5 * np.sin(t)
+    spectrum = whirl_spectrum(trajectory([x, y]))
+    assert spectrum.at(0.5) == pytest.approx(2e-5, rel=1e-10)
+    assert spectrum.at(-1) == pytest.approx(1e-5, rel=1e-10)
+    assert spectrum.at(0) == pytest.approx(3e-5, rel=1e-10)
+    assert max(spectrum.at(-0.5), spectrum.at(1)) < 1e-15
+    first, second = dominant_orders(spectrum)
+    assert first.order == pytest.approx(0.5) and second.order == pytest.approx(-1)
+
+
+def resonator(tau, q, v, speed):
+    """Unit mass on a spring of 100 N/m, damped, driven by 3 N at order 1 and 1 N at order 2."""
+    del speed
+    return (-100 * q[0] - 4 * v[0] + 3 * jnp.sin(tau) + jnp.cos(2 * tau),)
+
+
+def test_waterfall_of_a_resonator_is_its_frequency_response():
+    speeds = np.array([3.0, 5.0, 12.0])
+    result = waterfall(
+        ForcedOscillator(resonator, coordinates=1), speeds, revolutions=16, discard=40
+    )
+    assert result.amplitude.shape == (3, 8 * 16 + 1)
+    np.testing.assert_allclose(result.rpm, speeds * 30 / np.pi)
+    for i, speed in enumerate(speeds):
+        for order, force in ((1, 3.0), (2, 1.0)):
+            w = order * speed
+            expected = force / np.hypot(100 - w**2, 4 * w)
+            assert result.spectrum(i).at(order) == pytest.approx(expected, rel=1e-6)
+    assert result.outcome == ("successful",) * 3
+    assert "1.000x" in str(result)
+
+
+def runaway(tau, q, v, speed):
+    """Falls off to infinity above 4 rad/s."""
+    del tau, v
+    return (jnp.where(speed > 4, 1e3 * q[0] ** 3, -q[0]),)
+
+
+def test_waterfall_leaves_failed_speeds_nan():
+    result = waterfall(
+        ForcedOscillator(runaway, coordinates=1), np.array([3.0, 5.0]), revolutions=4, discard=4
+    )
+    assert result.outcome[0] == "successful" != result.outcome[1]
+    assert np.all(np.isfinite(result.amplitude[0])) and np.all(np.isnan(result.amplitude[1]))
+    assert result.outcome[1] in str(result) and "1 failed" in str(result)
+
+
+def test_bad_arguments_are_named():
+    run = trajectory([np.sin], revolutions=1)
+    with pytest.raises(ValueError, match="Argument `trajectory` must last for at least 2"):
+        order_spectrum(run)

@@ -1,0 +1,420 @@
+"""Support, unbalance and roller impacts against hand-written NumPy, SciPy and closed forms."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.special import gamma
+
+from jaxcage.bearing import load_distribution
+from jaxcage.forces import (
+    ElasticRib,
+    PocketImpact,
+    RollerPassImpact,
+    Support,
+    approach_speed,
+    cross_force,
+    cubic_stiffness,
+    effective_eccentricity,
+    impact_history,
+    impact_time_scale,
+    pulse_spectrum,
+    pulse_train,
+    pulse_train_force,
+    rib_force,
+    spring_force,
+    synchronous_amplitude,
+    synchronous_force,
+    unbalance_force,
+)
+from jaxcage.models import case
+
+
+POINTS = np.random.default_rng(7).normal(scale=2e-4, size=(5, 2))
+
+
+def cage_with(speed=900.0, **parts):
+    model = case("1a")
+    for name, part in parts.items():
+        model = eqx.tree_at(lambda m, name=name: getattr(m, name), model, part)
+    return model, model.cage_at(speed)
+
+
+# --- support ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("r", POINTS)
+def test_support_in_the_cage_against_numpy(r):
+    """Isotropic cubic stiffness, K_x and K_y apart, damping and circulatory cross-coupling."""
+    given = Support(
+        stiffness_x=3e4, stiffness_y=5e4, damping=3.0, cubic_stiffness=1e13, cross_stiffness=-40.0
+    )
+    _, cage = cage_with(support=given)
+    x, y = r
+    vx, vy = 0.1, -0.3
+    hardening = 1e13 * (x**2 + y**2)
+    expected = (
+        -(3e4 + hardening) * x - 3.0 * vx + 40.0 * y,
+        -(5e4 + hardening) * y - 3.0 * vy - 40.0 * x,
+    )
+    np.testing.assert_allclose(cage.support_force(x, y, vx, vy), expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("r", POINTS)
+def test_support_with_the_cross_coupling_of_20_as_printed(r):
+    given = Support(
+        stiffness_x=3e4,
+        stiffness_y=3e4,
+        damping=0.0,
+        cross_stiffness=700.0,
+        cross_cubic=3e10,
+        cross="as_printed",
+    )
+    _, cage = cage_with(support=given)
+    x, y = r
+    expected = (
+        -3e4 * x - 700.0 * y - 3e10 * y**3,
+        -3e4 * y - 700.0 * x - 3e10 * x**3,
+    )
+    np.testing.assert_allclose(cage.support_force(x, y, 0.0, 0.0), expected, rtol=1e-13)
+
+
+def work_around_circle(force, radius, points=64):
+    """Work of a force field once counter-clockwise around a circle."""
+    t = 2 * np.pi * np.arange(points) / points
+    x, y = radius * np.cos(t), radius * np.sin(t)
+    fx, fy = np.array([[float(c) for c in force(a, b)] for a, b in zip(x, y, strict=True)]).T
+    return np.mean(fy * x - fx * y) * 2 * np.pi
+
+
+def test_circulatory_coupling_pumps_and_the_printed_one_does_not():
+    radius, linear = 2e-4, 700.0
+    pumped = work_around_circle(lambda x, y: cross_force("circulatory", x, y, linear, 0.0), radius)
+    assert pumped == pytest.approx(2 * np.pi * radius**2 * linear, rel=1e-12)
+    printed = work_around_circle(lambda x, y: cross_force("as_printed", x, y, linear, 0.0), radius)
+    assert abs(printed) < 1e-12 * pumped
+
+
+def test_printed_cross_coupling_is_not_rotation_invariant():
+    """Its linear part is a spring at 45 degrees: soft along one diagonal, hard along the other."""
+    along = np.array(cross_force("as_printed", 1.0, 1.0, 5.0, 0.0))
+    across = np.array(cross_force("as_printed", 1.0, -1.0, 5.0, 0.0))
+    np.testing.assert_allclose(along, [-5.0, -5.0])
+    np.testing.assert_allclose(across, [5.0, -5.0])
+
+
+def test_isotropic_spring_is_conservative_and_radial():
+    potential = lambda r: 0.5 * 3e4 * (r @ r) + 0.25 * 1e13 * (r @ r) ** 2
+    for r in POINTS:
+        found = spring_force(r[0], r[1], 3e4, 3e4, 1e13)
+        np.testing.assert_allclose(found, -jax.grad(potential)(jnp.asarray(r)), rtol=1e-12)
+
+
+def test_readings_of_the_cubic_stiffness():
+    assert float(cubic_stiffness("absolute", 1e13, 5.0, 4e4, 4.5e-4)) == 1e13
+    relative = [float(cubic_stiffness("dimensionless", 1e13, 5.0, 4e4, c)) for c in (4.5e-4, 6e-4)]
+    np.testing.assert_allclose(relative, [5.0 * 4e4 / c**2 for c in (4.5e-4, 6e-4)], rtol=1e-13)
+    assert relative[1] / relative[0] == pytest.approx((4.5 / 6) ** 2)  # a larger gap softens it
+
+
+def test_dimensionless_cubic_reaches_the_cage():
+    given = Support(
+        stiffness_x=3e4, stiffness_y=5e4, damping=0.0, cubic_ratio=2.0, cubic="dimensionless"
+    )
+    _, cage = cage_with(support=given)
+    assert float(cage.cubic_stiffness) == pytest.approx(2.0 * 4e4 / 0.45e-3**2, rel=1e-13)
+
+
+def test_elastic_rib_is_held_by_its_own_spring():
+    rib = ElasticRib(mass=2.0, stiffness=1e6, damping=50.0, cubic_stiffness=1e15)
+    args = 1e-5, -2e-5, 0.01, 0.03, rib.stiffness, rib.damping, rib.cubic_stiffness
+    hardened = 1e6 + 1e15 * 5e-10
+    expected = -hardened * 1e-5 - 50 * 0.01, hardened * 2e-5 - 50 * 0.03
+    np.testing.assert_allclose(rib_force(*args), expected, rtol=1e-13)
+
+
+def test_elastic_rib_feels_the_reaction_of_what_acts_between():
+    """Momentum: the internal forces cancel in M_C a_C + M_O a_O."""
+    rib = ElasticRib(mass=2.0, stiffness=1e6, damping=50.0)
+    model, cage = cage_with(rib=rib)
+    model = eqx.tree_at(lambda m: m.film.supply_pressure, model, jnp.asarray(2e4))
+    q, v, tau, speed = (1e-4, -2e-4, 3e-5, 1e-5), (0.1, -0.2, 0.02, 0.05), 0.7, 900.0
+    rates = [float(c) * speed for c in model.at_speed(speed)(tau, (*q, *v))]
+    assert rates[:4] == pytest.approx(v, rel=1e-12)
+    mass = float(model.cage_mass)
+    found = [mass * rates[4 + i] + 2.0 * rates[6 + i] for i in (0, 1)]
+    held = rib_force(q[2], q[3], v[2], v[3], 1e6, 50.0, 0.0)
+    driven = np.add(cage.impact_force(tau), unbalance_force(tau, mass, 23e-6, speed))
+    weight = np.array([0.0, -(mass + 2.0) * 9.81])
+    np.testing.assert_allclose(found, driven + np.array(held) + weight, rtol=1e-10)
+
+
+# --- unbalance -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap, factor", [(0.45e-3, 4.44), (0.60e-3, 3.33)])
+def test_readings_of_the_unbalance(gap, factor):
+    e = 23e-6
+    assert float(effective_eccentricity("physical", e, gap, 1e-3)) == e
+    printed = float(effective_eccentricity("as_printed", e, gap, 1e-3))
+    assert printed / e == pytest.approx(factor, abs=5e-3)
+    # (20): 2 M rho omega^2 with the number rho = e/C_r and lengths in millimetres.
+    assert printed * 1e3 == pytest.approx(2 * e / gap, rel=1e-13)
+
+
+def test_unbalance_force_turns_with_the_cage():
+    tau = np.array([0.0, 0.4, np.pi / 2, 4.0])
+    found = np.array([unbalance_force(t, 0.2, 23e-6, 1200.0) for t in tau])
+    size = 0.2 * 23e-6 * 1200.0**2
+    np.testing.assert_allclose(found, size * np.stack([np.cos(tau), np.sin(tau)], 1), atol=1e-12)
+
+
+# --- synchronous impact ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tau", [0.0, 0.3, 2.0, 5.5])
+def test_synchronous_force_against_15_as_printed(tau):
+    q, theta = 31.0, 0.7
+    f_x = q * (np.sin(tau) + np.sin(np.pi - tau)) * np.cos(theta)
+    f_y = q * (np.sin(tau) - np.sin(np.pi - tau)) * np.sin(theta)
+    found = synchronous_force(tau, 2 * q * np.cos(theta))
+    np.testing.assert_allclose(found, (f_x, f_y), atol=1e-13 * q)
+
+
+def test_synchronous_amplitude_grows_as_a_power_of_speed():
+    assert float(synchronous_amplitude(1000.0, 110.0, 1000.0, 1.5)) == 110.0
+    assert float(synchronous_amplitude(2000.0, 110.0, 1000.0, 1.5)) == pytest.approx(110 * 2**1.5)
+
+
+# --- roller-bar impact (14) ------------------------------------------------------------------
+
+IMPACT = PocketImpact()
+ROLLER, SPEED = 0.0423, 0.18
+
+
+def history(impact=IMPACT, v0=SPEED, times=8.0, **options):
+    duration = times * impact_time_scale(impact, ROLLER, v0)
+    return impact_history(impact, ROLLER, jnp.asarray(v0), duration, **options)
+
+
+def constants(impact):
+    return float(impact.contact_stiffness), float(impact.bar_stiffness), float(impact.bar_mass)
+
+
+def solve_14(impact, roller, v0, times):
+    """The two-mass oscillator by SciPy: times, contact force."""
+    k, kc, mc = constants(impact)
+
+    def rates(_, y):
+        q = k * max(y[0] - y[1], 0.0) ** (10 / 9)
+        return [y[2], y[3], -q / roller, (q - kc * y[1]) / mc]
+
+    span, start = (0.0, times[-1]), [0.0, 0.0, v0, 0.0]
+    options = dict(method="DOP853", rtol=1e-11, atol=1e-15, max_step=times[-1] / 500)
+    y = solve_ivp(rates, span, start, t_eval=times, **options).y
+    return k * np.maximum(y[0] - y[1], 0.0) ** (10 / 9), y
+
+
+# Where the contact closes within a step, p^(10/9) costs a fixed-step method order: the errors below
+# belong to the default 511 x 4 steps, and to 16 times as many.
+@pytest.mark.parametrize("samples, tolerance", [(512, 3e-4), (4089, 1e-5)])
+def test_impact_against_scipy(samples, tolerance):
+    h = history(samples=samples, substeps=4 if samples == 512 else 8)
+    q, y = solve_14(IMPACT, ROLLER, SPEED, np.asarray(h.time))
+    atol = tolerance * q.max()
+    np.testing.assert_allclose(h.contact_force, q, atol=atol)
+    np.testing.assert_allclose(h.bar_force, float(IMPACT.bar_stiffness) * y[1], atol=atol)
+    assert np.min(h.bar_force) < -0.01 * q.max()  # the bar swings back, as in fig. 5
+
+
+@pytest.mark.parametrize("samples, tolerance", [(512, 3e-5), (4089, 1e-6)])
+def test_impact_keeps_energy(samples, tolerance):
+    h = history(samples=samples, substeps=4 if samples == 512 else 8)
+    k, kc, mc = constants(IMPACT)
+    depth = np.maximum(h.roller_position - h.bar_position, 0.0)
+    kinetic = 0.5 * ROLLER * h.roller_velocity**2 + 0.5 * mc * h.bar_velocity**2
+    energy = kinetic + 0.5 * kc * h.bar_position**2 + 9 / 19 * k * depth ** (19 / 9)
+    np.testing.assert_allclose(energy, 0.5 * ROLLER * SPEED**2, rtol=tolerance)
+
+
+@pytest.mark.parametrize("samples, tolerance", [(512, 1e-3), (4089, 1e-5)])
+def test_impact_gives_the_roller_the_impulse_it_loses(samples, tolerance):
+    h = history(samples=samples, substeps=4 if samples == 512 else 8)
+    lost = ROLLER * (SPEED - float(h.roller_velocity[-1]))
+    assert float(h.contact_force[-1]) == 0.0
+    assert float(h.impulse) == pytest.approx(lost, rel=tolerance)
+
+
+def test_momentum_of_both_changes_by_the_force_of_the_bar():
+    h = history(samples=2049, substeps=1)
+    total = ROLLER * h.roller_velocity + float(IMPACT.bar_mass) * h.bar_velocity
+    spent = np.trapezoid(h.bar_force, h.time)
+    assert float(total[0] - total[-1]) == pytest.approx(spent, rel=1e-5)
+
+
+RIGID = eqx.tree_at(
+    lambda p: (p.contact_stiffness, p.bar_stiffness, p.bar_mass),
+    IMPACT,
+    (jnp.asarray(1e6), jnp.asarray(1e12), jnp.asarray(100.0)),
+)
+
+
+def test_rigid_bar_gives_the_hertz_impact_in_closed_form():
+    """m v^2/2 = (9/19) K d^(19/9), and the time 2 (d/v) sqrt(pi) G(1 + 1/p)/G(1/2 + 1/p)."""
+    v0, k = SPEED, 1e6
+    h = history(RIGID, samples=4097, substeps=1)
+    depth = (19 / 18 * ROLLER * v0**2 / k) ** (9 / 19)
+    # A bar of 1e12 N/m gives way by 3e-7 of the depth.
+    assert float(h.contact_force.max()) == pytest.approx(k * depth ** (10 / 9), rel=1e-5)
+    p = 19 / 9
+    duration = 2 * depth / v0 * np.sqrt(np.pi) * gamma(1 + 1 / p) / gamma(0.5 + 1 / p)
+    by_quadrature = 2 * depth / v0 * quad(lambda x: 1 / np.sqrt(1 - x**p), 0, 1)[0]
+    assert duration == pytest.approx(by_quadrature, rel=1e-6)
+    depths = np.asarray(h.roller_position - h.bar_position)
+    after = int(np.argmax((depths <= 0) & (np.asarray(h.time) > 0.5 * duration)))
+    before = after - 1
+    share = depths[before] / (depths[before] - depths[after])
+    left = float(h.time[before]) + share * float(h.time[after] - h.time[before])
+    assert left == pytest.approx(duration, rel=1e-5)
+    assert float(h.roller_velocity[-1]) == pytest.approx(-v0, rel=1e-5)
+
+
+def test_peak_force_on_a_stiff_bar_grows_as_the_20_19_power_of_speed():
+    speeds = 0.05, 0.1, 0.4
+    peaks = [float(history(RIGID, v, samples=4097, substeps=1).contact_force.max()) for v in speeds]
+    slopes = np.diff(np.log(peaks)) / np.diff(np.log(speeds))
+    np.testing.assert_allclose(slopes, 20 / 19, atol=1e-4)
+
+
+# --- roller passes ---------------------------------------------------------------------------
+
+
+Z, CLEARANCE, HALF_ANGLE = 13, 0.3e-3, 0.7
+
+
+def single_pulse(impact, omega, samples=4001):
+    """Q_cw(t) of one impact by SciPy, at times up to the end of the window the package uses."""
+    v0 = float(approach_speed(impact.approach_ratio, omega, CLEARANCE))
+    duration = 8 * float(impact_time_scale(impact, ROLLER, v0))
+    t = np.linspace(0, duration, samples)
+    return t, solve_14(impact, ROLLER, v0, t)[0]
+
+
+def superposed(impact, omega, tau):
+    """Force of all rollers by adding shifted pulses, several revolutions back."""
+    t, q = single_pulse(impact, omega)
+    reach = int(np.ceil(omega * t[-1] / (2 * np.pi))) + 1
+    total = np.zeros((2, tau.size))
+    zones = (
+        (-np.pi / 2 - HALF_ANGLE, 1.0, (np.cos(HALF_ANGLE), -np.sin(HALF_ANGLE))),
+        (-np.pi / 2 + HALF_ANGLE, -1.0, (np.cos(HALF_ANGLE), np.sin(HALF_ANGLE))),
+    )
+    for start, sign, direction in zones:
+        for j in range(-reach * Z, 2 * Z):
+            since = (tau - (start + 2 * np.pi * j / Z)) / omega
+            pulse = np.interp(since, t, q, left=0.0, right=0.0)
+            total += sign * pulse * np.array(direction)[:, None]
+    return total
+
+
+OMEGAS = 500.0, 2880.0  # 4800 rpm, and 27500 rpm where pulses overlap
+
+
+def train(omega, harmonics=24):
+    law = RollerPassImpact(oscillator=IMPACT, harmonics=harmonics)
+    args = omega, HALF_ANGLE, Z, ROLLER, CLEARANCE
+    return law, pulse_train(law, *args)
+
+
+def truncated(omega, harmonics=24):
+    """The superposed force on a fine grid of tau, all of it and its first harmonics of passing."""
+    tau = 2 * np.pi * np.arange(Z * 512) / (Z * 512)
+    force = superposed(IMPACT, omega, tau)
+    spectrum = np.fft.rfft(force, axis=1)
+    kept = spectrum.copy()
+    kept[:, harmonics * Z + 1 :] = 0
+    return tau, force, spectrum / tau.size, np.fft.irfft(kept, tau.size, axis=1)
+
+
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_pulse_train_has_the_spectrum_of_the_superposed_pulses(omega):
+    _, force, spectrum, _ = truncated(omega)
+    _, coefficients = train(omega)
+    peak = np.abs(force).max()
+    # Nothing lies between the multiples of Z.
+    others = np.ones(spectrum.shape[1], bool)
+    others[::Z] = False
+    assert np.abs(spectrum[:, others]).max() < 1e-12 * peak
+    passes = spectrum[:, : 25 * Z : Z]
+    cosine, sine = 2 * passes.real, -2 * passes.imag
+    cosine[:, 0] /= 2
+    # The package integrates the spectrum from 512 samples of the pulse: 1e-3 of the force.
+    found = np.array([coefficients.a_x, coefficients.a_y])
+    np.testing.assert_allclose(found, cosine, atol=1e-3 * peak)
+    found = np.array([coefficients.b_x, coefficients.b_y])
+    np.testing.assert_allclose(found, sine, atol=1e-3 * peak)
+
+
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_pulse_train_force_is_the_superposition_of_shifted_pulses(omega):
+    tau, force, _, kept = truncated(omega)
+    _, coefficients = train(omega)
+    at = jax.vmap(lambda t: jnp.stack(pulse_train_force(t, coefficients, Z)))
+    found = np.asarray(at(jnp.asarray(tau))).T
+    np.testing.assert_allclose(found, kept, atol=6e-3 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_default_harmonics_resolve_the_pulses(omega):
+    """A pulse of 0.03 ms against 0.97 ms between rollers at 4800 rpm, 0.17 ms at 27500 rpm."""
+    tau, force, _, _ = truncated(omega)
+    _, coefficients = train(omega, RollerPassImpact(oscillator=IMPACT).harmonics)
+    at = jax.vmap(lambda t: jnp.stack(pulse_train_force(t, coefficients, Z)))
+    misfit = np.asarray(at(jnp.asarray(tau))).T - force
+    assert np.sqrt(np.mean(misfit**2)) < 0.1 * np.sqrt(np.mean(force**2))
+
+
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_mean_force_of_the_pulse_train_is_impulse_times_rate(omega):
+    _, coefficients = train(omega)
+    v0 = approach_speed(IMPACT.approach_ratio, omega, CLEARANCE)
+    impulse = float(history(v0=float(v0)).impulse)
+    mean = -2 * np.sin(HALF_ANGLE) * impulse * Z * omega / (2 * np.pi)
+    assert float(coefficients.a_y[0]) == pytest.approx(mean, rel=1e-9)
+    assert abs(float(coefficients.a_x[0])) < 1e-12 * abs(mean)
+    assert float(coefficients.b_x[0]) == 0.0 == float(coefficients.b_y[0])
+
+
+def test_pulses_overlap_at_the_highest_speed():
+    """Physics: at 27500 rpm rollers pass every 0.16 ms, less than a pulse and its rebound last."""
+    t, q = single_pulse(IMPACT, 2880.0)
+    lasting = t[np.nonzero(q)[0][-1]]
+    assert lasting > 2 * np.pi / (Z * 2880.0)
+
+
+def test_highest_harmonics_a_user_may_ask_for_are_resolved():
+    omega = 2880.0
+    law = RollerPassImpact(oscillator=IMPACT, harmonics=128)
+    cosine, sine = pulse_spectrum(law, omega, Z, ROLLER, CLEARANCE)
+    t, q = single_pulse(IMPACT, omega, 40001)
+    k = Z * np.arange(129)
+    rate = Z * omega / (2 * np.pi)
+    weight = np.where(k == 0, 1.0, 2.0) * rate
+    exact = np.trapezoid(q * np.exp(1j * np.outer(k * omega, t)), t, axis=1) * weight
+    found = np.asarray(cosine) + 1j * np.asarray(sine)
+    peak = float(np.abs(exact).max())
+    np.testing.assert_allclose(found, exact, atol=5e-3 * peak)
+
+
+def test_roller_pass_reaches_the_cage_with_the_half_angle_of_the_loaded_zone():
+    law = RollerPassImpact(oscillator=IMPACT)
+    model, cage = cage_with(impact=law)
+    bearing = model.bearing
+    angle = load_distribution(bearing, model.load).half_angle
+    sizes = bearing.n_rollers, bearing.roller_mass, bearing.pocket_clearance
+    expected = pulse_train(law, 900.0, angle, *sizes)
+    for tau in (0.0, 1.0, 4.4):
+        force = pulse_train_force(tau, expected, bearing.n_rollers)
+        np.testing.assert_allclose(cage.impact_force(tau), force, rtol=1e-12, atol=1e-12)
