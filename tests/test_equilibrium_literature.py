@@ -16,22 +16,22 @@ import pytest
 
 from jaxcage._parameters import replace
 from jaxcage.analysis._equilibrium import (
+    LARGEST_WHIRLING,
     attitude_angle,
     dimensional,
     eccentricity_ratio,
     equilibrium,
     film_coefficients,
     film_whirl_speed,
-    LARGEST_WHIRLING,
     load_number,
     stability_chart,
     whirl_threshold,
 )
-from jaxcage.forces import ElasticRib, film_scale, RibFilm
+from jaxcage.forces import ElasticRib, RibFilm, film_scale
 from jaxcage.models import case
 
 
-# eps, N, attitude angle [deg], Kxx, Kxy, Kyx, Kyy, Cxx, Cxy = Cyx, Cyy, omega sqrt(c/g), whirl ratio
+# eps, N, angle [deg], Kxx, Kxy, Kyx, Kyy, Cxx, Cxy = Cyx, Cyy, omega sqrt(c/g), whirl ratio
 TABLE = """
 0.1 0.080383 82.708 2.5308 9.7577 -10.3811 1.3284 19.7905 -2.5325 20.4872 2.7413 0.5029
 0.2 0.172547 75.431 2.4849 4.5203  -5.7631 1.4978  9.5869 -2.4916 10.9798 2.6814 0.5106
@@ -184,9 +184,7 @@ def test_eigenvalues_cross_the_axis_at_rouths_threshold(eps):
     c, found = film_coefficients(eps), threshold(eps)
     for factor, sign in ((0.99, -1), (1.0, 0), (1.01, 1)):
         m = (factor * found.speed) ** 2
-        matrix = np.block(
-            [[np.zeros((2, 2)), np.eye(2)], [-c.stiffness / m, -c.damping / m]]
-        )
+        matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-c.stiffness / m, -c.damping / m]])
         values = np.linalg.eigvals(matrix)
         worst = values[np.argmax(values.real)]
         if sign == 0:
@@ -234,7 +232,7 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     "gap_mm, highest", [(0.225, 5511), (0.30, 4773), (0.45, 3897), (0.60, 3375)]
 )
 def test_whirl_speed_of_a_light_cage_in_rpm(gap_mm, highest):
-    """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as one over the root of the gap."""
+    """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as the root of the gap."""
     model = cage_in_film(cage_mass=1e-6, guidance_gap=gap_mm * 1e-3)
     assert float(film_whirl_speed(model)) * 30 / np.pi == pytest.approx(highest, abs=0.6)
 
@@ -247,7 +245,9 @@ def test_whirl_speed_depends_on_mass_over_cube_of_land_width():
     by_width = width * slope("land_width")(width)
     assert float(by_mass) > 1.0
     assert float(by_width) == pytest.approx(-3 * float(by_mass), rel=1e-9)
-    up, down = (film_whirl_speed(replace(model, guidance_gap=gap * k)) for k in (1 + 1e-5, 1 - 1e-5))
+    up, down = (
+        film_whirl_speed(replace(model, guidance_gap=gap * k)) for k in (1 + 1e-5, 1 - 1e-5)
+    )
     difference = float(up - down) / 2e-5
     assert float(gap * slope("guidance_gap")(gap)) == pytest.approx(difference, rel=1e-7)
 
@@ -256,7 +256,9 @@ def test_heavy_cage_on_a_weak_film_never_whirls():
     model = cage_in_film(cage_mass=100.0, land_width=1e-4)
     assert np.isinf(film_whirl_speed(model))
     with pytest.raises(ValueError, match="'full'"):
-        full = eqx.tree_at(lambda m: m.film, model, RibFilm(land_width=1e-4, model="full"))
+        full = eqx.tree_at(
+            lambda m: m.film, model, RibFilm(land_width=jnp.asarray(1e-4), model="full")
+        )
         film_whirl_speed(full)
 
 
@@ -266,7 +268,8 @@ def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
     model, speed = case(name), rpm * np.pi / 30
     at = equilibrium(model, speed)
     zero = jnp.zeros(())
-    forces = model.cage_at(speed).forces(zero, *at.coordinates, zero, zero)
+    x, y = at.coordinates
+    forces = model.cage_at(speed).forces(zero, x, y, zero, zero)
     for i in (0, 1):
         rest = sum(f[i] for f in (forces.film, forces.contact, forces.support, forces.weight))
         assert abs(float(rest)) < 1e-9 * float(model.cage_mass) * 9.81
@@ -297,9 +300,8 @@ def test_gradient_of_the_growth_rate_is_that_of_differences():
 
 def test_elastic_rib_sinks_under_both_weights_and_the_cage_with_it():
     model = case("1a")
-    elastic = eqx.tree_at(
-        lambda m: m.rib, model, ElasticRib(mass=1.0, stiffness=1e7, damping=50.0)
-    )
+    rib = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e7, 50.0)))
+    elastic = eqx.tree_at(lambda m: m.rib, model, rib)
     rigid, soft = equilibrium(model, 800.0), equilibrium(elastic, 800.0)
     assert soft.eigenvalues.shape == (8,) and float(soft.growth_rate) < 0
     rib = np.asarray(soft.coordinates[2:])

@@ -17,7 +17,7 @@ from jaxcage.analysis._measures import (
     relative_state,
     winding,
 )
-from jaxcage.forces import ElasticRib, PocketImpact, RollerPassImpact, RibFilm
+from jaxcage.forces import ElasticRib, PocketImpact, RollerPassImpact
 from jaxcage.models import case
 
 
@@ -37,7 +37,9 @@ def orbit(
     return trajectory(tau, np.stack(position + velocity, axis=1), speed, samples)
 
 
-def trajectory(tau, state, speed=SPEED, samples=64, peak=0.0, outcome="successful"):
+def trajectory(
+    tau, state, speed: float | np.ndarray = SPEED, samples=64, peak=0.0, outcome="successful"
+):
     speed = np.broadcast_to(np.asarray(speed, dtype=float), tau.shape).copy()
     return ji.Trajectory(
         time=tau / speed,
@@ -83,7 +85,7 @@ def test_centre_that_stands_still_has_no_whirl():
     still = orbit(radius=0.0, centre=(0.0, -1e-4))
     m = orbit_measures(case("1a"), still)
     assert np.isnan(m.whirl_ratio) and np.isnan(m.velocity_scatter)
-    assert m.rms == 0.0 and m.largest_eps == pytest.approx(1e-4 / GAP)
+    assert m.rms < 1e-15 and m.largest_eps == pytest.approx(1e-4 / GAP)
     assert m.film_power == 0.0
 
 
@@ -133,7 +135,8 @@ def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
     radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
     scale = 2 * viscosity * radius * width * (width / GAP) ** 2
     tangential = scale * SPEED * (1 - 2 * ratio) * np.pi * eps / (4 * (1 - eps**2) ** 1.5)
-    assert m.film_power == pytest.approx(-tangential * eps * GAP * ratio * SPEED, rel=1e-3, abs=1e-9)
+    expected = -tangential * eps * GAP * ratio * SPEED
+    assert m.film_power == pytest.approx(expected, rel=1e-3, abs=1e-9)
     assert sign == 0 or np.sign(m.film_power) == sign
 
 
@@ -177,12 +180,8 @@ def test_forces_vanish_in_sum_at_the_equilibrium():
 def test_speed_of_each_sample_counts(impact):
     model = case("1a")
     if impact == "roller_pass":
-        oscillator = PocketImpact(
-            contact_stiffness=1e8, bar_stiffness=1e7, bar_mass=0.02, approach_ratio=0.1
-        )
-        model = eqx.tree_at(
-            lambda m: m.impact, model, RollerPassImpact(oscillator=oscillator, harmonics=4)
-        )
+        rollers = RollerPassImpact(oscillator=PocketImpact(), harmonics=4)
+        model = eqx.tree_at(lambda m: m.impact, model, rollers)
     run = orbit(revolutions=1, samples=8)
     speeds = np.linspace(400, 1400, 8)
     ramped = cage_forces(model, trajectory(run.tau, run.state, speeds, 8))
@@ -207,9 +206,8 @@ def test_means_of_a_ramp_are_over_time():
 
 
 def test_elastic_rib_motion_is_taken_out():
-    elastic = eqx.tree_at(
-        lambda m: m.rib, case("1a"), ElasticRib(mass=1.0, stiffness=1e8, damping=100.0)
-    )
+    rib_law = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e8, 100.0)))
+    elastic = eqx.tree_at(lambda m: m.rib, case("1a"), rib_law)
     run = orbit(ratio=0.5)
     rib = orbit(radius=3e-5, ratio=1.7, centre=(1e-5, 1e-5)).state
     q, v = run.state[:, :2] + rib[:, :2], run.state[:, 2:] + rib[:, 2:]

@@ -89,9 +89,7 @@ def test_displacement_of_a_mean_is_the_oscillation_that_centring_removes():
     """V_osc = mean^2 (1 - cos n c)/(1 - cos c), Gottwald and Melbourne's subtracted term."""
     c, lag = 1.3, np.arange(1, 21)
     expected = 0.7**2 * (1 - np.cos(lag * c)) / (1 - np.cos(c))
-    np.testing.assert_allclose(
-        mean_square_displacement(np.full(200, 0.7), c), expected, rtol=1e-10
-    )
+    np.testing.assert_allclose(mean_square_displacement(np.full(200, 0.7), c), expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize(

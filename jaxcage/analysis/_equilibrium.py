@@ -25,7 +25,7 @@ import optimistix as optx
 from jaxtyping import Array, Complex, Float
 
 from .._types import Scalar
-from ..forces import film_scale, FilmModel, short_film_force, SynchronousImpact
+from ..forces import FilmModel, SynchronousImpact, film_scale, short_film_force
 from ..models import CageModel, SecondOrderField
 
 
@@ -84,7 +84,9 @@ class FilmCoefficients(NamedTuple):
     """-dF_i/dv_j in units of W/(c omega)."""
 
 
-def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half") -> FilmCoefficients:
+def film_coefficients(
+    eccentricity_ratio: Scalar, film: FilmModel = "fixed_half"
+) -> FilmCoefficients:
     """Static equilibrium and dimensionless dynamic coefficients, by differentiating the film force.
 
     The half film and the film of positive pressure agree in all of them: at rest the pressurised
@@ -126,9 +128,7 @@ class WhirlThreshold(NamedTuple):
     """Whirl speed at the threshold over omega; NaN where it never whirls."""
 
 
-def whirl_threshold(
-    stiffness: Float[Array, "2 2"], damping: Float[Array, "2 2"]
-) -> WhirlThreshold:
+def whirl_threshold(stiffness: Float[Array, "2 2"], damping: Float[Array, "2 2"]) -> WhirlThreshold:
     """Threshold of a rigid mass on dimensionless film coefficients, in closed form (Routh).
 
     It is 0 where the mass whirls at every speed, as in a full film. Coefficients must be those of a
@@ -141,14 +141,12 @@ def whirl_threshold(
     whirls, held = square > 0, kappa > 0
     safe = jnp.where(whirls, square, 1.0)
     speed = jnp.where(whirls, jnp.sqrt(jnp.where(held, kappa, 1.0) / safe), jnp.inf)
-    return WhirlThreshold(
-        jnp.where(held, speed, 0.0), jnp.where(whirls, jnp.sqrt(safe), jnp.nan)
-    )
+    return WhirlThreshold(jnp.where(held, speed, 0.0), jnp.where(whirls, jnp.sqrt(safe), jnp.nan))
 
 
 @dataclasses.dataclass(frozen=True)
 class StabilityChart:
-    """Whirl threshold of a rigid mass in a film over its load; every array has one entry a point."""
+    """Whirl threshold of a rigid mass in a film over its load, point by point."""
 
     eccentricity_ratio: Float[np.ndarray, " points"]
     load_number: Float[np.ndarray, " points"]
@@ -160,13 +158,17 @@ class StabilityChart:
 
 
 @eqx.filter_jit
-def _chart(eps: Float[Array, " points"], film: FilmModel) -> tuple[FilmCoefficients, WhirlThreshold]:
+def _chart(
+    eps: Float[Array, " points"], film: FilmModel
+) -> tuple[FilmCoefficients, WhirlThreshold]:
     coefficients = jax.vmap(lambda e: film_coefficients(e, film))(eps)
     return coefficients, jax.vmap(whirl_threshold)(coefficients.stiffness, coefficients.damping)
 
 
 def stability_chart(
-    eccentricity_ratios: Float[np.ndarray, " points"] | None = None, *, film: FilmModel = "fixed_half"
+    eccentricity_ratios: Float[np.ndarray, " points"] | None = None,
+    *,
+    film: FilmModel = "fixed_half",
 ) -> StabilityChart:
     """The chart of threshold speed against load number.
 
@@ -179,10 +181,10 @@ def stability_chart(
 
 
 def film_whirl_speed(model: CageModel) -> Array:
-    """Speed [rad/s] above which the cage would whirl in its film under its weight, with nothing else.
+    """Speed [rad/s] above which the cage would whirl, in its film under its weight alone.
 
-    Support, contact, supply pressure and forcing are left out: it is the oil-whirl line to lay over a
-    diagram of the full model. On it omega = threshold(eps) sqrt(g/c), with the load number of the
+    Support, contact, supply pressure and forcing are left out: it is the oil-whirl line to lay over
+    a diagram of the full model. On it omega = threshold(eps) sqrt(g/c), with the load number of the
     weight at that speed: one equation for eps. Differentiable with respect to every parameter.
 
     **Returns:** the speed, infinite beyond 50 000 sqrt(g/c): a weak film that the weight squeezes.
@@ -236,13 +238,13 @@ class Equilibrium(NamedTuple):
 
     @property
     def whirl_frequency(self) -> Array:
-        """Angular frequency of the least stable mode [rad/s]; over the speed it is the whirl ratio."""
+        """Angular frequency of the least stable mode [rad/s]; over the speed, the whirl ratio."""
         return jnp.abs(self.eigenvalues.imag[jnp.argmax(self.eigenvalues.real)])
 
 
 def _unforced(model: CageModel) -> CageModel:
     """The model without unbalance and impacts: an autonomous system at every speed."""
-    calm = (jnp.zeros(()), SynchronousImpact(amplitude=0.0, exponent=1.0))
+    calm = (jnp.zeros(()), SynchronousImpact(amplitude=jnp.zeros(()), exponent=jnp.ones(())))
     return eqx.tree_at(lambda m: (m.eccentricity, m.impact), model, calm)
 
 
@@ -286,7 +288,7 @@ def _equilibrium(model: CageModel, speed: Array, start: Array | None) -> Equilib
 def equilibrium(
     model: CageModel, speed: Scalar, *, start: Float[Array, " coordinates"] | None = None
 ) -> Equilibrium:
-    """Where the cage stays at `speed` without unbalance and impacts: film, support, contact, weight.
+    """Where film, support, contact and weight hold the cage without unbalance and impacts.
 
     Differentiable with respect to speed and every parameter, by the implicit function theorem.
 

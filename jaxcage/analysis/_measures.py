@@ -5,6 +5,7 @@ sample: with evenly spaced phases and whole revolutions the sum is as good as th
 """
 
 import dataclasses
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -17,6 +18,9 @@ from ..models import CageForces, CageModel
 
 BATCH = 256
 """Samples whose forces are worked out at a time where the speed changes from sample to sample."""
+
+STILL = 1e-9
+"""A centre that moves by less than this part of the clearance, or per radian, stands still."""
 
 
 def relative_state(
@@ -47,7 +51,10 @@ def _forces_at_one_speed(
 
 @eqx.filter_jit
 def _forces(
-    model: CageModel, speed: Float[Array, " n"], tau: Float[Array, " n"], motion: Float[Array, "n 4"]
+    model: CageModel,
+    speed: Float[Array, " n"],
+    tau: Float[Array, " n"],
+    motion: Float[Array, "n 4"],
 ) -> CageForces:
     def at(sample: tuple[Array, Array, Array]) -> CageForces:
         omega, t, m = sample
@@ -59,8 +66,8 @@ def _forces(
 def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, "n 2"]]:
     """Every force on the cage along a trajectory of `model`.
 
-    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance` and `weight`, each (F_x, F_y) [N]
-    at every sample, at the speed of that sample.
+    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance` and `weight`, each
+    (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
     position, velocity = relative_state(model, trajectory.state)
     motion = jax.numpy.asarray(np.concatenate([position, velocity], axis=1))
@@ -69,9 +76,7 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
         forces = _forces_at_one_speed(model, speed[0], tau, motion)
     else:
         forces = _forces(model, speed, tau, motion)
-    n = len(trajectory.tau)
-    columns = {name: [np.broadcast_to(f, n) for f in pair] for name, pair in forces._asdict().items()}
-    return {name: np.stack(pair, axis=1) for name, pair in columns.items()}
+    return {name: np.stack(pair, axis=1) for name, pair in forces._asdict().items()}
 
 
 def film_drag_power(
@@ -102,7 +107,7 @@ def winding(position: Float[np.ndarray, "n 2"], centre: Float[np.ndarray, " 2"])
     return float(turned[-1] - turned[0])
 
 
-def _measure(unit: str, text: str) -> float:
+def _measure(unit: str, text: str) -> Any:
     return dataclasses.field(metadata={"unit": unit, "text": text})
 
 
@@ -111,8 +116,8 @@ class OrbitMeasures:
     """Measures of one orbit of the cage centre in its rib; printed, a table with units."""
 
     whirl_ratio: float = _measure("1", "whirl speed about the mean centre / cage speed")
-    """Mean angular velocity about the mean centre over the mean cage speed, positive in the sense of
-    rotation; NaN where the centre stands still. 1 is synchronous, near 0.5 oil whirl."""
+    """Mean angular velocity about the mean centre over the mean cage speed, positive in the sense
+    of rotation; NaN where the centre stands still. 1 is synchronous, near 0.5 oil whirl."""
     rib_whirl_ratio: float = _measure("1", "whirl speed about the rib centre / cage speed")
     """The same about the rib centre: 0 for an orbit that does not go around it."""
     rms: float = _measure("m", "rms displacement about the mean")
@@ -124,8 +129,8 @@ class OrbitMeasures:
     minimum_film_thickness: float = _measure("m", "smallest film thickness")
     """c (1 - eps) at the largest eps, not below 0 [m]."""
     velocity_scatter: float = _measure("1", "scatter of the centre's speed / mean speed")
-    """Standard deviation of |v| over its mean (Ghaisas et al. 2004): small is steady; 0 for a circle,
-    NaN where the centre stands still."""
+    """Standard deviation of |v| over its mean (Ghaisas et al. 2004): small is steady; 0 for a
+    circle, NaN where the centre stands still."""
     peak_contact_force: float = _measure("N", "largest land contact force")
     """[N], at the samples."""
     mean_contact_force: float = _measure("N", "mean land contact force")
@@ -179,7 +184,8 @@ def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
     away = _magnitude(position - centre)
     pace = _magnitude(velocity)
     phase = trajectory.tau[-1] - trajectory.tau[0]
-    moves = np.max(away) > 1e-9 * c
+    moves = np.max(away) > STILL * c
+    paced = np.mean(pace) > STILL * c * np.mean(speed)
     eps = _magnitude(position) / c
     largest = max(float(np.max(eps)), trajectory.peak)
     forces = cage_forces(model, trajectory)
@@ -191,7 +197,7 @@ def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
         peak_displacement=float(np.max(away)),
         largest_eps=largest,
         minimum_film_thickness=max(c * (1 - largest), 0.0),
-        velocity_scatter=float(np.std(pace, ddof=1) / np.mean(pace)) if moves else float("nan"),
+        velocity_scatter=float(np.std(pace, ddof=1) / np.mean(pace)) if paced else float("nan"),
         peak_contact_force=float(np.max(contact)),
         mean_contact_force=mean(contact),
         contact_impulse=impulse(contact),

@@ -5,14 +5,14 @@ A trajectory is sampled evenly in phase, so its spectrum is over orders even whe
 
 import dataclasses
 import math
-from typing import get_args, Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.signal import get_window
 
 from .._types import State
-from ..integrate import AbstractMethod, simulate, Trajectory
+from ..integrate import AbstractMethod, Trajectory, simulate
 from ..models import AbstractForcedSystem
 
 
@@ -116,7 +116,7 @@ def whirl_spectrum(
 
 
 def _hann_line(ratio: float) -> tuple[float, float]:
-    """Offset in bins and amplitude factor of a line, from the ratio r of its larger neighbour to it.
+    """Offset in bins and amplitude factor of a line: r is the ratio of its larger neighbour to it.
 
     The main lobe of the Hann window is sinc(d)/(1 - d^2), so the ratio of two neighbours gives the
     offset d = (2 r - 1)/(r + 1) exactly for a single line (T. Grandke, IEEE Trans. Instrum. Meas.
@@ -236,4 +236,6 @@ def waterfall(
             row = order_spectrum(run, component, window=window).amplitude[:size]
         rows.append(row)
     order = np.arange(size) / revolutions
-    return Waterfall(np.asarray(speeds, dtype=float), order, np.stack(rows), tuple(outcomes), window)
+    return Waterfall(
+        np.asarray(speeds, dtype=float), order, np.stack(rows), tuple(outcomes), window
+    )

@@ -30,9 +30,9 @@ def mean_square_displacement(
 ) -> Float[np.ndarray, "*lanes cut"]:
     """Mean-square displacement D_c(n) of the walk that a centred series drives, n = 1 to N/10.
 
-    Centring removes, exactly, the bounded oscillation V_osc = mean^2 (1 - cos n c)/(1 - cos c) that
-    the paper subtracts afterwards (its modified displacement), without loss of digits where the mean
-    is large. The average runs over the same N - N/10 places at every lag, by one FFT.
+    Centring removes the bounded oscillation V_osc = mean^2 (1 - cos n c)/(1 - cos c) that the paper
+    subtracts afterwards (its modified displacement), and its cross terms, without loss of digits
+    where the mean is large. The average runs over the same N - N/10 places at every lag, by one FFT.
 
     **Arguments:** series with zero mean; frequency c [rad per value].
     """
@@ -71,7 +71,7 @@ def zero_one(
     **Arguments:**
 
     - `series`: one scalar per revolution, e.g. a strobe coordinate, along the last axis; the other
-        axes are lanes. At least 50 values, better 1000 (see the module on lengths and oversampling).
+        axes are lanes. At least 50 values, better 1000; the module says more on this.
     - `frequencies`: number of random c in (pi/5, 4 pi/5); K is the median, because single c
         resonate with the motion.
     - `seed`: of the random c; all lanes use the same ones.
@@ -86,9 +86,7 @@ def zero_one(
     """
     n = series.shape[-1]
     if n < SHORTEST:
-        raise ValueError(
-            f"Argument `series` must have at least {SHORTEST} values, but it has {n}."
-        )
+        raise ValueError(f"Argument `series` must have at least {SHORTEST} values, but it has {n}.")
     if frequencies < 1:
         raise ValueError(f"Argument `frequencies` must be at least 1, but {frequencies} was given.")
     finite = np.all(np.isfinite(series), axis=-1)

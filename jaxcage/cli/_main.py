@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(str(error))
         return FAILED
     except KeyboardInterrupt:
-        say("Interrupted: nothing was written.")
+        say("Interrupted.")
         return INTERRUPTED
 
 
@@ -71,14 +71,13 @@ def _parse(arguments: list[str]) -> Options | None:
 
 
 def _sentence(box: str) -> str:
-    """The first paragraph in a box, as one sentence."""
-    inside = [
-        line.strip(" │|") for line in box.splitlines() if not line.startswith(("╭", "╰", "+"))
-    ]
-    paragraph = []
-    for line in inside:
-        if re.match(r"[─-]{3,}", line):
-            break
-        paragraph.append(line)
-    text = " ".join(" ".join(paragraph).split()).rstrip(".")
-    return f"{text or 'The command line was not understood'} (see jaxcage --help)."
+    """What a box says first, as one sentence.
+
+    The title stands in the upper border, or above a rule where the terminal has no line drawing.
+    """
+    framed = box.lstrip().startswith("╭")
+    lines = [line.strip(" │") for line in box.splitlines() if not line.startswith(("╭", "╰"))]
+    parts = [" ".join(part.split()) for part in re.split(r"\s[─-]{3,}\s", " ".join(lines))]
+    said = [part.rstrip(".") for part in parts if part][0 if framed else 1 :][:2]
+    kept = [part for i, part in enumerate(said) if i == 0 or part.startswith("Available")]
+    return f"{'; '.join(kept) or 'The command line was not understood'} (see jaxcage --help)."

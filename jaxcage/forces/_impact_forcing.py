@@ -57,7 +57,7 @@ def pulse_spectrum(
     v0 = approach_speed(impact.oscillator.approach_ratio, omega, pocket_clearance)
     duration = 8 * impact_time_scale(impact.oscillator, roller_mass, v0)
     history = impact_history(impact.oscillator, roller_mass, v0, duration)
-    k = jnp.arange(impact.harmonics + 1) * float(n_rollers)
+    k = jnp.arange(impact.harmonics + 1, dtype=float) * n_rollers
     phase = omega * jnp.outer(k, history.time)
     rate = n_rollers * omega / (2 * jnp.pi)
     weight = jnp.where(k == 0, 1.0, 2.0) * rate
@@ -80,7 +80,7 @@ def pulse_train(
     direction of motion is (cos theta, -sin theta), and leave at -pi/2 + theta, where it is (cos theta, sin theta).
     """
     cosine, sine = pulse_spectrum(impact, omega, n_rollers, roller_mass, pocket_clearance)
-    k = jnp.arange(impact.harmonics + 1) * float(n_rollers)
+    k = jnp.arange(impact.harmonics + 1, dtype=float) * n_rollers
 
     def shifted(start: Scalar) -> tuple[Array, Array]:
         c, s = jnp.cos(k * start), jnp.sin(k * start)
@@ -93,6 +93,6 @@ def pulse_train(
 
 def pulse_train_force(tau: Scalar, train: PulseTrain, n_rollers: int) -> tuple[Array, Array]:
     """Force of the pulse train at phase tau [N]."""
-    k = jnp.arange(train.a_x.shape[0]) * float(n_rollers)
+    k = jnp.arange(train.a_x.shape[0], dtype=float) * n_rollers
     c, s = jnp.cos(k * tau), jnp.sin(k * tau)
     return jnp.sum(train.a_x * c + train.b_x * s), jnp.sum(train.a_y * c + train.b_y * s)

@@ -7,6 +7,7 @@ once. It is differentiable (forward mode) with respect to state, speed and every
 import diffrax as dfx
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array, Int
 
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
@@ -26,7 +27,7 @@ class StrobeMap(eqx.Module):
         """One revolution from `y`: state after it, largest excursion on the way, outcome."""
         return self.part(y, 0, 1)
 
-    def part(self, y: State, i: Scalar, parts: int) -> Stretch:
+    def part(self, y: State, i: Int[Array, ""] | int, parts: int) -> Stretch:
         """The `i`-th of `parts` equal parts of a revolution."""
         phase = jnp.asarray(i, dtype=float) * (REVOLUTION / parts)
         return self.method.advance(self.field, self.system, self.scale, y, phase, parts)

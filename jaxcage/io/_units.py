@@ -47,7 +47,7 @@ def _convert(number: float, given: str, unit: str) -> float:
     except Exception as error:  # pint's parser leaks errors of many kinds
         raise ValueError(f'has the unknown unit "{given}"') from error
     wanted = f'a unit like "{unit}"' if unit else "no unit"
-    if unit == "rad/s" and "hertz" in source._units:
+    if unit == "rad/s" and any(name.endswith("hertz") for name in source._units):
         raise ValueError('is in Hz, where "rpm" or "rad/s" is wanted')
     try:
         return float(registry.Quantity(number, source).to(registry.parse_units(unit)).magnitude)

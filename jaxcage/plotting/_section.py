@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from .._glossary import component_names, quantity
-from ._style import BLUE, GREEN, PURPLE, SKY, VERMILION, axes_or_new, enlarge_dots, padded_limits
+from ._style import BLUE, GREEN, PURPLE, SKY, VERMILION, axes_or_new, dots, enlarge_dots, padded_limits
 
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)

@@ -60,7 +60,7 @@ def dress(ax: Axes) -> Axes:
     return ax
 
 
-def dots(colour: str, size: float) -> dict[str, Any]:
+def dots(colour: str, size: float | int) -> dict[str, Any]:
     """Style of a cloud of points without a line."""
     style = {"marker": ".", "linestyle": "none", "markeredgewidth": 0}
     return style | {"color": colour, "markersize": size}

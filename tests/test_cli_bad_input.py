@@ -1,0 +1,144 @@
+"""Every bad input is refused with one sentence on standard error and exit status 2."""
+
+from pathlib import Path
+
+import pytest
+
+from jaxcage.cli import main
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The sentence with which the command refuses `arguments`."""
+    assert main(list(arguments)) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Traceback" not in err
+    lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
+    assert len(lines) == 1, err
+    assert lines[0].endswith(".")
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        ("sweep 4z", "'4z' is unknown: it must be one of 1a, 1b, 2a, 2b, 3a, 3b"),
+        ("statics 1", "'1' is unknown"),
+        ("sweep nowhere.toml", "nowhere.toml' must be a readable TOML file"),
+        ("sweep 1a --first 0", "--first must be a speed above 0 rpm, but 0 was given"),
+        ("sweep 1a --first -100", "--first must be a speed above 0 rpm, but -100 was given"),
+        ("sweep 1a --last nan", "--last must be a speed above 0 rpm, but nan was given"),
+        ("sweep 1a --last inf", "--last must be a speed above 0 rpm, but inf was given"),
+        ("sweep 1a --first 9000 --last 8000", "the range is 9000 to 8000 rpm"),
+        ("zones 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
+        ("zones 1a --count 0", "--count must be at least 1, but 0 was given"),
+        ("sweep 1a --count -3", "--count must be at least 1, but -3 was given"),
+        ("sweep 1a --count 2.5", "--count"),
+        ("sweep 1a --revolutions 0", "--revolutions must be a multiple of 10 above 0, but 0"),
+        ("sweep 1a --revolutions 37", "--revolutions must be a multiple of 10 above 0, but 37"),
+        ("sweep 1a --discard -1", "--discard must be at least 0, but -1 was given"),
+        ("sweep 1a --exponents 0", "--exponents must be at least 1, but 0 was given"),
+        ("sweep 1a --exponents 9", "--exponents must be at most 4, but 9 was given"),
+        ("sweep 1a --solver euler", "--solver must be one of rodas3, rodas4"),
+        ("sweep 1a --steps 0", "--steps` must be at least 1"),
+        ("sweep 1a --tolerance 2", "--tolerance must lie between 0 and 1, but 2.0"),
+        ("sweep 1a --steps 64 --tolerance 1e-6", "--steps and --tolerance must not both be given"),
+        ("poincare 1a --speed 0", "--speed must be a speed above 0 rpm, but 0 was given"),
+        ("poincare 1a --speed -8500", "--speed must be a speed above 0 rpm, but -8500"),
+        ("poincare 1a --speed 8500 --revolutions 5", "--revolutions must be a multiple of 10"),
+        ("poincare 1a", "--speed"),
+        ("simulate 1a --speed nan", "--speed must be a speed above 0 rpm, but nan was given"),
+        ("simulate 1a --speed 8500 --revolutions 0", "--revolutions must be at least 1, but 0"),
+        ("simulate 1a --speed 8500 --discard -1", "--discard must be at least 0, but -1"),
+        ("impact 1a --speed -1", "--speed must be a speed above 0 rpm, but -1 was given"),
+        ("impact 1a --speed 8500 --duration 0", "--duration must lie between 0 and 1000 ms, but 0"),
+        ("impact 1a --speed 8500 --duration nan", "--duration must lie between 0 and 1000 ms"),
+        ("statics 1a --load 0", "--load must be above 0 N, but 0 was given"),
+        ("statics 1a --load -4450", "--load must be above 0 N, but -4450 was given"),
+        ("statics 1a --load nan", "--load must be above 0 N, but nan was given"),
+        ("statics 1a --shaft-speed -1", "--shaft-speed must be at least 0 rpm, but -1"),
+        ("statics 1a --load heavy", "could not convert string to float: 'heavy'"),
+        ("sweep", "CASE"),
+        ("spin 1a", "Unrecognized options: spin"),
+        ("sweep 1a --sped 3", "Unrecognized options: --sped"),
+        ("", "Expected one of {simulate, sweep, zones, poincare, statics, impact}"),
+    ],
+)
+def test_bad_arguments(capsys: pytest.CaptureFixture[str], arguments: str, said: str):
+    sentence = refused(capsys, *arguments.split())
+    assert said.replace("`", "") in sentence.replace("`", "")
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("guidance_gap = ", "must be valid TOML"),
+        ("base = '1a'\nguidence_gap = 4e-4", "Key `guidence_gap` at the top level must be one of"),
+        ("base = '1a'\n[film]\nwidth = 4e-3", "Key `width` in [film] must be one of land_width,"),
+        ("base = '1a'\nguidance_gap = 0", "`guidance_gap` must be a number from 1e-05 to 0.005 m"),
+        ("base = '1a'\nguidance_gap = -4e-4", "but is -0.0004 m"),
+        ("base = '1a'\nguidance_gap = 0.45", "but is 0.45 m"),
+        ("base = '1a'\nguidance_gap = '0.45 m'", 'but is 0.45 m (given as "0.45 m")'),
+        ("base = '1a'\nguidance_gap = '0.45 kg'", 'has the unit "kg"'),
+        ("base = '1a'\nguidance_gap = '0.45 fathoom'", 'the unknown unit "fathoom"'),
+        ("base = '1a'\nguidance_gap = nan", "but is nan m"),
+        ("base = '1a'\neccentricity = '0.5 mm'", "but is 0.5 mm in a gap of 0.45 mm"),
+        ("base = '9'", "`base` must be one of 1a, 1b, 2a, 2b, 3a, 3b, but is '9'"),
+    ],
+)
+def test_bad_configurations(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, said: str
+):
+    path = tmp_path / "design.toml"
+    path.write_text(text)
+    sentence = refused(capsys, "sweep", str(path), "--out", str(tmp_path / "out"))
+    assert said in sentence
+    assert str(path) in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_is_not_a_configuration(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    assert "must be a readable TOML file" in refused(capsys, "statics", str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    "command", ["sweep 1a", "zones 1a", "statics 1a", "impact 1a --speed 8500"]
+)
+@pytest.mark.parametrize("below", ["", "results"])
+def test_unwritable_output_is_refused_before_the_computation(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    command: str,
+    below: str,
+):
+    from jaxcage.sweep import _speed
+
+    monkeypatch.setattr(_speed, "run_lanes", lambda *_: pytest.fail("the sweep was started"))
+    occupied = tmp_path / "occupied"
+    occupied.write_text("a file, not a folder")
+    sentence = refused(capsys, *command.split(), "--out", str(occupied / below))
+    assert "must be a folder that can be written to" in sentence
+    assert occupied.read_text() == "a file, not a folder"
+
+
+def test_interruption(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    from jaxcage.cli import _statics
+
+    def interrupted(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(_statics, "run", interrupted)
+    assert main(["statics", "1a"]) == 130
+    assert capsys.readouterr().err == "Interrupted.\n"
+
+
+def test_errors_of_our_own_are_not_taken_for_bad_input(monkeypatch: pytest.MonkeyPatch):
+    from jaxcage.cli import _statics
+
+    def broken(_: object) -> None:
+        raise ValueError("a mistake in the library")
+
+    monkeypatch.setattr(_statics, "run", broken)
+    with pytest.raises(ValueError, match="a mistake in the library"):
+        main(["statics", "1a"])

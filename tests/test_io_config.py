@@ -1,0 +1,183 @@
+"""TOML to model and back: units, ranges, defaults, round trips."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from helpers import elastic, roller_pass
+
+import jaxcage as jc
+from jaxcage.io import (
+    ConfigError,
+    configuration,
+    load_model,
+    model_from,
+    save_model,
+    to_si,
+    toml_text,
+)
+
+
+@pytest.mark.parametrize(
+    "text, unit, value",
+    [
+        ("0.45 mm", "m", 0.45e-3),
+        ("23 um", "m", 23e-6),
+        ("23µm", "m", 23e-6),
+        ("1e-3", "m", 1e-3),
+        ("-.5 inch", "m", -0.0127),
+        ("40 degC", "K", 313.15),
+        ("40 °C", "K", 313.15),
+        ("104 degF", "K", 313.15),
+        ("56 cSt", "m^2/s", 56e-6),
+        ("56 mm^2/s", "m^2/s", 56e-6),
+        ("0.87 g/cm^3", "kg/m^3", 870.0),
+        ("4 g", "kg", 4e-3),
+        ("3000 rpm", "rad/s", 314.1592653589793),
+        ("210 GPa", "Pa", 210e9),
+        ("80.6e3 N/mm^(10/9)", "N/m^(10/9)", 80.6e3 * 1000 ** (10 / 9)),
+        ("97 %", "1", 0.97),
+        ("0.97", "1", 0.97),
+    ],
+)
+def test_units(text: str, unit: str, value: float):
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text, unit, said",
+    [
+        ("thick", "m", "not a number with a unit"),
+        ("", "m", "not a number with a unit"),
+        ("1 2 mm", "m", "unknown unit"),
+        ("0.45 furlongs_per", "m", "unknown unit"),
+        ("0.45 kg", "m", 'has the unit "kg", where a unit like "m" is wanted'),
+        ("0.45 m", "1", 'has the unit "m", where no unit is wanted'),
+        ("50 Hz", "rad/s", "is in Hz"),
+        ("50 kHz", "rad/s", "is in Hz"),
+        ("nan", "m", "not a number with a unit"),
+        ("__import__('os')", "m", "not a number with a unit"),
+    ],
+)
+def test_wrong_units(text: str, unit: str, said: str):
+    with pytest.raises(ValueError, match=said):
+        to_si(text, unit)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        jc.case("1a"),
+        jc.case("3b"),
+        elastic(jc.case("2a")),
+        roller_pass(jc.case("1b")),
+        jc.replace(jc.case("1a"), guidance_gap=1 / 3e3, eccentricity=1e-5 / 7),
+    ],
+    ids=["1a", "3b", "elastic", "roller_pass", "replaced"],
+)
+def test_round_trip_keeps_every_digit(tmp_path: Path, model: jc.CageModel):
+    path = save_model(tmp_path / "model.toml", model)
+    again = load_model(path)
+    assert configuration(again) == configuration(model)
+    assert type(again.rib) is type(model.rib)
+    assert type(again.impact) is type(model.impact)
+
+
+def test_every_parameter_is_in_the_configuration():
+    model = elastic(roller_pass(jc.case("1a")))
+    nested = tomllib.loads(toml_text(configuration(model)))
+
+    def count(table: dict) -> int:
+        return sum(
+            count(v) if isinstance(v, dict) else isinstance(v, float) for v in table.values()
+        )
+
+    assert count(nested) == len(jc.parameters(model))
+
+
+def test_base_is_changed_only_where_the_file_says_so():
+    model = model_from({"base": "1a", "guidance_gap": "0.5 mm", "film": {"model": "full"}})
+    expected = configuration(jc.case("1a"))
+    expected["guidance_gap"] = 0.5e-3
+    expected["film"]["model"] = "full"
+    assert configuration(model) == expected
+
+
+def test_oil_by_grade():
+    model = model_from({"base": "1a", "lubricant": {"grade": 68, "temperature": "70 degC"}})
+    expected = jc.vg(68.0, 343.15)
+    assert float(model.lubricant.dynamic_viscosity) == pytest.approx(
+        float(expected.dynamic_viscosity), rel=1e-12
+    )
+
+
+def test_bearing_by_designation_with_one_change():
+    table = {"designation": "NU2310", "radial_clearance": "20 um"}
+    model = model_from({"base": "1a", "bearing": table})
+    assert float(model.bearing.radial_clearance) == pytest.approx(20e-6)
+    assert float(model.bearing.roller_diameter) == 16e-3
+
+
+@pytest.mark.parametrize(
+    "kind, law", [("synchronous", jc.SynchronousImpact), ("roller_pass", jc.RollerPassImpact)]
+)
+def test_kind_chooses_the_impact(kind: str, law: type):
+    assert type(model_from({"base": "1a", "impact": {"kind": kind}}).impact) is law
+
+
+def test_oscillator_of_the_impact():
+    impact = {"kind": "roller_pass", "harmonics": 8, "oscillator": {"bar_mass": "5 g"}}
+    model = model_from({"base": "1a", "impact": impact})
+    assert isinstance(model.impact, jc.RollerPassImpact)
+    assert model.impact.harmonics == 8
+    assert float(model.impact.oscillator.bar_mass) == pytest.approx(5e-3)
+    assert float(model.impact.oscillator.bar_stiffness) == float(jc.PocketImpact().bar_stiffness)
+
+
+@pytest.mark.parametrize(
+    "table, said",
+    [
+        ({}, "`bearing`, `lubricant`, `film`, `contact`, `support`, `impact`, .* must be given"),
+        ({"rib": {"kind": "elastic", "mass": 1.0}}, "`rib.stiffness`, `rib.damping` must be given"),
+        ({"rib": {"kind": "soft"}}, "`rib.kind` must be one of rigid, elastic, but is 'soft'"),
+        (
+            {"film": {"model": "half"}},
+            "`film.model` must be one of fixed_half, positive_pressure,",
+        ),
+        (
+            {"film": {"n_lands": 2.5}},
+            "`film.n_lands` must be a whole number from 1 to 4, but is 2",
+        ),
+        ({"film": {"n_lands": True}}, "`film.n_lands` must be a whole number"),
+        ({"film": {"land_width": "8 mm"}}, "must fit beside the rollers, in 6.5 mm, but is 8 mm"),
+        ({"film": 3}, "`film` must be a table of values, but is 3"),
+        ({"cage_mass": True}, "`cage_mass` must be a number from 0.001 to 100 kg, but is True"),
+        ({"cage_mass": [1.0]}, r"`cage_mass` must be a number .*, but is \[1.0\]"),
+        ({"cage_mass": float("inf")}, "`cage_mass` must be a number .*, but is inf kg"),
+        ({"lubricant": {"temperature": 40}}, "`lubricant.temperature` must be a number from 200"),
+        ({"lubricant": {"grade": "68"}}, "`lubricant.grade` must be a number from 2"),
+        ({"bearing": {"designation": "6310"}}, "`bearing.designation` must be NU2310"),
+        ({"bearing": {"n_rollers": 40}}, "40 rollers overlap on the pitch circle"),
+        (
+            {"contact": {"smoothing": 1e-5}, "guidance_gap": 5e-5},
+            "a tenth of the clearance, 0.05",
+        ),
+        ({"base": ["1a"]}, "`base` must be one of"),
+    ],
+)
+def test_refused(table: dict, said: str):
+    whole = {"base": "1a", **table} if table else table
+    with pytest.raises(ConfigError, match=said):
+        model_from(whole)
+
+
+def test_example_in_the_documentation_is_valid(tmp_path: Path):
+    from jaxcage.io import _config
+
+    assert _config.__doc__ is not None
+    path = tmp_path / "example.toml"
+    path.write_text(_config.__doc__.split("\n\n", 1)[1])
+    model = load_model(path)
+    assert float(model.guidance_gap) == pytest.approx(0.5e-3)
+    assert isinstance(model.impact, jc.RollerPassImpact)
+    assert float(model.impact.oscillator.bar_mass) == pytest.approx(4e-3)

@@ -1,0 +1,121 @@
+"""Labels, zones and edges from made-up lanes."""
+
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from jaxcage.analysis import closing_period, label_lanes
+
+
+def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
+    """A sweep whose lanes carry the labels of the string: 1-8 period, # chaotic, q quasi-periodic, ? undecided, X failed."""
+    n, keep, blocks = len(label_row), 32, 10
+    speed = (5000.0 + step_rpm * np.arange(n)) * np.pi / 30
+    strobe = np.zeros((n, starts, keep, 2))
+    growth = np.zeros((n, starts, blocks, 1))
+    outcome = np.zeros((n, starts), dtype=int)
+    wiggle = np.sin(np.sqrt(2) * np.arange(keep))
+    noise = 0.01 * np.cos(np.arange(blocks))
+    for i, sign in enumerate(label_row):
+        if sign.isdigit():
+            strobe[i, 0, :, 0] = np.arange(keep) % int(sign)
+            growth[i, 0, :, 0] = -0.3 + noise
+        elif sign == "X":
+            strobe[i], growth[i], outcome[i] = np.nan, np.nan, 1
+        else:
+            strobe[i, 0, :, 0] = wiggle
+            growth[i, 0, :, 0] = {"#": 0.4, "q": 0.0, "?": -0.1}[sign] + noise
+    return jc.Sweep(
+        speed=speed,
+        strobe=strobe,
+        last=strobe[:, :, -1],
+        block_growth=growth,
+        peak=np.full((n, starts), 0.5),
+        outcome=outcome,
+        scale=np.ones((n, 2)),
+        discard=10,
+        revolutions=100,
+    )
+
+
+@pytest.mark.parametrize("k", range(1, 9))
+def test_smallest_closing_period_is_found(k: int):
+    strobe = np.tile(np.arange(k, dtype=float), 64)[:64, None] * np.array([1.0, -2.0])
+    assert closing_period(strobe, np.ones(2)) == k
+
+
+def test_closing_is_measured_in_the_scale():
+    strobe = np.array([0.0, 0.9e-4] * 16)[:, None]
+    assert closing_period(strobe, np.array([1.0])) == 1
+    assert closing_period(strobe, np.array([0.5])) == 2
+
+
+def test_period_nine_and_nan_do_not_close():
+    assert closing_period(np.tile(np.arange(9.0), 8)[:, None], np.ones(1)) == 0
+    assert closing_period(np.full((64, 1), np.nan), np.ones(1)) == 0
+
+
+@pytest.mark.parametrize(
+    "exponent, error, expected",
+    [
+        (0.05, 0.01, "chaotic"),
+        (0.05, 0.02, "undecided"),
+        (0.004, 0.0, "quasi-periodic"),
+        (-0.004, 0.0, "quasi-periodic"),
+        (0.03, 0.02, "quasi-periodic"),
+        (-0.1, 0.01, "undecided"),
+    ],
+)
+def test_labels_by_exponent_and_error(exponent: float, error: float, expected: str):
+    got = label_lanes(np.array([False]), np.array([0]), np.array([exponent]), np.array([error]))
+    assert got[0] == expected
+
+
+def test_failure_comes_first_and_closing_before_chaos():
+    label = label_lanes(np.array([True, False]), np.array([1, 2]), np.array([0.5, 0.5]), np.zeros(2))
+    assert list(label) == ["failed", "periodic-2"]
+
+
+def test_narrow_windows_are_closed_and_wide_ones_are_not():
+    found = jc.zones(made("11###111##11"))  # chaotic at 5200-5400 and 5800-5900: a window of 400 rpm
+    (zone,) = found.zones
+    assert zone.onset is not None and zone.exit is not None
+    assert (zone.onset.speed_rpm, zone.exit.speed_rpm) == pytest.approx((5150, 5950))
+    assert zone.width_rpm == pytest.approx(800)
+    assert zone.onset.uncertainty_rpm == pytest.approx(100) and zone.onset.kind == "chaotic"
+    assert len(jc.zones(made("11###1111##11")).zones) == 2
+
+
+def test_zones_that_run_past_the_range_are_open():
+    first, last = jc.zones(made("##11111111#")).zones
+    assert first.onset is None and first.exit is not None and first.width_rpm is None
+    assert last.onset is not None and last.exit is None
+
+
+def test_failed_speeds_are_neither_chaotic_nor_calm():
+    """An edge next to speeds that failed is as uncertain as the gap they leave."""
+    (zone,) = jc.zones(made("11XX##11")).zones
+    assert zone.onset is not None
+    assert zone.onset.speed_rpm == pytest.approx(5250) and zone.onset.uncertainty_rpm == pytest.approx(300)
+    (zone,) = jc.zones(made("XX##11")).zones
+    assert zone.onset is None
+    sweep = made("XX##11")
+    assert np.isnan(sweep.chaotic_share[0]) and sweep.chaotic_share[2] == 1.0
+
+
+def test_synchronous_stretches_end_where_period_one_is_lost():
+    stretch = jc.zones(made("11122##q11")).synchronous
+    assert [z.exit and z.exit.speed_rpm for z in stretch] == [pytest.approx(5250), None]
+    assert all(e.kind == "synchronous-loss" for z in stretch for e in (z.onset, z.exit) if e)
+
+
+def test_no_zone_and_table():
+    found = jc.zones(made("1111"))
+    assert found.zones == () and "none" in str(found)
+    assert "500" not in str(found) and "resolution of 100 rpm" in str(found)
+    assert "zone 1: 5150 +- 100 rpm to 5350 +- 100 rpm, 200 rpm wide, 100% of starts chaotic" in str(jc.zones(made("11##1")))
+
+
+def test_sweep_prints_counts():
+    text = str(made("11#qX?"))
+    assert "2 periodic-1" in text and "1 lanes failed: not_finite" in text

@@ -1,0 +1,127 @@
+"""Sweeps: results do not depend on how lanes are spread, carried states show hysteresis, ramps follow their speed."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcage as jc
+
+
+def duffing(tau, q, v, speed):
+    """Hardening Duffing x'' + 0.1 x' + x + x^3 = 0.3 cos(speed t)."""
+    del speed
+    (x,), (u,) = q, v
+    return (-0.1 * u - x - x**3 + 0.3 * jnp.cos(tau),)
+
+
+HARDENING = jc.ForcedOscillator(duffing, coordinates=1)
+FAST = jc.method("rodas4", steps=32)
+
+
+def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
+    """300 lanes in three chunks, and the same speeds in pieces: bit for bit the same."""
+    speeds = np.linspace(1.0, 2.0, 150)
+    options = {"discard": 5, "revolutions": 20, "blocks": 4, "keep": 8, "method": FAST}
+    starts = [(0.1, 0.0), (1.0, 0.5)]
+    whole = jc.sweep(HARDENING, speeds, starts=starts, **options)
+    pieces = [jc.sweep(HARDENING, speeds[i::2], starts=starts, **options) for i in (0, 1)]
+    for i, piece in enumerate(pieces):
+        assert np.array_equal(whole.strobe[i::2], piece.strobe)
+        assert np.array_equal(whole.block_growth[i::2], piece.block_growth)
+
+
+def test_kept_states_are_the_last_ones_in_order():
+    long = jc.sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=20, method=FAST)
+    short = jc.sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=7, method=FAST)
+    assert np.array_equal(short.strobe, long.strobe[:, :, -7:])
+    assert np.array_equal(long.last, long.strobe[:, :, -1])
+    one = jc.sweep(HARDENING, np.array([1.5]), discard=22, revolutions=1, blocks=1, exponents=0, method=FAST)
+    assert np.allclose(one.last, long.last, rtol=0, atol=1e-13)
+
+
+def test_number_of_exponents_does_not_change_the_first():
+    a, b = (
+        jc.sweep(HARDENING, np.array([1.2, 1.5]), discard=20, revolutions=40, blocks=4, exponents=k, method=FAST)
+        for k in (1, 2)
+    )
+    assert np.allclose(a.exponents[..., 0], b.exponents[..., 0], rtol=0, atol=1e-12)
+    # the sum of the spectrum is the mean divergence, -damping times the period
+    assert np.allclose(b.exponents.sum(-1), -0.1 * 2 * np.pi / b.speed[:, None], rtol=0, atol=1e-6)
+
+
+def test_run_up_and_run_down_show_the_hysteresis_of_a_hardening_oscillator():
+    """Folds of the hardening Duffing oscillator at 1.77972 (upper branch ends) and 1.32424 (lower branch ends): between
+    them run-up stays on the large orbit and run-down on the small one; outside they agree. Folds: SciPy DOP853 and
+    Newton at 1e-12."""
+    speeds = np.linspace(1.1, 2.0, 37)
+    got = jc.run_up_down(HARDENING, speeds, start=(0.5, 0.0), discard=150, revolutions=20, method=FAST)
+    apart = got.apart > 0.1
+    inside = (speeds > 1.3242362) & (speeds < 1.77971952)
+    assert np.array_equal(apart, inside)
+    assert np.all(got.up.label == "periodic-1")
+
+
+def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():
+    run = jc.ramp(HARDENING, 1.0, 1.1, revolutions=400, samples=8, start=(0.1, 0.0), method=FAST)
+    assert run.speed[0] == 1.0 and run.speed[-1] == pytest.approx(1.1, abs=1e-4)
+    # time of a ramp linear in phase: integral of dtau / speed
+    exact = 2 * np.pi * 400 / 0.1 * np.log(run.speed[-1] / run.speed[0])
+    assert run.time[-1] == pytest.approx(exact, rel=1e-6)
+    steady = jc.simulate(HARDENING, 1.1, revolutions=1, samples=8, discard=400, start=(0.1, 0.0), method=FAST)
+    assert np.max(np.abs(run.state[-8:, 0] - steady.state[:, 0])) < 5e-3
+
+
+def test_simulation_and_sweep_agree():
+    run = jc.simulate(HARDENING, 1.3, revolutions=3, samples=4, start=(0.2, 0.1), method=FAST)
+    swept = jc.sweep(HARDENING, np.array([1.3]), starts=[(0.2, 0.1)], discard=0, revolutions=3, blocks=1, keep=3, method=FAST)
+    assert np.allclose(run.state[4::4], swept.strobe[0, 0, :2], rtol=0, atol=1e-13)
+    assert run.outcome == "successful" and run.time[4] == pytest.approx(2 * np.pi / 1.3)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"speeds": np.array([])}, "at least one speed"),
+        ({"speeds": np.array([0.0, 1.0])}, "positive and finite"),
+        ({"speeds": np.array([1.0, -1.0])}, "positive and finite"),
+        ({"speeds": np.array([1.0, np.nan])}, "positive and finite"),
+        ({"speeds": np.array([2.0, 1.0])}, "ascending"),
+        ({"discard": -1}, "at least 0 and 1"),
+        ({"revolutions": 0}, "at least 0 and 1"),
+        ({"exponents": 3}, "between 0 and 2"),
+        ({"blocks": 7}, "divide"),
+        ({"starts": []}, "states of 2 numbers"),
+        ({"starts": [(1.0,)]}, "states of 2 numbers"),
+        ({"starts": np.zeros((1, 1, 3))}, "states of 2 numbers"),
+    ],
+)
+def test_impossible_requests_are_refused(change: dict, words: str):
+    request = {"speeds": np.array([1.0]), "discard": 1, "revolutions": 10, "blocks": 2, "method": FAST} | change
+    with pytest.raises(ValueError, match=words):
+        jc.sweep(HARDENING, request.pop("speeds"), **request)
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"solver": "euler"}, "must be one of"),
+        ({"steps": 0}, "at least 1"),
+        ({"steps": 10, "tolerance": 1e-3}, "must not both"),
+        ({"tolerance": 2.0}, "between 0 and 1"),
+        ({"solver": "newmark", "tolerance": 1e-3}, "must be one of"),
+    ],
+)
+def test_unknown_methods_are_refused(options: dict, words: str):
+    with pytest.raises(ValueError, match=words):
+        jc.method(**options)
+
+
+def test_replace_by_name():
+    model = jc.case("1a")
+    changed = jc.replace(model, guidance_gap=0.5e-3, **{"film.model": "full"})
+    assert float(changed.guidance_gap) == 0.5e-3 and changed.film.model == "full"
+    assert float(model.guidance_gap) == pytest.approx(0.45e-3)
+    with pytest.raises(ValueError, match="must name a part of the model"):
+        jc.replace(model, gap=1.0)
+    with pytest.raises(ValueError, match="must be one of fixed_half, positive_pressure, full"):
+        jc.replace(model, **{"film.model": "half"})
