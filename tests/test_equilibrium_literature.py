@@ -232,7 +232,7 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     "gap_mm, highest", [(0.225, 5511), (0.30, 4773), (0.45, 3897), (0.60, 3375)]
 )
 def test_whirl_speed_of_a_light_cage_in_rpm(gap_mm, highest):
-    """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as the root of the gap."""
+    """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as gap^(-1/2)."""
     model = cage_in_film(cage_mass=1e-6, guidance_gap=gap_mm * 1e-3)
     assert float(film_whirl_speed(model)) * 30 / np.pi == pytest.approx(highest, abs=0.6)
 

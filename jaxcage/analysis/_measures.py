@@ -85,7 +85,8 @@ def film_drag_power(
     """Power [W] that shearing the film in all lands costs: torque times speed.
 
     Torque of one land 2 pi mu omega R^3 L/(c sqrt(1 - eps^2)), the short bearing's; as the film
-    force, it keeps its value beyond the onset of contact.
+    force, it keeps its value beyond the onset of contact. The gap is taken as full of oil at the
+    lubricant's own temperature: an upper bound where the land starves or warms up.
 
     **Arguments:** model; speed [rad/s] and eccentricity ratio at each sample.
     """

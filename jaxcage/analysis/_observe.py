@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from .._types import State
+from .._types import LaneState, State
 from ..integrate import outcome_code, StrobeMap
 
 
@@ -38,7 +38,7 @@ class Observation(NamedTuple):
 class Lanes(NamedTuple):
     """Where every lane is, how far out it has been, and whether it still runs."""
 
-    y: State
+    y: LaneState
     peak: Float[Array, " lanes"]
     outcome: Int[Array, " lanes"]
 
@@ -79,18 +79,18 @@ def _coded(strobe: StrobeMap, y: State) -> tuple[State, Array, Array]:
     return stretch.y, jnp.asarray(stretch.peak), outcome_code(stretch.result)
 
 
-def _blank(y: State, outcome: Int[Array, " lanes"]) -> State:
+def _blank(y: LaneState, outcome: Int[Array, " lanes"]) -> LaneState:
     return tuple(jnp.where(outcome == 0, c, jnp.nan) for c in y)
 
 
 def _push(maps: StrobeMap, lanes: Lanes, tangents: Tangents) -> tuple[Lanes, Tangents]:
     """All lanes one revolution on, with their tangent vectors (in units of the state's scale)."""
 
-    def step(y: State) -> tuple[State, tuple[Array, Array]]:
+    def step(y: LaneState) -> tuple[LaneState, tuple[Array, Array]]:
         moved = _advance(maps, lanes._replace(y=y))
         return moved.y, (moved.peak, moved.outcome)
 
-    def along(tangent: State) -> tuple[State, State, tuple[Array, Array]]:
+    def along(tangent: LaneState) -> tuple[LaneState, LaneState, tuple[Array, Array]]:
         y, moved, aux = jax.jvp(step, (lanes.y,), (tangent,), has_aux=True)
         return y, moved, aux
 
@@ -106,7 +106,7 @@ def _start_tangents(dimension: int, exponents: int, lanes: int) -> Tangents:
     return orthonormalise(raw)[0]
 
 
-def observe(maps: StrobeMap, y0: State, plan: Plan) -> Observation:
+def observe(maps: StrobeMap, y0: LaneState, plan: Plan) -> Observation:
     """Run lanes from `y0` and record strobe states and Lyapunov exponents.
 
     **Arguments:** strobe maps with a leading lane axis on every array; initial states, each of shape `(lanes,)`; plan.

@@ -32,7 +32,7 @@ def mean_square_displacement(
 
     Centring removes the bounded oscillation V_osc = mean^2 (1 - cos n c)/(1 - cos c) that the paper
     subtracts afterwards (its modified displacement), and its cross terms, without loss of digits
-    where the mean is large. The average runs over the same N - N/10 places at every lag, by one FFT.
+    where the mean is large. Each lag averages over the same N - N/10 places; one FFT does them all.
 
     **Arguments:** series with zero mean; frequency c [rad per value].
     """

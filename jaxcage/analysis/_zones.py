@@ -86,7 +86,7 @@ def close_windows(
     """
     joined: list[tuple[int, int]] = []
     for first, last in runs(chaotic):
-        if joined and rpm[first] - rpm[joined[-1][1]] < close_below_rpm:
+        if joined and rpm[first] - rpm[joined[-1][1]] < close_below_rpm * (1 - 1e-9):  # rounding of the grid
             first = joined.pop()[0]
         joined.append((first, last))
     return joined

@@ -8,9 +8,8 @@ import numpy as np
 from ..forces import ImpactHistory, PocketImpact, RollerPassImpact, approach_speed, impact_history
 from ..io import write_columns
 from ..plotting import impact_forces, new_figure
-from ..sweep import rpm
 from ._errors import UsageError, require_speed
-from ._inputs import output_folder, save_figure, subject
+from ._inputs import angular_speed, output_folder, save_figure, subject
 from ._options import ImpactOptions
 from ._report import Report, Table
 
@@ -30,7 +29,9 @@ def run(options: ImpactOptions) -> Report:
         raise UsageError(
             f"The pocket clearance of {about.name} must be above 0 for an impact, but it is 0."
         )
-    v0 = approach_speed(law.approach_ratio, rpm(options.speed), model.bearing.pocket_clearance)
+    v0 = approach_speed(
+        law.approach_ratio, angular_speed(options.speed), model.bearing.pocket_clearance
+    )
     history = impact_history(
         law, model.bearing.roller_mass, v0, jnp.asarray(1e-3 * options.duration)
     )

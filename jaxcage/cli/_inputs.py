@@ -1,6 +1,7 @@
 """What commands start from: a case or TOML file, an integration method, a folder to write to."""
 
 import dataclasses
+import math
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -43,6 +44,11 @@ def subject(options: Options) -> Subject:
     if broken:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
     return found
+
+
+def angular_speed(rpm: float) -> float:
+    """Speed [rad/s] from revolutions per minute, the unit of the command line."""
+    return rpm * math.pi / 30
 
 
 def integration(options: IntegrationOptions) -> AbstractMethod:

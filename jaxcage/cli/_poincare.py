@@ -7,10 +7,10 @@ from ..analysis import Sweep
 from ..integrate import OUTCOMES
 from ..io import write_columns
 from ..plotting import new_figure, strobe_section
-from ..sweep import rpm, sweep
+from ..sweep import sweep
 from ._console import progress
 from ._errors import ComputationError, require_at_least, require_blocks, require_speed
-from ._inputs import integration, output_folder, save_figure, subject
+from ._inputs import angular_speed, integration, output_folder, save_figure, subject
 from ._options import PoincareOptions
 from ._report import Report, Table, number
 
@@ -24,7 +24,7 @@ def run(options: PoincareOptions) -> Report:
     with progress(f"poincare {about.name}") as bar:
         found = sweep(
             about.model,
-            np.atleast_1d(rpm(options.speed)),
+            np.array([angular_speed(options.speed)]),
             discard=options.discard,
             revolutions=options.revolutions,
             blocks=blocks,

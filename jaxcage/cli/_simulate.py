@@ -6,9 +6,15 @@ from ..analysis import OrbitMeasures, cage_forces, orbit_measures
 from ..integrate import simulate
 from ..io import write_trajectory
 from ..plotting import simulation_figure
-from ..sweep import rpm
 from ._errors import ComputationError, require_at_least, require_speed
-from ._inputs import integration, output_folder, samples_per_revolution, save_figure, subject
+from ._inputs import (
+    angular_speed,
+    integration,
+    output_folder,
+    samples_per_revolution,
+    save_figure,
+    subject,
+)
 from ._options import SimulateOptions
 from ._report import Report, Table
 
@@ -21,7 +27,7 @@ def run(options: SimulateOptions) -> Report:
     chosen, about, folder = integration(options), subject(options), output_folder(options)
     trajectory = simulate(
         about.model,
-        float(rpm(options.speed)),
+        angular_speed(options.speed),
         revolutions=options.revolutions,
         discard=options.discard,
         samples=samples_per_revolution(chosen, 128),

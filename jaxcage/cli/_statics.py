@@ -18,9 +18,8 @@ from ..bearing import (
 from ..io import write_columns
 from ..models import CageModel
 from ..plotting import load_bars, new_figure
-from ..sweep import rpm
 from ._errors import UsageError
-from ._inputs import output_folder, save_figure, subject
+from ._inputs import angular_speed, output_folder, save_figure, subject
 from ._options import StaticsOptions
 from ._report import Report, Table
 
@@ -41,7 +40,7 @@ def run(options: StaticsOptions) -> Report:
             f"The shaft load of {about.name} must be above 0 N, but it is {load:g}: "
             "give one with --load."
         )
-    shaft = float(rpm(options.shaft_speed))
+    shaft = angular_speed(options.shaft_speed)
     shared = load_distribution(bearing, load, bearing.roller_centrifugal_force(shaft))
     figure = new_figure(7.0, 3.8)
     load_bars(shared, figure.subplots()).set_title(

@@ -57,12 +57,12 @@ def sweep_case(options: SweepOptions) -> Swept:
             f"but {options.exponents} was given."
         )
     folder = output_folder(options)
-    speeds = np.atleast_1d(rpm(options.first, options.last, options.count))
+    speeds = rpm(options.first, options.last, options.count)
     began = time.perf_counter()
     with progress(f"sweep {about.name}") as bar:
         found = sweep(
             about.model,
-            speeds[: options.count],
+            speeds,
             discard=options.discard,
             revolutions=options.revolutions,
             exponents=options.exponents,

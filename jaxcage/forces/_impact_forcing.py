@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -61,8 +62,8 @@ def pulse_spectrum(
     phase = omega * jnp.outer(k, history.time)
     rate = n_rollers * omega / (2 * jnp.pi)
     weight = jnp.where(k == 0, 1.0, 2.0) * rate
-    cosine = weight * jnp.trapezoid(history.contact_force[None, :] * jnp.cos(phase), history.time, axis=1)
-    sine = weight * jnp.trapezoid(history.contact_force[None, :] * jnp.sin(phase), history.time, axis=1)
+    transform = jax.vmap(lambda wave: jnp.trapezoid(history.contact_force * wave, history.time))
+    cosine, sine = weight * transform(jnp.cos(phase)), weight * transform(jnp.sin(phase))
     return cosine, sine
 
 

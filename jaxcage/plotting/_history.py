@@ -58,7 +58,7 @@ def orbit(
     x, y = trajectory.state[:, 0], trajectory.state[:, 1]
     if trajectory.state.shape[1] == 8:
         x, y = x - trajectory.state[:, 2], y - trajectory.state[:, 3]
-    x, y, radius = shown("x_C", x), shown("y_C", y), float(shown("x_C", np.asarray(clearance)))
+    x, y, radius = shown("x_C", x), shown("y_C", y), float(clearance) * quantity("x_C").factor
     ax.add_patch(Circle((0, 0), radius, fill=False, color=GREY, linewidth=1.0, linestyle="--"))
     ax.plot(x, y, color=BLUE, linewidth=0.7, alpha=0.8)
     ax.plot(x[:: trajectory.samples], y[:: trajectory.samples], ".", color=BLACK, markersize=4)

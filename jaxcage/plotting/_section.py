@@ -7,7 +7,17 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from .._glossary import component_names, quantity
-from ._style import BLUE, GREEN, PURPLE, SKY, VERMILION, axes_or_new, dots, enlarge_dots, padded_limits
+from ._style import (
+    BLUE,
+    GREEN,
+    PURPLE,
+    SKY,
+    VERMILION,
+    axes_or_new,
+    dots,
+    enlarge_dots,
+    padded_limits,
+)
 
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)
@@ -31,7 +41,7 @@ def strobe_section(
     place, velocity = quantity(components[coordinate]), quantity(components[coordinate + half])
     x, y = states[..., coordinate] * place.factor, states[..., coordinate + half] * velocity.factor
     for i, (across, up) in enumerate(zip(x, y, strict=True)):
-        size = 7.0 if _spread(across) < 1e-3 * max(_spread(x), 1e-12) or across.size <= 100 else 2.5
+        size = 7.0 if across.size <= 100 or _spread(across) < 1e-3 * _spread(x) else 2.5
         label = names[i] if names else f"start {i + 1}"
         style = dots(_COLOURS[i % len(_COLOURS)], size)
         ax.plot(across, up, **style, alpha=0.7, rasterized=across.size > 5000, label=label)

@@ -76,7 +76,7 @@ def enlarge_dots(legend: Legend) -> Legend:
     return legend
 
 
-def shown(name: str, values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+def shown(name: str, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """`values` [SI] of the glossary's quantity `name`, in the unit of its axis."""
     return np.asarray(values) * quantity(name).factor
 

@@ -8,15 +8,14 @@ full size, so that the arithmetic of a lane does not depend on how many neighbou
 import concurrent.futures
 import os
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
-from .._types import State
+from .._types import LaneState
 from ..analysis import Observation, observe, Plan
 from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem
@@ -32,7 +31,7 @@ Progress = Callable[[int, int], None]
 
 @eqx.filter_jit
 def _run_chunk(
-    system: AbstractForcedSystem, method: AbstractMethod, plan: Plan, speed: Float[Any, " lanes"], y0: State
+    system: AbstractForcedSystem, method: AbstractMethod, plan: Plan, speed: Float[Array, " lanes"], y0: LaneState
 ) -> Observation:
     maps = eqx.filter_vmap(lambda s: strobe_map(system, s, method))(speed)
     return observe(maps, y0, plan)
