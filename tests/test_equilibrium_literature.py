@@ -27,7 +27,9 @@ from jaxcage.analysis._equilibrium import (
     stability_chart,
     whirl_threshold,
 )
+from jaxcage.analysis._measures import orbit_measures
 from jaxcage.forces import ElasticRib, RibFilm, film_scale
+from jaxcage.integrate import simulate
 from jaxcage.models import case
 
 
@@ -126,9 +128,7 @@ def test_ross_doctest():
     speed = 1500 * np.pi / 30
     eps = eccentricity_ratio(525 / (film_scale(0.1, 0.05, 0.03, 1e-4) * speed))
     assert float(eps) == pytest.approx(0.266298, abs=6e-7)
-    stiffness, damping = dimensional(
-        film_coefficients(eps), load=525.0, clearance=1e-4, speed=speed
-    )
+    stiffness, damping = dimensional(film_coefficients(eps), load=525.0, clearance=1e-4, speed=speed)
     printed = [[12807959, 16393593], [-25060393, 8815302]]
     np.testing.assert_allclose(stiffness, printed, atol=1.0)
     np.testing.assert_allclose(damping, friswell(float(eps))[1] * 525 / (1e-4 * speed), rtol=1e-10)
@@ -217,9 +217,7 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     speed = film_whirl_speed(model)
     at = equilibrium(model, speed)
     eps = at.eccentricity_ratio
-    assert float(speed) == pytest.approx(
-        float(threshold(eps).speed) * np.sqrt(9.81 / 0.45e-3), rel=1e-8
-    )
+    assert float(speed) == pytest.approx(float(threshold(eps).speed) * np.sqrt(9.81 / 0.45e-3), rel=1e-8)
     assert float(at.attitude_angle) == pytest.approx(float(attitude_angle(eps)), rel=1e-8)
     assert abs(float(at.growth_rate)) < 1e-6
     ratio = float(at.whirl_frequency / speed)
@@ -228,9 +226,29 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     assert float(equilibrium(model, 1.01 * speed).growth_rate) > 0.03
 
 
-@pytest.mark.parametrize(
-    "gap_mm, highest", [(0.225, 5511), (0.30, 4773), (0.45, 3897), (0.60, 3375)]
-)
+@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
+@pytest.mark.parametrize("factor", [0.99, 1.01])
+def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
+    """A push of 1e-3 c, within 1 % of the threshold: rate, and whirl between 0.500 and 0.524."""
+    width = cage_in_film().film.land_width
+    model = eqx.tree_at(lambda m: m.film, cage_in_film(cage_mass=0.02), RibFilm(width, model=film))
+    model = replace(model, eccentricity=0.0, amplitude=0.0)
+    speed = float(film_whirl_speed(model)) * factor
+    at = equilibrium(model, speed)
+    push = 1e-3 * float(model.clearance)
+    start = (at.coordinates[0] + push, at.coordinates[1], jnp.zeros(()), jnp.zeros(()))
+    run = simulate(model, speed, revolutions=60, discard=20, start=start)
+    away = np.linalg.norm(run.state[:, :2] - np.asarray(at.coordinates), axis=1)
+    largest = np.max(away.reshape(6, -1), axis=1)  # of ten revolutions each: five turns of whirl
+    rate = np.log(largest[-1] / largest[0]) / (50 * 2 * np.pi / speed)
+    assert np.sign(rate) == (1 if factor > 1 else -1)
+    assert rate == pytest.approx(float(at.growth_rate), rel=0.05)
+    ratio = orbit_measures(model, run).whirl_ratio
+    assert 0.500 < ratio < 0.524
+    assert ratio == pytest.approx(float(at.whirl_frequency) / speed, rel=5e-3)
+
+
+@pytest.mark.parametrize("gap_mm, highest", [(0.225, 5511), (0.30, 4773), (0.45, 3897), (0.60, 3375)])
 def test_whirl_speed_of_a_light_cage_in_rpm(gap_mm, highest):
     """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as gap^(-1/2)."""
     model = cage_in_film(cage_mass=1e-6, guidance_gap=gap_mm * 1e-3)
@@ -245,9 +263,7 @@ def test_whirl_speed_depends_on_mass_over_cube_of_land_width():
     by_width = width * slope("land_width")(width)
     assert float(by_mass) > 1.0
     assert float(by_width) == pytest.approx(-3 * float(by_mass), rel=1e-9)
-    up, down = (
-        film_whirl_speed(replace(model, guidance_gap=gap * k)) for k in (1 + 1e-5, 1 - 1e-5)
-    )
+    up, down = (film_whirl_speed(replace(model, guidance_gap=gap * k)) for k in (1 + 1e-5, 1 - 1e-5))
     difference = float(up - down) / 2e-5
     assert float(gap * slope("guidance_gap")(gap)) == pytest.approx(difference, rel=1e-7)
 
@@ -256,9 +272,7 @@ def test_heavy_cage_on_a_weak_film_never_whirls():
     model = cage_in_film(cage_mass=100.0, land_width=1e-4)
     assert np.isinf(film_whirl_speed(model))
     with pytest.raises(ValueError, match="'full'"):
-        full = eqx.tree_at(
-            lambda m: m.film, model, RibFilm(land_width=jnp.asarray(1e-4), model="full")
-        )
+        full = eqx.tree_at(lambda m: m.film, model, RibFilm(land_width=jnp.asarray(1e-4), model="full"))
         film_whirl_speed(full)
 
 
@@ -279,9 +293,7 @@ def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
 
 def test_light_support_adds_its_stiffness_to_the_eigenvalues():
     """Without weight and film the cage is two oscillators: w^2 = K/M - (B/2M)^2."""
-    model = replace(
-        case("1a"), gravity=0.0, land_width=1e-7, cross_stiffness=0.0, stiffness_y=9000.0
-    )
+    model = replace(case("1a"), gravity=0.0, land_width=1e-7, cross_stiffness=0.0, stiffness_y=9000.0)
     at = equilibrium(model, 500.0, start=jnp.array([1e-6, 2e-6]))
     np.testing.assert_allclose(at.coordinates, 0.0, atol=1e-12)
     mass, rate = 0.212227, 3.3136 / (2 * 0.212227)

@@ -108,14 +108,14 @@ LANES = 250
 def chaos():
     """Exponents with standard errors by the package and by NumPy, for every chaotic speed."""
     model, speeds = case("1a"), np.array(CHAOTIC_RPM) * np.pi / 30
-    rng = np.random.default_rng(2)
-    unit = independent.scale(1500.0)
-    starts = [tuple(map(float, s)) for s in rng.uniform(-0.6, 0.6, (12, 4)) * unit]
+    rng = np.random.default_rng(0)
+    reach = np.array([0.6, 0.6, 0.3, 0.3]) * independent.scale(1500.0)
+    starts = [tuple(map(float, s)) for s in rng.uniform(-1, 1, (12, 4)) * reach]
     seen = sweep(model, speeds, starts=starts, discard=150, revolutions=400, keep=64)
     ours, states = [], []
     for k in range(speeds.size):
         chaotic = seen.label[k] == "chaotic"
-        assert np.sum(chaotic) >= 8
+        assert np.sum(chaotic) >= 8  # at the last speed a periodic orbit takes some of the starts
         error = np.sqrt(np.sum(seen.standard_error[k, chaotic, 0] ** 2)) / np.sum(chaotic)
         ours.append((np.mean(seen.exponents[k, chaotic, 0]), error))
         # Points of the attractor, then moved by 2 % of the clearance so that no two lanes are

@@ -26,9 +26,7 @@ GAP = 0.45e-3
 MASS = 0.212227
 
 
-def orbit(
-    radius=1e-4, ratio=1.0, centre=(0.0, 0.0), flatten=1.0, revolutions=8, samples=64, speed=SPEED
-):
+def orbit(radius=1e-4, ratio=1.0, centre=(0.0, 0.0), flatten=1.0, revolutions=8, samples=64, speed=SPEED):
     """Centre on an ellipse at `ratio` times the cage speed."""
     tau = 2 * np.pi * np.arange(revolutions * samples) / samples
     a, w = ratio * tau, ratio * speed
@@ -37,9 +35,7 @@ def orbit(
     return trajectory(tau, np.stack(position + velocity, axis=1), speed, samples)
 
 
-def trajectory(
-    tau, state, speed: float | np.ndarray = SPEED, samples=64, peak=0.0, outcome="successful"
-):
+def trajectory(tau, state, speed: float | np.ndarray = SPEED, samples=64, peak=0.0, outcome="successful"):
     speed = np.broadcast_to(np.asarray(speed, dtype=float), tau.shape).copy()
     return ji.Trajectory(
         time=tau / speed,
@@ -214,9 +210,7 @@ def test_elastic_rib_motion_is_taken_out():
     both = np.concatenate([q, rib[:, :2], v, rib[:, 2:]], axis=1)
     moved = orbit_measures(elastic, trajectory(run.tau, both))
     fixed = orbit_measures(case("1a"), run)
-    np.testing.assert_allclose(
-        dataclasses.astuple(moved), dataclasses.astuple(fixed), rtol=1e-8, atol=1e-12
-    )
+    np.testing.assert_allclose(dataclasses.astuple(moved), dataclasses.astuple(fixed), rtol=1e-8, atol=1e-12)
     np.testing.assert_allclose(relative_state(elastic, both)[0], run.state[:, :2], atol=1e-18)
 
 

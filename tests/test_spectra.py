@@ -33,9 +33,7 @@ def trajectory(signals, revolutions=20, samples=64, extra=0, speed=500.0):
 @pytest.mark.parametrize("window", ["hann", "flattop", "boxcar"])
 @pytest.mark.parametrize("extra", [0, 1, 17])
 def test_sine_at_order_one_shows_its_amplitude(window, extra):
-    spectrum = order_spectrum(
-        trajectory([lambda t: 3e-4 * np.sin(t + 0.3) + 2e-3], extra=extra), window=window
-    )
+    spectrum = order_spectrum(trajectory([lambda t: 3e-4 * np.sin(t + 0.3) + 2e-3], extra=extra), window=window)
     assert spectrum.at(1) == pytest.approx(3e-4, rel=1e-10)
     assert spectrum.at(0) == pytest.approx(2e-3, rel=1e-10)
     assert spectrum.at(3) < 1e-15
@@ -52,9 +50,7 @@ def test_amplitude_at_half_the_sampling_rate():
 def test_line_between_bins_reads_as_the_windows_say():
     halfway = 1 + 0.5 / 20
     run = trajectory([lambda t: np.sin(halfway * t)])
-    hann, flat, box = (
-        np.max(order_spectrum(run, window=w).amplitude) for w in ("hann", "flattop", "boxcar")
-    )
+    hann, flat, box = (np.max(order_spectrum(run, window=w).amplitude) for w in ("hann", "flattop", "boxcar"))
     assert hann == pytest.approx(0.849, abs=2e-3)  # sinc(1/2)/(1 - 1/4)
     assert flat == pytest.approx(1.0, abs=2e-3)
     assert box == pytest.approx(2 / np.pi, abs=0.03)
@@ -98,9 +94,7 @@ def resonator(tau, q, v, speed):
 
 def test_waterfall_of_a_resonator_is_its_frequency_response():
     speeds = np.array([3.0, 5.0, 12.0])
-    result = waterfall(
-        ForcedOscillator(resonator, coordinates=1), speeds, revolutions=16, discard=40
-    )
+    result = waterfall(ForcedOscillator(resonator, coordinates=1), speeds, revolutions=16, discard=40)
     assert result.amplitude.shape == (3, 8 * 16 + 1)
     np.testing.assert_allclose(result.rpm, speeds * 30 / np.pi)
     for i, speed in enumerate(speeds):
@@ -119,9 +113,7 @@ def runaway(tau, q, v, speed):
 
 
 def test_waterfall_leaves_failed_speeds_nan():
-    result = waterfall(
-        ForcedOscillator(runaway, coordinates=1), np.array([3.0, 5.0]), revolutions=4, discard=4
-    )
+    result = waterfall(ForcedOscillator(runaway, coordinates=1), np.array([3.0, 5.0]), revolutions=4, discard=4)
     assert result.outcome[0] == "successful" != result.outcome[1]
     assert np.all(np.isfinite(result.amplitude[0])) and np.all(np.isnan(result.amplitude[1]))
     assert result.outcome[1] in str(result) and "1 failed" in str(result)

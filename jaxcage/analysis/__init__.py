@@ -1,6 +1,49 @@
-"""Analysis of forced systems."""
+"""Analysis of forced systems: what a lane does, where zones begin and end, spectra, stability, measures.
 
+| module          | responsibility                                                                       |
+|-----------------|--------------------------------------------------------------------------------------|
+| `_observe`      | kernel of every sweep: strobe states and Lyapunov exponents of a batch of lanes      |
+| `_sweep`        | the result of a sweep                                                                |
+| `_labels`       | periodic, chaotic, quasi-periodic, undecided or failed                               |
+| `_zones`        | zones and both kinds of edge                                                         |
+| `_zero_one`     | the 0-1 test for chaos                                                               |
+| `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
+| `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
+| `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
+"""
+
+from ._equilibrium import (
+    attitude_angle as attitude_angle,
+    dimensional as dimensional,
+    eccentricity_ratio as eccentricity_ratio,
+    Equilibrium as Equilibrium,
+    equilibrium as equilibrium,
+    film_coefficients as film_coefficients,
+    film_whirl_speed as film_whirl_speed,
+    FilmCoefficients as FilmCoefficients,
+    load_number as load_number,
+    stability_chart as stability_chart,
+    StabilityChart as StabilityChart,
+    whirl_threshold as whirl_threshold,
+    WhirlThreshold as WhirlThreshold,
+)
 from ._labels import closing_period as closing_period, label_lanes as label_lanes
+from ._measures import (
+    cage_forces as cage_forces,
+    film_drag_power as film_drag_power,
+    orbit_measures as orbit_measures,
+    OrbitMeasures as OrbitMeasures,
+)
 from ._observe import Observation as Observation, observe as observe, Plan as Plan
+from ._spectra import (
+    dominant_orders as dominant_orders,
+    order_spectrum as order_spectrum,
+    OrderSpectrum as OrderSpectrum,
+    Peak as Peak,
+    Waterfall as Waterfall,
+    waterfall as waterfall,
+    whirl_spectrum as whirl_spectrum,
+)
 from ._sweep import Sweep as Sweep
+from ._zero_one import zero_one as zero_one
 from ._zones import Edge as Edge, Zone as Zone, Zones as Zones, zones as zones

@@ -84,9 +84,7 @@ class FilmCoefficients(NamedTuple):
     """-dF_i/dv_j in units of W/(c omega)."""
 
 
-def film_coefficients(
-    eccentricity_ratio: Scalar, film: FilmModel = "fixed_half"
-) -> FilmCoefficients:
+def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half") -> FilmCoefficients:
     """Static equilibrium and dimensionless dynamic coefficients, by differentiating the film force.
 
     The half film and the film of positive pressure agree in all of them: at rest the pressurised
@@ -158,9 +156,7 @@ class StabilityChart:
 
 
 @eqx.filter_jit
-def _chart(
-    eps: Float[Array, " points"], film: FilmModel
-) -> tuple[FilmCoefficients, WhirlThreshold]:
+def _chart(eps: Float[Array, " points"], film: FilmModel) -> tuple[FilmCoefficients, WhirlThreshold]:
     coefficients = jax.vmap(lambda e: film_coefficients(e, film))(eps)
     return coefficients, jax.vmap(whirl_threshold)(coefficients.stiffness, coefficients.damping)
 
@@ -180,6 +176,7 @@ def stability_chart(
     return StabilityChart(np.asarray(eps, dtype=float), *(np.asarray(a) for a in columns))
 
 
+@eqx.filter_jit
 def film_whirl_speed(model: CageModel) -> Array:
     """Speed [rad/s] above which the cage would whirl, in its film under its weight alone.
 
@@ -212,9 +209,7 @@ def film_whirl_speed(model: CageModel) -> Array:
     # tolerance on `excess` would be met.
     solver = optx.Bisection(rtol=0.0, atol=0.0, flip=False)
     bounds = dict(lower=-30.0, upper=22.0)
-    root = optx.root_find(
-        excess, solver, jnp.zeros(()), wanted, options=bounds, max_steps=64, throw=False
-    )
+    root = optx.root_find(excess, solver, jnp.zeros(()), wanted, options=bounds, max_steps=64, throw=False)
     beyond = excess(jnp.asarray(22.0), wanted) < 0
     return jnp.where(beyond, jnp.inf, at(root.value)[1] * unit)
 
@@ -285,9 +280,7 @@ def _equilibrium(model: CageModel, speed: Array, start: Array | None) -> Equilib
     return Equilibrium(q, eps, jnp.arctan2(x, -y), jnp.linalg.eigvals(matrix))
 
 
-def equilibrium(
-    model: CageModel, speed: Scalar, *, start: Float[Array, " coordinates"] | None = None
-) -> Equilibrium:
+def equilibrium(model: CageModel, speed: Scalar, *, start: Float[Array, " coordinates"] | None = None) -> Equilibrium:
     """Where film, support, contact and weight hold the cage without unbalance and impacts.
 
     Differentiable with respect to speed and every parameter, by the implicit function theorem.

@@ -32,9 +32,7 @@ def relative_state(
     """
     dim = model.dimension
     if state.shape[-1] != dim:
-        raise ValueError(
-            f"Argument `state` must have {dim} components, but it has {state.shape[-1]}."
-        )
+        raise ValueError(f"Argument `state` must have {dim} components, but it has {state.shape[-1]}.")
     q, v = state[:, : dim // 2], state[:, dim // 2 :]
     if dim == 4:
         return q, v

@@ -79,9 +79,7 @@ def _transform(
     return lines
 
 
-def order_spectrum(
-    trajectory: Trajectory, component: int = 0, *, window: Window = "hann"
-) -> OrderSpectrum:
+def order_spectrum(trajectory: Trajectory, component: int = 0, *, window: Window = "hann") -> OrderSpectrum:
     """Amplitude spectrum of one component of the state.
 
     **Arguments:**
@@ -126,9 +124,7 @@ def _hann_line(ratio: float) -> tuple[float, float]:
     return d, (1 - d * d) / float(np.sinc(d))
 
 
-def dominant_orders(
-    spectrum: OrderSpectrum, count: int = 5, *, floor: float | int = 0.01
-) -> tuple[Peak, ...]:
+def dominant_orders(spectrum: OrderSpectrum, count: int = 5, *, floor: float | int = 0.01) -> tuple[Peak, ...]:
     """The largest lines of a spectrum, largest first, the mean left out.
 
     With the Hann window order and amplitude are interpolated between the bins.
@@ -236,6 +232,4 @@ def waterfall(
             row = order_spectrum(run, component, window=window).amplitude[:size]
         rows.append(row)
     order = np.arange(size) / revolutions
-    return Waterfall(
-        np.asarray(speeds, dtype=float), order, np.stack(rows), tuple(outcomes), window
-    )
+    return Waterfall(np.asarray(speeds, dtype=float), order, np.stack(rows), tuple(outcomes), window)

@@ -81,14 +81,15 @@ class FixedSteps(AbstractMethod):
             y, peak, result, state = carry
             t0 = phase + i.astype(float) * h
             y, _, _, state, outcome = self.solver.step(TERM, t0, t0 + h, y, field, state, False)
+            if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
+                result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
             excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
-            result = _worse(result, judge(outcome, y, excursion, ESCAPE))
-            return y, jnp.maximum(peak, excursion), result, state
+            return y, jnp.maximum(peak, excursion), result, state  # the maximum keeps a NaN
 
         state = self.solver.init(TERM, phase, phase + h, y, field)
-        start = (y, jnp.zeros(()), RESULTS.successful, state)
+        start = (y, jnp.zeros(()), dfx.RESULTS.successful, state)
         y, peak, result, _ = jax.lax.fori_loop(0, self.steps // parts, step, start)
-        return Stretch(y, peak, result)
+        return Stretch(y, peak, judge(result, y, peak, ESCAPE))
 
 
 class AdaptiveSteps(AbstractMethod):

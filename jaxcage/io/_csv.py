@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 
 from .._glossary import component_names, quantity
 from ..integrate import Trajectory
 from ._files import replacing
 
 
-def write_columns(path: str | Path, columns: Mapping[str, Float[np.ndarray, " rows"]]) -> Path:
+def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " rows"]]) -> Path:
     """Write columns of one length under their names; nothing is left behind if that fails."""
     table = np.column_stack([np.asarray(column) for column in columns.values()])
     with replacing(path) as temporary:
