@@ -86,9 +86,7 @@ def test_bad_arguments(capsys: pytest.CaptureFixture[str], arguments: str, said:
         ("base = '9'", "`base` must be one of 1a, 1b, 2a, 2b, 3a, 3b, but is '9'"),
     ],
 )
-def test_bad_configurations(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, said: str
-):
+def test_bad_configurations(capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, said: str):
     path = tmp_path / "design.toml"
     path.write_text(text)
     sentence = refused(capsys, "sweep", str(path), "--out", str(tmp_path / "out"))
@@ -101,9 +99,7 @@ def test_a_folder_is_not_a_configuration(capsys: pytest.CaptureFixture[str], tmp
     assert "must be a readable TOML file" in refused(capsys, "statics", str(tmp_path))
 
 
-@pytest.mark.parametrize(
-    "command", ["sweep 1a", "zones 1a", "statics 1a", "impact 1a --speed 8500"]
-)
+@pytest.mark.parametrize("command", ["sweep 1a", "zones 1a", "statics 1a", "impact 1a --speed 8500"])
 @pytest.mark.parametrize("below", ["", "results"])
 def test_unwritable_output_is_refused_before_the_computation(
     capsys: pytest.CaptureFixture[str],
@@ -112,9 +108,9 @@ def test_unwritable_output_is_refused_before_the_computation(
     command: str,
     below: str,
 ):
-    from jaxcage.sweep import _speed
+    from jaxcage.cli import _sweep
 
-    monkeypatch.setattr(_speed, "run_lanes", lambda *_: pytest.fail("the sweep was started"))
+    monkeypatch.setattr(_sweep, "sweep", lambda *_, **__: pytest.fail("the sweep was started"))
     occupied = tmp_path / "occupied"
     occupied.write_text("a file, not a folder")
     sentence = refused(capsys, *command.split(), "--out", str(occupied / below))

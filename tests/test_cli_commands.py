@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import main
+from jaxcage.cli._report import Report, show
+from jaxcage.cli._zone_report import zones_table
 from jaxcage.io import load_sweep, open_sweep, read_columns
 
 
@@ -82,8 +85,10 @@ def test_sweep_prints_the_zone_table_beside_the_published_edges(capsys: pytest.C
     assert main(["sweep", "1a", *TINY, "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert "Chaotic zones of 1a [rpm], resolution 500 rpm" in out
-    assert "published onset" in out
-    assert "9100" in out and "12000" in out and "25500" in out
+    rows = out.splitlines()
+    assert any(row.startswith("zone ") and row.endswith("published") for row in rows)
+    assert any(row.endswith("9100 to 12000") for row in rows)
+    assert any("not swept" in row and row.endswith("25500 and up") for row in rows)
     assert f"Figure: {tmp_path / 'sweep_1a.png'}" in out
     assert f"Data: {tmp_path / 'sweep_1a.zarr'}" in out
     assert "Failed lanes: none" in out
@@ -182,6 +187,35 @@ def test_every_published_case_is_known(capsys: pytest.CaptureFixture[str], tmp_p
     found = document(capsys, "statics", name, "--out", str(tmp_path))
     gap = PUBLISHED_CASES[name].guidance_gap_mm * 1e-3
     assert found["cage_displacement"]["outer_rib"] == pytest.approx(gap / 2)
+
+
+def test_zone_table_puts_published_zones_beside_those_found():
+    found = (
+        Zone("chaotic", Edge(8000.0, 100.0, "chaotic"), Edge(9000.0, 100.0, "chaotic"), 1.0),
+        Zone("chaotic", Edge(9500.0, 100.0, "chaotic", "torus"), Edge(13e3, 90.0, "chaotic"), 0.5),
+    )
+    zones = Zones(found, (), 100.0, 500.0)
+    swept = (2500.0, 27500.0)
+    table = zones_table("1a", zones, PUBLISHED_CASES["1a"], swept)
+    assert [row[-1] for row in table.rows] == ["-", "9100 to 12000", "25500 and up"]
+    assert [row[1] for row in table.rows] == ["8000 ± 100", "9500 ± 100", "not found"]
+    assert table.rows[1][3:6] == ("3500", "torus / unknown", "50%")
+    empty = zones_table("design", Zones((), (), 100.0, 500.0), None, swept)
+    assert [row[0] for row in empty.rows] == ["none"]
+
+
+def test_table_on_a_terminal_keeps_its_brackets_and_fits(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    zone = Zone("chaotic", Edge(9100.0, 100.0, "chaotic"), Edge(12e3, 100.0, "chaotic"), 1.0)
+    zones = Zones((zone,), (), 100.0, 500.0)
+    table = zones_table("1a", zones, PUBLISHED_CASES["1a"], (2500.0, 27500.0))
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    show(Report({}, [table]), as_json=False)
+    out = capsys.readouterr().out
+    assert "Chaotic zones of 1a [rpm], resolution 100 rpm" in out
+    assert "9100 to 12000" in out and "25500 and up" in out and "…" not in out
 
 
 def test_help_of_every_command(capsys: pytest.CaptureFixture[str]):

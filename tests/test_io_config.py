@@ -88,9 +88,7 @@ def test_every_parameter_is_in_the_configuration():
     nested = tomllib.loads(toml_text(configuration(model)))
 
     def count(table: dict) -> int:
-        return sum(
-            count(v) if isinstance(v, dict) else isinstance(v, float) for v in table.values()
-        )
+        return sum(count(v) if isinstance(v, dict) else isinstance(v, float) for v in table.values())
 
     assert count(nested) == len(jc.parameters(model))
 
@@ -106,9 +104,7 @@ def test_base_is_changed_only_where_the_file_says_so():
 def test_oil_by_grade():
     model = model_from({"base": "1a", "lubricant": {"grade": 68, "temperature": "70 degC"}})
     expected = jc.vg(68.0, 343.15)
-    assert float(model.lubricant.dynamic_viscosity) == pytest.approx(
-        float(expected.dynamic_viscosity), rel=1e-12
-    )
+    assert float(model.lubricant.dynamic_viscosity) == pytest.approx(float(expected.dynamic_viscosity), rel=1e-12)
 
 
 def test_bearing_by_designation_with_one_change():
@@ -118,9 +114,7 @@ def test_bearing_by_designation_with_one_change():
     assert float(model.bearing.roller_diameter) == 16e-3
 
 
-@pytest.mark.parametrize(
-    "kind, law", [("synchronous", jc.SynchronousImpact), ("roller_pass", jc.RollerPassImpact)]
-)
+@pytest.mark.parametrize("kind, law", [("synchronous", jc.SynchronousImpact), ("roller_pass", jc.RollerPassImpact)])
 def test_kind_chooses_the_impact(kind: str, law: type):
     assert type(model_from({"base": "1a", "impact": {"kind": kind}}).impact) is law
 

@@ -120,9 +120,7 @@ def test_failure_half_way_keeps_the_earlier_result(tmp_path: Path, monkeypatch: 
     assert [p.name for p in tmp_path.iterdir()] == ["sweep.zarr"]
 
 
-def test_a_folder_that_cannot_move_in_leaves_the_earlier_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_folder_that_cannot_move_in_leaves_the_earlier_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / "result"
     path.mkdir()
     (path / "old").write_text("kept")

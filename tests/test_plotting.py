@@ -100,9 +100,7 @@ def test_exponent_strip():
 def test_exponent_of_a_speed_at_which_all_starts_failed_is_a_gap():
     sweep = sweep_of(starts=3)
     sweep.outcome[4], sweep.block_growth[4], sweep.strobe[4] = 1, np.nan, np.nan
-    assert points(exponent_strip(sweep), "largest of the starts")[:, 0] == pytest.approx(
-        [8000, 8100, 8200, 8300]
-    )
+    assert points(exponent_strip(sweep), "largest of the starts")[:, 0] == pytest.approx([8000, 8100, 8200, 8300])
 
 
 def test_zones_are_shaded_where_they_are():

@@ -3,6 +3,7 @@
 | module          | responsibility                                                                       |
 |-----------------|--------------------------------------------------------------------------------------|
 | `_observe`      | kernel of every sweep: strobe states and Lyapunov exponents of a batch of lanes      |
+| `_lanes`        | strobe maps of many lanes at once                                                    |
 | `_sweep`        | the result of a sweep                                                                |
 | `_labels`       | periodic, chaotic, quasi-periodic, undecided or failed                               |
 | `_zones`        | zones and both kinds of edge                                                         |
@@ -28,6 +29,7 @@ from ._equilibrium import (
     WhirlThreshold as WhirlThreshold,
 )
 from ._labels import closing_period as closing_period, label_lanes as label_lanes
+from ._lanes import StrobeLanes as StrobeLanes
 from ._measures import (
     cage_forces as cage_forces,
     film_drag_power as film_drag_power,

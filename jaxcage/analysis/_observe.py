@@ -6,13 +6,13 @@ the compiled program runs along the lanes.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from .._types import LaneState, State
 from ..integrate import outcome_code, StrobeMap
+from ._lanes import StrobeLanes
 
 
 class Plan(NamedTuple):
@@ -67,9 +67,9 @@ def orthonormalise(tangents: Tangents) -> tuple[Tangents, Float[Array, "exponent
     return tuple(jnp.stack([u[d] for u in done]) for d in range(len(tangents))), jnp.stack(logs)
 
 
-def _advance(maps: StrobeMap, lanes: Lanes) -> Lanes:
+def _advance(maps: StrobeLanes, lanes: Lanes) -> Lanes:
     """All lanes one revolution on; a lane that fails turns to NaN and keeps the code of its first failure."""
-    y, peak, code = eqx.filter_vmap(_coded)(maps, lanes.y)
+    y, peak, code = maps.map(_coded, lanes.y)
     outcome = jnp.where(lanes.outcome == 0, code, lanes.outcome)
     return Lanes(_blank(y, outcome), jnp.maximum(lanes.peak, peak), outcome)
 
@@ -83,7 +83,7 @@ def _blank(y: LaneState, outcome: Int[Array, " lanes"]) -> LaneState:
     return tuple(jnp.where(outcome == 0, c, jnp.nan) for c in y)
 
 
-def _push(maps: StrobeMap, lanes: Lanes, tangents: Tangents) -> tuple[Lanes, Tangents]:
+def _push(maps: StrobeLanes, lanes: Lanes, tangents: Tangents) -> tuple[Lanes, Tangents]:
     """All lanes one revolution on, with their tangent vectors (in units of the state's scale)."""
 
     def step(y: LaneState) -> tuple[LaneState, tuple[Array, Array]]:
@@ -95,7 +95,11 @@ def _push(maps: StrobeMap, lanes: Lanes, tangents: Tangents) -> tuple[Lanes, Tan
         return y, moved, aux
 
     scaled = tuple(t * s[None, :] for t, s in zip(tangents, maps.scale, strict=True))
-    y, moved, aux = jax.vmap(along, out_axes=(None, 0, None))(scaled)
+    if tangents[0].shape[0] == 1:  # without the extra axis the compiled loops are nearly twice as fast
+        y, moved, aux = along(tuple(t[0] for t in scaled))
+        moved = tuple(t[None, :] for t in moved)
+    else:
+        y, moved, aux = jax.vmap(along, out_axes=(None, 0, None))(scaled)
     return Lanes(y, *aux), tuple(t / s[None, :] for t, s in zip(moved, maps.scale, strict=True))
 
 
@@ -106,17 +110,17 @@ def _start_tangents(dimension: int, exponents: int, lanes: int) -> Tangents:
     return orthonormalise(raw)[0]
 
 
-def observe(maps: StrobeMap, y0: LaneState, plan: Plan) -> Observation:
+def observe(maps: StrobeLanes, y0: LaneState, plan: Plan) -> Observation:
     """Run lanes from `y0` and record strobe states and Lyapunov exponents.
 
-    **Arguments:** strobe maps with a leading lane axis on every array; initial states, each of shape `(lanes,)`; plan.
+    **Arguments:** strobe maps of the lanes; initial states, each of shape `(lanes,)`; plan.
 
     **Returns:** `Observation`. A failed lane is NaN from the revolution in which it failed and carries its outcome code.
     """
     dim, count = len(y0), y0[0].shape[0]
     observed = plan.block * plan.blocks
     align = min(plan.block, plan.discard) if plan.exponents else 0
-    admitted = eqx.filter_vmap(lambda m, y: outcome_code(m.admit(y)))(maps, y0)
+    admitted = maps.map(lambda m, y: outcome_code(m.admit(y)), y0)
     lanes = Lanes(_blank(y0, admitted), jnp.zeros(count), admitted)
     lanes = jax.lax.fori_loop(0, plan.discard - align, lambda _, c: _advance(maps, c), lanes)
     ring = jnp.zeros((plan.keep, dim, count))

@@ -42,7 +42,5 @@ def require_at_least(option: str, value: int, least: int) -> int:
 def require_blocks(option: str, revolutions: int) -> int:
     """Revolutions that can be cut into equal blocks. **Returns:** the number of blocks."""
     if revolutions < 10 or revolutions % 10:
-        raise UsageError(
-            f"Option {option} must be a multiple of 10 above 0, but {revolutions} was given."
-        )
+        raise UsageError(f"Option {option} must be a multiple of 10 above 0, but {revolutions} was given.")
     return 10 if revolutions % 20 else 20

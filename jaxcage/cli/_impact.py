@@ -18,23 +18,15 @@ def run(options: ImpactOptions) -> Report:
     """Carry out `jaxcage impact`."""
     require_speed("--speed", options.speed)
     if not 0 < options.duration <= 1000:
-        raise UsageError(
-            f"Option --duration must lie between 0 and 1000 ms, but {options.duration:g} was given."
-        )
+        raise UsageError(f"Option --duration must lie between 0 and 1000 ms, but {options.duration:g} was given.")
     about, folder = subject(options), output_folder(options)
     model = about.model
     # The synchronous law has no oscillator: its amplitude is all that it knows of the impact.
     law = model.impact.oscillator if isinstance(model.impact, RollerPassImpact) else PocketImpact()
     if not float(model.bearing.pocket_clearance) > 0:
-        raise UsageError(
-            f"The pocket clearance of {about.name} must be above 0 for an impact, but it is 0."
-        )
-    v0 = approach_speed(
-        law.approach_ratio, angular_speed(options.speed), model.bearing.pocket_clearance
-    )
-    history = impact_history(
-        law, model.bearing.roller_mass, v0, jnp.asarray(1e-3 * options.duration)
-    )
+        raise UsageError(f"The pocket clearance of {about.name} must be above 0 for an impact, but it is 0.")
+    v0 = approach_speed(law.approach_ratio, angular_speed(options.speed), model.bearing.pocket_clearance)
+    history = impact_history(law, model.bearing.roller_mass, v0, jnp.asarray(1e-3 * options.duration))
     stem = f"impact_{about.name}_{options.speed:g}rpm"
     figure = new_figure(7.0, 4.0)
     title = f"{about.name}, {options.speed:g} rpm, approach at {float(v0):.3g} m/s"
@@ -90,8 +82,6 @@ def _rows(values: dict[str, Any]) -> list[tuple[str, str, str]]:
         "contacts": ("contacts", 1.0, ""),
         "impulse": ("impulse of the contact force", 1e3, "mN s"),
     }
-    rows = [
-        (text, f"{factor * values[name]:.4g}", unit) for name, (text, factor, unit) in shown.items()
-    ]
+    rows = [(text, f"{factor * values[name]:.4g}", unit) for name, (text, factor, unit) in shown.items()]
     ends = "yes, give a longer --duration" if values["ends_in_contact"] else "no"
     return [*rows, ("still in contact at the end", ends, "")]

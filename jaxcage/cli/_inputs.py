@@ -37,9 +37,7 @@ def subject(options: Options) -> Subject:
             found = Subject(Path(given).stem, load_model(given), None)
     else:
         known = ", ".join(PUBLISHED_CASES)
-        raise UsageError(
-            f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file."
-        )
+        raise UsageError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
     broken = design_rule_violations(found.model.bearing, found.model.guidance_gap)
     if broken:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))

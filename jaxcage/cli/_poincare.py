@@ -33,16 +33,12 @@ def run(options: PoincareOptions) -> Report:
             progress=bar,
         )
     if np.all(found.failed):
-        raise ComputationError(
-            f"Every start failed at {options.speed:g} rpm ({OUTCOMES[found.outcome[0, 0]]})."
-        )
+        raise ComputationError(f"Every start failed at {options.speed:g} rpm ({OUTCOMES[found.outcome[0, 0]]}).")
     stem = folder / f"poincare_{about.name}_{options.speed:g}rpm"
     figure = new_figure(6.5, 5.4)
     names = [f"start {i + 1}: {label}" for i, label in enumerate(found.label[0])]
     strobe_section(found.strobe[0], figure.subplots(), names=names)
-    figure.suptitle(
-        f"{about.name}, {options.speed:g} rpm, {options.revolutions} revolutions", fontsize=11
-    )
+    figure.suptitle(f"{about.name}, {options.speed:g} rpm, {options.revolutions} revolutions", fontsize=11)
     paths = {
         "figure": save_figure(figure, stem.with_name(stem.name + ".png")),
         "data": str(write_columns(stem.with_name(stem.name + ".csv"), _columns(found))),

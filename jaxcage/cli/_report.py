@@ -58,12 +58,15 @@ def _show_rich(table: Table) -> None:
     import rich.box
     import rich.console
     import rich.table
+    from rich.text import Text
 
-    drawn = rich.table.Table(title=table.title, title_justify="left", box=rich.box.SIMPLE_HEAD)
+    # Text and not str: units in square brackets are not markup.
+    box, title = rich.box.SIMPLE_HEAD, Text(table.title)
+    drawn = rich.table.Table(title=title, title_justify="left", box=box, pad_edge=False)
     for i, column in enumerate(table.columns):
-        drawn.add_column(column, justify="left" if i == 0 else "right")
+        drawn.add_column(Text(column), justify="left" if i == 0 else "right")
     for row in table.rows:
-        drawn.add_row(*row)
+        drawn.add_row(*map(Text, row))
     rich.console.Console().print(drawn)
 
 

@@ -35,8 +35,7 @@ def run(options: SimulateOptions) -> Report:
     )
     if trajectory.outcome != "successful":
         raise ComputationError(
-            f"The simulation at {options.speed:g} rpm failed ({trajectory.outcome}): "
-            "try more --steps."
+            f"The simulation at {options.speed:g} rpm failed ({trajectory.outcome}): try more --steps."
         )
     forces = cage_forces(about.model, trajectory)
     measures = orbit_measures(about.model, trajectory)

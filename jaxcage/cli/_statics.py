@@ -29,23 +29,16 @@ def run(options: StaticsOptions) -> Report:
     if options.load is not None and not (math.isfinite(options.load) and options.load > 0):
         raise UsageError(f"Option --load must be above 0 N, but {options.load:g} was given.")
     if not (math.isfinite(options.shaft_speed) and options.shaft_speed >= 0):
-        raise UsageError(
-            f"Option --shaft-speed must be at least 0 rpm, but {options.shaft_speed:g} was given."
-        )
+        raise UsageError(f"Option --shaft-speed must be at least 0 rpm, but {options.shaft_speed:g} was given.")
     about, folder = subject(options), output_folder(options)
     model, bearing = about.model, about.model.bearing
     load = float(model.load) if options.load is None else options.load
     if load <= 0:
-        raise UsageError(
-            f"The shaft load of {about.name} must be above 0 N, but it is {load:g}: "
-            "give one with --load."
-        )
+        raise UsageError(f"The shaft load of {about.name} must be above 0 N, but it is {load:g}: give one with --load.")
     shaft = angular_speed(options.shaft_speed)
     shared = load_distribution(bearing, load, bearing.roller_centrifugal_force(shaft))
     figure = new_figure(7.0, 3.8)
-    load_bars(shared, figure.subplots()).set_title(
-        f"{about.name}, {load:g} N", loc="left", fontsize=11
-    )
+    load_bars(shared, figure.subplots()).set_title(f"{about.name}, {load:g} N", loc="left", fontsize=11)
     loads = {
         "angle [rad]": np.asarray(shared.roller_angles),
         "inner load [N]": np.asarray(shared.inner_loads),
@@ -59,10 +52,7 @@ def run(options: StaticsOptions) -> Report:
         "case": about.name,
         "load": load,
         "shaft_speed_rpm": options.shaft_speed,
-        "rollers": [
-            dict(zip(("angle", "inner_load", "outer_load"), row, strict=True))
-            for row in zip(*loads.values())
-        ],
+        "rollers": [dict(zip(("angle", "inner_load", "outer_load"), row, strict=True)) for row in zip(*loads.values())],
         "max_load": shared.max_load,
         "shaft_shift": shared.shaft_shift,
         "elastic_approach": shared.elastic_approach,
@@ -71,9 +61,7 @@ def run(options: StaticsOptions) -> Report:
         "kinematics": _kinematics(bearing, shaft),
         **paths,
     }
-    return Report(
-        document, _tables(document), [f"Figure: {paths['figure']}", f"Data: {paths['data']}"]
-    )
+    return Report(document, _tables(document), [f"Figure: {paths['figure']}", f"Data: {paths['data']}"])
 
 
 def _displacements(model: CageModel, shared: LoadDistribution) -> dict[str, float]:
@@ -97,9 +85,7 @@ def _kinematics(bearing: Bearing, shaft_speed: float) -> dict[str, float]:
     return {
         "cage_speed_ratio": float(bearing.cage_speed_ratio),
         "cage_speed": float(bearing.cage_speed(shaft_speed)),
-        "inner_raceway_surface_speed": float(
-            raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter)
-        ),
+        "inner_raceway_surface_speed": float(raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter)),
         "roller_centrifugal_force": float(bearing.roller_centrifugal_force(shaft_speed)),
     }
 

@@ -31,6 +31,11 @@ class Swept:
     data: str
     seconds: float
 
+    @property
+    def range_rpm(self) -> tuple[float, float]:
+        """First and last speed [rpm]."""
+        return float(self.sweep.rpm[0]), float(self.sweep.rpm[-1])
+
 
 def _check(options: SweepOptions) -> None:
     require_speed("--first", options.first)
@@ -38,8 +43,7 @@ def _check(options: SweepOptions) -> None:
     require_at_least("--count", options.count, 1)
     if options.count > 1 and options.last <= options.first:
         raise UsageError(
-            "Option --last must be above --first, "
-            f"but the range is {options.first:g} to {options.last:g} rpm."
+            f"Option --last must be above --first, but the range is {options.first:g} to {options.last:g} rpm."
         )
     require_at_least("--discard", options.discard, 0)
     require_at_least("--exponents", options.exponents, 1)
@@ -53,8 +57,7 @@ def sweep_case(options: SweepOptions) -> Swept:
     about = subject(options)
     if options.exponents > about.model.dimension:
         raise UsageError(
-            f"Option --exponents must be at most {about.model.dimension}, "
-            f"but {options.exponents} was given."
+            f"Option --exponents must be at most {about.model.dimension}, but {options.exponents} was given."
         )
     folder = output_folder(options)
     speeds = rpm(options.first, options.last, options.count)
@@ -73,9 +76,7 @@ def sweep_case(options: SweepOptions) -> Swept:
     seconds = time.perf_counter() - began
     if np.all(found.failed):
         names = ", ".join(sorted({OUTCOMES[code] for code in found.outcome.ravel()}))
-        raise ComputationError(
-            f"All {found.outcome.size} lanes failed ({names}): try more --steps."
-        )
+        raise ComputationError(f"All {found.outcome.size} lanes failed ({names}): try more --steps.")
     data = save_sweep(folder / f"sweep_{about.name}.zarr", found, about.model)
     return Swept(about, found, folder, str(data), seconds)
 
@@ -96,7 +97,7 @@ def run(options: SweepOptions) -> Report:
         "figure": path,
         "data": swept.data,
     }
-    zone_table = zones_table(about.name, edges, about.published)
+    zone_table = zones_table(about.name, edges, about.published, swept.range_rpm)
     return Report(document, [_label_table(found, counts), zone_table], _notes(document))
 
 

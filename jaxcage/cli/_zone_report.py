@@ -52,26 +52,25 @@ def zones_document(name: str, zones: Zones, published: PublishedCase | None) -> 
     }
 
 
-def zones_table(name: str, zones: Zones, published: PublishedCase | None) -> Table:
+def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept: tuple[float, float]) -> Table:
     """Zones found, each published zone beside the one it shares most speeds with, or in a row of
-    its own.
+    its own that says whether its speeds were swept at all [rpm].
     """
     spans = published_zones(published)
     partner = {i: _partner(span, zones) for i, span in enumerate(spans)}
     rows = []
     for i, zone in enumerate(zones.zones):
         beside = [spans[k] for k, found in partner.items() if found == i]
-        rows.append((str(i + 1), *_zone_cells(zone), *_published_cells(beside)))
-    rows += [
-        ("-", *5 * ("-",), *_published_cells([spans[k]]))
-        for k, found in partner.items()
-        if found is None
-    ]
+        rows.append((str(i + 1), *_zone_cells(zone), _published_cell(beside)))
+    for span in (spans[k] for k, found in partner.items() if found is None):
+        missed = span[0] <= swept[1] and (span[1] is None or span[1] >= swept[0])
+        why = "not found" if missed else "not swept"
+        rows.append(("-", why, *4 * ("-",), _published_cell([span])))
     if not rows:
-        rows = [("none", *7 * ("-",))]
+        rows = [("none", *6 * ("-",))]
     title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm"
-    columns = ("zone", "onset", "exit", "width", "mechanism", "starts chaotic")
-    return Table(title, (*columns, "published onset", "published exit"), rows)
+    columns = ("zone", "onset", "exit", "width", "mechanism", "share")
+    return Table(title, (*columns, "published"), rows)
 
 
 def _zone_cells(zone: Zone) -> tuple[str, ...]:
@@ -85,10 +84,10 @@ def _edge_cell(edge: Edge | None) -> str:
     return "past range" if edge is None else f"{edge.speed_rpm:.0f} ± {edge.uncertainty_rpm:.0f}"
 
 
-def _published_cells(spans: list[Span]) -> tuple[str, str]:
-    onsets = ", ".join(number(onset) for onset, _ in spans)
-    exits = ", ".join(number(exit_, nothing="open") for _, exit_ in spans)
-    return onsets or "-", exits or "-"
+def _published_cell(spans: list[Span]) -> str:
+    """Onset and exit of the published zones; the paper gives the second no exit."""
+    texts = (number(a) + (" and up" if b is None else f" to {b:.0f}") for a, b in spans)
+    return ", ".join(texts) or "-"
 
 
 def _partner(span: Span, zones: Zones) -> int | None:

@@ -16,6 +16,4 @@ def run(options: ZonesOptions) -> Report:
         "failed": failed,
         "data": swept.data,
     }
-    return Report(
-        document, [zones_table(about.name, edges, about.published)], [f"Data: {swept.data}"]
-    )
+    return Report(document, [zones_table(about.name, edges, about.published, swept.range_rpm)], [f"Data: {swept.data}"])

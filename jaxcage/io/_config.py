@@ -47,9 +47,7 @@ def load_model(path: str | Path) -> CageModel:
         with open(path, "rb") as file:
             table = tomllib.load(file)
     except OSError as error:
-        raise ConfigError(
-            f"File '{path}' must be a readable TOML file, but: {error.strerror}."
-        ) from error
+        raise ConfigError(f"File '{path}' must be a readable TOML file, but: {error.strerror}.") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         reason = str(error).rstrip(".")
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
@@ -67,9 +65,7 @@ def model_from(table: Mapping[str, Any]) -> CageModel:
     if "base" in rest:
         name = rest.pop("base")
         if not isinstance(name, str) or name not in PUBLISHED_CASES:
-            raise ConfigError(
-                f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {name!r}."
-            )
+            raise ConfigError(f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {name!r}.")
         start = case(name)
     model = _build(CageModel, rest, start, ())
     assert isinstance(model, CageModel)
@@ -90,11 +86,7 @@ def _build(
     start = _ready_made(table, start, path)
     nested, fields = submodules(kind), list(values(kind))
     _refuse_unknown(table, [f.name for f in fields], list(nested), path)
-    arguments = {
-        f.name: read_value(_dotted(path, f.name), table[f.name], f)
-        for f in fields
-        if f.name in table
-    }
+    arguments = {f.name: read_value(_dotted(path, f.name), table[f.name], f) for f in fields if f.name in table}
     for name, options in nested.items():
         if name in table:
             below = getattr(start, name, None)
@@ -120,9 +112,7 @@ def _build_chosen(
         given = table.pop("kind", None if start is None else kind_name(start))
         if given not in names:
             given = "missing" if given is None else f"{given!r}"
-            raise ConfigError(
-                f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}."
-            )
+            raise ConfigError(f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}.")
         kind = KINDS[given]
     return _build(kind, table, start if isinstance(start, kind) else None, path)
 
@@ -132,9 +122,7 @@ def kind_name(module: eqx.Module) -> str:
     return next(name for name, law in KINDS.items() if type(module) is law)
 
 
-def _construct(
-    kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[str, ...]
-) -> eqx.Module:
+def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[str, ...]) -> eqx.Module:
     if "oscillator" in submodules(kind):
         arguments.setdefault("oscillator", PocketImpact())
     required = [f.name for f in dataclasses.fields(kind) if _has_no_default(f)]
@@ -174,18 +162,13 @@ def _ready_made(table: dict, start: eqx.Module | None, path: tuple[str, ...]) ->
 
 def _designated(given: Any) -> eqx.Module:
     if given != "NU2310":
-        raise ConfigError(
-            f"`bearing.designation` must be NU2310, the bearing in the catalogue, but is {given!r}."
-        )
+        raise ConfigError(f"`bearing.designation` must be NU2310, the bearing in the catalogue, but is {given!r}.")
     return nu2310()
 
 
 def _grade(given: Any) -> float:
     if isinstance(given, bool) or not isinstance(given, int | float) or not 2 <= given <= 10000:
-        raise ConfigError(
-            "`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), "
-            f"but is {given!r}."
-        )
+        raise ConfigError(f"`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), but is {given!r}.")
     return float(given)
 
 
@@ -194,19 +177,15 @@ def _check_together(model: CageModel) -> None:
     gap, eccentricity = 1e3 * float(model.guidance_gap), 1e3 * float(model.eccentricity)
     if eccentricity >= gap:
         raise ConfigError(
-            "`eccentricity` must be smaller than `guidance_gap`, "
-            f"but is {eccentricity:g} mm in a gap of {gap:g} mm."
+            f"`eccentricity` must be smaller than `guidance_gap`, but is {eccentricity:g} mm in a gap of {gap:g} mm."
         )
     width, limit = 1e3 * float(model.film.land_width), 1e3 * float(model.bearing.land_width_limit)
     if width > limit:
-        raise ConfigError(
-            f"`film.land_width` must fit beside the rollers, in {limit:g} mm, but is {width:g} mm."
-        )
+        raise ConfigError(f"`film.land_width` must fit beside the rollers, in {limit:g} mm, but is {width:g} mm.")
     clearance = 1e3 * float(model.clearance)
     for name, law in (("contact", model.contact), ("film", model.film)):
         length = 1e3 * float(law.smoothing)
         if length > 0.1 * clearance:
             raise ConfigError(
-                f"`{name}.smoothing` must be at most a tenth of the clearance, {clearance:g} mm, "
-                f"but is {length:g} mm."
+                f"`{name}.smoothing` must be at most a tenth of the clearance, {clearance:g} mm, but is {length:g} mm."
             )

@@ -15,9 +15,7 @@ def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " r
     """Write columns of one length under their names; nothing is left behind if that fails."""
     table = np.column_stack([np.asarray(column) for column in columns.values()])
     with replacing(path) as temporary:
-        np.savetxt(
-            temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments=""
-        )
+        np.savetxt(temporary, table, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
     return Path(path)
 
 

@@ -19,9 +19,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    workplace = Path(
-        tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent)
-    )
+    workplace = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
     try:
         yield workplace / target.name
         _move_in(workplace / target.name, target, workplace / "earlier")
@@ -55,7 +53,5 @@ def check_writable(folder: str | Path) -> Path:
             pass
     except OSError as error:
         reason = error.strerror or type(error).__name__
-        raise ValueError(
-            f"Output folder '{folder}' must be a folder that can be written to, but: {reason}."
-        ) from error
+        raise ValueError(f"Output folder '{folder}' must be a folder that can be written to, but: {reason}.") from error
     return path

@@ -74,9 +74,7 @@ def _read_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
 
 def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
-        raise ConfigError(
-            f"`{name}` must be a whole number from {lower} to {upper}, but is {value!r}."
-        )
+        raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {value!r}.")
     return value
 
 

@@ -20,9 +20,7 @@ def configuration(model: CageModel) -> dict[str, Any]:
 
 def _table(module: eqx.Module) -> dict[str, Any]:
     fields = list(values(type(module)))
-    table: dict[str, Any] = {
-        f.name: _plain(getattr(module, f.name), "parameter" in f.metadata) for f in fields
-    }
+    table: dict[str, Any] = {f.name: _plain(getattr(module, f.name), "parameter" in f.metadata) for f in fields}
     for name, options in submodules(type(module)).items():
         below = getattr(module, name)
         kind = {"kind": kind_name(below)} if len(options) > 1 else {}

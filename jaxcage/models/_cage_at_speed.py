@@ -119,22 +119,25 @@ class CageAtSpeed(eqx.Module):
 
     def land_forces(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Vector, Vector]:
         """Film and contact force for the cage centre at (x, y) [m] from the rib centre, moving at (vx, vy) [m/s]."""
-        c = self.clearance
-        x, y, vx, vy = x / c, y / c, vx / c, vy / c
+        # Divisions are slow on a CPU and multiply under differentiation: constants are inverted once, eps once.
+        c, per_c = self.clearance, 1 / self.clearance
+        x, y, vx, vy = x * per_c, y * per_c, vx * per_c, vy * per_c
         eps = smooth_norm(x, y, self.film_smoothing)
+        per_eps = 1 / eps
         excess = smooth_plus(eps - self.contact_onset, self.contact_smoothing)
         px, py = film_drive(x, y, vx, vy, self.omega)
-        kept = 1 - excess / eps  # the film's coefficients stay at their value at the onset of contact
+        kept = 1 - excess * per_eps  # the film's coefficients stay at their value at the onset of contact
         m = film_resistance(self.film_model, kept * x, kept * y, px, py, self.omega, self.film_smoothing)
         half = -self.film_scale / 2
         film = half * (m.xx * px + m.xy * py), half * (m.xy * px + m.yy * py)
         thrust = supply_force(self.film_model, x, y, px, py, self.omega, self.film_smoothing)
         film = film[0] + self.supply_scale * thrust[0], film[1] + self.supply_scale * thrust[1]
-        rate = (x * vx + y * vy) / eps
+        rate = (x * vx + y * vy) * per_eps
         normal = contact_force(
             c * excess, c * rate, self.contact_stiffness, self.damping_number, self.contact_approach_speed
         )
-        return film, (-normal * x / eps, -normal * y / eps)
+        push = -normal * per_eps
+        return film, (push * x, push * y)
 
     def support_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Vector:
         """Force of the elastic support for the same relative motion."""
@@ -182,7 +185,8 @@ class RigidRibLaw(eqx.Module):
 
     def __call__(self, tau: Scalar, q: State, v: State) -> State:
         f = self.cage.forces(tau, *q, *v)
-        return sum(p[0] for p in f) / self.cage.mass, sum(p[1] for p in f) / self.cage.mass
+        per_mass = 1 / self.cage.mass
+        return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
 
 
 class ElasticRibLaw(eqx.Module):

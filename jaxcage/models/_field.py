@@ -90,7 +90,8 @@ class SecondOrderLinearisation(AbstractLinearisation):
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         rate = 1 / self.speed
-        lever = rate / shift
+        per_shift = 1 / shift
+        lever = rate * per_shift
         n = len(self.a_q)
         a = tuple(
             tuple(rate * (v + lever * q) for v, q in zip(*rows, strict=True))
@@ -104,7 +105,7 @@ class SecondOrderLinearisation(AbstractLinearisation):
                 r_v[i] + lever * sum(self.a_q[i][j] * r_q[j] for j in range(n)) for i in range(n)
             )
             u_v = lu_solve(lu, known)
-            return (*((r_q[i] + rate * u_v[i]) / shift for i in range(n)), *u_v)
+            return (*((r_q[i] + rate * u_v[i]) * per_shift for i in range(n)), *u_v)
 
         return solve
 

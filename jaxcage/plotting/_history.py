@@ -46,9 +46,7 @@ def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:
     return _legend_beside(ax)
 
 
-def orbit(
-    trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: Axes | None = None
-) -> Axes:
+def orbit(trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: Axes | None = None) -> Axes:
     """Path of the cage centre relative to the rib, in the clearance circle; the strobe points on it
     as dots.
 
@@ -73,16 +71,12 @@ def orbit(
     return ax
 
 
-def force_history(
-    trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None
-) -> Axes:
+def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) part."""
     ax = axes_or_new(ax, height=3.0)
     time = shown("time", trajectory.time)
     for name, force in forces.items():
-        ax.plot(
-            time, force[:, axis], color=FORCE_COLOURS.get(name, BLACK), linewidth=0.9, label=name
-        )
+        ax.plot(time, force[:, axis], color=FORCE_COLOURS.get(name, BLACK), linewidth=0.9, label=name)
     ax.set(
         xlabel=quantity("time").label,
         ylabel=f"{('Horizontal', 'Vertical')[axis]} force [N]",
@@ -96,9 +90,7 @@ def _ends(time: np.ndarray) -> tuple[float, float]:
 
 
 def _legend_beside(ax: Axes) -> Axes:
-    ax.legend(
-        loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=9, handlelength=1.4
-    )
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=9, handlelength=1.4)
     return ax
 
 

@@ -166,15 +166,9 @@ def _legend_below(figure: Figure, *axes: Axes) -> None:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     place = "outside lower center"
-    enlarge_dots(
-        figure.legend(
-            entries.values(), entries.keys(), loc=place, ncols=5, frameon=False, fontsize=9
-        )
-    )
+    enlarge_dots(figure.legend(entries.values(), entries.keys(), loc=place, ncols=5, frameon=False, fontsize=9))
 
 
-def zoomed_diagram(
-    sweep: Sweep, first_rpm: float, last_rpm: float, component: int = 1, ax: Axes | None = None
-) -> Axes:
+def zoomed_diagram(sweep: Sweep, first_rpm: float, last_rpm: float, component: int = 1, ax: Axes | None = None) -> Axes:
     """The orbit diagram between two speeds, its vertical limits fitted to them."""
     return orbit_diagram(sweep, component, ax, limits_rpm=(first_rpm, last_rpm))

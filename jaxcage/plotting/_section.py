@@ -41,13 +41,13 @@ def strobe_section(
     place, velocity = quantity(components[coordinate]), quantity(components[coordinate + half])
     x, y = states[..., coordinate] * place.factor, states[..., coordinate + half] * velocity.factor
     for i, (across, up) in enumerate(zip(x, y, strict=True)):
-        size = 7.0 if across.size <= 100 or _spread(across) < 1e-3 * _spread(x) else 2.5
+        # Closed orbits of several starts may coincide: the later ones are drawn smaller, on top.
+        closed = _spread(across) < 1e-3 * _spread(x)
+        size = 14.0 - 4 * min(i, 2) if closed else 7.0 if across.size <= 100 else 2.5
         label = names[i] if names else f"start {i + 1}"
         style = dots(_COLOURS[i % len(_COLOURS)], size)
         ax.plot(across, up, **style, alpha=0.7, rasterized=across.size > 5000, label=label)
-    ax.set(
-        xlabel=place.label, ylabel=velocity.label, xlim=_not_too_narrow(x), ylim=_not_too_narrow(y)
-    )
+    ax.set(xlabel=place.label, ylabel=velocity.label, xlim=_not_too_narrow(x), ylim=_not_too_narrow(y))
     place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": len(x)}
     enlarge_dots(ax.legend(**place, frameon=False, fontsize=9))
     return ax

@@ -31,9 +31,7 @@ def waterfall_map(
     norm = LogNorm(top * 10**-decades, top)
     floor = np.ma.maximum(shown, top * 10**-decades)
     ax.grid(False)
-    mesh = ax.pcolormesh(
-        rpm, orders, floor.T, norm=norm, cmap="cividis", shading="nearest", rasterized=True
-    )
+    mesh = ax.pcolormesh(rpm, orders, floor.T, norm=norm, cmap="cividis", shading="nearest", rasterized=True)
     ax.figure.colorbar(mesh, ax=ax, label=quantity("amplitude").label, pad=0.01)
     ax.set(ylabel=quantity("order").label, ylim=(float(orders[0]), float(orders[-1])))
     return label_speed(ax)

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import LaneState
-from ..analysis import Observation, observe, Plan
-from ..integrate import AbstractMethod, strobe_map
+from ..analysis import Observation, observe, Plan, StrobeLanes
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 
 
@@ -33,8 +33,7 @@ Progress = Callable[[int, int], None]
 def _run_chunk(
     system: AbstractForcedSystem, method: AbstractMethod, plan: Plan, speed: Float[Array, " lanes"], y0: LaneState
 ) -> Observation:
-    maps = eqx.filter_vmap(lambda s: strobe_map(system, s, method))(speed)
-    return observe(maps, y0, plan)
+    return observe(StrobeLanes.of(system, method, speed), y0, plan)
 
 
 def cores() -> int:

@@ -1,0 +1,298 @@
+"""Integration methods: order, stability, adaptive steps, derivatives of the strobe map."""
+
+import diffrax as dfx
+import equinox as eqx
+import independent
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from jaxcage import replace
+from jaxcage.integrate import (
+    FixedSteps,
+    NewmarkBeta,
+    Rodas3,
+    Rodas4,
+    method,
+    rosenbrock_step,
+    strobe_map,
+)
+from jaxcage.models import FirstOrderField, ForcedOscillator, ForcedSystem, case
+
+
+def stacked(state):
+    return jnp.stack([jnp.asarray(c) for c in state])
+
+
+def acceleration(tau, q, v, speed):
+    """Two coupled coordinates, nonlinear in both, damping that depends on phase and position."""
+    (x, y), (u, w) = q, v
+    return (
+        -(0.4 + 0.3 * jnp.sin(tau)) * u - x - x**3 + 0.5 * y + 0.8 * jnp.cos(tau),
+        -0.2 * (1 + y**2) * w - 2 * y + 0.5 * x * w + 0.6 * jnp.sin(2 * tau),
+    )
+
+
+def rates(tau, y, speed):
+    """Forced van der Pol with a third, slower component."""
+    x, u, z = y
+    return (
+        u,
+        1.5 * (1 - x**2) * u - x + 0.7 * jnp.cos(tau) + 0.3 * z,
+        -0.5 * z + jnp.sin(tau) * x**2,
+    )
+
+
+SECOND_ORDER = ForcedOscillator(acceleration, coordinates=2)
+FIRST_ORDER = ForcedSystem(rates, dimension=3)
+SYSTEMS = {"second order": (SECOND_ORDER, 1.3), "first order": (FIRST_ORDER, 0.8)}
+
+
+def reference(system, speed, start):
+    field = eqx.filter_jit(system.at_speed(speed))
+
+    def f(tau, y):
+        return np.asarray(stacked(field(jnp.asarray(tau), tuple(map(jnp.asarray, y)))))
+
+    start = [float(c) for c in start]
+    solution = solve_ivp(f, (0.0, 2 * np.pi), start, method="DOP853", rtol=1e-13, atol=1e-14)
+    return solution.y[:, -1]
+
+
+def one_revolution(system, speed, chosen, start):
+    return eqx.filter_jit(lambda y: stacked(strobe_map(system, speed, chosen)(y).y))(start)
+
+
+@pytest.mark.parametrize(
+    "kind, solver, order, steps",
+    [
+        ("second order", Rodas3(), 3, (64, 128, 256)),
+        ("second order", Rodas4(), 4, (64, 128, 256)),
+        ("second order", NewmarkBeta(), 2, (128, 256, 512)),
+        ("first order", Rodas3(), 3, (128, 256, 512)),
+        ("first order", Rodas4(), 4, (128, 256, 512)),
+    ],
+)
+def test_observed_order(kind, solver, order, steps):
+    system, speed = SYSTEMS[kind]
+    start = system.starts(speed)[1]
+    exact = reference(system, speed, start)
+    ends = [one_revolution(system, speed, FixedSteps(solver, n), start) for n in steps]
+    errors = np.array([np.linalg.norm(np.asarray(end) - exact) for end in ends])
+    assert errors[-1] > 1e-12  # still above rounding, so that the slopes mean something
+    slopes = np.log2(errors[:-1] / errors[1:])
+    np.testing.assert_allclose(slopes[-1], order, atol=0.25)
+
+
+def test_newmark_refuses_first_order_systems():
+    start = FIRST_ORDER.starts(0.8)[0]
+    with pytest.raises(ValueError, match="must be a `SecondOrderField`"):
+        strobe_map(FIRST_ORDER, 0.8, method("newmark", steps=64))(start)
+
+
+# --- stability -------------------------------------------------------------------------------
+
+
+def decay(z):
+    """The stability function R(z): one step of size 1 on y' = z y (z complex as a 2-d system)."""
+
+    def field_rates(tau, y):
+        a, b = y
+        return (z.real * a - z.imag * b, z.imag * a + z.real * b)
+
+    return FirstOrderField(field_rates, 1.0)
+
+
+def stability(solver, z):
+    start = (jnp.ones(()), jnp.zeros(()))
+    end, _, _ = rosenbrock_step(solver.tableau, decay(complex(z)), 0.0, 1.0, start)
+    return complex(float(end[0]), float(end[1]))
+
+
+@pytest.mark.parametrize("solver, order", [(Rodas3(), 3), (Rodas4(), 4)])
+def test_rosenbrock_methods_are_l_stable(solver, order):
+    # Stiffly accurate: R(z) falls as 1/z on the left.
+    far = [abs(stability(solver, z)) for z in (-1e3, -1e5, -1e7)]
+    assert far[-1] < 1e-5 and far[0] > 30 * far[1] > 900 * far[2]
+    assert abs(stability(solver, 1e6j)) < 1e-4
+    axis = [abs(stability(solver, 1j * y)) for y in np.geomspace(1e-2, 1e4, 60)]
+    assert max(axis) <= 1 + 1e-12
+    z = -0.05 + 0.1j
+    error = abs(stability(solver, z) - np.exp(z))
+    half = abs(stability(solver, z / 2) - np.exp(z / 2))
+    assert np.log2(error / half) == pytest.approx(order + 1, abs=0.15)
+
+
+@pytest.mark.parametrize("name", ["rodas3", "rodas4"])
+def test_stiff_decay_onto_a_moving_solution(name):
+    """Prothero-Robinson: y' = -k (y - cos tau) - sin tau with k a million times the speed."""
+    stiff = ForcedSystem(lambda tau, y, speed: (-1e6 * (y[0] - jnp.cos(tau)) - jnp.sin(tau),), dimension=1)
+    end = one_revolution(stiff, 1.0, method(name, steps=64), (jnp.asarray(3.0),))
+    assert float(end[0]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_newmark_does_not_damp():
+    """Average acceleration: the amplitude of a free oscillation stays, its period is longer."""
+    free = ForcedOscillator(lambda tau, q, v, speed: (-q[0],), coordinates=1)
+    steps = 40
+    end = one_revolution(free, 1.0, method("newmark", steps=steps), (jnp.asarray(1.0), jnp.asarray(0.0)))
+    assert float(jnp.hypot(end[0], end[1])) == pytest.approx(1.0, abs=1e-10)
+    phase = 2 * steps * np.arctan(np.pi / steps)  # of 2 pi: tan(w h / 2) = h / 2
+    np.testing.assert_allclose(end, [np.cos(phase), -np.sin(phase)], atol=1e-8)
+
+
+# --- adaptive steps --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", [Rodas3(), Rodas4()], ids=["rodas3", "rodas4"])
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_adaptive_steps_through_diffeqsolve(solver, kind):
+    """A user's own call of diffrax with one of our solvers."""
+    system, speed = SYSTEMS[kind]
+    field, start = system.at_speed(speed), system.starts(speed)[1]
+    exact = reference(system, speed, start)
+    errors, counts = [], []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        solution = dfx.diffeqsolve(
+            dfx.ODETerm(lambda tau, y, args: args(tau, y)),
+            solver,
+            t0=0.0,
+            t1=2 * np.pi,
+            dt0=1e-3,
+            y0=start,
+            args=field,
+            stepsize_controller=dfx.PIDController(rtol=tolerance, atol=tolerance),
+            max_steps=100_000,
+        )
+        assert solution.ys is not None
+        end = np.array([float(c[-1]) for c in solution.ys])
+        errors.append(np.abs(end - exact).max() / tolerance)
+        counts.append(int(solution.stats["num_accepted_steps"]))
+    assert max(errors) < 30  # global error against the tolerance of one step
+    # Steps grow as the power 1/(order of the estimate) of the tolerance: 100^(1/3), 100^(1/4).
+    expected = 100 ** (1 / (solver.order(None)))
+    assert counts[2] / counts[1] == pytest.approx(expected, rel=0.3)
+
+
+# --- the cage --------------------------------------------------------------------------------
+
+CAGE, SPEED = case("1a"), 15000 * np.pi / 30
+START = CAGE.starts(SPEED)[0]
+UNIT = independent.scale(SPEED)
+
+# What a revolution's error is at these steps, in units of the clearance.
+NAMED = {
+    "rodas3": (1024, 1e-6),
+    "rodas4": (512, 1e-8),
+    "newmark": (2048, 1e-5),
+    "tsit5": (1024, 1e-8),
+    "kvaerno3": (1024, 1e-6),
+    "kvaerno5": (512, 1e-6),
+    "kencarp4": (512, 1e-6),
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
+    steps, tolerance = NAMED[name]
+    end = one_revolution(CAGE, SPEED, method(name, steps=steps), START)
+    expected = independent.strobe([float(c) for c in START], SPEED)
+    np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", ["rodas3", "rodas4", "tsit5", "kvaerno3", "kvaerno5", "kencarp4"])
+def test_named_solvers_agree_with_adaptive_steps(name):
+    tolerance = 1e-7
+    end = one_revolution(CAGE, SPEED, method(name, tolerance=tolerance), START)
+    expected = independent.strobe([float(c) for c in START], SPEED)
+    np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=100 * tolerance)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_fixed_steps_of_every_solver_are_forward_differentiable(name):
+    """Exponents, orbits and gradients need it: along one tangent against central differences."""
+    direction = np.array([0.3, -0.5, 0.2, 0.7])
+    start = jnp.asarray(stacked(START) / UNIT)
+    chosen = method(name, steps=128)
+
+    @jax.jit
+    def image(z):
+        return stacked(strobe_map(CAGE, SPEED, chosen)(tuple(z * UNIT)).y) / UNIT
+
+    _, slope = jax.jvp(image, (start,), (jnp.asarray(direction),))
+    h = 1e-5
+    difference = (image(start + h * direction) - image(start - h * direction)) / (2 * h)
+    size = float(jnp.linalg.norm(difference))
+    np.testing.assert_allclose(slope, difference, rtol=0, atol=3e-5 * size)
+
+
+def strobe_of(parameters):
+    """Strobe state over state (4), speed, gap, support stiffness, impact amplitude; all relative."""
+    z, factors = parameters[:4], parameters[4:]
+    model = replace(
+        CAGE,
+        guidance_gap=CAGE.guidance_gap * factors[1],
+        stiffness_x=CAGE.support.stiffness_x * factors[2],
+        amplitude=CAGE.impact.amplitude * factors[3],
+    )
+    end = strobe_map(model, SPEED * factors[0], method("rodas4", steps=256))(tuple(z * UNIT))
+    return stacked(end.y) / UNIT
+
+
+def test_derivatives_of_the_strobe_map_against_central_differences():
+    at = jnp.concatenate([jnp.array([0.1, -0.4, 0.2, 0.1]), jnp.ones(4)])
+    exact = np.asarray(jax.jit(jax.jacfwd(strobe_of))(at))
+    h = 1e-5
+    image = jax.jit(jax.vmap(strobe_of))
+    shifts = h * jnp.eye(8)
+    difference = (image(at[None] + shifts) - image(at[None] - shifts)).T / (2 * h)
+    np.testing.assert_allclose(exact, difference, rtol=0, atol=1e-6 * np.abs(exact).max())
+    assert np.all(np.abs(exact).max(axis=0) > 1e-3)  # each of the eight matters
+
+
+@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
+def test_liouville_for_the_cage(film):
+    """log |det M| of the strobe map is the integral of the trace of the linearised equations."""
+    model = eqx.tree_at(lambda m: m.film, CAGE, type(CAGE.film)(land_width=CAGE.film.land_width, model=film))
+    parts = 512
+    chosen = method("rodas4", steps=parts)
+    strobe = strobe_map(model, SPEED, chosen)
+    start = jnp.asarray([0.3, -0.5, 0.2, -0.3]) * UNIT
+
+    def divergence(tau, y):
+        field = strobe.field
+        return jnp.trace(jax.jacfwd(lambda s: stacked(field(tau, tuple(s))))(y))
+
+    @jax.jit
+    def along(y):
+        def advance(y, i):
+            tau = i.astype(float) * (2 * jnp.pi / parts)
+            end = stacked(strobe.part(tuple(y), i, parts).y)
+            return end, divergence(tau, y)
+
+        end, traces = jax.lax.scan(advance, y, jnp.arange(parts))
+        return jnp.append(traces, divergence(2 * jnp.pi, end))
+
+    traces = np.asarray(along(start))
+    # Simpson's rule over the steps.
+    weights = np.ones(parts + 1)
+    weights[1:-1:2], weights[2:-1:2] = 4, 2
+    integral = traces @ weights * (2 * np.pi / parts) / 3
+    matrix = jax.jit(jax.jacfwd(lambda y: stacked(strobe(tuple(y)).y)))(start)
+    determinant = np.linalg.slogdet(np.asarray(matrix) * UNIT / UNIT[:, None])[1]
+    assert determinant == pytest.approx(integral, abs=1e-6)
+    assert determinant < -0.05
+
+
+def test_parts_of_a_revolution_make_the_whole():
+    strobe = strobe_map(CAGE, SPEED, method("rodas3", steps=128))
+
+    @jax.jit
+    def in_parts(y):
+        for i in range(4):
+            y = strobe.part(y, i, 4).y
+        return stacked(y)
+
+    np.testing.assert_allclose(in_parts(START), stacked(strobe(START).y), rtol=1e-12)
