@@ -28,7 +28,15 @@ METHODS = [
     *(("rodas4", n) for n in (64, 96, 128, 192, 256, 512)),
     *(("newmark", n) for n in (128, 512, 2048)),
 ]
-PICTURES = [("rodas3", 64), ("rodas3", 128), ("rodas3", 256), ("rodas3", 1024), ("rodas4", 64), ("rodas4", 128), ("rodas4", 256)]
+PICTURES = [
+    ("rodas3", 64),
+    ("rodas3", 128),
+    ("rodas3", 256),
+    ("rodas3", 1024),
+    ("rodas4", 64),
+    ("rodas4", 128),
+    ("rodas4", 256),
+]
 
 
 def attractor_states(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
@@ -36,7 +44,9 @@ def attractor_states(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
     return jc.sweep(model, speeds, discard=200, revolutions=16, blocks=1, exponents=0, keep=16).last
 
 
-def one_revolution(model: jc.CageModel, speeds: np.ndarray, states: np.ndarray, method: jc.AbstractMethod) -> np.ndarray:
+def one_revolution(
+    model: jc.CageModel, speeds: np.ndarray, states: np.ndarray, method: jc.AbstractMethod
+) -> np.ndarray:
     """The strobe map of every state, shape (speeds, starts, 4)."""
     return jc.sweep(model, speeds, starts=states, method=method, discard=0, revolutions=1, blocks=1, exponents=0).last
 
@@ -94,10 +104,12 @@ def main() -> None:
         ["solver", "steps", "median error / c", "99 % error / c", "us per revolution and lane"],
         errors(model, speeds, states, quick),
     )
-    second = table(["solver", "steps", "failed lanes", "chaotic zones at least 500 rpm wide, rpm"], pictures(model, speeds, quick))
+    second = table(
+        ["solver", "steps", "failed lanes", "chaotic zones at least 500 rpm wide, rpm"], pictures(model, speeds, quick)
+    )
     page = (
-        f"# Convergence study\n\nMade by `python -m benchmarks.convergence`, case {CASE}, {states[..., 0].size} states on the "
-        f"attractors from {speeds.size} speeds, jax {version('jax')}. Reference: Rodas4, 8192 steps.\n\n"
+        f"# Convergence study\n\nMade by `python -m benchmarks.convergence`, case {CASE}, {states[..., 0].size} "
+        f"states on the attractors from {speeds.size} speeds, jax {version('jax')}. Reference: Rodas4, 8192 steps.\n\n"
         f"## Error of the one-revolution map\n\n{first}\n\n## Zones\n\nGrid of "
         f"{np.diff(speeds)[0] * 30 / np.pi:.0f} rpm, 3 starts, 300 + 300 revolutions.\n\n{second}\n"
     )

@@ -16,7 +16,7 @@ def require_x64() -> None:
     """
     if jax.__version__ in BAD_JAX:
         raise RuntimeError(
-            f"JAX {jax.__version__} gives wrong results ({BAD_JAX[jax.__version__]}): install another, e.g. jax==0.10.1."
+            f"JAX {jax.__version__} gives wrong results ({BAD_JAX[jax.__version__]}): install jax==0.10.1."
         )
     if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
         raise RuntimeError(

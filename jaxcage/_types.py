@@ -2,11 +2,10 @@
 
 from typing import TypeAlias
 
-import numpy as np
 from jaxtyping import Array, Float
 
 
-Scalar: TypeAlias = Float[Array, ""] | Float[np.ndarray, ""] | np.floating | float | int
+Scalar: TypeAlias = Float[Array, ""] | float | int
 """A real number: a zero-dimensional array (traced or not) or a Python number."""
 
 State: TypeAlias = tuple[Scalar, ...]

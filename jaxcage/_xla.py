@@ -1,9 +1,9 @@
 """Compiler settings for XLA on CPUs, chosen by measurement.
 
-XLA's CPU backend computes every output of a fused loop by itself unless multi-output fusion is on: an integration step,
-which has several outputs that share nearly all of their arithmetic, then does that arithmetic over and over. Measured on
-one revolution of the cage (128 steps of Rodas3): 5345 multiplications compiled instead of 586, and 3.4 times the run time.
-The setting is read when JAX compiles for the first time in a process, so it must be made before that.
+XLA's CPU backend computes every output of a fused loop by itself unless multi-output fusion is on: an integration
+step, which has several outputs that share nearly all of their arithmetic, then does it over and over. Measured on one
+revolution of the cage (128 steps of Rodas3): 5345 multiplications compiled instead of 586, 3.4 times the run time. The
+setting is read when JAX compiles for the first time in a process, so it must be made before that.
 """
 
 import os

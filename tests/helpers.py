@@ -37,7 +37,15 @@ def roller_pass(model: jc.CageModel) -> jc.CageModel:
 
 def unforced(model: jc.CageModel) -> jc.CageModel:
     """Film, contact and weight only: no support, no impact, no unbalance."""
-    zero = ("stiffness_x", "stiffness_y", "support.damping", "cubic_stiffness", "cross_stiffness", "amplitude", "eccentricity")
+    zero = (
+        "stiffness_x",
+        "stiffness_y",
+        "support.damping",
+        "cubic_stiffness",
+        "cross_stiffness",
+        "amplitude",
+        "eccentricity",
+    )
     names = parameter_paths(model)
     chosen = [n if n in names else n.split(".")[-1] for n in zero]
     return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})

@@ -43,9 +43,7 @@ def land_forces(x, y, u, v, omega):
     kept = eps - excess  # the film's coefficients stay at their value at the onset of contact
     gap = 1 - kept * kept
     cross = kept / gap**2
-    radial = -FILM * (
-        sliding * cross + np.pi / 2 * (1 + 2 * kept * kept) / (gap**2 * np.sqrt(gap)) * eps_rate
-    )
+    radial = -FILM * (sliding * cross + np.pi / 2 * (1 + 2 * kept * kept) / (gap**2 * np.sqrt(gap)) * eps_rate)
     tangential = FILM * (sliding * np.pi / (4 * gap * np.sqrt(gap)) + 2 * cross * eps_rate)
     pressed = np.zeros_like(excess)
     np.power(excess, 10 / 9, out=pressed, where=excess > 0)
@@ -99,9 +97,7 @@ def periodic_orbit(state, omega, method="LSODA", iterations=4):
     correction = np.inf
     for _ in range(iterations):
         image = strobe(z * unit, omega, method) / unit
-        columns = [
-            (strobe((z + h * e) * unit, omega, method) / unit - image) / h for e in np.eye(4)
-        ]
+        columns = [(strobe((z + h * e) * unit, omega, method) / unit - image) / h for e in np.eye(4)]
         step = np.linalg.solve(np.stack(columns, axis=1) - np.eye(4), z - image)
         z = z + step
         correction = np.abs(step).max()

@@ -17,9 +17,7 @@ def distribution(clearance=40e-6, load=4450.0, centrifugal=0.0, angle=-np.pi / 2
 
 
 @pytest.mark.parametrize("clearance", [0.0, 40e-6])
-@pytest.mark.parametrize(
-    "load, centrifugal", [(1.0, 0.0), (4450.0, 435.9), (18.6e3, 27.2), (50.0, 435.9)]
-)
+@pytest.mark.parametrize("load, centrifugal", [(1.0, 0.0), (4450.0, 435.9), (18.6e3, 27.2), (50.0, 435.9)])
 @pytest.mark.parametrize("angle", [-np.pi / 2, -np.pi / 2 + np.pi / 13, 0.7])
 def test_rollers_carry_the_load_and_fill_the_gap(clearance, load, centrifugal, angle):
     bearing, result = distribution(clearance, load, centrifugal, angle)
@@ -50,9 +48,7 @@ def test_centrifugal_load_leaves_unloaded_rollers_on_the_outer_ring_and_sinks_th
 def test_distribution_repeats_after_one_roller_pitch():
     _, here = distribution(angle=-1.3)
     _, there = distribution(angle=-1.3 + 2 * np.pi / 13)
-    np.testing.assert_allclose(
-        np.roll(there.inner_loads, 1), here.inner_loads, rtol=1e-9, atol=1e-7
-    )
+    np.testing.assert_allclose(np.roll(there.inner_loads, 1), here.inner_loads, rtol=1e-9, atol=1e-7)
 
 
 def test_series_stiffness_without_centrifugal_load():
@@ -163,9 +159,7 @@ def test_homogeneity_of_cage_mass_and_viscosity():
 
 def test_batch_over_clearances_equals_single_solves():
     clearances = jnp.array([0.0, 20e-6, 60e-6])
-    batch = jax.vmap(
-        lambda c: jb.load_distribution(replace(jb.nu2310(), radial_clearance=c)).shaft_shift
-    )(clearances)
+    batch = jax.vmap(lambda c: jb.load_distribution(replace(jb.nu2310(), radial_clearance=c)).shaft_shift)(clearances)
     single = [float(distribution(c)[1].shaft_shift) for c in clearances]
     np.testing.assert_allclose(batch, single, rtol=1e-10)
     assert np.all(np.diff(single) > 0)

@@ -87,18 +87,14 @@ def test_contact_stiffness(bearing, raceway, series):
     per_millimetre = 1e3 ** (10 / 9)
     assert float(bearing().contact_stiffness) / per_millimetre == pytest.approx(series, rel=1e-3)
     if raceway is not None:
-        assert float(bearing().raceway_stiffness) / per_millimetre == pytest.approx(
-            raceway, rel=1e-3
-        )
+        assert float(bearing().raceway_stiffness) / per_millimetre == pytest.approx(raceway, rel=1e-3)
 
 
 def test_palmgren_constant_is_the_inverse_of_his_deflection_law():
     # delta = 3.84e-5 Q^0.9 / l^0.8 in N and mm, for Q = 1000 N and l = 10 mm.
     deflection = 3.84e-5 * 1000**0.9 / 10**0.8
     stiffness = jb.line_contact_stiffness(jb.PALMGREN_CONSTANT, 10e-3)
-    assert float(jb.line_contact_approach(stiffness, 1000.0)) * 1e3 == pytest.approx(
-        deflection, rel=1e-3
-    )
+    assert float(jb.line_contact_approach(stiffness, 1000.0)) * 1e3 == pytest.approx(deflection, rel=1e-3)
 
 
 @pytest.mark.parametrize("rpm, force", [(3000, 27.2), (6700, 135.9), (12000, 435.9)])
@@ -133,9 +129,7 @@ def test_cage_mass_of_plausible_cages():
 
 def test_pocket_area_against_counting_points():
     inner, outer, pocket, pitch = 37.5e-3, 45.825e-3, 8.15e-3, 40.5e-3
-    x, y = np.meshgrid(
-        np.linspace(pitch - pocket, pitch + pocket, 1501), np.linspace(-pocket, pocket, 1501)
-    )
+    x, y = np.meshgrid(np.linspace(pitch - pocket, pitch + pocket, 1501), np.linspace(-pocket, pocket, 1501))
     radius = np.hypot(x, y)
     inside = (np.hypot(x - pitch, y) < pocket) & (radius > inner) & (radius < outer)
     counted = inside.mean() * (2 * pocket) ** 2
@@ -145,9 +139,7 @@ def test_pocket_area_against_counting_points():
     assert whole == pytest.approx(np.pi * pocket**2, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "guidance, expected", [("outer_rib", 225e-6), ("inner_rib", 251.1e-6), ("roller", 326.1e-6)]
-)
+@pytest.mark.parametrize("guidance, expected", [("outer_rib", 225e-6), ("inner_rib", 251.1e-6), ("roller", 326.1e-6)])
 def test_static_cage_displacement(guidance, expected):
     bearing = jb.nu2310()
     found = jb.static_cage_displacement(

@@ -62,11 +62,7 @@ D2270 = [
 
 def viscosity_index(nu_40, nu_100):
     low, high = next((l, h) for a, b, l, h in D2270 if a <= nu_100 < b)
-    return (
-        100
-        * (np.polyval(low, nu_100) - nu_40)
-        / (np.polyval(low, nu_100) - np.polyval(high, nu_100))
-    )
+    return 100 * (np.polyval(low, nu_100) - nu_40) / (np.polyval(low, nu_100) - np.polyval(high, nu_100))
 
 
 def test_viscosity_index_of_the_standards_examples():

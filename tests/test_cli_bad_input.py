@@ -1,5 +1,9 @@
 """Every bad input is refused with one sentence on standard error and exit status 2."""
 
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -127,6 +131,19 @@ def test_interruption(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     monkeypatch.setattr(_statics, "run", interrupted)
     assert main(["statics", "1a"]) == 130
     assert capsys.readouterr().err == "Interrupted.\n"
+
+
+def test_interruption_of_a_sweep_does_not_wait_for_its_threads(tmp_path: Path):
+    command = [sys.executable, "-m", "jaxcage", "sweep", "1a", "--out", str(tmp_path)]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, text=True, stdout=pipe, stderr=pipe) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith("Warning:")
+        time.sleep(2)  # the sweep itself begins right after the warning
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=5)
+    assert (process.returncode, out, err) == (130, "", "Interrupted.\n")
+    assert not any(tmp_path.iterdir())
 
 
 def test_errors_of_our_own_are_not_taken_for_bad_input(monkeypatch: pytest.MonkeyPatch):

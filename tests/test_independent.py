@@ -145,8 +145,7 @@ def test_numpy_tangent_dynamics_against_the_multipliers_of_an_orbit():
     speed, unit = PERIODIC_RPM[1] * np.pi / 30, independent.scale(PERIODIC_RPM[1] * np.pi / 30)
     h = 1e-5
     columns = [
-        (independent.strobe(exact[1] + h * e, speed) - independent.strobe(exact[1] - h * e, speed))
-        / (2 * h)
+        (independent.strobe(exact[1] + h * e, speed) - independent.strobe(exact[1] - h * e, speed)) / (2 * h)
         for e in np.diag(unit)
     ]
     matrix = np.stack(columns, axis=1) / unit[:, None]

@@ -44,7 +44,7 @@ def test_import_leaves_precision_alone():
 
 
 def test_multi_output_fusion_changes_no_result():
-    """The compiler setting of jaxcage._xla must change rounding at most: a periodic orbit's strobe state, on and off."""
+    """The compiler setting of jaxcage._xla must change rounding at most: strobe state of an orbit, on and off."""
     code = (
         "import jax; jax.config.update('jax_enable_x64', True)\nimport jaxcage as jc\n"
         "s = jc.sweep(jc.case('1a'), jc.rpm(16000), discard=300, revolutions=1, blocks=1, exponents=0)\n"

@@ -8,7 +8,7 @@ from jaxcage.analysis import closing_period, label_lanes
 
 
 def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
-    """A sweep whose lanes carry the labels of the string: 1-8 period, # chaotic, q quasi-periodic, ? undecided, X failed."""
+    """A sweep whose lanes carry the labels of the string: 1-8, # chaotic, q quasi-periodic, ? undecided, X failed."""
     n, keep, blocks = len(label_row), 32, 10
     speed = (5000.0 + step_rpm * np.arange(n)) * np.pi / 30
     strobe = np.zeros((n, starts, keep, 2))
@@ -113,7 +113,9 @@ def test_no_zone_and_table():
     found = jc.zones(made("1111"))
     assert found.zones == () and "none" in str(found)
     assert "500" not in str(found) and "resolution of 100 rpm" in str(found)
-    assert "zone 1: 5150 +- 100 rpm to 5350 +- 100 rpm, 200 rpm wide, 100% of starts chaotic" in str(jc.zones(made("11##1")))
+    assert "zone 1: 5150 +- 100 rpm to 5350 +- 100 rpm, 200 rpm wide, 100% of starts chaotic" in str(
+        jc.zones(made("11##1"))
+    )
 
 
 def test_sweep_prints_counts():

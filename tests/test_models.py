@@ -15,9 +15,7 @@ MODELS = {
     "rigid": lambda: jc.case("2a"),
     "elastic": lambda: helpers.elastic(jc.case("1b")),
     "roller-pass": lambda: helpers.roller_pass(jc.case("3b")),
-    "dimensionless cubic": lambda: jc.replace(
-        jc.case("1a"), cubic_ratio=50.0, **{"support.cubic": "dimensionless"}
-    ),
+    "dimensionless cubic": lambda: jc.replace(jc.case("1a"), cubic_ratio=50.0, **{"support.cubic": "dimensionless"}),
     "printed unbalance": lambda: jc.replace(jc.case("1a"), unbalance="as_printed"),
     "positive pressure": lambda: jc.replace(jc.case("1a"), **{"film.model": "positive_pressure"}),
     "restitution": lambda: jc.replace(jc.case("1a"), restitution=0.5),
@@ -141,3 +139,16 @@ def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool
     assert late > 1.5 if grows else late < 0.67
     turns = np.unwrap(np.arctan2(*(run.state[800:, :2] - rest).T[::-1]))
     assert abs(turns[-1] - turns[0]) / (run.tau[-1] - run.tau[800]) == pytest.approx(0.5146, abs=0.01)
+
+
+@pytest.mark.parametrize("base", ["mass", "length", "time"])
+def test_dimensionless_groups_have_no_dimension(base: str):
+    model, factor = jc.case("1a"), 2.3
+    rate = factor ** (-1.0 if base == "time" else 0.0)
+    here = jc.dimensionless_groups(model, 1000.0)
+    there = jc.dimensionless_groups(helpers.in_other_units(model, base, factor), 1000.0 * rate)
+    assert len(here) == 7
+    for name, value in here.items():
+        assert float(there[name]) == pytest.approx(float(value), rel=1e-12), name
+    assert float(here["eccentricity"]) == pytest.approx(23 / 450)
+    assert float(here["speed"]) == pytest.approx(1000 * np.sqrt(0.45e-3 / 9.81))

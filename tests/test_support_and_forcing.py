@@ -48,9 +48,7 @@ def cage_with(speed=900.0, **parts):
 @pytest.mark.parametrize("r", POINTS)
 def test_support_in_the_cage_against_numpy(r):
     """Isotropic cubic stiffness, K_x and K_y apart, damping and circulatory cross-coupling."""
-    given = Support(
-        stiffness_x=3e4, stiffness_y=5e4, damping=3.0, cubic_stiffness=1e13, cross_stiffness=-40.0
-    )
+    given = Support(stiffness_x=3e4, stiffness_y=5e4, damping=3.0, cubic_stiffness=1e13, cross_stiffness=-40.0)
     _, cage = cage_with(support=given)
     x, y = r
     vx, vy = 0.1, -0.3
@@ -120,9 +118,7 @@ def test_readings_of_the_cubic_stiffness():
 
 
 def test_dimensionless_cubic_reaches_the_cage():
-    given = Support(
-        stiffness_x=3e4, stiffness_y=5e4, damping=0.0, cubic_ratio=2.0, cubic="dimensionless"
-    )
+    given = Support(stiffness_x=3e4, stiffness_y=5e4, damping=0.0, cubic_ratio=2.0, cubic="dimensionless")
     _, cage = cage_with(support=given)
     assert float(cage.cubic_stiffness) == pytest.approx(2.0 * 4e4 / 0.45e-3**2, rel=1e-13)
 

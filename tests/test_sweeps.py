@@ -41,7 +41,15 @@ def test_kept_states_are_the_last_ones_in_order():
 
 def test_number_of_exponents_does_not_change_the_first():
     a, b = (
-        jc.sweep(HARDENING, np.array([1.2, 1.5]), discard=20, revolutions=40, blocks=4, exponents=k, method=jc.method("rodas4", steps=128))
+        jc.sweep(
+            HARDENING,
+            np.array([1.2, 1.5]),
+            discard=20,
+            revolutions=40,
+            blocks=4,
+            exponents=k,
+            method=jc.method("rodas4", steps=128),
+        )
         for k in (1, 2)
     )
     assert np.allclose(a.exponents[..., 0], b.exponents[..., 0], rtol=0, atol=1e-12)
@@ -73,7 +81,9 @@ def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():
 
 def test_simulation_and_sweep_agree():
     run = jc.simulate(HARDENING, 1.3, revolutions=3, samples=4, start=(0.2, 0.1), method=FAST)
-    swept = jc.sweep(HARDENING, np.array([1.3]), starts=[(0.2, 0.1)], discard=0, revolutions=3, blocks=1, keep=3, method=FAST)
+    swept = jc.sweep(
+        HARDENING, np.array([1.3]), starts=[(0.2, 0.1)], discard=0, revolutions=3, blocks=1, keep=3, method=FAST
+    )
     assert np.allclose(run.state[4::4], swept.strobe[0, 0, :2], rtol=0, atol=1e-13)
     assert run.outcome == "successful" and run.time[4] == pytest.approx(2 * np.pi / 1.3)
 

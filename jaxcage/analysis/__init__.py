@@ -14,35 +14,35 @@
 """
 
 from ._equilibrium import (
+    Equilibrium as Equilibrium,
+    FilmCoefficients as FilmCoefficients,
+    StabilityChart as StabilityChart,
+    WhirlThreshold as WhirlThreshold,
     attitude_angle as attitude_angle,
     dimensional as dimensional,
     eccentricity_ratio as eccentricity_ratio,
-    Equilibrium as Equilibrium,
     equilibrium as equilibrium,
     film_coefficients as film_coefficients,
     film_whirl_speed as film_whirl_speed,
-    FilmCoefficients as FilmCoefficients,
     load_number as load_number,
     stability_chart as stability_chart,
-    StabilityChart as StabilityChart,
     whirl_threshold as whirl_threshold,
-    WhirlThreshold as WhirlThreshold,
 )
 from ._labels import closing_period as closing_period, label_lanes as label_lanes
 from ._lanes import StrobeLanes as StrobeLanes
 from ._measures import (
+    OrbitMeasures as OrbitMeasures,
     cage_forces as cage_forces,
     film_drag_power as film_drag_power,
     orbit_measures as orbit_measures,
-    OrbitMeasures as OrbitMeasures,
 )
-from ._observe import Observation as Observation, observe as observe, Plan as Plan
+from ._observe import Observation as Observation, Plan as Plan, observe as observe
 from ._spectra import (
-    dominant_orders as dominant_orders,
-    order_spectrum as order_spectrum,
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,
     Waterfall as Waterfall,
+    dominant_orders as dominant_orders,
+    order_spectrum as order_spectrum,
     waterfall as waterfall,
     whirl_spectrum as whirl_spectrum,
 )

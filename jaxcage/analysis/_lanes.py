@@ -1,8 +1,8 @@
 """Strobe maps of many lanes at once, with what is the same in every lane kept as scalars.
 
-A compiled step reads some thirty numbers per lane. Those that do not depend on the speed are the same for all lanes; left
-as scalars instead of arrays they halve the run time (they stay in registers, and what follows from them alone is worked out
-once).
+A compiled step reads some thirty numbers per lane. Those that do not depend on the speed are the same for all lanes;
+left as scalars instead of arrays they halve the run time (they stay in registers, and what follows from them alone is
+worked out once).
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 from .._types import LaneState
-from ..integrate import AbstractMethod, strobe_map, StrobeMap
+from ..integrate import AbstractMethod, StrobeMap, strobe_map
 from ..models import AbstractForcedSystem
 
 
@@ -38,9 +38,7 @@ class StrobeLanes(eqx.Module):
     scale: LaneState
 
     @classmethod
-    def of(
-        cls, system: AbstractForcedSystem, method: AbstractMethod, speed: Float[Array, " lanes"]
-    ) -> "StrobeLanes":
+    def of(cls, system: AbstractForcedSystem, method: AbstractMethod, speed: Float[Array, " lanes"]) -> "StrobeLanes":
         """One lane per speed [rad/s]."""
         make = lambda s: strobe_map(system, s, method)
         arrays = lambda s: eqx.filter(make(s), eqx.is_array)

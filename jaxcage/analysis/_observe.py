@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._types import LaneState, State
-from ..integrate import outcome_code, StrobeMap
+from ..integrate import StrobeMap, outcome_code
 from ._lanes import StrobeLanes
 
 
@@ -28,11 +29,11 @@ class Plan(NamedTuple):
 class Observation(NamedTuple):
     """What a batch of lanes did."""
 
-    strobe: Float[Array, "keep dim lanes"]
-    growth: Float[Array, "blocks exponents lanes"]  # mean logarithmic growth per revolution in each block
-    last: Float[Array, "dim lanes"]
-    peak: Float[Array, " lanes"]  # largest excursion (for a cage: eps) while observed
-    outcome: Int[Array, " lanes"]
+    strobe: Float[Array | np.ndarray, "keep dim lanes"]
+    growth: Float[Array | np.ndarray, "blocks exponents lanes"]  # mean logarithmic growth per revolution in each block
+    last: Float[Array | np.ndarray, "dim lanes"]
+    peak: Float[Array | np.ndarray, " lanes"]  # largest excursion (for a cage: eps) while observed
+    outcome: Int[Array | np.ndarray, " lanes"]
 
 
 class Lanes(NamedTuple):
@@ -115,7 +116,7 @@ def observe(maps: StrobeLanes, y0: LaneState, plan: Plan) -> Observation:
 
     **Arguments:** strobe maps of the lanes; initial states, each of shape `(lanes,)`; plan.
 
-    **Returns:** `Observation`. A failed lane is NaN from the revolution in which it failed and carries its outcome code.
+    **Returns:** `Observation`. A failed lane is NaN from the revolution it failed in and carries its outcome code.
     """
     dim, count = len(y0), y0[0].shape[0]
     observed = plan.block * plan.blocks

@@ -1,8 +1,8 @@
 """Zones and their edges, as found in a sweep.
 
 Two kinds of edge are never mixed. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower than
-a stated width are closed: it is statistical, and no more certain than the grid. A **synchronous-loss edge** is where the
-stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
+a stated width are closed: it is statistical, and no more certain than the grid. A **synchronous-loss edge** is where
+the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
 """
 
 import dataclasses

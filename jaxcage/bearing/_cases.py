@@ -59,9 +59,7 @@ def published_case(name: str) -> PublishedCase:
     **Raises:** `ValueError` that names the cases there are.
     """
     if name not in PUBLISHED_CASES:
-        raise ValueError(
-            f"Argument `name` must be one of {', '.join(PUBLISHED_CASES)}, but {name!r} was given."
-        )
+        raise ValueError(f"Argument `name` must be one of {', '.join(PUBLISHED_CASES)}, but {name!r} was given.")
     return PUBLISHED_CASES[name]
 
 

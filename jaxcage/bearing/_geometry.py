@@ -104,9 +104,7 @@ def design_rule_violations(bearing: Bearing, guidance_gap: Scalar) -> list[str]:
 
     **Returns:** a list of sentences, empty when the rule holds.
     """
-    t, c_r, g_r = (
-        1e3 * float(x) for x in (bearing.pocket_clearance, guidance_gap, bearing.radial_clearance)
-    )
+    t, c_r, g_r = (1e3 * float(x) for x in (bearing.pocket_clearance, guidance_gap, bearing.radial_clearance))
     sentences = []
     if not t > c_r:
         sentences.append(

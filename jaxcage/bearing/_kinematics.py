@@ -19,9 +19,7 @@ def raceway_surface_speed(angular_speed: Scalar, raceway_diameter: Scalar) -> Ar
     return jnp.asarray(angular_speed * raceway_diameter / 2)
 
 
-def cage_speed(
-    inner_speed: Scalar, outer_speed: Scalar, roller_diameter: Scalar, pitch_diameter: Scalar
-) -> Array:
+def cage_speed(inner_speed: Scalar, outer_speed: Scalar, roller_diameter: Scalar, pitch_diameter: Scalar) -> Array:
     """Speed of the set of rollers, and so of the cage, in pure rolling, (8).
 
     **Arguments:** speeds of inner and outer ring [rad/s], roller and pitch diameter [m].

@@ -50,9 +50,7 @@ def series_stiffness(inner: Scalar, outer: Scalar) -> Array:
 
     **Arguments, returns:** stiffnesses [N/m^(10/9)].
     """
-    compliance = _power(inner, -1 / LINE_CONTACT_EXPONENT) + _power(
-        outer, -1 / LINE_CONTACT_EXPONENT
-    )
+    compliance = _power(inner, -1 / LINE_CONTACT_EXPONENT) + _power(outer, -1 / LINE_CONTACT_EXPONENT)
     return _power(compliance, -LINE_CONTACT_EXPONENT)
 
 
@@ -74,9 +72,7 @@ def _inner_share(total: Array, inner: Array, outer: Array, centrifugal: Array) -
     return optx.root_find(residual, solver, start, args, max_steps=64).value
 
 
-def raceway_loads(
-    approach: Scalar, inner: Scalar, outer: Scalar, centrifugal: Scalar
-) -> tuple[Array, Array]:
+def raceway_loads(approach: Scalar, inner: Scalar, outer: Scalar, centrifugal: Scalar) -> tuple[Array, Array]:
     """Loads of one roller on both raceways under a given approach of the raceways, (3), (4), (10).
 
     The centrifugal force acts on the outer raceway only: Q_o = Q_i + F_cen. The approach splits as
@@ -88,9 +84,7 @@ def raceway_loads(
 
     **Returns:** Q_i and Q_o [N].
     """
-    total, inner, outer, centrifugal = (
-        jnp.asarray(x, dtype=float) for x in (approach, inner, outer, centrifugal)
-    )
+    total, inner, outer, centrifugal = (jnp.asarray(x, dtype=float) for x in (approach, inner, outer, centrifugal))
     seat = line_contact_approach(outer, centrifugal)
     loaded = total > seat
     # An unloaded roller solves a harmless stand-in, so that no value or gradient is NaN.

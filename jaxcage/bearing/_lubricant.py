@@ -63,8 +63,7 @@ class Lubricant(eqx.Module):
         first, second = self.temperature_1, self.temperature_2
         if is_concrete(first, second) and first == second:
             raise ValueError(
-                "Argument `temperature_2` must differ from `temperature_1`, but both are "
-                f"{float(first):g} K."
+                f"Argument `temperature_2` must differ from `temperature_1`, but both are {float(first):g} K."
             )
 
     @property

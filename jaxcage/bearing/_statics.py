@@ -82,10 +82,7 @@ def static_cage_displacement(
         return jnp.asarray(shift + guidance_gap / 2)
     if guidance == "roller":
         return jnp.asarray(shift + pocket_clearance)
-    raise ValueError(
-        f"Argument `guidance` must be one of {', '.join(get_args(Guidance))}, "
-        f"but {guidance!r} was given."
-    )
+    raise ValueError(f"Argument `guidance` must be one of {', '.join(get_args(Guidance))}, but {guidance!r} was given.")
 
 
 class _LoadCase(eqx.Module):
@@ -146,9 +143,7 @@ def _solve_excess(case: _LoadCase) -> Array:
 
 
 @eqx.filter_jit
-def _distribution(
-    bearing: Bearing, load: Array, centrifugal: Array, roller_angle: Array
-) -> LoadDistribution:
+def _distribution(bearing: Bearing, load: Array, centrifugal: Array, roller_angle: Array) -> LoadDistribution:
     angles = roller_angles(bearing.n_rollers, roller_angle)
     case = _LoadCase(bearing, load, centrifugal, -jnp.sin(angles))
     excess = _solve_excess(case)

@@ -1,8 +1,17 @@
 """Standard error: progress on a terminal, warnings, and one sentence when something is wrong."""
 
 import contextlib
+import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
+from types import FrameType
+
+from ._errors import INTERRUPTED
+
+
+_computing = False
+_SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
 
 
 def say(text: str) -> None:
@@ -10,15 +19,46 @@ def say(text: str) -> None:
     print(" ".join(text.split()), file=sys.stderr)
 
 
+def leave_at_once_when_interrupted() -> None:
+    """Ctrl-C during a computation ends the process then and there.
+
+    The threads of a sweep cannot be stopped, and Python would wait for them. Outside a computation,
+    when files are written, an interruption is raised as ever, so that things are tidied up.
+    """
+    signal.signal(signal.SIGINT, _on_interruption)
+
+
+def _on_interruption(number: int, frame: FrameType | None) -> None:
+    del number, frame
+    if not _computing:
+        raise KeyboardInterrupt
+    if sys.stderr.isatty():
+        sys.stderr.write(_SHOW_CURSOR_AND_CLEAR_LINE)
+    say("Interrupted.")
+    sys.stderr.flush()
+    os._exit(INTERRUPTED)
+
+
 @contextlib.contextmanager
 def progress(text: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A bar that is called with lanes done and lanes in all; None where standard error is not a
-    terminal.
+    """Around a computation: a bar that is called with lanes done and lanes in all; None where
+    standard error is not a terminal.
     """
+    global _computing
+    _computing = True
+    try:
+        with _bar(text) as bar:
+            yield bar
+    finally:
+        _computing = False
+
+
+@contextlib.contextmanager
+def _bar(text: str) -> Iterator[Callable[[int, int], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
-    import rich.console
+    from rich.console import Console
     from rich.progress import (
         BarColumn,
         Progress,
@@ -27,12 +67,8 @@ def progress(text: str) -> Iterator[Callable[[int, int], None] | None]:
         TimeRemainingColumn,
     )
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=rich.console.Console(stderr=True), transient=True) as bar:
+    text_column = TextColumn("{task.description}")
+    columns = (text_column, BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from .._xla import configure
-from ._console import say
+from ._console import leave_at_once_when_interrupted, say
 from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
 from ._options import Command, Options
 from ._report import show
@@ -21,6 +21,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupted.
     """
     configure()
+    if arguments is None:  # the process is ours, not a notebook's
+        leave_at_once_when_interrupted()
     try:
         options = _parse(sys.argv[1:] if arguments is None else list(arguments))
         if options is not None:

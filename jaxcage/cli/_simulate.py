@@ -6,6 +6,7 @@ from ..analysis import OrbitMeasures, cage_forces, orbit_measures
 from ..integrate import simulate
 from ..io import write_trajectory
 from ..plotting import simulation_figure
+from ._console import progress
 from ._errors import ComputationError, require_at_least, require_speed
 from ._inputs import (
     angular_speed,
@@ -25,14 +26,15 @@ def run(options: SimulateOptions) -> Report:
     require_at_least("--revolutions", options.revolutions, 1)
     require_at_least("--discard", options.discard, 0)
     chosen, about, folder = integration(options), subject(options), output_folder(options)
-    trajectory = simulate(
-        about.model,
-        angular_speed(options.speed),
-        revolutions=options.revolutions,
-        discard=options.discard,
-        samples=samples_per_revolution(chosen, 128),
-        method=chosen,
-    )
+    with progress(f"simulate {about.name}"):
+        trajectory = simulate(
+            about.model,
+            angular_speed(options.speed),
+            revolutions=options.revolutions,
+            discard=options.discard,
+            samples=samples_per_revolution(chosen, 128),
+            method=chosen,
+        )
     if trajectory.outcome != "successful":
         raise ComputationError(
             f"The simulation at {options.speed:g} rpm failed ({trajectory.outcome}): try more --steps."

@@ -36,7 +36,7 @@ def restitution_damping(restitution: Scalar) -> Array:
     solver = optx.Bisection(rtol=1e-13, atol=1e-13)
     bounds = {"lower": jnp.array(-0.1), "upper": jnp.array(60.0)}
     s = optx.root_find(_restitution_defect, solver, jnp.array(0.5), args=e, options=bounds, max_steps=200).value
-    return -jnp.expm1(-s) / e
+    return jnp.asarray(-jnp.expm1(-s) / e)
 
 
 def contact_force(
@@ -44,8 +44,8 @@ def contact_force(
 ) -> Array:
     """Normal force [N] of the land contact, never adhesive.
 
-    **Arguments:** penetration p >= 0 [m] (already regularised) and its rate [m/s]; stiffness K [N/m^(10/9)]; Hunt-Crossley
-    number chi and the approach speed v_0 [m/s] at which it gives the restitution asked for.
+    **Arguments:** penetration p >= 0 [m] (already regularised) and its rate [m/s]; stiffness K [N/m^(10/9)];
+    Hunt-Crossley number chi and the approach speed v_0 [m/s] at which it gives the restitution asked for.
     """
     loading = 1 + (damping / approach_speed) * rate
     hysteresis = (loading + jnp.sqrt(loading * loading + 1e-6)) / 2  # max(loading, 0), smooth; 1 + 2.5e-7 at rest
@@ -55,10 +55,12 @@ def contact_force(
 class LandContact(eqx.Module):
     """The contact of the cage's guiding lands with the rib."""
 
-    stiffness: Array = parameter("N/m^(10/9)", 1e4, 1e12, "line-contact stiffness of all lands together")
-    onset: Array = parameter("1", 0.5, 0.999, "eccentricity ratio at which the contact begins")
-    restitution: Array = parameter("1", 0.05, 1.0, "coefficient of restitution at the approach speed", default=1.0)
-    approach_speed: Array = parameter("m/s", 1e-4, 10.0, "approach speed to which the restitution belongs", default=0.1)
-    smoothing: Array = parameter(
+    stiffness: Scalar = parameter("N/m^(10/9)", 1e4, 1e12, "line-contact stiffness of all lands together")
+    onset: Scalar = parameter("1", 0.5, 0.999, "eccentricity ratio at which the contact begins")
+    restitution: Scalar = parameter("1", 0.05, 1.0, "coefficient of restitution at the approach speed", default=1.0)
+    approach_speed: Scalar = parameter(
+        "m/s", 1e-4, 10.0, "approach speed to which the restitution belongs", default=0.1
+    )
+    smoothing: Scalar = parameter(
         "m", 1e-12, 1e-5, "half width over which contact sets in and film coefficients saturate", default=2e-7
     )

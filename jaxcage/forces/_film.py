@@ -28,9 +28,9 @@ FilmModel = Literal["fixed_half", "positive_pressure", "full"]
 class Resistance(NamedTuple):
     """The symmetric matrix M = integral of n n^T / H^3 over the pressurised arc, dimensionless."""
 
-    xx: Array
-    xy: Array
-    yy: Array
+    xx: Scalar
+    xy: Scalar
+    yy: Scalar
 
 
 def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scalar) -> Array:
@@ -162,8 +162,10 @@ def film_pressure(
 class RibFilm(eqx.Module):
     """The oil film of the guiding lands: how many, how wide, and which film model."""
 
-    land_width: Array = parameter("m", 1e-4, 0.05, "width of one guiding land")
-    smoothing: Array = parameter("m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9)
-    supply_pressure: Array = parameter("Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", default=0.0)
+    land_width: Scalar = parameter("m", 1e-4, 0.05, "width of one guiding land")
+    smoothing: Scalar = parameter(
+        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9
+    )
+    supply_pressure: Scalar = parameter("Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", default=0.0)
     n_lands: int = count(1, 4, "number of guiding lands, each a film of its own", default=2)
     model: FilmModel = choice("fixed_half", "positive_pressure", "full", text="film model", default="fixed_half")

@@ -26,13 +26,13 @@ def synchronous_force(tau: Scalar, amplitude: Scalar) -> tuple[Array, Array]:
 class SynchronousImpact(eqx.Module):
     """The paper's (15): one horizontal force at cage frequency that grows as a power of speed."""
 
-    amplitude: Array = parameter("N", 0.0, 1e5, "amplitude A at the reference speed")
-    exponent: Array = parameter("1", 0.0, 4.0, "power n of speed; 20/19 for a Hertz impact on a stiff bar")
-    reference_speed: Array = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
+    amplitude: Scalar = parameter("N", 0.0, 1e5, "amplitude A at the reference speed")
+    exponent: Scalar = parameter("1", 0.0, 4.0, "power n of speed; 20/19 for a Hertz impact on a stiff bar")
+    reference_speed: Scalar = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
 
 
 class RollerPassImpact(eqx.Module):
-    """A pulse Q_cw(t) each time a roller enters or leaves the loaded zone, kept as a Fourier series in the pass angle."""
+    """A pulse Q_cw(t) each time a roller enters or leaves the loaded zone, kept as a Fourier series."""
 
     oscillator: PocketImpact
     harmonics: int = count(1, 128, "harmonics of the roller-pass frequency that are kept", default=24)
@@ -52,8 +52,8 @@ def pulse_spectrum(
 ) -> tuple[Float[Array, " harmonics"], Float[Array, " harmonics"]]:
     """Cosine and sine coefficients [N] of the train of pulses that starts at tau = 0 and repeats every 2 pi / Z.
 
-    Pulses that last longer than the time between two rollers add up: summing shifted pulses and sampling the spectrum of
-    one pulse at the multiples of Z are the same thing (Poisson).
+    Pulses that last longer than the time between two rollers add up: summing shifted pulses and sampling the spectrum
+    of one pulse at the multiples of Z are the same thing (Poisson).
     """
     v0 = approach_speed(impact.oscillator.approach_ratio, omega, pocket_clearance)
     duration = 8 * impact_time_scale(impact.oscillator, roller_mass, v0)

@@ -5,6 +5,8 @@
 started with the roller approaching at v_0. The paper prints d_w'' in the second line and gives no constants.
 """
 
+from typing import Any
+
 import diffrax as dfx
 import equinox as eqx
 import jax
@@ -19,10 +21,14 @@ from ._smooth import power_10_9
 class PocketImpact(eqx.Module):
     """Constants of the roller-bar oscillator; none is printed in the paper."""
 
-    contact_stiffness: Array = parameter("N/m^(10/9)", 1e4, 1e13, "roller-bar line-contact stiffness K_cw", default=2e8)
-    bar_stiffness: Array = parameter("N/m", 1e3, 1e10, "bending stiffness of a cage bar K_c", default=2.5e6)
-    bar_mass: Array = parameter("kg", 1e-5, 1.0, "effective mass of a cage bar M_c", default=4e-3)
-    approach_ratio: Array = parameter("1", 1e-3, 10.0, "kappa in v_0 = kappa omega T, T the pocket clearance", default=0.6)
+    contact_stiffness: Scalar = parameter(
+        "N/m^(10/9)", 1e4, 1e13, "roller-bar line-contact stiffness K_cw", default=2e8
+    )
+    bar_stiffness: Scalar = parameter("N/m", 1e3, 1e10, "bending stiffness of a cage bar K_c", default=2.5e6)
+    bar_mass: Scalar = parameter("kg", 1e-5, 1.0, "effective mass of a cage bar M_c", default=4e-3)
+    approach_ratio: Scalar = parameter(
+        "1", 1e-3, 10.0, "kappa in v_0 = kappa omega T, T the pocket clearance", default=0.6
+    )
 
 
 class ImpactHistory(eqx.Module):
@@ -58,12 +64,14 @@ def _contact(y: tuple[Array, ...], impact: PocketImpact) -> Array:
     return impact.contact_stiffness * power_10_9(jnp.maximum(d_w - d_c, 0.0))
 
 
-def _rates(s: Scalar, y: tuple[Array, ...], args: tuple) -> tuple[Array, ...]:
+def _rates(s: Any, y: Any, args: Any) -> tuple[Array, ...]:
     del s
     impact, roller_mass, scale = args
     _, d_c, u_w, u_c = y
     q = _contact(y, impact)
-    return tuple(scale * rate for rate in (u_w, u_c, -q / roller_mass, (q - impact.bar_stiffness * d_c) / impact.bar_mass))
+    return tuple(
+        scale * rate for rate in (u_w, u_c, -q / roller_mass, (q - impact.bar_stiffness * d_c) / impact.bar_mass)
+    )
 
 
 def impact_history(

@@ -23,7 +23,7 @@ class RigidRib(eqx.Module):
 class ElasticRib(eqx.Module):
     """A rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
 
-    mass: Array = parameter("kg", 1e-3, 100.0, "rib mass M_O")
-    stiffness: Array = parameter("N/m", 1.0, 1e12, "rib stiffness K_O")
-    damping: Array = parameter("N s/m", 0.0, 1e8, "rib damping B_O")
-    cubic_stiffness: Array = parameter("N/m^3", 0.0, 1e24, "cubic rib stiffness K_O3", default=0.0)
+    mass: Scalar = parameter("kg", 1e-3, 100.0, "rib mass M_O")
+    stiffness: Scalar = parameter("N/m", 1.0, 1e12, "rib stiffness K_O")
+    damping: Scalar = parameter("N s/m", 0.0, 1e8, "rib damping B_O")
+    cubic_stiffness: Scalar = parameter("N/m^3", 0.0, 1e24, "cubic rib stiffness K_O3", default=0.0)

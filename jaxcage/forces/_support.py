@@ -14,9 +14,7 @@ Cross = Literal["circulatory", "as_printed"]
 Cubic = Literal["absolute", "dimensionless"]
 
 
-def spring_force(
-    x: Scalar, y: Scalar, stiffness_x: Scalar, stiffness_y: Scalar, cubic: Scalar
-) -> tuple[Array, Array]:
+def spring_force(x: Scalar, y: Scalar, stiffness_x: Scalar, stiffness_y: Scalar, cubic: Scalar) -> tuple[Array, Array]:
     """-(K + K_3 |r|^2) r [N]: our isotropic form of the paper's cubic stiffness, with K_x and K_y of its fig. 6."""
     hardening = cubic * (x * x + y * y)
     return jnp.asarray(-(stiffness_x + hardening) * x), jnp.asarray(-(stiffness_y + hardening) * y)
@@ -30,7 +28,7 @@ def cross_force(cross: Cross, x: Scalar, y: Scalar, linear: Scalar, cubic: Scala
     """
     if cross == "circulatory":
         return jnp.asarray(-linear * y), jnp.asarray(linear * x)
-    return -(linear * y + cubic * y**3), -(linear * x + cubic * x**3)
+    return jnp.asarray(-(linear * y + cubic * y**3)), jnp.asarray(-(linear * x + cubic * x**3))
 
 
 def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffness: Scalar, clearance: Scalar) -> Array:
@@ -41,12 +39,16 @@ def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffnes
 class Support(eqx.Module):
     """Stiffness and damping between cage and rib; none of the values is printed in the paper."""
 
-    stiffness_x: Array = parameter("N/m", 0.0, 1e9, "support stiffness K_x")
-    stiffness_y: Array = parameter("N/m", 0.0, 1e9, "support stiffness K_y")
-    damping: Array = parameter("N s/m", 0.0, 1e5, "support damping B_s")
-    cubic_stiffness: Array = parameter("N/m^3", 0.0, 1e18, "cubic stiffness K_3, for cubic = absolute", default=0.0)
-    cubic_ratio: Array = parameter("1", 0.0, 1e4, "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless", default=0.0)
-    cross_stiffness: Array = parameter("N/m", -1e8, 1e8, "cross-coupling stiffness K_xy", default=0.0)
-    cross_cubic: Array = parameter("N/m^3", -1e18, 1e18, "cubic cross-coupling K'_xy, for cross = as_printed", default=0.0)
+    stiffness_x: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_x")
+    stiffness_y: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_y")
+    damping: Scalar = parameter("N s/m", 0.0, 1e5, "support damping B_s")
+    cubic_stiffness: Scalar = parameter("N/m^3", 0.0, 1e18, "cubic stiffness K_3, for cubic = absolute", default=0.0)
+    cubic_ratio: Scalar = parameter(
+        "1", 0.0, 1e4, "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless", default=0.0
+    )
+    cross_stiffness: Scalar = parameter("N/m", -1e8, 1e8, "cross-coupling stiffness K_xy", default=0.0)
+    cross_cubic: Scalar = parameter(
+        "N/m^3", -1e18, 1e18, "cubic cross-coupling K'_xy, for cross = as_printed", default=0.0
+    )
     cross: Cross = choice("circulatory", "as_printed", text="form of the cross-coupling", default="circulatory")
     cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")

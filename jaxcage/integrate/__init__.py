@@ -11,22 +11,22 @@
 """
 
 from ._method import (
+    REVOLUTION as REVOLUTION,
     AbstractMethod as AbstractMethod,
     AdaptiveSteps as AdaptiveSteps,
     FixedSteps as FixedSteps,
-    method as method,
-    REVOLUTION as REVOLUTION,
     Stretch as Stretch,
+    method as method,
 )
 from ._newmark import NewmarkBeta as NewmarkBeta
-from ._results import outcome_code as outcome_code, OUTCOMES as OUTCOMES, RESULTS as RESULTS
+from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
 from ._rosenbrock import (
     RODAS3 as RODAS3,
-    Rodas3 as Rodas3,
     RODAS4 as RODAS4,
+    Rodas3 as Rodas3,
     Rodas4 as Rodas4,
-    rosenbrock_step as rosenbrock_step,
     RosenbrockTableau as RosenbrockTableau,
+    rosenbrock_step as rosenbrock_step,
 )
-from ._simulate import ramp as ramp, simulate as simulate, Trajectory as Trajectory
-from ._strobe import strobe_map as strobe_map, StrobeMap as StrobeMap
+from ._simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate
+from ._strobe import StrobeMap as StrobeMap, strobe_map as strobe_map

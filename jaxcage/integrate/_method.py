@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._types import Scalar, State
-from ..models import AbstractField, AbstractForcedSystem, ESCAPE, ScaledField
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField
 from ._newmark import NewmarkBeta
 from ._results import RESULTS
 from ._rosenbrock import Rodas3, Rodas4
@@ -29,7 +29,7 @@ class Stretch(NamedTuple):
     result: RESULTS
 
 
-def _evaluate(tau: Scalar, y: State, field: AbstractField) -> State:
+def _evaluate(tau: Any, y: Any, field: Any) -> State:
     return field(tau, y)
 
 
@@ -55,7 +55,7 @@ def _worse(first: RESULTS, second: RESULTS) -> RESULTS:
 def judge(result: Any, y: State, excursion: Scalar, limit: float) -> RESULTS:
     """What to say of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
-    state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)
+    state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     return _worse(RESULTS.promote(result), RESULTS.where(finite, state, RESULTS.not_finite))  # pyright: ignore
 
 

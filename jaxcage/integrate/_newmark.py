@@ -46,7 +46,7 @@ class NewmarkBeta(dfx.AbstractSolver):
     ) -> tuple[Any, None, dict[str, Any], None, Any]:
         del terms, solver_state, made_jump
         v1, q1, converged = self._solve(args, t0, t1, y0)
-        result = dfx.RESULTS.where(converged, dfx.RESULTS.successful, dfx.RESULTS.nonlinear_divergence)
+        result = dfx.RESULTS.where(converged, dfx.RESULTS.successful, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
         y1 = (*q1, *v1)
         return y1, None, dict(y0=y0, y1=y1), None, result
 
@@ -62,7 +62,9 @@ class NewmarkBeta(dfx.AbstractSolver):
         shift = 1 / (self.gamma * (t1 - t0))
 
         def positions(v1: State) -> State:
-            a1 = tuple((b - a - h * (1 - self.gamma) * c) / (h * self.gamma) for a, b, c in zip(v0, v1, a0, strict=True))
+            a1 = tuple(
+                (b - a - h * (1 - self.gamma) * c) / (h * self.gamma) for a, b, c in zip(v0, v1, a0, strict=True)
+            )
             return tuple(
                 q + h * v + h**2 * ((0.5 - self.beta) * a + self.beta * b)
                 for q, v, a, b in zip(q0, v0, a0, a1, strict=True)

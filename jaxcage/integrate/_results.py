@@ -10,8 +10,8 @@ class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
 
     not_finite = "The state became infinite or undefined: use more steps per revolution, or a smaller tolerance."
     outside = (
-        "The state started outside, or went far outside, what the model holds for (a cage: eps > 1 at the start, eps > 2 "
-        "later): start inside the clearance, or use a stiffer contact or more steps per revolution."
+        "The state started outside, or went far outside, what the model holds for (a cage: eps > 1 at the start, "
+        "eps > 2 later): start inside the clearance, or use a stiffer contact or more steps per revolution."
     )
 
 

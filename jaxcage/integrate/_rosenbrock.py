@@ -1,8 +1,8 @@
 """L-stable Rosenbrock methods as diffrax solvers that use the structure of the field they integrate.
 
 A Rosenbrock method solves linear systems only, one matrix per step:
-    (shift I - J) U_i = f(t + alpha_i h, y + sum_j a_ij U_j) + sum_j c_ij U_j / h + gamma_i h df/dt,  shift = 1/(gamma h),
-    y_1 = y + sum_i m_i U_i,  error = sum_i e_i U_i.
+    (shift I - J) U_i = f(t + alpha_i h, y + sum_j a_ij U_j) + sum_j c_ij U_j / h + gamma_i h df/dt,
+    y_1 = y + sum_i m_i U_i,  error = sum_i e_i U_i,  shift = 1/(gamma h).
 The field's linearisation does the solve: for a second-order system it eliminates the positions in closed form.
 """
 
@@ -101,7 +101,9 @@ class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     """A Rosenbrock method on an `AbstractField`, which travels as the `args` of `diffrax.diffeqsolve`."""
 
     term_structure: ClassVar = dfx.ODETerm
-    interpolation_cls: ClassVar[Callable[..., dfx.AbstractLocalInterpolation]] = dfx.ThirdOrderHermitePolynomialInterpolation
+    interpolation_cls: ClassVar[Callable[..., dfx.AbstractLocalInterpolation]] = (
+        dfx.ThirdOrderHermitePolynomialInterpolation
+    )
     tableau: ClassVar[RosenbrockTableau]
 
     def init(self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any) -> _SolverState:

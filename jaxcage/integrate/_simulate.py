@@ -11,8 +11,8 @@ from jaxtyping import Array, Float, Int
 from .._checks import require_x64
 from .._types import Scalar, State
 from ..models import AbstractForcedSystem
-from ._method import AbstractMethod, method as make_method, REVOLUTION
-from ._results import outcome_code, OUTCOMES
+from ._method import REVOLUTION, AbstractMethod, method as make_method
+from ._results import OUTCOMES, outcome_code
 from ._strobe import strobe_map
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Array, Int
 
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
-from ._method import AbstractMethod, judge, method as make_method, REVOLUTION, Stretch
+from ._method import REVOLUTION, AbstractMethod, Stretch, judge, method as make_method
 from ._results import RESULTS
 
 

@@ -6,6 +6,7 @@
 | `_field`          | dy/dtau at one speed, its linearisation, elimination of positions                |
 | `_cage`           | the cage in its rib: parameters                                                  |
 | `_cage_at_speed`  | the cage in its rib: forces at one speed                                         |
+| `_groups`         | dimensionless groups                                                             |
 | `_cases`          | the paper's six cases as models                                                  |
 """
 
@@ -19,9 +20,10 @@ from ._field import (
     ScaledField as ScaledField,
     SecondOrderField as SecondOrderField,
 )
+from ._groups import dimensionless_groups as dimensionless_groups
 from ._system import (
-    AbstractForcedSystem as AbstractForcedSystem,
     ESCAPE as ESCAPE,
+    AbstractForcedSystem as AbstractForcedSystem,
     ForcedOscillator as ForcedOscillator,
     ForcedSystem as ForcedSystem,
 )

@@ -1,5 +1,5 @@
 """The cage in its guiding rib, driven by unbalance and roller impacts: paper eqs. (16)-(32) in the form
-    M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin tau) - M g y.
+M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin tau) - M g y.
 """
 
 from typing import Literal
@@ -11,8 +11,17 @@ from jaxtyping import Array
 from .._parameters import choice, parameter
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant
-from ..forces import ElasticRib, LandContact, RibFilm, RigidRib, RollerPassImpact, Support, SynchronousImpact
-from ..forces import smooth_norm, UnbalanceReading
+from ..forces import (
+    ElasticRib,
+    LandContact,
+    RibFilm,
+    RigidRib,
+    RollerPassImpact,
+    Support,
+    SynchronousImpact,
+    UnbalanceReading,
+    smooth_norm,
+)
 from ._cage_at_speed import CageAtSpeed, ElasticRibLaw, RigidRibLaw
 from ._field import AbstractField, SecondOrderField
 from ._system import AbstractForcedSystem
@@ -34,13 +43,13 @@ class CageModel(AbstractForcedSystem):
     contact: LandContact
     support: Support
     impact: SynchronousImpact | RollerPassImpact
-    cage_mass: Array = parameter("kg", 1e-3, 100.0, "cage mass M")
-    guidance_gap: Array = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib")
-    eccentricity: Array = parameter("m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre")
+    cage_mass: Scalar = parameter("kg", 1e-3, 100.0, "cage mass M")
+    guidance_gap: Scalar = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib")
+    eccentricity: Scalar = parameter("m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre")
     rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
-    gravity: Array = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
-    load: Array = parameter("N", 0.0, 1e7, "shaft load F", default=4450.0)
-    printed_unit: Array = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
+    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
+    load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", default=4450.0)
+    printed_unit: Scalar = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
     clearance_reading: ClearanceReading = choice(
         "as_printed", "radial", text="radial clearance c = C_r (as printed) or C_r/2", default="as_printed"
     )
@@ -55,12 +64,12 @@ class CageModel(AbstractForcedSystem):
     @property
     def clearance(self) -> Array:
         """Radial clearance c [m]: (12) defines C_r as diametral, (13) and (25)-(27) use it as radial."""
-        return self.guidance_gap if self.clearance_reading == "as_printed" else self.guidance_gap / 2
+        return jnp.asarray(self.guidance_gap if self.clearance_reading == "as_printed" else self.guidance_gap / 2)
 
     @property
     def land_radius(self) -> Array:
         """Radius of the cage's guiding land R = (d_g - C_r)/2 [m]."""
-        return (self.bearing.rib_diameter - self.guidance_gap) / 2
+        return jnp.asarray((self.bearing.rib_diameter - self.guidance_gap) / 2)
 
     def cage_at(self, speed: Scalar) -> CageAtSpeed:
         """The cage's force laws at `speed` [rad/s]."""

@@ -3,28 +3,27 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._types import Scalar, State
 from ..bearing import load_distribution
 from ..forces import (
-    contact_force,
     Cross,
+    ElasticRib,
+    FilmModel,
+    PulseTrain,
+    RollerPassImpact,
+    contact_force,
     cross_force,
     cubic_stiffness,
     effective_eccentricity,
-    ElasticRib,
     film_drive,
     film_resistance,
     film_scale,
-    FilmModel,
     pulse_train,
     pulse_train_force,
-    PulseTrain,
     restitution_damping,
     rib_force,
-    RollerPassImpact,
     smooth_norm,
     smooth_plus,
     spring_force,
@@ -100,9 +99,7 @@ class CageAtSpeed(eqx.Module):
             stiffness_x=support.stiffness_x,
             stiffness_y=support.stiffness_y,
             support_damping=support.damping,
-            cubic_stiffness=cubic_stiffness(
-                support.cubic, support.cubic_stiffness, support.cubic_ratio, stiffness, c
-            ),
+            cubic_stiffness=cubic_stiffness(support.cubic, support.cubic_stiffness, support.cubic_ratio, stiffness, c),
             cross_stiffness=support.cross_stiffness,
             cross_cubic=support.cross_cubic,
             contact_stiffness=contact.stiffness,

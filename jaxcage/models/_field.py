@@ -101,9 +101,7 @@ class SecondOrderLinearisation(AbstractLinearisation):
 
         def solve(r: State) -> State:
             r_q, r_v = r[:n], r[n:]
-            known = tuple(
-                r_v[i] + lever * sum(self.a_q[i][j] * r_q[j] for j in range(n)) for i in range(n)
-            )
+            known = tuple(r_v[i] + lever * sum(self.a_q[i][j] * r_q[j] for j in range(n)) for i in range(n))
             u_v = lu_solve(lu, known)
             return (*((r_q[i] + rate * u_v[i]) * per_shift for i in range(n)), *u_v)
 

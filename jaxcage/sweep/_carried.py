@@ -23,7 +23,7 @@ class Hysteresis:
 
     @property
     def apart(self) -> Float[np.ndarray, " speeds"]:
-        """Largest distance between the mean strobe positions of the two, in units of the scale; NaN where one failed."""
+        """Largest distance between the mean strobe states of the two, in units of the scale; NaN after a failure."""
         means = [np.mean(s.strobe[:, 0], axis=1) / s.scale for s in (self.up, self.down)]
         return np.max(np.abs(means[0] - means[1]), axis=-1)
 

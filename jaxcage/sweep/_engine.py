@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import LaneState
-from ..analysis import Observation, observe, Plan, StrobeLanes
+from ..analysis import Observation, Plan, StrobeLanes, observe
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 

@@ -39,8 +39,7 @@ def checked_speeds(speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"
 def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
     if discard < 0 or revolutions < 1:
         raise ValueError(
-            "Arguments `discard` and `revolutions` must be at least 0 and 1, but are "
-            f"{discard} and {revolutions}."
+            f"Arguments `discard` and `revolutions` must be at least 0 and 1, but are {discard} and {revolutions}."
         )
     if not 0 <= exponents <= dimension:
         raise ValueError(f"Argument `exponents` must lie between 0 and {dimension}, but {exponents} was given.")
