@@ -7,7 +7,7 @@
 | `models`     | the forced-system protocol, the cage in its rib                                     |
 | `integrate`  | stiff solvers as diffrax solvers, time histories, the strobe map                    |
 | `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
-| `sweep`      | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
+| `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
 | `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
 | `cli`        | the `jaxcage` command                                                               |
 
@@ -89,7 +89,7 @@ from .models import (
     case as case,
     dimensionless_groups as dimensionless_groups,
 )
-from .sweep import (
+from .sweeps import (
     Hysteresis as Hysteresis,
     rpm as rpm,
     run_up_down as run_up_down,

@@ -13,8 +13,8 @@ import pytest
 from jaxcage.analysis import Plan
 from jaxcage.integrate import OUTCOMES, method
 from jaxcage.models import case
-from jaxcage.sweep import sweep
-from jaxcage.sweep._engine import run_lanes
+from jaxcage.sweeps import sweep
+from jaxcage.sweeps._engine import run_lanes
 
 
 MODEL = case("1a")

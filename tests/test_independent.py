@@ -11,7 +11,7 @@ import pytest
 
 from jaxcage.integrate import method, strobe_map
 from jaxcage.models import case
-from jaxcage.sweep import rpm, sweep
+from jaxcage.sweeps import rpm, sweep
 
 
 def stacked(state):

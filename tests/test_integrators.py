@@ -261,21 +261,21 @@ def test_liouville_for_the_cage(film):
     strobe = strobe_map(model, SPEED, chosen)
     start = jnp.asarray([0.3, -0.5, 0.2, -0.3]) * UNIT
 
-    def divergence(tau, y):
-        field = strobe.field
-        return jnp.trace(jax.jacfwd(lambda s: stacked(field(tau, tuple(s))))(y))
+    @jax.jit
+    def states(y):
+        def advance(y, i):
+            return stacked(strobe.part(tuple(y), i, parts).y), y
+
+        end, before = jax.lax.scan(advance, y, jnp.arange(parts))
+        return jnp.concatenate([before, end[None]])
 
     @jax.jit
-    def along(y):
-        def advance(y, i):
-            tau = i.astype(float) * (2 * jnp.pi / parts)
-            end = stacked(strobe.part(tuple(y), i, parts).y)
-            return end, divergence(tau, y)
+    @jax.vmap
+    def divergence(tau, y):
+        return jnp.trace(jax.jacfwd(lambda s: stacked(strobe.field(tau, tuple(s))))(y))
 
-        end, traces = jax.lax.scan(advance, y, jnp.arange(parts))
-        return jnp.append(traces, divergence(2 * jnp.pi, end))
-
-    traces = np.asarray(along(start))
+    tau = jnp.linspace(0.0, 2 * jnp.pi, parts + 1)
+    traces = np.asarray(divergence(tau, states(start)))
     # Simpson's rule over the steps.
     weights = np.ones(parts + 1)
     weights[1:-1:2], weights[2:-1:2] = 4, 2

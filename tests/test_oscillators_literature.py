@@ -10,7 +10,7 @@ import pytest
 
 from jaxcage.integrate import method
 from jaxcage.models import ForcedOscillator, ForcedSystem
-from jaxcage.sweep import sweep
+from jaxcage.sweeps import sweep
 
 
 def ueda(tau, q, v, speed):

@@ -28,7 +28,7 @@ from ._equilibrium import (
     stability_chart as stability_chart,
     whirl_threshold as whirl_threshold,
 )
-from ._labels import closing_period as closing_period, label_lanes as label_lanes
+from ._labels import CHAOS_THRESHOLD as CHAOS_THRESHOLD, closing_period as closing_period, label_lanes as label_lanes
 from ._lanes import StrobeLanes as StrobeLanes
 from ._measures import (
     OrbitMeasures as OrbitMeasures,

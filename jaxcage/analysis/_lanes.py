@@ -41,12 +41,11 @@ class StrobeLanes(eqx.Module):
     def of(cls, system: AbstractForcedSystem, method: AbstractMethod, speed: Float[Array, " lanes"]) -> "StrobeLanes":
         """One lane per speed [rad/s]."""
         make = lambda s: strobe_map(system, s, method)
-        arrays = lambda s: eqx.filter(make(s), eqx.is_array)
-        differs = depends_on_input(arrays, speed[0])
-        stacked = eqx.filter_vmap(make)(speed)
-        first = make(speed[0])
-        own = eqx.filter(stacked, differs)
-        shared = jax.tree.map(lambda varies, x: None if varies else x, differs, first)
+        differs = depends_on_input(lambda s: eqx.filter(make(s), eqx.is_array), speed[0])
+        stacked = eqx.filter(eqx.filter_vmap(make)(speed), eqx.is_array)
+        alike, static = eqx.partition(make(speed[0]), eqx.is_array)
+        own = jax.tree.map(lambda varies, x: x if varies else None, differs, stacked)
+        shared = eqx.combine(jax.tree.map(lambda varies, x: None if varies else x, differs, alike), static)
         scale = tuple(jnp.broadcast_to(c, speed.shape) for c in stacked.scale)
         return cls(own, shared, scale)
 

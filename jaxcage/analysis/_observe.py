@@ -70,7 +70,9 @@ def orthonormalise(tangents: Tangents) -> tuple[Tangents, Float[Array, "exponent
 
 def _advance(maps: StrobeLanes, lanes: Lanes) -> Lanes:
     """All lanes one revolution on; a lane that fails turns to NaN and keeps the code of its first failure."""
-    y, peak, code = maps.map(_coded, lanes.y)
+    # A failed lane runs on from rest, unseen: solvers that check their input would otherwise stop the whole batch.
+    running = tuple(jnp.where(lanes.outcome == 0, c, 0.0) for c in lanes.y)
+    y, peak, code = maps.map(_coded, running)
     outcome = jnp.where(lanes.outcome == 0, code, lanes.outcome)
     return Lanes(_blank(y, outcome), jnp.maximum(lanes.peak, peak), outcome)
 
@@ -146,8 +148,9 @@ def observe(maps: StrobeLanes, y0: LaneState, plan: Plan) -> Observation:
             # Revolutions n < 0 only align the tangent vectors; their growth goes to the extra row of `sums`.
             lanes, ring, tangents, total, sums = carry
             lanes, moved = _push(maps, lanes, tangents)
-            tangents, logs = orthonormalise(moved)
-            total = total + logs
+            runs = lanes.outcome[None, :] == 0
+            tangents, logs = orthonormalise(tuple(jnp.where(runs, t, 1.0) for t in moved))
+            total = total + jnp.where(runs, logs, jnp.nan)
             row = jnp.where(n < 0, plan.blocks, n // plan.block)
             sums = jax.lax.dynamic_update_index_in_dim(sums, total, row, 0)
             total = jnp.where((n + 1) % plan.block == 0, zero, total)

@@ -7,7 +7,7 @@ from ..analysis import Sweep
 from ..integrate import OUTCOMES
 from ..io import write_columns
 from ..plotting import new_figure, strobe_section
-from ..sweep import sweep
+from ..sweeps import sweep
 from ._console import progress
 from ._errors import ComputationError, require_at_least, require_blocks, require_speed
 from ._inputs import angular_speed, integration, output_folder, save_figure, subject

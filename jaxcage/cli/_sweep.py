@@ -12,7 +12,7 @@ from ..analysis import Sweep, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
 from ..plotting import sweep_figure
-from ..sweep import rpm, sweep
+from ..sweeps import rpm, sweep
 from ._console import progress, say
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
 from ._inputs import Subject, integration, output_folder, save_figure, subject

@@ -48,7 +48,7 @@ def contact_force(
     Hunt-Crossley number chi and the approach speed v_0 [m/s] at which it gives the restitution asked for.
     """
     loading = 1 + (damping / approach_speed) * rate
-    hysteresis = (loading + jnp.sqrt(loading * loading + 1e-6)) / 2  # max(loading, 0), smooth; 1 + 2.5e-7 at rest
+    hysteresis = (loading + jnp.sqrt(loading * loading + 1e-8)) / 2  # max(loading, 0), smooth; 1 + 2.5e-9 at rest
     return stiffness * power_10_9(penetration) * hysteresis
 
 

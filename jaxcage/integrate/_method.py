@@ -9,10 +9,11 @@ import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import optimistix as optx
 from jaxtyping import Array
 
 from .._types import Scalar, State
-from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._newmark import NewmarkBeta
 from ._results import RESULTS
 from ._rosenbrock import Rodas3, Rodas4
@@ -33,8 +34,19 @@ def _evaluate(tau: Any, y: Any, field: Any) -> State:
     return field(tau, y)
 
 
+def _nothing(tau: Any, y: Any, field: Any) -> State:
+    del tau, field
+    return tuple(jnp.zeros_like(c) for c in y)
+
+
 TERM = dfx.ODETerm(_evaluate)
 """The diffrax term of every field: the field itself travels as `args`, where solvers can use its structure."""
+ALL_IMPLICIT = dfx.MultiTerm(dfx.ODETerm(_nothing), TERM)
+"""The same for solvers that split their terms: everything in the implicit one."""
+
+
+def _term(solver: dfx.AbstractSolver) -> Any:
+    return ALL_IMPLICIT if isinstance(solver, dfx.KenCarp3 | dfx.KenCarp4 | dfx.KenCarp5) else TERM
 
 
 class AbstractMethod(eqx.Module):
@@ -72,23 +84,29 @@ class FixedSteps(AbstractMethod):
     def advance(
         self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
     ) -> Stretch:
-        del scale
         if self.steps % parts:
             raise ValueError(f"Argument `parts` must divide the {self.steps} steps per revolution, but it is {parts}.")
         h = REVOLUTION / self.steps
+        term = _term(self.solver)
+        if isinstance(self.solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
+            field, y = ScaledField(field, scale), divide(y, scale)
+            unscale = lambda state: multiply(state, scale)
+        else:
+            unscale = lambda state: state
 
         def step(i: Array, carry: tuple) -> tuple:
             y, peak, result, state = carry
             t0 = phase + i.astype(float) * h
-            y, _, _, state, outcome = self.solver.step(TERM, t0, t0 + h, y, field, state, False)
+            y, _, _, state, outcome = self.solver.step(term, t0, t0 + h, y, field, state, False)
             if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
                 result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
-            excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
+            excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(unscale(y))))
             return y, jnp.maximum(peak, excursion), result, state  # the maximum keeps a NaN
 
-        state = self.solver.init(TERM, phase, phase + h, y, field)
+        state = self.solver.init(term, phase, phase + h, y, field)
         start = (y, jnp.zeros(()), dfx.RESULTS.successful, state)
         y, peak, result, _ = jax.lax.fori_loop(0, self.steps // parts, step, start)
+        y = unscale(y)
         return Stretch(y, peak, judge(result, y, peak, ESCAPE))
 
 
@@ -103,14 +121,13 @@ class AdaptiveSteps(AbstractMethod):
     def advance(
         self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
     ) -> Stretch:
-        scaled = tuple(c / s for c, s in zip(y, scale, strict=True))
         solution = dfx.diffeqsolve(
-            TERM,
+            _term(self.solver),
             self.solver,
             t0=phase,
             t1=phase + REVOLUTION / parts,
             dt0=REVOLUTION / 512,
-            y0=scaled,
+            y0=divide(y, scale),
             args=ScaledField(field, scale),
             stepsize_controller=dfx.PIDController(rtol=self.rtol, atol=self.atol, pcoeff=0.3, icoeff=0.4),
             adjoint=dfx.ForwardMode(),
@@ -118,20 +135,22 @@ class AdaptiveSteps(AbstractMethod):
             throw=False,
         )
         assert solution.ys is not None
-        y = tuple(c[-1] * s for c, s in zip(solution.ys, scale, strict=True))
+        y = multiply(tuple(c[-1] for c in solution.ys), scale)
         excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
         return Stretch(y, excursion, judge(solution.result, y, excursion, ESCAPE))
 
 
+# `scan_kind="lax"`: outside `diffeqsolve`, diffrax's own solvers are differentiable in forward mode only with this.
+# Newton instead of diffrax's VeryChord, which with equal steps calls it divergence when it starts at the solution.
 def _implicit(solver: Any) -> Callable[[], dfx.AbstractSolver]:
-    return lambda: solver(root_finder=dfx.VeryChord(rtol=1e-6, atol=1e-9))
+    return lambda: solver(scan_kind="lax", root_finder=optx.Newton(rtol=1e-8, atol=1e-8))
 
 
 _FIXED: dict[str, Callable[[], dfx.AbstractSolver]] = {
     "rodas3": Rodas3,
     "rodas4": Rodas4,
     "newmark": NewmarkBeta,
-    "tsit5": dfx.Tsit5,
+    "tsit5": lambda: dfx.Tsit5(scan_kind="lax"),
     "kvaerno3": _implicit(dfx.Kvaerno3),
     "kvaerno5": _implicit(dfx.Kvaerno5),
     "kencarp4": _implicit(dfx.KenCarp4),

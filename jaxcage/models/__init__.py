@@ -19,6 +19,8 @@ from ._field import (
     FirstOrderField as FirstOrderField,
     ScaledField as ScaledField,
     SecondOrderField as SecondOrderField,
+    divide as divide,
+    multiply as multiply,
 )
 from ._groups import dimensionless_groups as dimensionless_groups
 from ._system import (

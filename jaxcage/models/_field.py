@@ -177,7 +177,7 @@ class ScaledLinearisation(AbstractLinearisation):
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         solve = self.inner.solver(shift)
-        return lambda r: _divide(solve(_multiply(r, self.scale)), self.scale)
+        return lambda r: divide(solve(multiply(r, self.scale)), self.scale)
 
 
 class ScaledField(AbstractField):
@@ -187,17 +187,19 @@ class ScaledField(AbstractField):
     scale: State
 
     def __call__(self, tau: Scalar, y: State) -> State:
-        return _divide(self.field(tau, _multiply(y, self.scale)), self.scale)
+        return divide(self.field(tau, multiply(y, self.scale)), self.scale)
 
     def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
-        inner = self.field.linearise(tau, _multiply(y, self.scale))
-        value, slope = _divide(inner.value, self.scale), _divide(inner.phase_derivative, self.scale)
+        inner = self.field.linearise(tau, multiply(y, self.scale))
+        value, slope = divide(inner.value, self.scale), divide(inner.phase_derivative, self.scale)
         return ScaledLinearisation(value, slope, inner, self.scale)
 
 
-def _multiply(y: State, scale: State) -> State:
+def multiply(y: State, scale: State) -> State:
+    """Each component times its scale."""
     return tuple(c * s for c, s in zip(y, scale, strict=True))
 
 
-def _divide(y: State, scale: State) -> State:
+def divide(y: State, scale: State) -> State:
+    """Each component over its scale."""
     return tuple(c / s for c, s in zip(y, scale, strict=True))

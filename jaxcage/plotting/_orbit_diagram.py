@@ -6,8 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
 from .._glossary import component_names, quantity
-from ..analysis import Sweep, Zones
-from ..analysis._labels import CHAOS_THRESHOLD
+from ..analysis import CHAOS_THRESHOLD, Sweep, Zones
 from ..bearing import PublishedCase
 from ._marks import mark_published, shade_zones
 from ._style import (

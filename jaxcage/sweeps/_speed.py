@@ -1,5 +1,6 @@
 """Sweeps over speed from several starts."""
 
+import math
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
@@ -18,13 +19,14 @@ from ..models import AbstractForcedSystem
 from ._engine import Progress, run_lanes
 
 
-def rpm(first: float, last: float | None = None, count: int | None = None) -> Float[np.ndarray, "..."]:
-    """Speeds given in revolutions per minute, in rad/s: one, or `count` from `first` to `last`."""
-    values = np.asarray(first) if last is None else np.linspace(first, last, count or 2)
-    return values * np.pi / 30
+def rpm(first: float, last: float | None = None, count: int = 2) -> Any:
+    """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`."""
+    if last is None:
+        return float(first) * math.pi / 30
+    return np.linspace(first, last, count) * math.pi / 30
 
 
-def checked_speeds(speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"]) -> np.ndarray:
+def checked_speeds(speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]) -> np.ndarray:
     speed = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speed.size == 0:
         raise ValueError("Argument `speeds` must hold at least one speed, but it is empty.")
@@ -50,7 +52,7 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
 
 def sweep(
     system: AbstractForcedSystem,
-    speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
