@@ -53,6 +53,8 @@ class SweepOptions(IntegrationOptions):
     """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
     exponents: int = 1
     """Number of Lyapunov exponents."""
+    waterfall: int = 0
+    """Speeds of a waterfall of spectra of the vertical motion; none by default."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis import Sweep, zones
+from ..analysis import Sweep, Zones, waterfall, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
-from ..plotting import sweep_figure
+from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
 from ..sweeps import rpm, sweep
 from ._console import progress, say
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
-from ._inputs import Subject, integration, output_folder, save_figure, subject
+from ._inputs import Subject, integration, output_folder, samples_per_revolution, save_figure, subject
 from ._options import SweepOptions
 from ._report import Report, Table
 from ._zone_report import zones_document, zones_table
@@ -47,6 +47,7 @@ def _check(options: SweepOptions) -> None:
         )
     require_at_least("--discard", options.discard, 0)
     require_at_least("--exponents", options.exponents, 1)
+    require_at_least("--waterfall", options.waterfall, 0)
 
 
 def sweep_case(options: SweepOptions) -> Swept:
@@ -87,18 +88,49 @@ def run(options: SweepOptions) -> Report:
     about, found = swept.subject, swept.sweep
     edges = zones(found)
     figure = sweep_figure(found, edges, about.published, _title(swept))
-    path = save_figure(figure, swept.folder / f"sweep_{about.name}.png")
+    stem = f"sweep_{about.name}"
+    figures = {"figure": save_figure(figure, swept.folder / f"{stem}.png")}
+    figures |= _zoom(swept, edges) | _waterfall(swept, options)
     counts = collections.Counter(found.label.ravel().tolist())
     document = zones_document(about.name, edges, about.published) | {
         "labels": dict(sorted(counts.items())),
         "failed": failed_lanes(found),
         "beyond_clearance": int(np.sum(found.peak > 1)),
         "seconds": round(swept.seconds, 2),
-        "figure": path,
+        **figures,
         "data": swept.data,
     }
     zone_table = zones_table(about.name, edges, about.published, swept.range_rpm)
     return Report(document, [_label_table(found, counts), zone_table], _notes(document))
+
+
+def _zoom(swept: Swept, edges: Zones) -> dict[str, str]:
+    """The widest closed zone enlarged, with a fifth of its width at either side."""
+    closed = [zone for zone in edges.zones if zone.width_rpm]
+    if not closed:
+        return {}
+    zone = max(closed, key=lambda z: z.width_rpm or 0.0)
+    assert zone.onset is not None and zone.exit is not None and zone.width_rpm is not None
+    margin = 0.2 * zone.width_rpm
+    figure = new_figure(9.0, 5.0)
+    axes = figure.subplots()
+    zoomed_diagram(swept.sweep, zone.onset.speed_rpm - margin, zone.exit.speed_rpm + margin, ax=axes)
+    figure.suptitle(f"{_title(swept)}, widest zone", fontsize=11)
+    return {"zoom": save_figure(figure, swept.folder / f"sweep_{swept.subject.name}_zoom.png")}
+
+
+def _waterfall(swept: Swept, options: SweepOptions) -> dict[str, str]:
+    """Spectra of the vertical motion over speed, if asked for."""
+    if options.waterfall == 0:
+        return {}
+    speeds = np.linspace(swept.sweep.speed[0], swept.sweep.speed[-1], options.waterfall)
+    chosen = integration(options)
+    samples = samples_per_revolution(chosen, 64)
+    found = waterfall(swept.subject.model, speeds, component=1, samples=samples, method=chosen)
+    figure = new_figure(9.0, 5.0)
+    waterfall_map(found.rpm, found.order, found.amplitude, figure.subplots())
+    figure.suptitle(f"{_title(swept)}: spectra of the vertical motion", fontsize=11)
+    return {"waterfall": save_figure(figure, swept.folder / f"sweep_{swept.subject.name}_waterfall.png")}
 
 
 def failed_lanes(found: Sweep) -> dict[str, int]:
@@ -131,6 +163,6 @@ def _notes(document: dict[str, Any]) -> list[str]:
         f"Failed lanes: {failed or 'none'}",
         f"Lanes beyond eps = 1: {beyond}",
         f"Time: {document['seconds']:.1f} s",
-        f"Figure: {document['figure']}",
+        *(f"{name.capitalize()}: {document[name]}" for name in ("figure", "zoom", "waterfall") if name in document),
         f"Data: {document['data']}",
     ]

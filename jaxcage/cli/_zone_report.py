@@ -45,6 +45,7 @@ def zones_document(name: str, zones: Zones, published: PublishedCase | None) -> 
         "resolution_rpm": zones.resolution_rpm,
         "close_below_rpm": zones.close_below_rpm,
         "zones": [zone_document(zone) for zone in zones.zones],
+        "synchronous": [zone_document(stretch) for stretch in zones.synchronous],
         "published": [
             {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
             for i, (onset, exit_) in enumerate(published_zones(published), start=1)
@@ -71,6 +72,15 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm"
     columns = ("zone", "onset", "exit", "width", "mechanism", "share")
     return Table(title, (*columns, "published"), rows)
+
+
+def synchronous_table(name: str, zones: Zones) -> Table:
+    """Stretches in which some start settled on the synchronous (period-1) orbit; their ends are synchronous-loss edges,
+    bracketed by the grid only [rpm].
+    """
+    rows = [(_edge_cell(z.onset), _edge_cell(z.exit), f"{z.share:.0%}") for z in zones.synchronous]
+    title = f"Synchronous orbit of {name} met [rpm], resolution {number(zones.resolution_rpm)} rpm"
+    return Table(title, ("from", "to", "share"), rows or [("none", "-", "-")])
 
 
 def _zone_cells(zone: Zone) -> tuple[str, ...]:

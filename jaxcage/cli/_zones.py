@@ -4,7 +4,7 @@ from ..analysis import zones
 from ._options import ZonesOptions
 from ._report import Report
 from ._sweep import failed_lanes, sweep_case
-from ._zone_report import zones_document, zones_table
+from ._zone_report import synchronous_table, zones_document, zones_table
 
 
 def run(options: ZonesOptions) -> Report:
@@ -16,4 +16,8 @@ def run(options: ZonesOptions) -> Report:
         "failed": failed,
         "data": swept.data,
     }
-    return Report(document, [zones_table(about.name, edges, about.published, swept.range_rpm)], [f"Data: {swept.data}"])
+    tables = [
+        zones_table(about.name, edges, about.published, swept.range_rpm),
+        synchronous_table(about.name, edges),
+    ]
+    return Report(document, tables, [f"Data: {swept.data}"])

@@ -27,7 +27,7 @@ class PocketImpact(eqx.Module):
     bar_stiffness: Scalar = parameter("N/m", 1e3, 1e10, "bending stiffness of a cage bar K_c", default=2.5e6)
     bar_mass: Scalar = parameter("kg", 1e-5, 1.0, "effective mass of a cage bar M_c", default=4e-3)
     approach_ratio: Scalar = parameter(
-        "1", 1e-3, 10.0, "kappa in v_0 = kappa omega T, T the pocket clearance", default=0.6
+        "1", 1e-3, 10.0, "kappa in v_0 = kappa omega T, T the pocket clearance", default=0.45
     )
 
 
