@@ -14,11 +14,6 @@
 SI units inside, always; y points up and rotation is positive counter-clockwise.
 """
 
-from ._xla import configure as _configure
-
-
-_configure()  # before anything below lets JAX compile
-
 from ._parameters import (
     parameter_info as parameter_info,
     parameters as parameters,

@@ -186,7 +186,7 @@ def test_synchronous_amplitude_grows_as_a_power_of_speed():
 
 # --- roller-bar impact (14) ------------------------------------------------------------------
 
-IMPACT = PocketImpact()
+IMPACT = PocketImpact(contact_stiffness=2e8, bar_stiffness=2.5e6, bar_mass=4e-3, approach_ratio=0.6)
 ROLLER, SPEED = 0.0423, 0.18
 
 

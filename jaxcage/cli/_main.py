@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Sequence
 
-from .._xla import configure
 from ._console import leave_at_once_when_interrupted, say
 from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
 from ._options import Command, Options
@@ -20,7 +19,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     **Returns:** exit status: 0, 1 for a computation without a result, 2 for bad input, 130 when
     interrupted.
     """
-    configure()
     if arguments is None:  # the process is ours, not a notebook's
         leave_at_once_when_interrupted()
     try:

@@ -10,7 +10,9 @@ from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import diffrax as dfx
+import jax
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from .._types import Scalar, State
 from ..models import AbstractField
@@ -72,6 +74,18 @@ def _combine(base: State, weights: tuple[float, ...], stages: list[State], facto
     return tuple(b + factor * sum(w * u[i] for w, u in used) if used else b for i, b in enumerate(base))
 
 
+def _once(x: PyTree, t0: Scalar) -> PyTree:
+    """x as it is, worked out in full before anything makes use of it.
+
+    XLA's CPU backend computes each output of a fused loop by itself, so that a step written in one piece evaluates the
+    same forces over and over: 5345 multiplications instead of 586 for Rodas3, and 3.6 times the run time for Rodas4. It
+    drops optimisation barriers before it fuses (jax 0.10.1), but computes the operands of a conditional once.
+    """
+    return jax.lax.cond(
+        jnp.isfinite(t0), lambda v: v, lambda v: jax.tree.map(lambda c: jnp.full_like(c, jnp.nan), v), x
+    )
+
+
 def rosenbrock_step(
     tableau: RosenbrockTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State
 ) -> tuple[State, State, State]:
@@ -79,7 +93,7 @@ def rosenbrock_step(
 
     **Returns:** the new state, the error estimate of the embedded method, and dy/dtau at the beginning of the step.
     """
-    near = field.linearise(t0, y0)
+    near = _once(field.linearise(t0, y0), t0)
     solve = near.solver(1 / (tableau.gamma * h))
     zero = tuple(jnp.zeros_like(c) for c in near.value)
     stages: list[State] = []
@@ -90,7 +104,7 @@ def rosenbrock_step(
         r = _combine(rates, tableau.c[i], stages, 1 / h)
         if tableau.gamma_sum[i] != 0.0:
             r = tuple(c + tableau.gamma_sum[i] * h * s for c, s in zip(r, near.phase_derivative, strict=True))
-        stages.append(solve(r))
+        stages.append(_once(solve(r), t0))
     return _combine(y0, tableau.m, stages), _combine(zero, tableau.e, stages), near.value
 
 
