@@ -3,13 +3,12 @@
 Two tables, printed and written to `benchmarks/convergence.md`:
 
 1. Error of the one-revolution map against a tight reference, over states sampled from the attractors of a case, in
-   clearances (the largest of the two coordinates): median and 99th percentile, with the time per revolution and lane.
+   clearances (the largest of the two coordinates): median and 99th percentile.
 2. What the step count does to the picture: the chaotic zones of the case for each method.
 """
 
 import argparse
 import pathlib
-import time
 from importlib.metadata import version
 
 import jax
@@ -61,14 +60,8 @@ def errors(model: jc.CageModel, speeds: np.ndarray, states: np.ndarray, quick: b
         got = one_revolution(model, speeds, states, method)
         apart = np.max(np.abs(got - truth)[..., :2], axis=-1).ravel() / scale
         apart = np.where(np.isfinite(apart), apart, np.inf)
-        revolutions = 4 if quick else 20
-        run = lambda: jc.sweep(model, speeds, method=method, discard=0, revolutions=revolutions, blocks=1, exponents=0)
-        run()
-        begin = time.perf_counter()
-        run()
-        cost = (time.perf_counter() - begin) / revolutions / states[..., 0].size * 1e6
         median, most = np.quantile(apart, [0.5, 0.99], method="higher")
-        rows.append([solver, str(steps), f"{median:.1e}", f"{most:.1e}", f"{cost:.1f}"])
+        rows.append([solver, str(steps), f"{median:.1e}", f"{most:.1e}"])
         print(*rows[-1], flush=True)
     return rows
 
@@ -101,7 +94,7 @@ def main() -> None:
     speeds = jc.rpm(4000, 27500, 12 if quick else 95)
     states = attractor_states(model, speeds)
     first = table(
-        ["solver", "steps", "median error / c", "99 % error / c", "us per revolution and lane"],
+        ["solver", "steps", "median error / c", "99 % error / c"],
         errors(model, speeds, states, quick),
     )
     second = table(

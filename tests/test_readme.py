@@ -1,0 +1,49 @@
+"""The README's code runs, its numbers hold, and its commands are those of the check."""
+
+import contextlib
+import io
+import pathlib
+import re
+
+import numpy as np
+import pytest
+
+
+ROOT = pathlib.Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def test_python_blocks_run_in_order():
+    space: dict = {}
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        for block in re.findall(r"```python\n(.*?)```", README, flags=re.S):
+            exec(compile(block, "README.md", "exec"), space)
+    text = out.getvalue()
+    assert "Sweep of 9 speeds x 3 starts" in text and "Chaotic zones at a resolution of 500 rpm" in text
+    per_time = space["got"].exponents[0, :, 0].mean() / (2 * np.pi)
+    error = np.max(space["got"].standard_error) / (2 * np.pi)
+    assert per_time == pytest.approx(0.1034, abs=0.004 + 2 * error)
+
+
+def test_set_up_commands_are_those_of_the_check():
+    check = (ROOT / ".ci" / "run").read_text()
+    for command in ("python -m pip install . && jaxcage sweep 1a", 'python -m pip install -e ".[test]" && pytest'):
+        assert command in README
+        assert command.split(" sweep")[0] in check
+
+
+def test_toml_of_the_readme_is_accepted(tmp_path: pathlib.Path):
+    from jaxcage.io import load_model
+
+    (block,) = re.findall(r"```toml\n(.*?)```", README, flags=re.S)
+    path = tmp_path / "bearing.toml"
+    path.write_text(block)
+    model = load_model(path)
+    assert float(model.guidance_gap) == pytest.approx(0.5e-3)
+    assert float(model.lubricant.temperature) == pytest.approx(343.15)
+
+
+def test_files_the_readme_points_to_exist():
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
