@@ -111,21 +111,21 @@ def chaos():
     rng = np.random.default_rng(0)
     reach = np.array([0.6, 0.6, 0.3, 0.3]) * independent.scale(1500.0)
     starts = [tuple(map(float, s)) for s in rng.uniform(-1, 1, (12, 4)) * reach]
-    seen = sweep(model, speeds, starts=starts, discard=150, revolutions=400, keep=64)
+    seen = sweep(model, speeds, starts=starts, discard=150, revolutions=400, keep=400)
     ours, states = [], []
     for k in range(speeds.size):
         chaotic = seen.label[k] == "chaotic"
         assert np.sum(chaotic) >= 8  # at the last speed a periodic orbit takes some of the starts
         error = np.sqrt(np.sum(seen.standard_error[k, chaotic, 0] ** 2)) / np.sum(chaotic)
         ours.append((np.mean(seen.exponents[k, chaotic, 0]), error))
-        # Points of the attractor, then moved by 2 % of the clearance so that no two lanes are
-        # stretches of one trajectory; 20 revolutions bring them back.
+        # Points of the attractor, from all of the run because its memory is long; then moved by
+        # 2 % of the clearance so that no two lanes are stretches of one trajectory.
         pool = seen.strobe[k, chaotic].reshape(-1, 4)
         picked = pool[rng.integers(0, len(pool), LANES)].T
         moved = 0.02 * independent.scale(speeds[k])[:, None] * rng.normal(size=(4, LANES))
         states.append(picked + moved)
     omega = np.repeat(speeds, LANES)
-    found = independent.lyapunov_exponents(np.concatenate(states, axis=1), omega, 20, 20)
+    found = independent.lyapunov_exponents(np.concatenate(states, axis=1), omega, 30, 20)
     lanes = found.reshape(speeds.size, LANES)
     theirs = zip(lanes.mean(1), lanes.std(1, ddof=1) / np.sqrt(LANES), strict=True)
     return list(zip(ours, theirs, strict=True))

@@ -376,9 +376,10 @@ def test_default_harmonics_resolve_the_pulses(omega):
 def test_mean_force_of_the_pulse_train_is_impulse_times_rate(omega):
     _, coefficients = train(omega)
     v0 = approach_speed(IMPACT.approach_ratio, omega, CLEARANCE)
-    impulse = float(history(v0=float(v0)).impulse)
+    # the roller's change of momentum, exact whatever the shape of the pulse
+    impulse = ROLLER * (float(v0) - float(history(v0=float(v0)).roller_velocity[-1]))
     mean = -2 * np.sin(HALF_ANGLE) * impulse * Z * omega / (2 * np.pi)
-    assert float(coefficients.a_y[0]) == pytest.approx(mean, rel=1e-9)
+    assert float(coefficients.a_y[0]) == pytest.approx(mean, rel=1e-4)  # trapezoidal rule over the samples
     assert abs(float(coefficients.a_x[0])) < 1e-12 * abs(mean)
     assert float(coefficients.b_x[0]) == 0.0 == float(coefficients.b_y[0])
 

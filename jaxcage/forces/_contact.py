@@ -19,8 +19,8 @@ def _restitution_defect(s: Array, e: Array) -> Array:
     """The restitution law over chi^2 (which removes its trivial double root), with chi = (1 - exp(-s))/e."""
     chi = -jnp.expm1(-s) / e
     small = jnp.abs(chi) < 1e-2
-    safe = jnp.where(small, 0.01, chi)
-    exact = (jnp.log1p(safe) - jnp.log1p(-safe * e) - safe * (1 + e)) / safe**2
+    safe, safe_s = jnp.where(small, 0.01, chi), jnp.where(small, -jnp.log1p(-0.01 * e), s)
+    exact = (jnp.log1p(safe) + safe_s - safe * (1 + e)) / safe**2
     series = sum(((-1) ** (m + 1) + e**m) * chi ** (m - 2) / m for m in range(2, 11))
     return jnp.where(small, series, exact)
 
@@ -33,8 +33,8 @@ def restitution_damping(restitution: Scalar) -> Array:
     **Returns:** chi >= 0, solving ln[(1 + chi)/(1 - chi e)] = chi (1 + e); chi = 0 at e = 1. Differentiable.
     """
     e = jnp.asarray(restitution, dtype=float)
-    solver = optx.Bisection(rtol=1e-13, atol=1e-13)
-    bounds = {"lower": jnp.array(-0.1), "upper": jnp.array(60.0)}
+    solver = optx.Bisection(rtol=1e-12, atol=1e-12)
+    bounds = {"lower": -jnp.log1p(e / 2), "upper": jnp.array(60.0)}  # chi from -1/2 to nearly 1/e
     s = optx.root_find(_restitution_defect, solver, jnp.array(0.5), args=e, options=bounds, max_steps=200).value
     return jnp.asarray(-jnp.expm1(-s) / e)
 

@@ -110,7 +110,7 @@ def film_resistance(
         return fixed_half_resistance(x, y, smoothing)
     if model == "full":
         return full_resistance(x, y)
-    per_norm = 1 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
+    per_norm = 1 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)  # 1e-300: no 0/0 at rest
     return half_circle_resistance(x, y, px * per_norm, py * per_norm)
 
 
@@ -126,7 +126,7 @@ def supply_force(
     if model == "fixed_half":
         factor = 2 / jnp.sqrt(x * x + y * y + smoothing * smoothing)
         return -factor * y, factor * x
-    factor = -2 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2)
+    factor = -2 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)
     return factor * px, factor * py
 
 

@@ -35,7 +35,7 @@ class RollerPassImpact(eqx.Module):
     """A pulse Q_cw(t) each time a roller enters or leaves the loaded zone, kept as a Fourier series."""
 
     oscillator: PocketImpact
-    harmonics: int = count(1, 128, "harmonics of the roller-pass frequency that are kept", default=24)
+    harmonics: int = count(1, 128, "harmonics of the roller-pass frequency that are kept", default=48)
 
 
 class PulseTrain(NamedTuple):
@@ -57,7 +57,8 @@ def pulse_spectrum(
     """
     v0 = approach_speed(impact.oscillator.approach_ratio, omega, pocket_clearance)
     duration = 8 * impact_time_scale(impact.oscillator, roller_mass, v0)
-    history = impact_history(impact.oscillator, roller_mass, v0, duration)
+    samples = max(512, 64 * impact.harmonics)  # the highest harmonic must not alias on the samples of the pulse
+    history = impact_history(impact.oscillator, roller_mass, v0, duration, samples, substeps=2)
     k = jnp.arange(impact.harmonics + 1, dtype=float) * n_rollers
     phase = omega * jnp.outer(k, history.time)
     rate = n_rollers * omega / (2 * jnp.pi)

@@ -16,7 +16,7 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
     **Returns:** a value >= 0 in that unit; it exceeds max(u, 0) by at most 0.16 `width`, at u = 0.
     """
     t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
-    return jnp.where(u > width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
+    return jnp.where(u >= width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 
 
 def smooth_norm(x: Scalar, y: Scalar, length: Scalar) -> Array:

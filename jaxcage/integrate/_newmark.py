@@ -77,7 +77,7 @@ class NewmarkBeta(dfx.AbstractSolver):
 
         zero = tuple(jnp.zeros_like(c) for c in q0)
 
-        def iterate(_: int, v1: State) -> State:
+        def iterate(_: Any, v1: State) -> State:
             # The Newton matrix I - h gamma A_v - h^2 beta A_q is that of the field's own solver where beta = gamma^2,
             # as it is for average acceleration; elsewhere the iteration is a modified Newton's.
             near = field.linearise(t1, (*positions(v1), *v1))

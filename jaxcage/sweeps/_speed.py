@@ -19,7 +19,7 @@ from ..models import AbstractForcedSystem
 from ._engine import Progress, run_lanes
 
 
-def rpm(first: float, last: float | None = None, count: int = 2) -> Any:
+def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> Any:
     """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`."""
     if last is None:
         return float(first) * math.pi / 30
