@@ -1,4 +1,4 @@
-"""Statics, kinematics and masses against numbers of physics.md section 3, the paper, handbooks.
+"""Statics, kinematics and masses against printed numbers: the paper, handbooks.
 
 Palmgren's law is a handbook number; the rows for bearing 209 (Harris's example) and NU2310 were
 computed by independent code for discrete rollers, one of them at the bottom.
