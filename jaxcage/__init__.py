@@ -8,6 +8,7 @@
 | `integrate`  | stiff solvers as diffrax solvers, time histories, the strobe map                    |
 | `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
 | `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
+| `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
 | `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
 | `cli`        | the `jaxcage` command                                                               |
 
@@ -83,6 +84,12 @@ from .models import (
     ForcedSystem as ForcedSystem,
     case as case,
     dimensionless_groups as dimensionless_groups,
+)
+from .orbits import (
+    BifurcationPoint as BifurcationPoint,
+    Orbit as Orbit,
+    bifurcation as bifurcation,
+    periodic_orbit as periodic_orbit,
 )
 from .sweeps import (
     Hysteresis as Hysteresis,

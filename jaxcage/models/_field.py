@@ -56,11 +56,20 @@ def _shifted(shift: Scalar, a: Matrix) -> Matrix:
     return tuple(tuple(shift - c if i == j else -c for j, c in enumerate(row)) for i, row in enumerate(a))
 
 
+def _trace(a: Matrix) -> Scalar:
+    return sum((row[i] for i, row in enumerate(a)), start=jnp.zeros(()))
+
+
 class AbstractLinearisation(eqx.Module):
     """A field near one point: value, phase derivative, and solves with shift I - Jacobian."""
 
     value: eqx.AbstractVar[State]
     phase_derivative: eqx.AbstractVar[State]
+
+    @property
+    @abc.abstractmethod
+    def divergence(self) -> Scalar:
+        """Trace of the Jacobian."""
 
     @abc.abstractmethod
     def solver(self, shift: Scalar) -> Callable[[State], State]:
@@ -73,6 +82,10 @@ class DenseLinearisation(AbstractLinearisation):
     value: State
     phase_derivative: State
     jacobian: Matrix
+
+    @property
+    def divergence(self) -> Scalar:
+        return _trace(self.jacobian)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         lu = lu_factor(_shifted(shift, self.jacobian))
@@ -87,6 +100,10 @@ class SecondOrderLinearisation(AbstractLinearisation):
     a_q: Matrix  # d acceleration / d coordinates
     a_v: Matrix  # d acceleration / d velocities
     speed: Scalar
+
+    @property
+    def divergence(self) -> Scalar:
+        return _trace(self.a_v) / self.speed
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         rate = 1 / self.speed
@@ -174,6 +191,10 @@ class ScaledLinearisation(AbstractLinearisation):
     phase_derivative: State
     inner: AbstractLinearisation
     scale: State
+
+    @property
+    def divergence(self) -> Scalar:
+        return self.inner.divergence
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         solve = self.inner.solver(shift)

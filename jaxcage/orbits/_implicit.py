@@ -1,0 +1,110 @@
+"""Roots of an orbit's equations, differentiated through the equations that define them, never through the iterations.
+
+With R(u, k) = 0 and k = prepare(u, given), the implicit function theorem gives
+    (R_u + R_k k_u) du = -R_k k_given dgiven.
+The revolutions are differentiated once, with respect to the state and to the few numbers k of the field; how many
+design parameters stand behind these does not matter, and because the tangent is a matrix times dgiven, reverse mode is
+had by transposing that matrix and not by running revolutions backwards. The rule itself is differentiable: second
+derivatives are derivatives of it.
+"""
+
+import abc
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optimistix as optx
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Bool, Float, Int
+
+from ._newton import DampedNewton, NewtonState
+from ._problem import frozen
+
+
+class AbstractEquations(eqx.Module):
+    """As many equations as unknowns, split into what is cheap and what runs revolutions."""
+
+    @abc.abstractmethod
+    def prepare(self, u: Float[Array, " n"], given: Any) -> Any:
+        """All that the revolutions need to know of the unknowns and of what is given."""
+
+    @abc.abstractmethod
+    def residual(self, u: Float[Array, " n"], prepared: Any) -> tuple[Float[Array, " n"], Any]:
+        """The equations, and what else is wanted at the root."""
+
+
+class Found(eqx.Module):
+    """How a solve ended; without derivatives."""
+
+    converged: Bool[Array, ""]
+    iterations: Int[Array, ""]
+    newton: NewtonState
+    aux: Any
+
+
+def solve(equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40) -> Any:
+    """Newton's method from `guess`. **Returns:** the root and `Found`."""
+
+    def fn(u: Array, given: Any) -> tuple[Array, Any]:
+        return equations.residual(u, equations.prepare(u, given))
+
+    solver = DampedNewton()
+    got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
+    converged = got.result == optx.RESULTS.successful
+    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux)
+
+
+def implicit_root(
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40
+) -> tuple[Float[Array, " n"], Found]:
+    """u with residual(u, prepare(u, given)) = 0, differentiable with respect to `given` only.
+
+    **Returns:** u, NaN where Newton's method did not get there, and `Found`.
+    """
+    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), max_steps=max_steps)
+    return jnp.where(found.converged, u, jnp.nan), found
+
+
+@eqx.filter_custom_jvp
+def _root(given: Any, *, equations: AbstractEquations, guess: Array, max_steps: int) -> Any:
+    return solve(equations, given, guess, max_steps)
+
+
+@_root.def_jvp
+def _root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, max_steps: int) -> Any:
+    (given,), (given_dot,) = primals, tangents
+    u, found = _root(given, equations=equations, guess=guess, max_steps=max_steps)
+    row = lambda v, g: numbers_of(equations.prepare(v, g))[0]
+    _, remake = numbers_of(equations.prepare(u, given))
+    k, k_dot = eqx.filter_jvp(lambda g: row(u, g), (given,), (given_dot,))
+    residual = lambda x: equations.residual(x[: u.size], remake(x[u.size :]))[0]
+    whole = jax.jacfwd(residual)(jnp.concatenate([u, k]))
+    of_u, of_k = whole[:, : u.size], whole[:, u.size :]
+    k_of_u = jax.jacfwd(lambda v: row(v, given))(u)
+    u_dot = -jnp.linalg.solve(of_u + of_k @ k_of_u, of_k @ k_dot)
+    return (u, found), (u_dot, jax.tree.map(lambda _: None, found))
+
+
+def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any]]:
+    """All numbers of `prepared` in a row, and the function that puts such a row back."""
+    numbers, rest = eqx.partition(prepared, eqx.is_inexact_array)
+    k, unravel = ravel_pytree(numbers)
+    return k, lambda row: eqx.combine(unravel(row), rest)
+
+
+@eqx.filter_custom_jvp
+def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any]) -> Any:
+    """f(x), differentiated by its Jacobian matrix in forward mode even where reverse mode is asked for.
+
+    `f` is a module; what it holds has no derivative.
+    """
+    return f(x)
+
+
+@by_columns.def_jvp
+def _by_columns_jvp(primals: Any, tangents: Any, *, f: Callable[[Array], Any]) -> Any:
+    (x,), (x_dot,) = primals, tangents
+    jacobian, value = jax.jacfwd(lambda x: (f(x),) * 2, has_aux=True)(x)
+    return value, jax.tree.map(lambda j: j @ x_dot, jacobian)

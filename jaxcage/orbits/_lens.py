@@ -1,0 +1,63 @@
+"""Parameters by name: reading and setting one number of any system."""
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._parameters import get, parameter_paths
+from ..models import AbstractForcedSystem
+
+
+Parameter: TypeAlias = str | Callable[[Any], Any]
+"""`"speed"`, the name of a parameter, or a function that picks it from the system, as `equinox.tree_at` takes."""
+
+SPEED = "speed"
+
+
+def _is_number(leaf: Any) -> bool:
+    return isinstance(leaf, float) or eqx.is_inexact_array(leaf)
+
+
+def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
+    """Numbers of a user's own module by the last word of their path."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(system)
+    found: dict[str, tuple[str, ...]] = {}
+    for path, leaf in leaves:
+        if all(isinstance(key, jax.tree_util.GetAttrKey) for key in path) and _is_number(leaf):
+            names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
+            if not any(name.startswith("_") for name in names):
+                found[names[-1]] = names
+    return found
+
+
+def pick(system: AbstractForcedSystem, parameter: Parameter) -> Callable[[Any], Any]:
+    """The function that picks `parameter` from a system.
+
+    **Raises:** `ValueError` for a name the system does not have.
+    """
+    if callable(parameter):
+        return parameter
+    paths = parameter_paths(system) or _by_field_name(system)
+    if parameter not in paths:
+        known = ", ".join([SPEED, *paths])
+        raise ValueError(f"Argument `parameter` must be one of {known}, but '{parameter}' was given.")
+    path = paths[parameter]
+    return lambda s: get(s, path)
+
+
+def value(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
+    """What `parameter` is now."""
+    return jnp.asarray(speed if parameter == SPEED else pick(system, parameter)(system), dtype=float)
+
+
+def with_value(
+    system: AbstractForcedSystem, speed: Any, parameter: Parameter, new: Any
+) -> tuple[AbstractForcedSystem, Any]:
+    """System and speed with `parameter` set to `new`."""
+    if parameter == SPEED:
+        return system, new
+    return eqx.tree_at(pick(system, parameter), system, new), speed

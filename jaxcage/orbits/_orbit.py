@@ -1,0 +1,209 @@
+"""Periodic orbits: fixed points of powers of the strobe map, with their Floquet multipliers."""
+
+from typing import Any, Literal, get_args
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Complex, Float, Int
+
+from .._checks import require_x64
+from .._types import Scalar
+from ..integrate import AbstractMethod, StrobeMap, method as make_method, strobe_map
+from ..models import AbstractForcedSystem
+from ._implicit import AbstractEquations, by_columns, implicit_root, numbers_of
+from ._liouville import divergence_integral
+from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
+
+
+Period = Literal["driven", "free"]
+LIOUVILLE_TOLERANCE = 1e-3
+"""Largest disagreement in log|det M| at which multipliers are trusted."""
+
+
+class OrbitEquations(AbstractEquations):
+    """P(z) = z, and the phase condition of a self-excited orbit."""
+
+    problem: OrbitProblem
+    frame: Frame
+
+    def prepare(self, u: Array, given: Given) -> StrobeMap:
+        return self.problem.prepare(u, given, self.frame)
+
+    def residual(self, u: Array, prepared: StrobeMap) -> tuple[Array, None]:
+        return self.problem.residual(u, prepared, self.frame), None
+
+
+class _Monodromy(eqx.Module):
+    """Image and derivative of the return map from state and field numbers in a row."""
+
+    like: StrobeMap
+    frame: Frame
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        n = self.frame.scale.size
+        _, remake = numbers_of(self.like)
+        return ReturnMap(remake(x[n:]), self.frame).with_monodromy(x[:n])
+
+
+class Orbit(eqx.Module):
+    """A periodic orbit. Where none was found its numbers are NaN and `status` says so."""
+
+    state: Float[Array, " dim"]
+    """State at phase 0 [SI]."""
+    speed: Scalar
+    """Speed [rad/s]; of a self-excited orbit, 2 pi over its period."""
+    multipliers: Complex[Array, " dim"]
+    """Floquet multipliers over all its periods, the largest first; a self-excited orbit has one at 1."""
+    monodromy: Float[Array, "dim dim"]
+    """Derivative of the map, in units of the system's scale."""
+    residual: Float[Array, ""]
+    """Largest component of P(z) - z, in units of the system's scale."""
+    liouville: Float[Array, ""]
+    """log|det M| less the integral of the field's divergence over the orbit, which it must equal."""
+    converged: Bool[Array, ""]
+    iterations: Int[Array, ""]
+    periods: Int[Array, ""]
+    self_excited: bool = eqx.field(static=True)
+
+    @property
+    def period(self) -> Array:
+        """Duration [s]."""
+        return self.periods * 2 * jnp.pi / self.speed
+
+    @property
+    def stable(self) -> Bool[Array, ""]:
+        """Whether every multiplier is inside the unit circle (but for the one at 1 of a self-excited orbit)."""
+        size = jnp.abs(self.multipliers)
+        if self.self_excited:
+            size = jnp.where(jnp.arange(size.size) == jnp.argmin(jnp.abs(self.multipliers - 1)), 0.0, size)
+        return self.converged & (jnp.max(size) < 1.0)
+
+    @property
+    def status(self) -> str:
+        """`converged`, `no orbit` or `multipliers not trusted` (Liouville's identity is violated)."""
+        if not bool(self.converged):
+            return "no orbit"
+        return "converged" if abs(float(self.liouville)) <= LIOUVILLE_TOLERANCE else "multipliers not trusted"
+
+    def __str__(self) -> str:
+        if not bool(self.converged):
+            return f"No orbit found (residual {float(self.residual):.1e})"
+        what = "stable" if bool(self.stable) else "unstable"
+        mu = ", ".join(f"{complex(m):.4g}" for m in self.multipliers)
+        return (
+            f"Period-{int(self.periods)} orbit at {float(self.speed) * 30 / jnp.pi:.1f} rpm, {what}\n"
+            f"  state       {', '.join(f'{float(c):.6g}' for c in self.state)}\n"
+            f"  multipliers {mu}\n"
+            f"  residual {float(self.residual):.1e}, Liouville {float(self.liouville):.1e}, {self.status}"
+        )
+
+
+@jax.custom_jvp
+def sorted_multipliers(monodromy: Float[Array, "dim dim"]) -> Complex[Array, " dim"]:
+    """Eigenvalues, the largest first; differentiable to any order where they are distinct."""
+    mu = jnp.linalg.eigvals(monodromy)
+    return mu[jnp.argsort(-jnp.abs(mu))]
+
+
+@sorted_multipliers.defjvp
+def _sorted_multipliers_jvp(primals: Any, tangents: Any) -> Any:
+    (m,), (m_dot,) = primals, tangents
+    mu, v = jax.lax.linalg.eig(m, compute_left_eigenvectors=False, enable_eigvec_derivs=True)
+    order = jnp.argsort(-jnp.abs(mu))
+    mu, v = mu[order], v[:, order]
+    return mu, jnp.diagonal(jnp.linalg.solve(v, m_dot.astype(v.dtype) @ v))
+
+
+def settle(
+    system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod, start: Array, revolutions: Any
+) -> Float[Array, " dim"]:
+    """State after `revolutions` from `start`."""
+    strobe = strobe_map(system, speed, method)
+    y = tuple(start[i] for i in range(start.size))
+    return jnp.stack(jax.lax.fori_loop(0, revolutions, lambda _, y: strobe(y).y, y))
+
+
+@eqx.filter_jit
+def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, periods: Any, revolutions: Any) -> Orbit:
+    if revolutions is not None:
+        guess = settle(frozen(given.system), jax.lax.stop_gradient(speed), problem.method, guess, revolutions)
+    frame = make_frame(problem, given, guess, speed, jnp.ones(0), periods)
+    u0 = guess / frame.scale
+    if problem.free_speed:
+        u0 = jnp.append(u0, 1.0)
+    u, found = implicit_root(OrbitEquations(problem, frame), given, u0)
+    strobe, z = problem.prepare(u, given, frame), u[: problem.dimension]
+    row = jnp.concatenate([z, numbers_of(strobe)[0]])
+    image, monodromy = by_columns(row, f=_Monodromy(frozen(strobe), frame))
+    expected = divergence_integral(frozen(strobe), frozen(problem.state(u, frame)), frame.periods)
+    finite = jnp.where(jnp.isfinite(monodromy), monodromy, 0.0)
+    return Orbit(
+        state=problem.state(u, frame),
+        speed=jnp.asarray(problem.speed(u, given, frame), dtype=float),
+        multipliers=jnp.where(found.converged, sorted_multipliers(finite), jnp.nan),
+        monodromy=monodromy,
+        residual=frozen(
+            jnp.where(found.converged, jnp.max(jnp.abs(image - z)), jnp.max(jnp.abs(found.newton.residual)))
+        ),
+        liouville=jnp.linalg.slogdet(frozen(monodromy))[1] - expected,
+        converged=found.converged,
+        iterations=found.iterations,
+        periods=frame.periods,
+        self_excited=problem.free_speed,
+    )
+
+
+def periodic_orbit(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    periods: int = 1,
+    *,
+    guess: Any = None,
+    revolutions: int | None = None,
+    period: Period = "driven",
+    method: AbstractMethod | None = None,
+) -> Orbit:
+    """The orbit that closes after `periods` revolutions, by damped Newton on the strobe map.
+
+    **Arguments:**
+
+    - `system`, `speed`: any forced system, and its speed [rad/s]; for a self-excited one, a guess of 2 pi over its period.
+    - `periods`: revolutions after which the orbit closes.
+    - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
+    - `revolutions`: simulate so many before Newton takes over; by default 200 without a guess and none with one.
+    - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
+    - `method`: integration method, by default the library's own.
+
+    **Returns:** `Orbit`; it does not raise if there is none. Works under `jit` and `vmap`. State, speed and multipliers
+    have derivatives of every order with respect to `system` and `speed`, through the equation P(z) = z.
+    """
+    require_x64()
+    chosen = make_method() if method is None else method
+    problem = OrbitProblem(chosen, system.dimension, is_free(period), ())
+    given = Given(system, jnp.asarray(speed, dtype=float))
+    start = guess_state(system, given.speed, guess)
+    if revolutions is None and guess is None:
+        revolutions = 200
+    spin = None if revolutions is None else jnp.asarray(revolutions)
+    first = guess.speed if isinstance(guess, Orbit) and period == "free" else given.speed
+    return _find(problem, given, start, first, jnp.asarray(periods), spin)
+
+
+def is_free(period: Period) -> bool:
+    """Whether the period of an orbit is unknown."""
+    if period not in get_args(Period):
+        raise ValueError(f"Argument `period` must be one of driven, free, but '{period}' was given.")
+    return period == "free"
+
+
+def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Any) -> Float[Array, " dim"]:
+    """A guess as an array, without derivative."""
+    if guess is None:
+        guess = system.starts(speed)[0]
+    state = guess.state if isinstance(guess, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in guess])
+    if state.shape != (system.dimension,):
+        raise ValueError(
+            f"Argument `guess` must be a state of {system.dimension} numbers, but has shape {state.shape}."
+        )
+    return jax.lax.stop_gradient(state)

@@ -1,0 +1,302 @@
+"""Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
+
+from typing import Any, NamedTuple, get_args
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Complex, Float, Int
+
+from .._checks import require_x64
+from .._types import Scalar
+from ..integrate import AbstractMethod, StrobeMap, method as make_method
+from ..models import AbstractForcedSystem
+from ._implicit import AbstractEquations, Found, implicit_root, numbers_of, solve
+from ._lens import SPEED, Parameter, value as value_of, with_value
+from ._orbit import OrbitEquations, Period, guess_state, is_free, settle, sorted_multipliers
+from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
+from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
+
+
+POINT_OUTCOMES = ("converged", "no such point", "other kind", "tangential")
+"""How a search for a bifurcation point ended, in the order of the codes: converged; Newton's method found no point;
+it found one at which the multipliers are not those of the kind asked for (a neutral saddle instead of a torus
+bifurcation); or one at which the multiplier hardly crosses, so that its place is not a function of the design."""
+
+TANGENTIAL = 1e-2
+"""A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
+ON_CIRCLE = 1e-5
+
+
+class Singular(NamedTuple):
+    """What is known at the root beside the unknowns."""
+
+    monodromy: Float[Array, "dim dim"]
+    right: Float[Array, " k"]
+    left: Float[Array, " k"]
+
+
+class PointEquations(AbstractEquations):
+    """The orbit's equations and g = 0; a branch point has two more, with an imperfection as unknown."""
+
+    problem: OrbitProblem
+    frame: Frame
+    left: Float[Array, " k"]
+    right: Float[Array, " k"]
+    kind: Kind = eqx.field(static=True)
+
+    def prepare(self, u: Array, given: Given) -> Any:
+        strobe = self.problem.prepare(u, given, self.frame)
+        if self.kind != "branch-point":
+            return strobe, None
+        m = self.problem.equations
+        moved = lambda s: numbers_of(self.problem.prepare(u.at[m].set(s), given, self.frame))[0]
+        return strobe, jax.jacfwd(moved)(u[m])
+
+    def residual(self, u: Array, prepared: Any) -> tuple[Array, Singular]:
+        strobe, slope = prepared
+        n, m = self.problem.dimension, self.problem.equations
+        z = u[:n]
+        image, monodromy = ReturnMap(strobe, self.frame).with_monodromy(z)
+        closing = self.problem.orbit_residual(z, image, self.frame)
+        g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
+        known = Singular(monodromy, q, p)
+        if slope is None:
+            return jnp.append(closing, g), known
+        k, remake = numbers_of(strobe)
+        _, drift = jax.jvp(lambda k: ReturnMap(remake(k), self.frame)(z), (k,), (slope,))
+        return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ drift])]), known
+
+    @property
+    def borders(self) -> tuple[Array, Array]:
+        return self.left, self.right
+
+
+def critical_matrix(
+    problem: OrbitProblem, kind: Kind, strobe: StrobeMap, z: Array, monodromy: Array, frame: Frame
+) -> Float[Array, "k k"]:
+    """The matrix that is singular at the bifurcation.
+
+    A self-excited orbit always has a multiplier 1; at its fold the derivative of its own equations is singular, in which
+    the flow and the phase condition border M - I.
+    """
+    a = singular_matrix(kind, monodromy)
+    if not problem.free_speed or kind in ("period-doubling", "torus"):
+        return a
+    y = tuple(z[i] * frame.scale[i] for i in range(z.size))
+    flow = jnp.stack([jnp.asarray(c) for c in strobe.field(jnp.zeros(()), y)]) / frame.scale
+    return jnp.block([[a, flow[:, None]], [frame.phase_direction[None, :], jnp.zeros((1, 1))]])
+
+
+class BifurcationPoint(eqx.Module):
+    """A bifurcation of a periodic orbit. Where none was found its numbers are NaN and `status` says so."""
+
+    value: Float[Array, ""]
+    """Value of the parameter [SI]; differentiable."""
+    speed: Float[Array, ""]
+    """Speed [rad/s]; differentiable."""
+    state: Float[Array, " dim"]
+    """State of the orbit at phase 0 [SI]; differentiable."""
+    multipliers: Complex[Array, " dim"]
+    """Floquet multipliers, the largest first."""
+    angle: Float[Array, ""]
+    """Angle [rad] of the critical multiplier: pi at a period doubling, 0 at a fold."""
+    residual: Float[Array, ""]
+    """Largest component of the equations, in units of the system's scale."""
+    transversality: Float[Array, ""]
+    """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
+    p dP/d parameter of the map along the critical direction, with p q = 1."""
+    direction: Float[Array, " dim"]
+    """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
+    outcome: Int[Array, ""]
+    """Code: place in `POINT_OUTCOMES`."""
+    iterations: Int[Array, ""]
+    periods: Int[Array, ""]
+    kind: str = eqx.field(static=True)
+    parameter: str = eqx.field(static=True)
+
+    @property
+    def speed_rpm(self) -> Float[Array, ""]:
+        """Speed in revolutions per minute."""
+        return self.speed * 30 / jnp.pi
+
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether a point of the kind asked for was found."""
+        return (self.outcome == 0) | (self.outcome == 3)
+
+    @property
+    def trusted(self) -> Bool[Array, ""]:
+        """Whether its place is a function of the design: found, and crossed at a finite rate."""
+        return self.outcome == 0
+
+    @property
+    def status(self) -> str:
+        """One of `POINT_OUTCOMES`."""
+        return POINT_OUTCOMES[int(self.outcome)]
+
+    def __str__(self) -> str:
+        if not bool(self.converged):
+            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e})"
+        angle = f", angle {float(self.angle) * 180 / jnp.pi:.2f} deg" if self.kind == "torus" else ""
+        return (
+            f"{self.kind} at {float(self.speed_rpm):.3f} rpm, {self.parameter} = {float(self.value):.9g}{angle}\n"
+            f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
+        )
+
+
+def bifurcation(
+    system: AbstractForcedSystem,
+    kind: Kind,
+    guess: Any,
+    parameter: Parameter = SPEED,
+    *,
+    speed: Scalar | None = None,
+    periods: Any = 1,
+    period: Period = "driven",
+    method: AbstractMethod | None = None,
+) -> BifurcationPoint:
+    """The bifurcation of `kind` near `guess`, where `parameter` is free.
+
+    **Arguments:**
+
+    - `kind`: `period-doubling`, `torus` (Neimark-Sacker), `fold`, or `branch-point` (pitchfork or transcritical, which
+        only systems with a symmetry have).
+    - `guess`: a value of the parameter [SI], whose orbit is then found by simulation; an `Orbit`, `BifurcationPoint` or
+        special point of a branch; or a pair (state, value of the parameter).
+    - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
+    - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
+    - `periods`: revolutions after which the orbit closes.
+    - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
+
+    **Returns:** `BifurcationPoint`; it does not raise if there is none. Works under `jit` and `vmap`; value, speed and
+    state have derivatives of every order with respect to `system` and `speed`, by the implicit function theorem.
+
+    **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
+    """
+    require_x64()
+    if kind not in get_args(Kind):
+        raise ValueError(f"Argument `kind` must be one of {', '.join(KINDS)}, but '{kind}' was given.")
+    chosen = make_method() if method is None else method
+    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
+    start, first, at, spin = _read_guess(system, guess, parameter, speed)
+    given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
+    return _find_point(problem, given, kind, start, jnp.asarray(first, dtype=float), at, jnp.asarray(periods), spin)
+
+
+def _read_guess(
+    system: AbstractForcedSystem, guess: Any, parameter: Parameter, speed: Scalar | None
+) -> tuple[Array, Any, Array, bool]:
+    """State, speed, value of the parameter, and whether the state is to be found by simulation."""
+    spin = False
+    known_speed = getattr(guess, "speed", speed)
+    if hasattr(guess, "state"):
+        state = guess.state
+        at = getattr(guess, "value", None)
+        if at is None or getattr(guess, "parameter", parameter) != parameter:
+            at = value_of(system, known_speed, parameter)
+    elif isinstance(guess, tuple):
+        state, at = guess
+    else:
+        spin, at = True, guess
+        state = None
+    if parameter == SPEED:
+        known_speed = at
+    if known_speed is None:
+        raise ValueError(f"Argument `speed` must be given where the parameter is `{parameter}`, but it is not.")
+    return guess_state(system, known_speed, state), known_speed, frozen(jnp.asarray(at, dtype=float)), spin
+
+
+@eqx.filter_jit
+def _find_point(
+    problem: OrbitProblem,
+    given: Given,
+    kind: Kind,
+    start: Array,
+    speed: Scalar,
+    at: Array,
+    periods: Array,
+    spin: bool,
+) -> BifurcationPoint:
+    (parameter,) = problem.parameters
+    unit = frozen(jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at)))
+    system, here = with_value(frozen(given.system), frozen(speed), parameter, at)
+    if spin:
+        start = settle(system, here, problem.method, start, 200)
+    frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
+    u0 = start / frame.scale
+    if problem.free_speed:
+        u0 = jnp.append(u0, 1.0)
+    if spin:  # on the orbit itself, if there is one here
+        fixed = OrbitProblem(problem.method, problem.dimension, problem.free_speed, ())
+        u1, found = solve(OrbitEquations(fixed, frame), Given(system, here), u0)
+        u0 = jnp.where(found.converged, u1, u0)
+    u0 = jnp.append(u0, at / unit)
+    strobe = problem.prepare(u0, frozen(given), frame)
+    _, monodromy = ReturnMap(strobe, frame).with_monodromy(u0[: problem.dimension])
+    a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
+    left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
+    if kind == "branch-point":
+        u0 = jnp.append(u0, 0.0)
+    equations = PointEquations(problem, frame, left, right, kind)
+    u, found = implicit_root(equations, given, u0)
+    return _describe(problem, frame, kind, u, found, given)
+
+
+def _describe(
+    problem: OrbitProblem, frame: Frame, kind: Kind, u: Array, found: Found, given: Given
+) -> BifurcationPoint:
+    known: Singular = frozen(found.aux)
+    finite = jnp.all(jnp.isfinite(known.monodromy))
+    multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
+    critical, matches = critical_multiplier(kind, multipliers)
+    rate = _transversality(problem, kind, frozen(found.newton.jacobian), known)
+    value = problem.values(u, frame)[0]
+    tangential = jnp.abs(rate * frozen(u[problem.equations])) < TANGENTIAL
+    outcome = jnp.where(found.converged, jnp.where(matches, jnp.where(tangential, 3, 0), 2), 1)
+    keep = lambda x: jnp.where((outcome == 0) | (outcome == 3), x, jnp.nan)
+    direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
+    length = jnp.linalg.norm(direction)
+    (parameter,) = problem.parameters
+    return BifurcationPoint(
+        value=keep(value),
+        speed=keep(jnp.asarray(problem.speed(u, given, frame), dtype=float)),
+        state=keep(problem.state(u, frame)),
+        multipliers=jnp.where(found.converged, multipliers, jnp.nan),
+        angle=keep(jnp.abs(jnp.angle(critical))),
+        residual=jnp.max(jnp.abs(frozen(found.newton.residual))),
+        transversality=keep(rate / frame.units[0]),
+        direction=keep(direction / jnp.where(length > 0, length, 1.0) * frame.scale),
+        outcome=outcome,
+        iterations=found.iterations,
+        periods=frame.periods,
+        kind=kind,
+        parameter=parameter if isinstance(parameter, str) else "parameter",
+    )
+
+
+def critical_multiplier(kind: Kind, multipliers: Complex[Array, " dim"]) -> tuple[Array, Array]:
+    """The multiplier that a bifurcation of `kind` is about, and whether it is where that kind has it."""
+    mu = multipliers
+    if kind == "torus":
+        complex_pair = jnp.abs(mu.imag) > 1e-9
+        off = jnp.where(complex_pair, jnp.abs(jnp.abs(mu) - 1), jnp.inf)
+    else:
+        target = -1.0 if kind == "period-doubling" else 1.0
+        off = jnp.abs(mu - target)
+    i = jnp.argmin(off)
+    # A double multiplier is only known to the square root of rounding.
+    return mu[i], off[i] < jnp.sqrt(ON_CIRCLE)
+
+
+def _transversality(problem: OrbitProblem, kind: Kind, jacobian: Array, known: Singular) -> Array:
+    """Rate of the critical multiplier in the parameter's unit, from the derivative of the equations at the point."""
+    m = problem.equations
+    of_orbit, drift = jacobian[:m, :m], jacobian[:m, m]
+    overlap = known.left @ known.right
+    if kind in ("fold", "branch-point"):
+        return jnp.abs(known.left[:m] @ drift / overlap)
+    g = jacobian[m]
+    along = g[:m] @ -jnp.linalg.solve(of_orbit, drift) + g[m]
+    rate = -along / overlap
+    return rate / 2 if kind == "torus" else -rate

@@ -1,0 +1,137 @@
+"""The equations of a periodic orbit, P(z) = z, in the unknowns that Newton's method and continuation work on.
+
+Unknowns are numbers of order one: the state z in units of the system's scale, then, as far as they are not given, the
+speed of a self-excited system over its guess, and the free parameters in units of their own.
+
+What is expensive, the revolutions, sees the system only through the numbers of its field at one speed (for a cage some
+twenty of them); how these follow from the design is cheap. `prepare` does the latter, `ReturnMap` the former, so that a
+derivative with respect to any number of design parameters costs no more than one with respect to the field's numbers.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from .._types import Scalar
+from ..integrate import AbstractMethod, StrobeMap, strobe_map
+from ..models import AbstractForcedSystem
+from ._lens import Parameter, with_value
+
+
+def frozen(tree: Any) -> Any:
+    """The same without derivatives."""
+    return jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, tree)
+
+
+class Given(eqx.Module):
+    """What derivatives are taken with respect to."""
+
+    system: AbstractForcedSystem
+    speed: Scalar
+
+
+class Frame(NamedTuple):
+    """Numbers that only fix units and the phase of a self-excited orbit; results do not depend on them."""
+
+    scale: Float[Array, " dim"]
+    speed: Float[Array, ""]
+    units: Float[Array, " parameters"]
+    phase_point: Float[Array, " dim"]
+    phase_direction: Float[Array, " dim"]
+    periods: Int[Array, ""]
+
+
+class ReturnMap(eqx.Module):
+    """`periods` applications of the strobe map, in units of the frame."""
+
+    strobe: StrobeMap
+    frame: Frame
+
+    def __call__(self, z: Float[Array, " dim"]) -> Float[Array, " dim"]:
+        scale = self.frame.scale
+        y = tuple(z[i] * scale[i] for i in range(z.size))
+        y = jax.lax.fori_loop(0, self.frame.periods, lambda _, y: self.strobe(y).y, y)
+        return jnp.stack(y) / scale
+
+    def with_monodromy(self, z: Float[Array, " dim"]) -> tuple[Float[Array, " dim"], Float[Array, "dim dim"]]:
+        """The image of z and the derivative there."""
+        m, image = jax.jacfwd(lambda z: (self(z),) * 2, has_aux=True)(z)
+        return image, m
+
+
+class OrbitProblem(eqx.Module):
+    """A periodic orbit of a system, with the speed free for a self-excited one, and free parameters."""
+
+    method: AbstractMethod
+    dimension: int = eqx.field(static=True)
+    free_speed: bool = eqx.field(static=True)
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+
+    @property
+    def equations(self) -> int:
+        """How many equations `residual` has."""
+        return self.dimension + self.free_speed
+
+    def speed(self, u: Float[Array, " n"], given: Given, frame: Frame) -> Scalar:
+        """Speed [rad/s] at the unknowns u."""
+        return self._located(u, given, frame)[1]
+
+    def values(self, u: Float[Array, " n"], frame: Frame) -> Float[Array, " parameters"]:
+        """Values of the free parameters, in SI units."""
+        return u[self.equations :][: len(self.parameters)] * frame.units
+
+    def state(self, u: Float[Array, " n"], frame: Frame) -> Float[Array, " dim"]:
+        """State at phase 0, in SI units."""
+        return u[: self.dimension] * frame.scale
+
+    def _located(self, u: Array, given: Given, frame: Frame) -> tuple[AbstractForcedSystem, Scalar]:
+        system, speed = given.system, given.speed
+        if self.free_speed:
+            speed = u[self.dimension] * frame.speed
+        values = self.values(u, frame)
+        for i, parameter in enumerate(self.parameters):
+            system, speed = with_value(system, speed, parameter, values[i])
+        return system, speed
+
+    def prepare(self, u: Float[Array, " n"], given: Given, frame: Frame) -> StrobeMap:
+        """The strobe map at the unknowns u: all that depends on speed and design."""
+        return strobe_map(*self._located(u, given, frame), self.method)
+
+    def orbit_residual(
+        self, z: Float[Array, " dim"], image: Float[Array, " dim"], frame: Frame
+    ) -> Float[Array, " equations"]:
+        """P(z) - z, and the phase condition of a self-excited orbit."""
+        closing = image - z
+        if not self.free_speed:
+            return closing
+        return jnp.append(closing, jnp.dot(z - frame.phase_point, frame.phase_direction))
+
+    def residual(self, u: Float[Array, " n"], strobe: StrobeMap, frame: Frame) -> Float[Array, " equations"]:
+        """The orbit's equations."""
+        z = u[: self.dimension]
+        return self.orbit_residual(z, ReturnMap(strobe, frame)(z), frame)
+
+
+def make_frame(
+    problem: OrbitProblem,
+    given: Given,
+    state: Float[Array, " dim"],
+    speed: Scalar,
+    units: Float[Array, " parameters"],
+    periods: Any,
+) -> Frame:
+    """The frame around a first guess: `state` (SI) at `speed` [rad/s]."""
+    given, state, speed, units = frozen((given, state, jnp.asarray(speed, dtype=float), units))
+    system = given.system
+    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in system.scale(speed)])
+    z = state / scale
+    if problem.free_speed:
+        rate = system.at_speed(speed)(jnp.zeros(()), tuple(state[i] for i in range(state.size)))
+        direction = jnp.stack([jnp.asarray(c) for c in rate]) / scale
+        direction = direction / jnp.linalg.norm(direction)
+    else:
+        direction = jnp.zeros_like(z)
+    return frozen(Frame(scale, speed, units, z, direction, jnp.asarray(periods, dtype=int)))

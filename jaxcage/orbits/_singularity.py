@@ -1,0 +1,80 @@
+"""Where a periodic orbit loses stability: matrices that are singular there, and test functions that vanish there.
+
+With monodromy matrix M an orbit is at a
+- fold, where a multiplier is 1: M - I is singular;
+- period doubling, where a multiplier is -1: M + I is singular;
+- torus (Neimark-Sacker) bifurcation, where a complex pair is on the unit circle: the second compound matrix of M, whose
+  eigenvalues are the products mu_i mu_j (i < j), has the eigenvalue 1. It also has at a neutral saddle, a real pair
+  mu and 1/mu, which is no bifurcation; and it is regular where the pair meets at 1 or -1, unlike M - exp(i phi) I.
+The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
+"""
+
+import itertools
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+
+
+Kind = Literal["period-doubling", "torus", "fold", "branch-point"]
+KINDS: tuple[Kind, ...] = ("period-doubling", "torus", "fold", "branch-point")
+
+
+def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
+    """All 2 x 2 minors of `m`, k = n (n - 1)/2: its eigenvalues are the products of pairs of eigenvalues of `m`."""
+    i, j = np.array(list(itertools.combinations(range(m.shape[0]), 2))).T
+    return m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)]
+
+
+def singular_matrix(kind: Kind, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
+    """The matrix that is singular at a bifurcation of `kind` of an orbit with monodromy matrix `m`."""
+    if kind == "period-doubling":
+        return m + jnp.eye(m.shape[0])
+    if kind == "torus":
+        c = second_compound(m)
+        return c - jnp.eye(c.shape[0])
+    return m - jnp.eye(m.shape[0])
+
+
+def null_vectors(a: Float[Array, "k k"]) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
+    """Left and right singular vectors of the smallest singular value of `a`."""
+    u, _, vh = jnp.linalg.svd(a)
+    return u[:, -1], vh[-1]
+
+
+def bordered(
+    a: Float[Array, "k k"], left: Float[Array, " k"], right: Float[Array, " k"]
+) -> tuple[Float[Array, ""], Float[Array, " k"], Float[Array, " k"]]:
+    """A scalar that vanishes where `a` is singular, smooth and well scaled where the determinant is not.
+
+    **Arguments:** matrix; vectors not orthogonal to its left and right null vectors.
+
+    **Returns:** g and the vectors q, p of [[a, left], [right, 0]] [q; g] = [0; 1] and of the transposed system; where
+    g = 0, they are the right and left null vectors, and dg = -p da q.
+    """
+    k = a.shape[0]
+    whole = jnp.block([[a, left[:, None]], [right[None, :], jnp.zeros((1, 1))]])
+    one = jnp.zeros(k + 1).at[-1].set(1.0)
+    q = jnp.linalg.solve(whole, one)
+    p = jnp.linalg.solve(whole.T, one)
+    return q[-1], q[:-1], p[:-1]
+
+
+def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, Float[np.ndarray, "*points"]]:
+    """Real functions of all multipliers that change sign at a bifurcation of each kind."""
+    mu = np.asarray(multipliers)
+    i, j = np.array(list(itertools.combinations(range(mu.shape[-1]), 2))).T
+    return {
+        "period-doubling": np.prod(mu + 1, axis=-1).real,
+        "torus": np.prod(mu[..., i] * mu[..., j] - 1, axis=-1).real,
+        "fold": np.prod(mu - 1, axis=-1).real,
+    }
+
+
+def is_torus(multipliers: Complex[np.ndarray, " n"]) -> bool:
+    """Whether the pair of multipliers with a product closest to 1 is a complex one: if not, a neutral saddle."""
+    mu = np.asarray(multipliers)
+    pairs = itertools.combinations(range(mu.size), 2)
+    i, j = min(pairs, key=lambda p: abs(mu[p[0]] * mu[p[1]] - 1))
+    return bool(abs(mu[i].imag) > 1e-12 * abs(mu[i]) and abs(mu[i] - mu[j].conj()) < 1e-6 * abs(mu[i]))
