@@ -10,6 +10,13 @@
 | `_liouville`   | the determinant that every monodromy matrix must have                              |
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
 | `_point`       | bifurcation points                                                                 |
+| `_arclength`   | pseudo-arclength continuation of many curves at a time                             |
+| `_branch`      | branches of orbits with their bifurcations located                                 |
+| `_search`      | the synchronous orbits of a speed range, found without a hint                      |
+| `_loss`        | synchronous-loss zones and their edges                                             |
+| `_sensitivity` | derivatives and elasticities of an edge, homogeneity                               |
+| `_curve`       | bifurcation points followed in two parameters                                      |
+| `_cascade`     | period-doubling cascades and their limit                                           |
 """
 
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit

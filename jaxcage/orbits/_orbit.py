@@ -168,7 +168,7 @@ def periodic_orbit(
 
     **Arguments:**
 
-    - `system`, `speed`: any forced system, and its speed [rad/s]; for a self-excited one, a guess of 2 pi over its period.
+    - `system`, `speed`: any forced system, and its speed [rad/s]; for a self-excited one, a guess.
     - `periods`: revolutions after which the orbit closes.
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
     - `revolutions`: simulate so many before Newton takes over; by default 200 without a guess and none with one.

@@ -77,8 +77,8 @@ def critical_matrix(
 ) -> Float[Array, "k k"]:
     """The matrix that is singular at the bifurcation.
 
-    A self-excited orbit always has a multiplier 1; at its fold the derivative of its own equations is singular, in which
-    the flow and the phase condition border M - I.
+    A self-excited orbit always has a multiplier 1; at its fold the derivative of its own equations is singular, in
+    which the flow and the phase condition border M - I.
     """
     a = singular_matrix(kind, monodromy)
     if not problem.free_speed or kind in ("period-doubling", "torus"):

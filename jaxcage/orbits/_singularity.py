@@ -72,9 +72,13 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
     }
 
 
-def is_torus(multipliers: Complex[np.ndarray, " n"]) -> bool:
-    """Whether the pair of multipliers with a product closest to 1 is a complex one: if not, a neutral saddle."""
+def matches(kind: str, multipliers: Complex[np.ndarray, " n"]) -> bool:
+    """Whether the multipliers are those of a bifurcation of `kind`, and not e.g. of a neutral saddle, a real pair whose
+    product is 1.
+
+    A double multiplier is known to the square root of rounding only; the tolerance is wider than that.
+    """
     mu = np.asarray(multipliers)
-    pairs = itertools.combinations(range(mu.size), 2)
-    i, j = min(pairs, key=lambda p: abs(mu[p[0]] * mu[p[1]] - 1))
-    return bool(abs(mu[i].imag) > 1e-12 * abs(mu[i]) and abs(mu[i] - mu[j].conj()) < 1e-6 * abs(mu[i]))
+    if kind != "torus":
+        return bool(np.min(np.abs(mu - (-1 if kind == "period-doubling" else 1))) < 1e-3)
+    return bool(np.any((np.abs(mu.imag) > 1e-9) & (np.abs(np.abs(mu) - 1) < 1e-4)))

@@ -8,4 +8,5 @@
 """
 
 from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down
+from ._engine import cores as cores
 from ._speed import rpm as rpm, sweep as sweep

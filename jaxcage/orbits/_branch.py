@@ -1,0 +1,375 @@
+"""Branches of periodic orbits over a parameter, stable and unstable, with their bifurcations located and labelled."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float
+
+from .._checks import require_x64
+from .._types import Scalar
+from ..integrate import AbstractMethod, StrobeMap, method as make_method
+from ..models import AbstractForcedSystem
+from ._arclength import Corrected, Steps, Trace, correct, follow, stack, take
+from ._implicit import AbstractEquations
+from ._lens import SPEED, Parameter, value as value_of, with_value
+from ._orbit import Period, guess_state, is_free
+from ._problem import Frame, Given, OrbitProblem, make_frame
+from ._singularity import matches, null_vectors, singular_matrix, test_functions
+
+
+Start = tuple[np.ndarray, float]
+"""A state [SI] and the value of the parameter."""
+LOCATE_STEPS = 40
+LOCATED = 1e-9
+"""Places of special points are refined until they move by less than this in the unknowns' units."""
+
+
+class BranchEquations(AbstractEquations):
+    """The orbit's equations with one parameter free."""
+
+    problem: OrbitProblem
+    frame: Frame
+
+    def prepare(self, u: Array, given: Given) -> StrobeMap:
+        return self.problem.prepare(u, given, self.frame)
+
+    def residual(self, u: Array, prepared: StrobeMap) -> tuple[Array, None]:
+        return self.problem.residual(u, prepared, self.frame), None
+
+
+@dataclasses.dataclass(frozen=True)
+class SpecialPoint:
+    """A bifurcation on a branch."""
+
+    kind: str
+    """`period-doubling`, `torus`, `fold` or `branch-point`."""
+    value: float
+    """Value of the parameter [SI]."""
+    speed: float
+    """Speed [rad/s]."""
+    state: Float[np.ndarray, " dim"]
+    """State of the orbit at phase 0 [SI]."""
+    multipliers: Complex[np.ndarray, " dim"]
+    direction: Float[np.ndarray, " dim"]
+    """Critical direction in the state [SI]; zero for a torus."""
+    index: int
+    """The branch's point before it."""
+    edge: bool
+    """Whether a stable orbit is on one side of it."""
+    parameter: str = SPEED
+
+    @property
+    def speed_rpm(self) -> float:
+        """Speed in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    @property
+    def critical(self) -> complex:
+        """The multiplier on the unit circle, with a positive imaginary part."""
+        target = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}.get(self.kind)
+        mu = self.multipliers
+        if target is None:
+            mu = mu[mu.imag > 0]
+            return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
+        return complex(mu[np.argmin(np.abs(mu - target))])
+
+
+@dataclasses.dataclass(frozen=True)
+class Branch:
+    """Orbits in order along a branch."""
+
+    parameter: str
+    value: Float[np.ndarray, " points"]
+    """Values of the parameter [SI]."""
+    speed: Float[np.ndarray, " points"]
+    """Speeds [rad/s]."""
+    state: Float[np.ndarray, "points dim"]
+    """States at phase 0 [SI]."""
+    multipliers: Complex[np.ndarray, "points dim"]
+    stable: Bool[np.ndarray, " points"]
+    special: tuple[SpecialPoint, ...]
+    """Bifurcations, in order along the branch."""
+    periods: int
+    ended: tuple[str, str]
+    """Why the branch ends where it begins and where it ends."""
+
+    @property
+    def speed_rpm(self) -> Float[np.ndarray, " points"]:
+        """Speeds in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    def __str__(self) -> str:
+        head = (
+            f"Branch of period-{self.periods} orbits: {self.value.size} points, {self.parameter} from "
+            f"{self.value.min():.6g} to {self.value.max():.6g}, {np.mean(self.stable):.0%} stable"
+        )
+        rows = [f"  {p.kind:<16} {p.parameter} = {p.value:.8g}, multiplier {p.critical:.4f}" for p in self.special]
+        return "\n".join([head, *rows])
+
+
+class Follower(eqx.Module):
+    """What all lanes of one continuation share."""
+
+    problem: OrbitProblem
+    given: Given
+    lower: float
+    upper: float
+    unit: float
+
+    @property
+    def parameter(self) -> Parameter:
+        return self.problem.parameters[0]
+
+    def frame(self, state: Array, at: Scalar, periods: Any) -> Frame:
+        """The frame of all lanes, around one of their orbits."""
+        system, speed = with_value(self.given.system, self.given.speed, self.parameter, jnp.asarray(at, dtype=float))
+        return make_frame(self.problem, Given(system, speed), state, speed, jnp.full(1, self.unit), periods)
+
+    def inside(self, u: np.ndarray) -> np.ndarray:
+        """Whether the parameter is within the range."""
+        value = u[..., -1] * self.unit
+        return (value > self.lower) & (value < self.upper)
+
+    def monodromy(self, points: Corrected) -> np.ndarray:
+        n = self.problem.dimension
+        return points.jacobian[..., :n, :n] + np.eye(n)
+
+
+def branch(
+    system: AbstractForcedSystem,
+    orbit: Any,
+    parameter: Parameter = SPEED,
+    *,
+    lower: float,
+    upper: float,
+    speed: Scalar | None = None,
+    periods: int = 1,
+    period: Period = "driven",
+    steps: Steps = Steps(),
+    method: AbstractMethod | None = None,
+) -> Branch:
+    """Follow a branch of periodic orbits both ways from `orbit`, by pseudo-arclength continuation.
+
+    **Arguments:**
+
+    - `orbit`: an `Orbit`, or a pair (state, value of the parameter) near one.
+    - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
+    - `lower`, `upper`: range of the parameter [SI].
+    - `speed`: speed [rad/s] where it is not the parameter and `orbit` does not have it.
+    - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
+
+    **Returns:** `Branch`.
+
+    **Raises:** `ValueError` if there is no orbit to start from.
+    """
+    require_x64()
+    if not lower < upper:
+        raise ValueError(f"Argument `upper` must be above `lower`, but they are {upper:g} and {lower:g}.")
+    known_speed = getattr(orbit, "speed", speed)
+    state, at = orbit if isinstance(orbit, tuple) else (orbit.state, value_of(system, known_speed, parameter))
+    known_speed = at if parameter == SPEED else known_speed
+    follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
+    state = guess_state(system, known_speed, state)
+    count = int(getattr(orbit, "periods", periods))
+    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], count, steps)
+    if found is None:
+        raise ValueError(f"Argument `orbit` must be near a periodic orbit, but none is near it at {float(at):g}.")
+    return found
+
+
+def make_follower(
+    system: AbstractForcedSystem,
+    speed: Any,
+    parameter: Parameter,
+    lower: float,
+    upper: float,
+    period: Period = "driven",
+    method: AbstractMethod | None = None,
+) -> Follower:
+    chosen = make_method() if method is None else method
+    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
+    return Follower(problem, Given(system, jnp.asarray(speed, dtype=float)), lower, upper, (upper - lower) / 20)
+
+
+def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> tuple[Any, Corrected]:
+    """Orbits near (state, value of the parameter), the parameter kept. **Returns:** equations and points, lanes first."""
+    lanes, free = len(starts), follower.problem.free_speed
+    curves = stack(BranchEquations(follower.problem, frame), lanes)
+    u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
+    normal = np.zeros_like(u)
+    normal[:, -1] = 1.0
+    return curves, correct(curves, follower.given, u, normal)
+
+
+def turned(points: Corrected, sign: Any) -> Corrected:
+    """The same points, to be followed the other way where `sign` is -1."""
+    return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
+
+
+def follow_both_ways(follower: Follower, starts: Sequence[Start], periods: int, steps: Steps) -> list[Branch | None]:
+    """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one."""
+    frame = follower.frame(jnp.asarray(starts[0][0]), starts[0][1], periods)
+    curves, first = seeds(follower, frame, starts)
+    count = len(starts)
+    lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
+    taken = ~first.converged
+
+    def stop(lane: int, points: list[Corrected]) -> bool:
+        own = lane % count
+        for other in range(own + 1, count):
+            taken[other] |= passes(points[-2].u, points[-1].u, first.u[other])
+        return bool(taken[own])
+
+    both = turned(take(first, lanes), sign)
+    traces = follow(take(curves, lanes), follower.given, both, steps=steps, inside=follower.inside, stop=stop)
+    kept = [i for i in range(count) if not taken[i]]
+    found = describe(follower, frame, [_joined(traces[i], traces[i + count]) for i in kept])
+    return [found[kept.index(i)] if i in kept else None for i in range(count)]
+
+
+def passes(u: np.ndarray, v: np.ndarray, point: np.ndarray) -> bool:
+    """Whether the step from u to v goes through `point`, to the accuracy of the chord."""
+    step = v - u
+    share = np.dot(point - u, step) / np.dot(step, step)
+    return bool(-0.1 <= share <= 1.1 and np.linalg.norm(u + share * step - point) < 0.2 * np.linalg.norm(step))
+
+
+def _joined(up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
+    """Both directions as one row of points; a closed curve was gone round twice, and is taken once."""
+    if up.ended == "closed":
+        return up.points, (up.ended, up.ended)
+    back = turned(take(down.points, np.arange(len(down.points.u) - 1, 0, -1)), -1.0)
+    points = jax.tree.map(lambda a, b: np.concatenate([a, b]), back, up.points)
+    return points, (down.ended, up.ended)
+
+
+def describe(follower: Follower, frame: Frame, traces: Sequence[tuple[Corrected, tuple[str, str]]]) -> list[Branch]:
+    """Branches from their points, with special points located, all at once."""
+    found = [(i, *bracket) for i, (points, _) in enumerate(traces) for bracket in brackets(follower, points)]
+    located = locate(follower, frame, [(traces[i][0], k, kind) for i, k, kind in found])
+    branches = []
+    for i, (points, ended) in enumerate(traces):
+        mine = [(k, kind, p) for (j, k, kind), p in zip(found, located, strict=True) if j == i and p is not None]
+        branches.append(_branch(follower, frame, points, ended, mine))
+    return branches
+
+
+def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
+    """Multipliers, the largest first."""
+    mu = np.linalg.eigvals(monodromy).astype(complex)
+    return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
+
+
+def is_stable(multipliers: np.ndarray, free: bool) -> np.ndarray:
+    """Whether all multipliers are inside the unit circle, but for the one at 1 of a self-excited orbit."""
+    size = np.abs(multipliers)
+    if free:
+        np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
+    return np.max(size, axis=-1) < 1.0
+
+
+def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
+    """Functions along a branch that change sign at its special points."""
+    tests = test_functions(eigenvalues(follower.monodromy(points)))
+    tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
+    tests["fold"] = points.tangent[..., -1]
+    if follower.problem.free_speed:
+        del tests["branch-point"]
+    return tests
+
+
+def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
+    """Index and kind of each change of sign."""
+    found = []
+    for kind, value in signals(follower, points).items():
+        found += [(int(k), kind) for k in np.flatnonzero(value[:-1] * value[1:] < 0)]
+    return sorted(found)
+
+
+def locate(follower: Follower, frame: Frame, wanted: Sequence[tuple[Corrected, int, str]]) -> list[Corrected | None]:
+    """The points at which the test functions vanish, by the Illinois method on planes across the chords."""
+    if not wanted:
+        return []
+    lanes = len(wanted)
+    curves = stack(BranchEquations(follower.problem, frame), lanes)
+    ends = [take(points, np.array([k, k + 1])) for points, k, _ in wanted]
+    u0, u1 = (np.stack([e.u[j] for e in ends]) for j in (0, 1))
+    value = lambda i, p: signals(follower, p)[wanted[i][2]]
+    f0, f1 = (np.array([value(i, e)[j] for i, e in enumerate(ends)]) for j in (0, 1))
+    chord = u1 - u0
+    length = np.linalg.norm(chord, axis=1)
+    normal = chord / length[:, None]
+    low, high = np.zeros(lanes), np.ones(lanes)
+    best: list[Corrected | None] = [None] * lanes
+    active, last = np.ones(lanes, dtype=bool), np.zeros(lanes)
+    for _ in range(LOCATE_STEPS):
+        share = np.clip((low * f1 - high * f0) / (f1 - f0), low + 1e-3 * (high - low), high - 1e-3 * (high - low))
+        index = np.flatnonzero(active)
+        if index.size == 0:
+            break
+        at = u0[index] + share[index, None] * chord[index]
+        got = correct(take(curves, index), follower.given, at, normal[index])
+        for k, i in enumerate(index):
+            if not got.converged[k]:
+                active[i] = False
+                continue
+            point = take(got, np.array(k))
+            f = float(value(i, take(got, np.array([k])))[0])
+            before, best[i] = best[i], point
+            if f * f1[i] < 0:  # the root is between here and the upper end
+                low[i], f0[i], f1[i] = share[i], f, f1[i] * (0.5 if before is not None and f * last[i] > 0 else 1.0)
+            else:
+                high[i], f1[i], f0[i] = share[i], f, f0[i] * (0.5 if before is not None and f * last[i] > 0 else 1.0)
+            last[i] = f
+            moved = np.inf if before is None else np.linalg.norm(point.u - before.u)
+            active[i] = f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
+    return best
+
+
+def _branch(
+    follower: Follower,
+    frame: Frame,
+    points: Corrected,
+    ended: tuple[str, str],
+    located: Sequence[tuple[int, str, Corrected]],
+) -> Branch:
+    problem, free = follower.problem, follower.problem.free_speed
+    multipliers = eigenvalues(follower.monodromy(points))
+    stable = is_stable(multipliers, free)
+    n = problem.dimension
+    scale = np.asarray(frame.scale)
+    name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
+
+    def speed(u: np.ndarray) -> np.ndarray:
+        if name == SPEED:
+            return u[..., -1] * follower.unit
+        return u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.given.speed))
+
+    special = []
+    for k, kind, p in located:
+        mu = eigenvalues(follower.monodromy(p))
+        if not matches(kind, mu):
+            continue
+        direction = np.zeros(n)
+        if kind != "torus":
+            m = jnp.asarray(follower.monodromy(p))
+            direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])  # pyright: ignore[reportArgumentType]
+        edge = bool(stable[k] or stable[k + 1])
+        at = float(p.u[-1] * follower.unit)
+        special.append(SpecialPoint(kind, at, float(speed(p.u)), p.u[:n] * scale, mu, direction * scale, k, edge, name))
+    return Branch(
+        parameter=name,
+        value=points.u[:, -1] * follower.unit,
+        speed=speed(points.u),
+        state=points.u[:, :n] * scale,
+        multipliers=multipliers,
+        stable=stable,
+        special=tuple(special),
+        periods=int(frame.periods),
+        ended=ended,
+    )

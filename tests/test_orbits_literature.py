@@ -1,0 +1,348 @@
+"""Periodic orbits and bifurcation points of systems whose answers are published, exact, or found without JAX.
+
+Laws are modules as a user would write them. "DOP853" in a comment means: computed with SciPy's DOP853 at a tolerance of
+1e-12 and Newton's method on the variational equations, sharing nothing with this library.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import mathieu_a, mathieu_b
+
+import jaxcage as jc
+
+
+METHOD = jc.method("rodas4", steps=1024)
+FINE = jc.method("rodas4", steps=2048)
+
+
+def numbers(**values):
+    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
+
+
+class Duffing(eqx.Module):
+    """m x'' + d x' - k x + b x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
+
+    m: jax.Array
+    d: jax.Array
+    k: jax.Array
+    b: jax.Array
+    g: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return ((-self.d * u + self.k * x - self.b * x**3 + self.g * jnp.cos(tau)) / self.m,)
+
+
+def duffing(d=0.3, k=1.0, g=0.26):
+    return jc.ForcedOscillator(Duffing(**numbers(m=1, d=d, k=k, b=1, g=g)), coordinates=1)
+
+
+# Periods, a force inside the stable range, and the force at which the period doubles (DOP853, all printed digits).
+# Their distances shrink by 4.80 and 4.67, on the way to Feigenbaum's 4.669.
+CASCADE = [
+    (1, 0.262, 0.265581786),
+    (2, 0.285, 0.286693158),
+    (4, 0.2908, 0.291089909),
+    (8, 0.29196, 0.292031000),
+]
+
+
+@pytest.mark.parametrize("periods, inside, expected", CASCADE)
+def test_period_doubling_cascade_of_the_double_well_duffing(periods, inside, expected):
+    system = duffing(g=inside)
+    orbit = jc.periodic_orbit(system, 1.2, periods, guess=(1.0, 0.0), revolutions=400, method=METHOD)
+    assert bool(orbit.stable) and -1 < orbit.multipliers[0].real < -0.3
+    # Damping is all that shrinks areas, whatever the orbit.
+    assert abs(jnp.linalg.slogdet(orbit.monodromy)[1] + 0.3 * 2 * jnp.pi * periods / 1.2) < 1e-8
+    point = jc.bifurcation(system, "period-doubling", orbit, "g", speed=1.2, periods=periods, method=METHOD)
+    assert point.status == "converged"
+    assert abs(point.value - expected) < 2e-9
+    assert abs(point.multipliers[0] + 1) < 1e-8
+    assert point.transversality > 0
+    assert int(point.periods) == periods
+
+
+def test_gradient_of_the_first_period_doubling():
+    """DOP853 and differences; scaling x shows that the force at any edge goes with b^(-1/2)."""
+    system = duffing(g=0.262)
+    orbit = jc.periodic_orbit(system, 1.2, 1, guess=(1.0, 0.0), revolutions=400, method=METHOD)
+
+    def edge(system):
+        point = jc.bifurcation(system, "period-doubling", orbit, "g", speed=1.2, method=METHOD)
+        return point.value, point
+
+    gradient, point = eqx.filter_grad(edge, has_aux=True)(system)
+    law = gradient.acceleration
+    # The third: both stiffnesses multiplied by one number.
+    found = [law.m, law.d, law.k + law.b, law.b]
+    np.testing.assert_allclose(found, [0.163248905, 0.543875937, -0.060829900, -0.132790893], rtol=0, atol=2e-9)
+    assert abs(law.b + point.value / 2) < 1e-10
+    # The equation multiplied by a number.
+    assert abs(law.m + 0.3 * law.d + law.k + law.b - point.value) < 1e-10
+    assert law.g == 0.0  # the parameter that is solved for
+
+
+# State on the branch (speed from which it is followed, simulated from this start), and the fold (DOP853).
+FOLDS = [(1.7, (0.6, 2.4), 1.77971952, 2e-8), (1.4, (-0.3, 0.05), 1.3242362, 1e-7)]
+
+
+@pytest.mark.parametrize("speed, start, expected, printed", FOLDS, ids=["up", "down"])
+def test_folds_of_the_hardening_duffing(speed, start, expected, printed):
+    system = duffing(d=0.1, k=-1.0, g=0.3)
+    orbit = jc.periodic_orbit(system, speed, 1, guess=start, revolutions=400, method=METHOD)
+    assert bool(orbit.stable)
+    point = jc.bifurcation(system, "fold", orbit, method=METHOD)
+    assert point.status == "converged"
+    assert abs(point.value - expected) < printed and point.value == point.speed
+    assert abs(point.multipliers[0] - 1) < 1e-6
+    assert float(point.angle) < 1e-6
+    # The other multiplier follows from the damping.
+    assert abs(point.multipliers[1].real - jnp.exp(-0.1 * 2 * jnp.pi / point.speed)) < 1e-6
+    assert abs(jnp.linalg.norm(point.direction) - 1) < 1e-12
+
+
+class VanDerPol(eqx.Module):
+    mu: jax.Array
+
+    def __call__(self, tau, y, speed):
+        x, u = y
+        return (u, self.mu * (1 - x * x) * u - x)
+
+
+# Periods as published for van der Pol's equation; multipliers by DOP853.
+VAN_DER_POL = [(1.0, 6.6632868593, -7.05893281), (0.1, 6.2871112723, np.log(0.5330692592))]
+
+
+@pytest.mark.parametrize("mu, period, log_multiplier", VAN_DER_POL)
+def test_limit_cycle_of_van_der_pol(mu, period, log_multiplier):
+    system = jc.ForcedSystem(VanDerPol(**numbers(mu=mu)), dimension=2)
+    orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=20, period="free", method=FINE)
+    assert orbit.status == "converged" and bool(orbit.stable)
+    assert abs(orbit.period - period) < 1e-9
+    np.testing.assert_allclose(orbit.multipliers[0], 1.0, atol=1e-9)
+    np.testing.assert_allclose(jnp.log(orbit.multipliers[1].real), log_multiplier, atol=1e-8)
+    assert abs(orbit.liouville) < 1e-8
+
+
+class Mathieu(eqx.Module):
+    """x'' + 2 z x' + (a - 2 q cos 2t) x = 0 with tau = 2 t."""
+
+    a: jax.Array
+    q: jax.Array
+    z: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-2 * self.z * u - (self.a - 2 * self.q * jnp.cos(tau)) * x,)
+
+
+def mathieu(a=1.0, z=0.0):
+    return jc.ForcedOscillator(Mathieu(**numbers(a=a, q=1, z=z)), coordinates=1)
+
+
+def mathieu_trace(a, q=1.0):
+    """Trace of the monodromy matrix of the undamped equation over pi."""
+
+    def rates(t, y):
+        stiffness = a - 2 * q * np.cos(2 * t)
+        return [y[1], -stiffness * y[0], y[3], -stiffness * y[2]]
+
+    end = solve_ivp(rates, (0, np.pi), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    return end[0] + end[3]
+
+
+CHARACTERISTIC = {
+    "b1": ("period-doubling", mathieu_b(1, 1)),
+    "a1": ("period-doubling", mathieu_a(1, 1)),
+    "a0": ("branch-point", mathieu_a(0, 1)),
+    "b2": ("branch-point", mathieu_b(2, 1)),
+    "a2": ("branch-point", mathieu_a(2, 1)),
+}
+
+
+@pytest.mark.parametrize("name", CHARACTERISTIC)
+def test_characteristic_values_of_mathieu(name):
+    """DLMF chapter 28: both multipliers are 1 or -1 with a Jordan block, and cross at an infinite rate."""
+    kind, exact = CHARACTERISTIC[name]
+    point = jc.bifurcation(mathieu(), kind, ((0.0, 0.0), exact + 0.03), "a", speed=2.0, method=METHOD)
+    assert bool(point.converged)
+    assert abs(point.value - exact) < 1e-8
+    np.testing.assert_allclose(point.state, 0.0, atol=1e-9)
+    np.testing.assert_allclose(point.multipliers, -1.0 if kind == "period-doubling" else 1.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("a", [-1.0, 0.7, 2.5, 5.0])
+@pytest.mark.parametrize("z", [0.1, 0.6])
+def test_multipliers_of_damped_mathieu(a, z):
+    """x = exp(-z t) y makes it the undamped equation for y at a - z^2: exact."""
+    zero = dict(guess=(0.0, 0.0), method=METHOD)
+    damped = jc.periodic_orbit(mathieu(a, z), 2.0, **zero)
+    undamped = jc.periodic_orbit(mathieu(a - z * z), 2.0, **zero)
+    expected = np.sort_complex(np.exp(-z * np.pi) * np.asarray(undamped.multipliers))
+    np.testing.assert_allclose(np.sort_complex(np.asarray(damped.multipliers)), expected, rtol=1e-9)
+    assert abs(jnp.sum(undamped.multipliers).real - mathieu_trace(a - z * z)) < 1e-8
+
+
+# Kind, damping, bracket of a, sign of the multiplier.
+DAMPED = [
+    ("period-doubling", 0.1, (-0.2, 0.0), -1),
+    ("period-doubling", 0.1, (1.7, 1.9), -1),
+    ("period-doubling", 0.2, (1.5, 1.8), -1),
+    ("branch-point", 0.1, (-0.6, -0.3), 1),
+]
+
+
+@pytest.mark.parametrize("kind, z, bracket, sign", DAMPED)
+def test_edges_of_damped_mathieu(kind, z, bracket, sign):
+    """A multiplier is +-1 where the undamped trace at a - z^2 is +-2 cosh(z pi); the trace here is SciPy's."""
+    exact = brentq(lambda a: mathieu_trace(a - z * z) - sign * 2 * np.cosh(z * np.pi), *bracket, xtol=1e-12)
+    system = mathieu(z=z)
+    point = jc.bifurcation(system, kind, ((0.0, 0.0), exact + 0.02), "a", speed=2.0, method=METHOD)
+    assert abs(point.value - exact) < 1e-8
+    order = jnp.argmin(jnp.abs(point.multipliers - sign))
+    np.testing.assert_allclose(point.multipliers[order], sign, atol=1e-9)
+    np.testing.assert_allclose(point.multipliers[1 - order], sign * np.exp(-2 * z * np.pi), atol=1e-9)
+    # mu^2 - s t mu + s^2 = 0 with s = exp(-z pi), and so dmu/da = s t' mu/(2 mu - s t).
+    shrink, at, h = np.exp(-z * np.pi), exact - z * z, 1e-3
+    differences = [mathieu_trace(at + i * h) for i in (-2, -1, 1, 2)]
+    slope = np.dot([1, -8, 8, -1], differences) / (12 * h)
+    rate = shrink * slope * sign / (2 * sign - shrink * mathieu_trace(at))
+    np.testing.assert_allclose(abs(point.transversality), abs(rate), rtol=1e-6)
+    assert point.status == "converged" and bool(point.trusted)
+
+
+class Circle(eqx.Module):
+    """A Stuart-Landau oscillator with a planted pair: x, y on a circle of radius sqrt(r), which drives u, v."""
+
+    r: jax.Array
+    w: jax.Array
+    a: jax.Array
+    b: jax.Array
+    c: jax.Array
+
+    def __call__(self, tau, state, speed):
+        x, y, u, v = state
+        growth = self.r - x * x - y * y
+        return (
+            growth * x - self.w * y,
+            growth * y + self.w * x,
+            self.a * u - self.b * v + self.c * x,
+            self.b * u + self.a * v,
+        )
+
+
+def circle(r=0.3, w=1.3, a=-0.1, b=0.37):
+    return jc.ForcedSystem(Circle(**numbers(r=r, w=w, a=a, b=b, c=0.4)), dimension=4)
+
+
+def cycle_of(system, r):
+    guess = (0.9 * r**0.5, 0.1, 0.1, 0.1)
+    return jc.periodic_orbit(system, 1.25, guess=guess, revolutions=20, period="free", method=METHOD)
+
+
+@pytest.mark.parametrize("r, a, b", [(0.3, -0.1, 0.37), (0.05, 0.2, 1.9), (1.0, -0.7, 0.05)])
+def test_multipliers_of_a_planted_limit_cycle(r, a, b):
+    """1, exp(-2 r T) and exp((a +- i b) T): exact."""
+    orbit = cycle_of(circle(r=r, a=a, b=b), r)
+    period = 2 * np.pi / 1.3
+    assert abs(orbit.period - period) < 1e-8
+    assert abs(jnp.hypot(*orbit.state[:2]) - r**0.5) < 1e-8
+    exact = [1, np.exp(-2 * r * period), np.exp((a + 1j * b) * period), np.exp((a - 1j * b) * period)]
+    for mu in exact:
+        assert np.min(np.abs(np.asarray(orbit.multipliers) - mu)) < 1e-8 * max(1, abs(mu))
+    assert bool(orbit.stable) == (a < 0)
+
+
+@pytest.mark.parametrize("b", [0.37, 1.9])
+def test_torus_bifurcation_of_a_planted_limit_cycle(b):
+    """The pair leaves the unit circle at a = 0 with angle b T and rate T: exact. The drive is not resonant."""
+    system = circle(b=b, a=-0.05)
+    orbit = cycle_of(system, 0.3)
+    point = jc.bifurcation(system, "torus", orbit, "a", period="free", method=METHOD)
+    period = 2 * np.pi / 1.3
+    assert point.status == "converged"
+    assert abs(point.value) < 1e-8
+    assert abs(point.angle - abs(np.angle(np.exp(1j * b * period)))) < 1e-8
+    assert abs(point.transversality - period) < 1e-6
+    assert abs(point.speed - 1.3) < 1e-8
+
+
+class Planted(eqx.Module):
+    """A driven orbit p(tau) around which the state turns by half a turn a period, with rates a + s and a - s."""
+
+    a: jax.Array
+    s: jax.Array
+    b: jax.Array
+    turn: jax.Array
+
+    def __call__(self, tau, y, speed):
+        p = (jnp.cos(tau), 0.5 * jnp.sin(tau))
+        drift = (-speed * jnp.sin(tau), 0.5 * speed * jnp.cos(tau))
+        x, z = y[0] - p[0], y[1] - p[1]
+        c, s = jnp.cos(self.turn * tau), jnp.sin(self.turn * tau)
+        e, f = c * x + s * z, -s * x + c * z
+        cubic = e * e + f * f
+        de = (self.a + self.s - cubic) * e - self.b * f
+        df = (self.a - self.s - cubic) * f + self.b * e
+        spin = self.turn * speed
+        return (c * de - s * df - spin * z + drift[0], s * de + c * df + spin * x + drift[1])
+
+
+def planted(a, s=0.0, b=0.0, turn=0.5):
+    return jc.ForcedSystem(Planted(**numbers(a=a, s=s, b=b, turn=turn)), dimension=2)
+
+
+@pytest.mark.parametrize("speed", [0.8, 2.5])
+@pytest.mark.parametrize("at, inside", [(-0.2, -0.26), (0.2, 0.15)])
+def test_period_doubling_of_a_planted_driven_orbit(speed, at, inside):
+    """Multipliers -exp((a + s) T) and -exp((a - s) T): exact, with rate T and the orbit known."""
+    system, period = planted(inside, s=0.2), 2 * np.pi / speed
+    orbit = jc.periodic_orbit(system, speed, guess=(0.9, 0.1), method=METHOD)
+    exact = -np.exp([(inside + 0.2) * period, (inside - 0.2) * period])
+    np.testing.assert_allclose(orbit.multipliers, exact, rtol=1e-8)
+    point = jc.bifurcation(system, "period-doubling", orbit, "a", method=METHOD)
+    assert point.status == "converged"
+    assert abs(point.value - at) < 1e-8
+    np.testing.assert_allclose(point.state, [1.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
+    np.testing.assert_allclose(abs(point.direction), [1.0, 0.0] if at < 0 else [0.0, 1.0], atol=1e-6)
+    assert abs(point.angle - np.pi) < 1e-8
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5, 1.0])
+def test_torus_bifurcation_of_a_planted_driven_orbit(turn):
+    """(-1)^(2 turn) exp((a +- i b) T)."""
+    system, period = planted(-0.06, b=0.3, turn=turn), 2 * np.pi / 1.1
+    orbit = jc.periodic_orbit(system, 1.1, guess=(0.9, 0.1), method=METHOD)
+    point = jc.bifurcation(system, "torus", orbit, "a", method=METHOD)
+    assert point.status == "converged"
+    assert abs(point.value) < 1e-8
+    critical = np.exp(1j * np.pi * 2 * turn + 0.3j * period)
+    assert abs(point.angle - abs(np.angle(critical))) < 1e-8
+    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
+
+
+class Lure(eqx.Module):
+    a: jax.Array
+
+    def __call__(self, tau, y, speed):
+        x, u, f = y
+        return (u, f, -self.a * f - u - x + x * x)
+
+
+def test_period_doubling_of_the_lure_system():
+    """x''' + a x'' + x' + x = x^2, by DOP853; the tutorials of MatCont and BifurcationKit print 0.63031334 off their meshes."""
+    system = jc.ForcedSystem(Lure(**numbers(a=0.65)), dimension=3)
+    guess = (-0.373, 0.0, 0.577)  # a maximum of x'' by simulation, at a period of 6.360
+    orbit = jc.periodic_orbit(system, 2 * np.pi / 6.36, guess=guess, period="free", method=METHOD)
+    assert bool(orbit.stable)
+    point = jc.bifurcation(system, "period-doubling", orbit, "a", period="free", method=METHOD)
+    assert point.status == "converged"
+    assert abs(point.value - 0.6303020062) < 1e-9 and abs(point.value - 0.63031334) < 2e-5
+    # The divergence is -a everywhere.
+    assert abs(jnp.prod(point.multipliers).real - jnp.exp(-point.value * 2 * jnp.pi / point.speed)) < 1e-8
