@@ -6,6 +6,7 @@ What is declared here once is used by the configuration reader (units, ranges, u
 
 import dataclasses
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any, TypeVar
 
 import equinox as eqx
@@ -81,6 +82,40 @@ def parameter_info(module: eqx.Module) -> dict[str, ParameterInfo]:
     """Unit, range and description of every differentiable parameter of `module`, by name."""
     infos = {path: field.metadata["parameter"] for path, field in walk(module) if "parameter" in field.metadata}
     return {name: infos[path] for name, path in parameter_paths(module).items()}
+
+
+_BASES = {  # exponents of mass, length and time
+    "1": (0, 0, 0),
+    "rad": (0, 0, 0),
+    "K": (0, 0, 0),
+    "kg": (1, 0, 0),
+    "m": (0, 1, 0),
+    "s": (0, 0, 1),
+    "N": (1, 1, -2),
+    "Pa": (1, -1, -2),
+}
+
+
+def unit_dimensions(unit: str) -> dict[str, float]:
+    """Exponents of mass, length and time in a unit such as `N s/m` or `N/m^(10/9)`.
+
+    **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
+    """
+    above, _, below = unit.partition("/")
+    total = [0.0, 0.0, 0.0]
+    for sign, factors in ((1, above), (-1, below)):
+        for factor in factors.split():
+            base, _, power = factor.partition("^")
+            if base not in _BASES:
+                raise ValueError(f"Argument `unit` must be made of {', '.join(_BASES)}, but '{unit}' was given.")
+            exponent = sign * float(Fraction(power.strip("()") or "1"))
+            total = [t + exponent * b for t, b in zip(total, _BASES[base], strict=True)]
+    return dict(zip(("mass", "length", "time"), total, strict=True))
+
+
+def parameter_dimensions(module: eqx.Module) -> dict[str, dict[str, float]]:
+    """Exponents of mass, length and time of every differentiable parameter of `module`, by name."""
+    return {name: unit_dimensions(info.unit) for name, info in parameter_info(module).items()}
 
 
 def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:

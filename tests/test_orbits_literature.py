@@ -129,6 +129,30 @@ def test_limit_cycle_of_van_der_pol(mu, period, log_multiplier):
     assert abs(orbit.liouville) < 1e-8
 
 
+class Entrained(eqx.Module):
+    """x'' - 0.3 (1 - x^2) x' + x = g cos(w t)."""
+
+    g: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (0.3 * (1 - x * x) * u - x + self.g * jnp.cos(tau),)
+
+
+@pytest.mark.parametrize("force", [0.8, 1.2], ids=["unstable side", "stable side"])
+def test_torus_bifurcation_of_the_driven_van_der_pol(force):
+    """Where a drive of 1.3 rad/s lets go of the oscillator (DOP853)."""
+    system = jc.ForcedOscillator(Entrained(**numbers(g=force)), coordinates=1)
+    orbit = jc.periodic_orbit(system, 1.3, guess=(-1.3, -0.4), method=METHOD)
+    assert bool(orbit.stable) == (force > 1)
+    point = jc.bifurcation(system, "torus", orbit, "g", method=METHOD)
+    assert point.status == "converged"
+    assert abs(point.value - 1.0175566306) < 1e-9
+    np.testing.assert_allclose(jnp.abs(point.multipliers), 1.0, atol=1e-9)
+    assert abs(point.angle - np.angle(0.16011959 + 0.98709762j)) < 1e-8
+    assert point.transversality < 0  # a stronger drive holds it
+
+
 class Mathieu(eqx.Module):
     """x'' + 2 z x' + (a - 2 q cos 2t) x = 0 with tau = 2 t."""
 
@@ -242,7 +266,8 @@ def circle(r=0.3, w=1.3, a=-0.1, b=0.37):
 
 def cycle_of(system, r):
     guess = (0.9 * r**0.5, 0.1, 0.1, 0.1)
-    return jc.periodic_orbit(system, 1.25, guess=guess, revolutions=20, period="free", method=METHOD)
+    spin = 20 if system.rates.a < 0 else 0  # the drive of an unstable pair would only blow it up
+    return jc.periodic_orbit(system, 1.25, guess=guess, revolutions=spin, period="free", method=METHOD)
 
 
 @pytest.mark.parametrize("r, a, b", [(0.3, -0.1, 0.37), (0.05, 0.2, 1.9), (1.0, -0.7, 0.05)])
@@ -336,7 +361,7 @@ class Lure(eqx.Module):
 
 
 def test_period_doubling_of_the_lure_system():
-    """x''' + a x'' + x' + x = x^2, by DOP853; the tutorials of MatCont and BifurcationKit print 0.63031334 off their meshes."""
+    """x''' + a x'' + x' + x = x^2, by DOP853; MatCont and BifurcationKit print 0.63031334, off their meshes."""
     system = jc.ForcedSystem(Lure(**numbers(a=0.65)), dimension=3)
     guess = (-0.373, 0.0, 0.577)  # a maximum of x'' by simulation, at a period of 6.360
     orbit = jc.periodic_orbit(system, 2 * np.pi / 6.36, guess=guess, period="free", method=METHOD)

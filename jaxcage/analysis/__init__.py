@@ -48,4 +48,4 @@ from ._spectra import (
 )
 from ._sweep import Sweep as Sweep
 from ._zero_one import zero_one as zero_one
-from ._zones import Edge as Edge, Zone as Zone, Zones as Zones, zones as zones
+from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones

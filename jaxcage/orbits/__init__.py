@@ -19,5 +19,19 @@
 | `_cascade`     | period-doubling cascades and their limit                                           |
 """
 
+from ._arclength import Steps as Steps
+from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as branch
+from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from ._point import BifurcationPoint as BifurcationPoint, bifurcation as bifurcation
+from ._search import (
+    Stretch as Stretch,
+    SynchronousOrbits as SynchronousOrbits,
+    synchronous_orbits as synchronous_orbits,
+)
+from ._sensitivity import (
+    Sensitivity as Sensitivity,
+    sensitivities as sensitivities,
+    sensitivity as sensitivity,
+    width as width,
+)

@@ -157,8 +157,8 @@ def follow(
 
     - `curves`, `given`, `own_given`: as for `correct`.
     - `start`: first points, the lanes first.
-    - `inside`: tells for unknowns, the lanes first, whether they are within the range; a curve ends with its first point
-        outside.
+    - `inside`: tells for unknowns, the lanes first, whether they are within the range; a curve ends with its
+        first point outside.
     - `stop`: called with a lane and its points after each step.
     - `update`: new curves from the last points of the lanes given, e.g. with fresh borders.
 

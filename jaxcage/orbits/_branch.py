@@ -197,7 +197,10 @@ def make_follower(
 
 
 def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> tuple[Any, Corrected]:
-    """Orbits near (state, value of the parameter), the parameter kept. **Returns:** equations and points, lanes first."""
+    """Orbits near (state, value of the parameter), the parameter kept.
+
+    **Returns:** equations and points, the lanes first.
+    """
     lanes, free = len(starts), follower.problem.free_speed
     curves = stack(BranchEquations(follower.problem, frame), lanes)
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
@@ -212,37 +215,53 @@ def turned(points: Corrected, sign: Any) -> Corrected:
 
 
 def follow_both_ways(follower: Follower, starts: Sequence[Start], periods: int, steps: Steps) -> list[Branch | None]:
-    """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one."""
+    """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one.
+
+    A lane that comes upon what another has followed ends there: one branch may come in two parts.
+    """
     frame = follower.frame(jnp.asarray(starts[0][0]), starts[0][1], periods)
     curves, first = seeds(follower, frame, starts)
     count = len(starts)
     lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
     taken = ~first.converged
+    walked: dict[int, list[Corrected]] = {}
 
     def stop(lane: int, points: list[Corrected]) -> bool:
+        walked[lane] = points
         own = lane % count
+        step = points[-2].u, points[-1].u
+        if taken[own]:
+            return True
         for other in range(own + 1, count):
-            taken[other] |= passes(points[-2].u, points[-1].u, first.u[other])
-        return bool(taken[own])
+            taken[other] |= passes(*step, first.u[other][None])
+        others = [p.u for k, row in walked.items() if k % count != own and not taken[k % count] for p in row]
+        return bool(others) and passes(*step, np.stack(others))
 
     both = turned(take(first, lanes), sign)
     traces = follow(take(curves, lanes), follower.given, both, steps=steps, inside=follower.inside, stop=stop)
     kept = [i for i in range(count) if not taken[i]]
-    found = describe(follower, frame, [_joined(traces[i], traces[i + count]) for i in kept])
+    found = describe(follower, frame, [_joined(follower, traces[i], traces[i + count]) for i in kept])
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
 
 
-def passes(u: np.ndarray, v: np.ndarray, point: np.ndarray) -> bool:
-    """Whether the step from u to v goes through `point`, to the accuracy of the chord."""
+def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
+    """Whether the step from u to v goes through one of `points`, to the accuracy of the chord."""
     step = v - u
-    share = np.dot(point - u, step) / np.dot(step, step)
-    return bool(-0.1 <= share <= 1.1 and np.linalg.norm(u + share * step - point) < 0.2 * np.linalg.norm(step))
+    share = (points - u) @ step / np.dot(step, step)
+    off = np.linalg.norm(u + share[:, None] * step - points, axis=1)
+    return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
 
 
-def _joined(up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
-    """Both directions as one row of points; a closed curve was gone round twice, and is taken once."""
+def _joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
+    """Both directions as one row of points.
+
+    A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
+    """
     if up.ended == "closed":
-        return up.points, (up.ended, up.ended)
+        stable = is_stable(eigenvalues(follower.monodromy(up.points)), follower.problem.free_speed)
+        count = stable.size
+        order = (np.arange(count + 1) + int(np.argmin(stable))) % count
+        return take(up.points, order), (up.ended, up.ended)
     back = turned(take(down.points, np.arange(len(down.points.u) - 1, 0, -1)), -1.0)
     points = jax.tree.map(lambda a, b: np.concatenate([a, b]), back, up.points)
     return points, (down.ended, up.ended)

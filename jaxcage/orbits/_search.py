@@ -7,6 +7,7 @@ bifurcations, are what the synchronous-loss edges are about.
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -47,6 +48,10 @@ class Stretch:
     lower_rpm: float
     upper_rpm: float
     branch: int
+    met: int = 0
+    """How many simulations settled on it."""
+    met_first: int = 0
+    """How many of those from the system's conventional start, the first of its starts, did."""
 
     @property
     def width_rpm(self) -> float:
@@ -55,7 +60,7 @@ class Stretch:
 
     def __str__(self) -> str:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
-        return f"{end(self.lower, self.lower_rpm)} to {end(self.upper, self.upper_rpm)} rpm"
+        return f"{end(self.lower, self.lower_rpm)} to {end(self.upper, self.upper_rpm)} rpm, {self.met} settled"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,13 +80,12 @@ class SynchronousOrbits:
     @property
     def edges(self) -> tuple[SpecialPoint, ...]:
         """Bifurcations at which a stable synchronous orbit ends, by speed."""
-        ends = [p for s in self.stretches for p in (s.lower, s.upper) if p is not None]
-        return tuple(sorted(ends, key=lambda p: p.value))
+        return _distinct([p for s in self.stretches for p in (s.lower, s.upper) if p is not None])
 
     @property
     def points(self) -> tuple[SpecialPoint, ...]:
         """All bifurcations on all branches, by speed."""
-        return tuple(sorted((p for b in self.branches for p in b.special), key=lambda p: p.value))
+        return _distinct([p for b in self.branches for p in b.special])
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
         """Orbits at `speed` [rad/s]: branch, whether stable, state [SI], multipliers; to the accuracy of the steps."""
@@ -104,8 +108,24 @@ def crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.n
     return found
 
 
-def stable_stretches(branch: Branch, number: int) -> list[Stretch]:
-    """The stable parts of a branch over speed."""
+class _Piece(NamedTuple):
+    """A stable part of one branch, its points by rising speed."""
+
+    stretch: Stretch
+    rpm: np.ndarray
+    state: np.ndarray
+
+    def state_at(self, rpm: float) -> np.ndarray:
+        return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
+
+    def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
+        """Whether the orbit `state` at `rpm` lies on this piece."""
+        inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
+        return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
+
+
+def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
+    """The stable parts of a branch over speed, cut to the limits [rpm]."""
     found = []
     edges = {p.index: p for p in branch.special if p.edge}
     change = np.flatnonzero(np.diff(branch.stable.astype(int)))
@@ -113,11 +133,49 @@ def stable_stretches(branch: Branch, number: int) -> list[Stretch]:
     for first, last in zip(bounds[:-1], bounds[1:], strict=True):
         if last <= first or not branch.stable[last]:
             continue
-        ends = [(edges.get(first), branch.speed_rpm[first + 1]), (edges.get(last), branch.speed_rpm[last])]
-        placed = sorted(((rpm if p is None else p.speed_rpm, p) for p, rpm in ends), key=lambda e: float(e[0]))
-        (low, p), (high, q) = placed
-        found.append(Stretch(p, q, float(low), float(high), number))
+        points = [edges.get(first), edges.get(last)]
+        rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
+        if rpm[0] > rpm[-1]:
+            points, rpm, state = points[::-1], rpm[::-1], state[::-1]
+        low, high = (float(r) if p is None else p.speed_rpm for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
+        stretch = Stretch(*points, max(low, limits[0]), min(high, limits[1]), number)
+        found.append(_Piece(stretch, rpm, state))
     return found
+
+
+def _merged(pieces: Sequence[_Piece], scale: Callable[[float], np.ndarray]) -> list[_Piece]:
+    """Pieces of the same orbits, met on two branches that were followed from different starts, made one."""
+    whole: list[_Piece] = []
+    for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
+        for i, other in enumerate(whole):
+            a, b = other.stretch, piece.stretch
+            shared = min(a.upper_rpm, b.upper_rpm)
+            rpm = (b.lower_rpm + shared) / 2
+            if b.lower_rpm <= shared and other.holds(rpm, piece.state_at(rpm), scale(rpm)):
+                beyond = piece.rpm > other.rpm[-1]
+                top = b if b.upper_rpm > a.upper_rpm else a
+                joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
+                rows = (
+                    np.concatenate([other.rpm, piece.rpm[beyond]]),
+                    np.concatenate([other.state, piece.state[beyond]]),
+                )
+                whole[i] = _Piece(joined, *rows)
+                break
+        else:
+            whole.append(piece)
+    return whole
+
+
+def _distinct(points: Sequence[SpecialPoint]) -> tuple[SpecialPoint, ...]:
+    """Points by speed, those met twice taken once."""
+    kept: list[SpecialPoint] = []
+    for p in sorted(points, key=lambda p: p.value):
+        same = lambda q: (
+            q.kind == p.kind and abs(q.value - p.value) < 1e-6 * p.value and np.allclose(q.state, p.state, 1e-3)
+        )
+        if not any(same(q) for q in kept[-6:]):
+            kept.append(p)
+    return tuple(kept)
 
 
 def synchronous_orbits(
@@ -127,7 +185,7 @@ def synchronous_orbits(
     *,
     count: int = 101,
     discard: int = 250,
-    steps: Steps = Steps(most=600),
+    steps: Steps = Steps(most=1500),
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> SynchronousOrbits:
@@ -152,7 +210,7 @@ def synchronous_orbits(
         progress=lambda done, of: say("simulations", done, of),
     )
     follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
-    waiting = _stable_orbits(follower, settled)
+    orbits = waiting = _stable_orbits(follower, settled)
     branches: list[Branch] = []
     for turn in range(ROUNDS):
         if not waiting:
@@ -161,20 +219,27 @@ def synchronous_orbits(
         branches += [b for b in follow_both_ways(follower, _spread(waiting, ROUND), 1, steps) if b is not None]
         waiting = [w for w in waiting if not any(_covers(follower, b, w) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
-    stretches = [s for i, b in enumerate(branches) for s in stable_stretches(b, i)]
-    return SynchronousOrbits(
-        tuple(branches),
-        tuple(sorted(stretches, key=lambda s: s.lower_rpm)),
-        settled,
-        len(waiting),
-        lower * 30 / np.pi,
-        upper * 30 / np.pi,
-    )
+    limits = lower * 30 / np.pi, upper * 30 / np.pi
+    scale = lambda rpm: _scale(follower, rpm * np.pi / 30)
+    pieces = _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale)
+    stretches = []
+    for piece in pieces:
+        met = [o.start for o in orbits if piece.holds(o.speed * 30 / np.pi, o.state, _scale(follower, o.speed))]
+        stretches.append(dataclasses.replace(piece.stretch, met=len(met), met_first=met.count(0)))
+    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
 
 
-def _stable_orbits(follower: Follower, settled: Sweep) -> list[Start]:
+class _Settled(NamedTuple):
+    """A stable orbit that a simulation led to."""
+
+    state: np.ndarray
+    speed: float
+    start: int
+
+
+def _stable_orbits(follower: Follower, settled: Sweep) -> list[_Settled]:
     """Stable orbits on which simulations settled, by speed, corrected by Newton's method."""
-    lanes = zip(*np.nonzero(settled.label == "periodic-1"), strict=True)
+    lanes = np.argwhere(settled.label == "periodic-1").tolist()
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
@@ -183,18 +248,21 @@ def _stable_orbits(follower: Follower, settled: Sweep) -> list[Start]:
     good = points.converged.copy()
     good[good] = is_stable(eigenvalues(follower.monodromy(take(points, good))), follower.problem.free_speed)
     states = points.u[:, :-1] * np.asarray(frame.scale)
-    return [(states[i], met[i][1]) for i in np.flatnonzero(good)]
+    return [_Settled(states[i], met[i][1], lanes[i][1]) for i in np.flatnonzero(good)]
 
 
-def _spread(starts: Sequence[Start], most: int) -> list[Start]:
-    """At most `most` of the starts, spread over them."""
-    picked = np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(int))
-    return [starts[i] for i in picked]
+def _spread(orbits: Sequence[_Settled], most: int) -> list[Start]:
+    """At most `most` of the orbits, spread over them."""
+    picked = np.unique(np.linspace(0, len(orbits) - 1, min(most, len(orbits))).round().astype(int))
+    return [(orbits[i].state, orbits[i].speed) for i in picked]
 
 
-def _covers(follower: Follower, branch: Branch, start: Start) -> bool:
+def _covers(follower: Follower, branch: Branch, orbit: _Settled) -> bool:
     """Whether an orbit lies on a branch."""
-    state, speed = start
-    scale = np.array([float(c) for c in follower.given.system.scale(speed)])
-    apart = (np.max(np.abs(s - state) / scale) for _, s, _ in crossings(branch, speed))
+    scale = _scale(follower, orbit.speed)
+    apart = (np.max(np.abs(s - orbit.state) / scale) for _, s, _ in crossings(branch, orbit.speed))
     return any(a < ON_BRANCH for a in apart)
+
+
+def _scale(follower: Follower, speed: float) -> np.ndarray:
+    return np.array([float(c) for c in follower.given.system.scale(speed)])

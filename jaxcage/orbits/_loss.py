@@ -1,0 +1,128 @@
+"""Synchronous-loss zones: the speeds between the stable stretches of the synchronous orbit, with exact edges.
+
+Several synchronous orbits coexist at many speeds, so what a zone is needs a rule. The **principal** stretch is the one
+on which most simulations from the conventional start (a cage: at rest on the rib) settled; stretches of its own branch that overlap it or follow within a window that is closed
+belong to it. Other stretches count where they do not overlap it; those that do are coexisting orbits, which a cage
+meets only from other starts. Zones are what is left between, windows and stretches narrower than a stated width closed
+as for chaotic zones.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..analysis import CLOSE_BELOW_RPM, Edge, Zone
+from ._branch import SpecialPoint
+from ._search import Stretch, SynchronousOrbits
+
+
+LOCATED_RPM = 1e-3
+"""Uncertainty given to located edges: they are exact for the equations as integrated, whose error is of this order."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LossZones:
+    """Synchronous-loss zones of a speed range."""
+
+    zones: tuple[Zone, ...]
+    """Ascending; an edge is None where the zone runs past the range."""
+    edges: dict[str, SpecialPoint]
+    """Edges by name: `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ..."""
+    coexisting: dict[str, list[Any]]
+    """Orbits at each edge: branch, whether stable, state [SI], multipliers."""
+    principal: Stretch | None
+    """The stretch on which most simulations from the conventional start settled."""
+    close_below_rpm: float
+
+
+@dataclasses.dataclass(frozen=True)
+class _Group:
+    """Stretches taken as one."""
+
+    stretches: tuple[Stretch, ...]
+
+    @property
+    def low(self) -> Stretch:
+        return min(self.stretches, key=lambda s: s.lower_rpm)
+
+    @property
+    def high(self) -> Stretch:
+        return max(self.stretches, key=lambda s: s.upper_rpm)
+
+    def apart(self, other: "_Group") -> float:
+        """Width of the gap between two groups [rpm], negative where they overlap."""
+        return max(
+            other.low.lower_rpm - self.high.upper_rpm,
+            self.low.lower_rpm - other.high.upper_rpm,
+        )
+
+    @property
+    def width(self) -> float:
+        return self.high.upper_rpm - self.low.lower_rpm
+
+
+def _grown(seed: _Group, others: Sequence[Stretch], close: float) -> _Group:
+    """The group with all stretches that overlap it or lie within a closed window, again and again."""
+    group, left = seed, [s for s in others if s not in seed.stretches]
+    while near := [s for s in left if group.apart(_Group((s,))) < close]:
+        group = _Group((*group.stretches, *near))
+        left = [s for s in left if s not in near]
+    return group
+
+
+def loss_zones(found: SynchronousOrbits, close_below_rpm: float = CLOSE_BELOW_RPM) -> LossZones:
+    """Zones in which the synchronous orbit is lost, from the stable stretches that were found.
+
+    **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm].
+
+    **Returns:** `LossZones`. Without any stretch there is no zone: nothing is known of the orbit.
+    """
+    if not found.stretches:
+        return LossZones((), {}, {}, None, close_below_rpm)
+    principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))
+    own = [s for s in found.stretches if s.branch == principal.branch]
+    groups = [_grown(_Group((principal,)), own, close_below_rpm)]
+    left = [s for s in found.stretches if groups[0].apart(_Group((s,))) >= 0]
+    while left:
+        group = _grown(_Group((left[0],)), left, close_below_rpm)
+        left = [s for s in left if s not in group.stretches]
+        gap = groups[0].apart(group)
+        if gap < close_below_rpm:
+            groups[0] = _Group((*groups[0].stretches, *group.stretches))
+        elif group.width >= close_below_rpm:
+            groups.append(group)
+    groups.sort(key=lambda g: g.low.lower_rpm)
+    return _between(found, groups, principal, close_below_rpm)
+
+
+def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch, close: float) -> LossZones:
+    tops = [None, *(g.high for g in groups)]
+    bottoms = [*(g.low for g in groups), None]
+    zones: list[Zone] = []
+    edges: dict[str, SpecialPoint] = {}
+    for before, after in zip(tops, bottoms, strict=True):
+        onset = None if before is None else before.upper
+        leaves = None if after is None else after.lower
+        open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close
+        open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close
+        if open_below or open_above or (before is not None and onset is None):
+            continue
+        zones.append(Zone("synchronous-loss", _edge(onset), _edge(leaves), _share(found, onset, leaves)))
+        for name, point in (("onset", onset), ("exit", leaves)):
+            if point is not None:
+                edges[f"zone {len(zones)} {name}"] = point
+    coexisting = {name: found.coexisting(p.speed) for name, p in edges.items()}
+    return LossZones(tuple(zones), edges, coexisting, principal, close)
+
+
+def _share(found: SynchronousOrbits, onset: SpecialPoint | None, leaves: SpecialPoint | None) -> float:
+    """Share of the simulations inside a zone that did not settle on a synchronous orbit; NaN if there are none."""
+    rpm = found.sweep.rpm
+    inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
+    return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
+
+
+def _edge(point: SpecialPoint | None) -> Edge | None:
+    return None if point is None else Edge(point.speed_rpm, LOCATED_RPM, "synchronous-loss", point.kind)

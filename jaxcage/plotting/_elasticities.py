@@ -1,0 +1,88 @@
+"""How edges answer to the design: elasticities as bars."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..orbits import Sensitivity
+from ._style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new
+
+
+FIRST = ("guidance_gap", "eccentricity")
+"""The two quantities a designer asks for are always on top."""
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+
+
+def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None, most: int = 12) -> Axes:
+    """Elasticities of edges, or of widths, with respect to the parameters that move any of them most.
+
+    Guidance gap and eccentricity are on top; the others follow by their largest elasticity. Bars of a sensitivity that
+    is not to be trusted are hatched.
+
+    **Arguments:** sensitivities, one colour each; axes; number of parameters.
+
+    **Raises:** `ValueError` if there is no sensitivity.
+    """
+    if not sensitivities:
+        raise ValueError("Argument `sensitivities` must hold at least one sensitivity, but it is empty.")
+    names = _largest(sensitivities, most)
+    count = len(sensitivities)
+    ax = axes_or_new(ax, 9.0, 1.3 + len(names) * (0.16 + 0.19 * count))
+    thick = 0.8 / count
+    for i, s in enumerate(sensitivities):
+        value = np.array([s.elasticity.get(name, np.nan) for name in names])
+        place = np.arange(len(names)) + (i - (count - 1) / 2) * thick
+        note = "" if s.trusted else ", not trusted"
+        style = {"color": _COLOURS[i % len(_COLOURS)], "alpha": 1.0 if s.trusted else 0.45}
+        label = f"{s.name} ({s.value_rpm:.0f} rpm{note})"
+        hatch = None if s.trusted else "///"
+        ax.barh(place, value, height=0.9 * thick, **style, hatch=hatch, edgecolor="white", linewidth=0, label=label)
+        _write_values(ax, place, value)
+    ax.axvline(0, color=BLACK, linewidth=0.8)
+    ax.set_yticks(np.arange(len(names)), [readable(name) for name in names])
+    ax.tick_params(axis="y", length=0)
+    ax.grid(False, axis="y")
+    ax.set(ylim=(len(names) - 0.5, -0.5), xlim=_room_for_text(sensitivities, names))
+    ax.set_xlabel("Elasticity: relative change of the speed over relative change of the parameter")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(count, 4), frameon=False, fontsize=9)
+    return ax
+
+
+def readable(name: str) -> str:
+    """A parameter's name as words."""
+    return name.replace(".", " ").replace("_", " ")
+
+
+def _largest(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
+    """Names of the parameters, in order from the top."""
+    largest: dict[str, float] = {}
+    for s in sensitivities:
+        for name, value in s.elasticity.items():
+            largest[name] = max(largest.get(name, 0.0), abs(value) if np.isfinite(value) else 0.0)
+    first = [name for name in FIRST if name in largest]
+    rest = sorted((n for n in largest if n not in FIRST and largest[n] > 0), key=lambda n: -largest[n])
+    return [*first, *rest][:most]
+
+
+def _write_values(ax: Axes, place: np.ndarray, value: np.ndarray) -> None:
+    for y, v in zip(place, value, strict=True):
+        if np.isfinite(v):
+            side = {"ha": "left", "xytext": (3, 0)} if v >= 0 else {"ha": "right", "xytext": (-3, 0)}
+            style = {"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": BLACK}
+            ax.annotate(_number(v), (v, y), **side, **style)
+
+
+def _number(value: float) -> str:
+    """Two decimals, more digits for what would vanish."""
+    if value == 0:
+        return "0"
+    text = f"{value:+.2f}" if abs(value) >= 0.095 else f"{value:+.1g}"
+    return text.replace("-", "−")
+
+
+def _room_for_text(sensitivities: Sequence[Sensitivity], names: Sequence[str]) -> tuple[float, float]:
+    values = np.array([s.elasticity.get(n, 0.0) for s in sensitivities for n in names] + [0.0])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    room = 0.12 * (high - low) or 1.0
+    return (low - room if low < 0 else -0.2 * room), (high + room if high > 0 else 0.2 * room)

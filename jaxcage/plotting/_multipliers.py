@@ -1,0 +1,92 @@
+"""Floquet multipliers in the complex plane."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Complex
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+from .._glossary import quantity
+from ..orbits import Branch, SpecialPoint
+from ._branches import mark_of, move_apart
+from ._style import BLACK, BLUE, GREY, axes_or_new
+
+
+REACH = 1.6
+"""The figure ends at this real and imaginary part: what matters happens on the unit circle."""
+_ROWS = 9
+_LABEL_SIZE = 7.5
+
+
+def multiplier_circle(branch: Branch | Complex[np.ndarray, "*points dim"], ax: Axes | None = None) -> Axes:
+    """Multipliers along a branch, coloured by speed, with the unit circle; critical multipliers of its bifurcations are
+    marked and named with their speed [rpm], filled where a stable orbit is on one side.
+
+    **Arguments:** branch, or multipliers alone; axes. Multipliers beyond 1.6 are not shown.
+    """
+    ax = axes_or_new(ax, 7.0, 5.6)
+    ax.add_patch(Circle((0, 0), 1.0, fill=False, color=BLACK, linewidth=1.0, zorder=2))
+    for line in (ax.axhline, ax.axvline):
+        line(0, color=GREY, linewidth=0.6, zorder=1)
+    if isinstance(branch, Branch):
+        mu = branch.multipliers
+        speed = np.repeat(branch.speed_rpm, mu.shape[1])
+        shown = _shown(mu)
+        cloud = ax.scatter(mu.real[shown], mu.imag[shown], c=speed[shown.ravel()], s=7, cmap="viridis", linewidths=0)
+        cloud.set(clim=(float(speed.min()), float(speed.max())), zorder=3)
+        ax.figure.colorbar(cloud, ax=ax, label=quantity("speed_rpm").label, pad=0.02, format="{x:.0f}")
+        _mark_critical(ax, branch.special)
+    else:
+        mu = branch[_shown(branch)]
+        ax.plot(mu.real, mu.imag, "o", color=BLUE, markersize=4, zorder=3, label="multipliers")
+    limits = (-REACH, REACH)
+    ax.set(xlim=limits, ylim=limits, aspect="equal")
+    ax.set(xlabel=r"Real part of the multiplier $\mu$", ylabel=r"Imaginary part of the multiplier $\mu$")
+    return ax
+
+
+def _shown(mu: np.ndarray) -> np.ndarray:
+    return (np.abs(mu.real) <= REACH) & (np.abs(mu.imag) <= REACH)
+
+
+def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
+    seen = set()
+    for p in sorted(points, key=lambda p: p.edge):
+        mark, mu = mark_of(p.kind), p.critical
+        label = None if p.kind in seen else p.kind.replace("-p", " p") + f" ({mark.short})"
+        seen.add(p.kind)
+        size, face = (6.0, mark.colour) if p.edge else (4.5, "white")
+        both = (mu, mu.conjugate()) if p.kind == "torus" else (complex(mu.real, 0.0),)
+        style = {"marker": mark.marker, "linestyle": "none", "color": mark.colour, "markerfacecolor": face}
+        ax.plot([m.real for m in both], [m.imag for m in both], **style, markersize=size, zorder=5, label=label)
+    _write_column(ax, [p for p in points if p.critical.real < 0 and p.kind != "torus"], -1)
+    _write_column(ax, [p for p in points if p.critical.real > 0 and p.kind != "torus"], 1)
+    _write_around(ax, [p for p in points if p.kind == "torus"])
+    if seen:
+        ax.legend(loc="upper left", frameon=False, fontsize=8, handletextpad=0.2, borderaxespad=0.2)
+
+
+def _text(point: SpecialPoint) -> str:
+    return f"{mark_of(point.kind).short} {point.speed_rpm:.0f}"
+
+
+def _write_column(ax: Axes, points: Sequence[SpecialPoint], side: int) -> None:
+    """Points with a real multiplier, all at the same place, one beneath the other; edges are the first to be named."""
+    points = sorted(points, key=lambda p: (not p.edge, p.speed_rpm))
+    rows = [_text(p) for p in points[:_ROWS]] + ([f"+ {len(points) - _ROWS} more"] if len(points) > _ROWS else [])
+    if rows:
+        style = {"ha": "right" if side < 0 else "left", "va": "top", "fontsize": _LABEL_SIZE, "linespacing": 1.25}
+        ax.text(side * 1.09, -0.06, "\n".join(rows), color=mark_of(points[0].kind).colour, **style, zorder=6)
+
+
+def _write_around(ax: Axes, points: Sequence[SpecialPoint]) -> None:
+    """Points with complex multipliers, outside the circle at their angle, moved apart."""
+    points = sorted(points, key=lambda p: np.angle(p.critical))
+    angle = move_apart(np.array([np.angle(p.critical) for p in points]), 0.1, 0.1, np.pi - 0.1)
+    for p, a in zip(points, angle, strict=True):
+        place = (1.12 * np.cos(a), 1.12 * np.sin(a))
+        side = "center" if abs(np.cos(a)) < 0.2 else "right" if np.cos(a) < 0 else "left"
+        style = {"ha": side, "va": "center", "fontsize": _LABEL_SIZE, "color": mark_of(p.kind).colour}
+        line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+        ax.annotate(_text(p), (p.critical.real, p.critical.imag), place, **style, arrowprops=line, zorder=6)

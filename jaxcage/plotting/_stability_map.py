@@ -1,0 +1,163 @@
+"""Bifurcation curves in the plane of speed and a parameter, over the largest exponent."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
+from matplotlib.transforms import Bbox
+
+from .._glossary import quantity
+from ._branches import mark_of
+from ._elasticities import readable
+from ._orbit_diagram import label_speed
+from ._style import BLACK, axes_or_new, padded_limits
+
+
+if TYPE_CHECKING:
+    from ..orbits import Curve
+else:
+    Curve = Any
+
+Exponents = tuple[
+    Float[np.ndarray, " speeds"],
+    Float[np.ndarray, " values"],
+    Float[np.ndarray, "speeds values"],
+]
+"""Speeds [rpm], values of the parameter [SI], largest exponent per revolution at each (NaN: unknown)."""
+STEEPEST = 0.3
+"""The colours end at this exponent: what lies beyond looks like it."""
+_HALO = [withStroke(linewidth=2.6, foreground="white")]
+_CORNERS = [(dx, dy) for far in (1, 2, 3.5) for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1)) for dx, dy in [(far * dx, far * dy)]]
+
+
+def stability_map(
+    curves: Sequence[Curve],
+    ax: Axes | None = None,
+    *,
+    exponents: Exponents | None = None,
+    y_unit: str = "",
+    y_factor: float = 1.0,
+    y_label: str | None = None,
+) -> Axes:
+    """Curves of bifurcations over speed, coloured by kind, with the points of codimension two on them named.
+
+    **Arguments:** curves whose `x` is the speed; axes; largest exponents, drawn beneath with white at zero; unit in
+    which the parameter is shown and its factor from SI, e.g. `"mm"` and `1e3`; what to call the parameter.
+
+    **Raises:** `ValueError` if a curve is not over speed, or two have different parameters.
+    """
+    others = {c.y for c in curves}
+    if any(c.x != "speed" for c in curves) or len(others) > 1:
+        given = ", ".join(sorted({f"{c.y} over {c.x}" for c in curves}))
+        raise ValueError(f"Argument `curves` must all be of one parameter over speed, but {given} was given.")
+    ax = axes_or_new(ax, 9.0, 5.0)
+    if exponents is not None:
+        _colour_exponents(ax, exponents, y_factor)
+    rpm = quantity("speed").factor
+    lines = [(np.asarray(c.x_value) * rpm, np.asarray(c.y_value) * y_factor) for c in curves]
+    seen = set()
+    for c, (x, y) in zip(curves, lines, strict=True):
+        label = None if c.kind in seen else c.kind
+        seen.add(c.kind)
+        halo = [withStroke(linewidth=3.6, foreground="white")]
+        ax.plot(x, y, color=mark_of(c.kind).colour, linewidth=2.0, label=label, path_effects=halo, zorder=3)
+    _fit(ax, lines, exponents, y_factor)
+    name = y_label if y_label is not None else readable("".join(others)).capitalize()
+    ax.set_ylabel(f"{name} [{y_unit}]" if y_unit else name)
+    label_speed(ax)
+    if seen:
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=9)
+    _name_points(ax, [(p.x_value * rpm, p.y_value * y_factor, p.kind) for c in curves for p in c.special], lines)
+    return ax
+
+
+def _colour_exponents(ax: Axes, exponents: Exponents, factor: float) -> None:
+    rpm, values, largest = exponents
+    ax.grid(False)
+    shown = np.ma.masked_invalid(largest).T
+    style = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "shading": "nearest", "rasterized": True}
+    mesh = ax.pcolormesh(rpm, np.asarray(values) * factor, shown, **style, alpha=0.75, zorder=0)
+    label = quantity("largest_exponent").label
+    ax.figure.colorbar(mesh, ax=ax, label=label, pad=0.01, extend="both")
+
+
+def _fit(ax: Axes, lines: Sequence[tuple[np.ndarray, np.ndarray]], exponents: Exponents | None, factor: float) -> None:
+    """The map's own limits, or those of the curves if there is no map."""
+    if exponents is None:
+        across, upward = (np.concatenate([line[i] for line in lines] or [np.zeros(0)]) for i in (0, 1))
+        ax.set(xlim=padded_limits(across), ylim=padded_limits(upward))
+        return
+    for values, limit in ((exponents[0], ax.set_xlim), (np.asarray(exponents[1]) * factor, ax.set_ylim)):
+        first, last = (1.5 * values[i] - 0.5 * values[j] for i, j in ((0, 1), (-1, -2)))
+        limit(float(min(first, last)), float(max(first, last)))
+
+
+def _name_points(
+    ax: Axes, points: Sequence[tuple[float, float, str]], lines: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> None:
+    """Mark points inside the axes and write their kind where it hides least; curves that meet share a point."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    near = lambda a, b: abs(a[0] - b[0]) < 5e-3 * (right - left) and abs(a[1] - b[1]) < 5e-3 * (top - bottom)
+    kept: list[tuple[float, float, str]] = []
+    for p in points:
+        inside = left <= p[0] <= right and bottom <= p[1] <= top
+        if inside and not any(p[2] == q[2] and near(p, q) for q in kept):
+            kept.append(p)
+    if not kept:
+        return
+    style = {"marker": "o", "linestyle": "none", "color": BLACK, "markerfacecolor": "white", "markersize": 6}
+    ax.plot([p[0] for p in kept], [p[1] for p in kept], **style, zorder=5, label="_codimension two")
+    scale = 72 / ax.figure.dpi
+    pixels = lambda x, y: ax.transData.transform(np.column_stack([x, y])) * scale
+    hidden = np.concatenate([_dense(pixels(x, y)) for x, y in lines] + [np.repeat(pixels(*zip(*[p[:2] for p in kept], strict=True)), 9, axis=0)])
+    frame = ax.get_window_extent()
+    frame = Bbox(frame.get_points() * scale)
+    taken: list[Bbox] = []
+    for x, y, text in kept:
+        (at,) = pixels([x], [y])
+        boxes = [_box(at, corner, text) for corner in _CORNERS]
+        cost = [_cost(box, taken, hidden, frame) for box in boxes]
+        best = int(np.argmin(cost))
+        taken.append(boxes[best])
+        dx, dy = _offset(_CORNERS[best])
+        line = {"arrowstyle": "-", "color": BLACK, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3}
+        ax.annotate(
+            text,
+            (x, y),
+            (dx, dy),
+            textcoords="offset points",
+            ha="left" if dx > 0 else "right",
+            va="bottom" if dy > 0 else "top",
+            fontsize=8.5,
+            arrowprops=line | {"relpos": (0.0 if dx > 0 else 1.0, 0.0 if dy > 0 else 1.0)},
+            path_effects=_HALO,
+            zorder=6,
+        )
+
+
+def _offset(corner: tuple[float, float]) -> tuple[float, float]:
+    return 9.0 * corner[0], 7.0 * corner[1]
+
+
+def _box(at: np.ndarray, corner: tuple[float, float], text: str) -> Bbox:
+    """Where a text would be [points], about."""
+    dx, dy = _offset(corner)
+    width, height = 0.58 * 8.5 * len(text), 1.3 * 8.5
+    x, y = at[0] + dx, at[1] + dy
+    return Bbox.from_extents(min(x, x + np.sign(dx) * width), min(y, y + np.sign(dy) * height), max(x, x + np.sign(dx) * width), max(y, y + np.sign(dy) * height))
+
+
+def _dense(points: np.ndarray) -> np.ndarray:
+    """Points along a polyline about every 4 points of length."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    along = np.arange(0.0, max(min(length[-1], 4e4), 1.0), 4.0)
+    return np.column_stack([np.interp(along, length, points[:, i]) for i in (0, 1)])
+
+
+def _cost(box: Bbox, taken: Sequence[Bbox], hidden: np.ndarray, frame: Bbox) -> float:
+    """How much a text at `box` would hide: other texts, curves, or the frame."""
+    outside = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
+    return 1e4 * outside + 1e3 * box.count_overlaps(list(taken)) + int(box.padded(1.0).count_contains(hidden))
