@@ -44,6 +44,13 @@ def progress(text: str) -> Iterator[Callable[[int, int], None] | None]:
     """Around a computation: a bar that is called with lanes done and lanes in all; None where
     standard error is not a terminal.
     """
+    with progress_in_stages(text) as bar:
+        yield None if bar is None else lambda done, total: bar("", done, total)
+
+
+@contextlib.contextmanager
+def progress_in_stages(text: str) -> Iterator[Callable[[str, int, int], None] | None]:
+    """As `progress`, but the bar is first told what the computation is at."""
     global _computing
     _computing = True
     try:
@@ -54,7 +61,7 @@ def progress(text: str) -> Iterator[Callable[[int, int], None] | None]:
 
 
 @contextlib.contextmanager
-def _bar(text: str) -> Iterator[Callable[[int, int], None] | None]:
+def _bar(text: str) -> Iterator[Callable[[str, int, int], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
@@ -71,4 +78,5 @@ def _bar(text: str) -> Iterator[Callable[[int, int], None] | None]:
     columns = (text_column, BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(text, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        at = lambda what: f"{text}, {what}" if what else text
+        yield lambda what, done, total: bar.update(task, description=at(what), completed=done, total=total)

@@ -65,6 +65,58 @@ class ZonesOptions(SweepOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class SearchOptions(IntegrationOptions):
+    """How to search for synchronous orbits: simulations on a grid of speeds, then branches through all they met."""
+
+    first: float = 2500.0
+    """First cage speed [rpm]."""
+    last: float = 27500.0
+    """Last cage speed [rpm]."""
+    count: int = 101
+    """Speeds that are simulated, from three starts each."""
+    discard: int = 250
+    """Revolutions left out at the beginning."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BifurcationsOptions(SearchOptions):
+    """Synchronous orbits over speed: where they are stable, how they lose it, and the zones without one."""
+
+    implementation: ClassVar[str] = "_bifurcations"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GradientOptions(SearchOptions):
+    """Derivatives of the synchronous-loss edges, and of the width of zone 1, by every parameter."""
+
+    implementation: ClassVar[str] = "_gradient"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MapOptions(SearchOptions):
+    """Stability map: the edges followed in two parameters, over colours of the largest exponent."""
+
+    implementation: ClassVar[str] = "_map"
+
+    x: str = "speed"
+    """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
+    y: str = "guidance_gap"
+    """Parameter upwards, any of the model."""
+    lower: str | None = None
+    """Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out."""
+    upper: str | None = None
+    """Highest value of y; 1.25 of its value if left out."""
+    rows: int = 12
+    """Values of y at which the exponent is computed; with 0 it is left out."""
+    columns: int = 50
+    """Speeds at which the exponent is computed."""
+    revolutions: int = 100
+    """Revolutions over which the exponent is computed, a multiple of 10."""
+    starts: int = 1
+    """Starts of which the largest exponent is taken."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class PoincareOptions(IntegrationOptions):
     """Strobe section at one speed, from three starts."""
 
@@ -120,6 +172,9 @@ Command = (
     Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
     | Annotated[SweepOptions, tyro.conf.subcommand("sweep")]
     | Annotated[ZonesOptions, tyro.conf.subcommand("zones")]
+    | Annotated[BifurcationsOptions, tyro.conf.subcommand("bifurcations")]
+    | Annotated[GradientOptions, tyro.conf.subcommand("gradient")]
+    | Annotated[MapOptions, tyro.conf.subcommand("map")]
     | Annotated[PoincareOptions, tyro.conf.subcommand("poincare")]
     | Annotated[StaticsOptions, tyro.conf.subcommand("statics")]
     | Annotated[ImpactOptions, tyro.conf.subcommand("impact")]

@@ -11,6 +11,7 @@
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
 | `_point`       | bifurcation points                                                                 |
 | `_arclength`   | pseudo-arclength continuation of many curves at a time                             |
+| `_illinois`    | where a function along a curve vanishes                                            |
 | `_branch`      | branches of orbits with their bifurcations located                                 |
 | `_search`      | the synchronous orbits of a speed range, found without a hint                      |
 | `_loss`        | synchronous-loss zones and their edges                                             |
@@ -21,6 +22,8 @@
 
 from ._arclength import Steps as Steps
 from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as branch
+from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
+from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve
 from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from ._point import BifurcationPoint as BifurcationPoint, bifurcation as bifurcation

@@ -17,11 +17,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..sweeps import cores
-from ._implicit import AbstractEquations, solve
+from ._implicit import TOLERANCE, AbstractEquations, solve
 
 
-CHUNK = 8
-"""Lanes per call: one program for any number of curves."""
+CHUNK = 4
+"""Lanes per call: one program for any number of curves, and work for every core."""
+FOLLOWING = 1e-5
+"""Newton's last step while following, in the unknowns' units: points are then good to about its square."""
 CORRECTIONS = 8
 
 
@@ -52,8 +54,8 @@ class Corrected(NamedTuple):
     aux: Any
 
 
-def _correct(curve: AbstractEquations, given: Any, at: Array, normal: Array) -> Corrected:
-    u, found = solve(OnPlane(curve, at, normal), given, at, max_steps=CORRECTIONS)
+def _correct(curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array) -> Corrected:
+    u, found = solve(OnPlane(curve, at, normal), given, at, CORRECTIONS, tolerance)
     jacobian = found.newton.jacobian[:-1]
     whole = jnp.concatenate([jacobian, normal[None]])
     tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
@@ -63,8 +65,8 @@ def _correct(curve: AbstractEquations, given: Any, at: Array, normal: Array) -> 
 
 
 _axes = eqx.if_array(0)
-_correct_shared = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0)))
-_correct_own = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0)))
+_correct_shared = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None)))
+_correct_own = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None)))
 
 
 def take(tree: Any, lanes: np.ndarray) -> Any:
@@ -78,7 +80,12 @@ def stack(tree: Any, lanes: int) -> Any:
 
 
 def correct(
-    curves: AbstractEquations, given: Any, at: np.ndarray, normal: np.ndarray, own_given: bool = False
+    curves: AbstractEquations,
+    given: Any,
+    at: np.ndarray,
+    normal: np.ndarray,
+    own_given: bool = False,
+    tolerance: float = TOLERANCE,
 ) -> Corrected:
     """Points of many curves on planes across them.
 
@@ -91,7 +98,9 @@ def correct(
     def part(first: int) -> Corrected:
         chosen = np.minimum(np.arange(first, first + CHUNK), lanes - 1)
         mine = take(given, chosen) if own_given else given
-        got = run(take(curves, chosen), mine, jnp.asarray(at[chosen]), jnp.asarray(normal[chosen]))
+        got = run(
+            take(curves, chosen), mine, jnp.asarray(at[chosen]), jnp.asarray(normal[chosen]), jnp.asarray(tolerance)
+        )
         return jax.tree.map(lambda x: np.asarray(x)[: lanes - first], got)
 
     with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
@@ -174,7 +183,7 @@ def follow(
         u, tangent = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent"))
         mine = take(given, index) if own_given else given
         ahead = u + length[index, None] * tangent
-        got = correct(take(curves, index), mine, ahead, tangent, own_given)
+        got = correct(take(curves, index), mine, ahead, tangent, own_given, FOLLOWING)
         straight = np.sum(got.tangent * tangent, axis=1) > steps.turn
         near = np.linalg.norm(got.u - ahead, axis=1) < steps.bend * length[index]
         good = got.converged & straight & near

@@ -15,6 +15,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, method as make_method
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, correct, follow, stack, take
+from ._illinois import zeros
 from ._implicit import AbstractEquations
 from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._orbit import Period, guess_state, is_free
@@ -24,9 +25,6 @@ from ._singularity import matches, null_vectors, singular_matrix, test_functions
 
 Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
-LOCATE_STEPS = 40
-LOCATED = 1e-9
-"""Places of special points are refined until they move by less than this in the unknowns' units."""
 
 
 class BranchEquations(AbstractEquations):
@@ -311,43 +309,12 @@ def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
 
 
 def locate(follower: Follower, frame: Frame, wanted: Sequence[tuple[Corrected, int, str]]) -> list[Corrected | None]:
-    """The points at which the test functions vanish, by the Illinois method on planes across the chords."""
+    """The points at which the test functions of (points, index, kind) vanish; None where they could not be found."""
     if not wanted:
         return []
-    lanes = len(wanted)
-    curves = stack(BranchEquations(follower.problem, frame), lanes)
+    curves = stack(BranchEquations(follower.problem, frame), len(wanted))
     ends = [take(points, np.array([k, k + 1])) for points, k, _ in wanted]
-    u0, u1 = (np.stack([e.u[j] for e in ends]) for j in (0, 1))
-    value = lambda i, p: signals(follower, p)[wanted[i][2]]
-    f0, f1 = (np.array([value(i, e)[j] for i, e in enumerate(ends)]) for j in (0, 1))
-    chord = u1 - u0
-    length = np.linalg.norm(chord, axis=1)
-    normal = chord / length[:, None]
-    low, high = np.zeros(lanes), np.ones(lanes)
-    best: list[Corrected | None] = [None] * lanes
-    active, last = np.ones(lanes, dtype=bool), np.zeros(lanes)
-    for _ in range(LOCATE_STEPS):
-        share = np.clip((low * f1 - high * f0) / (f1 - f0), low + 1e-3 * (high - low), high - 1e-3 * (high - low))
-        index = np.flatnonzero(active)
-        if index.size == 0:
-            break
-        at = u0[index] + share[index, None] * chord[index]
-        got = correct(take(curves, index), follower.given, at, normal[index])
-        for k, i in enumerate(index):
-            if not got.converged[k]:
-                active[i] = False
-                continue
-            point = take(got, np.array(k))
-            f = float(value(i, take(got, np.array([k])))[0])
-            before, best[i] = best[i], point
-            if f * f1[i] < 0:  # the root is between here and the upper end
-                low[i], f0[i], f1[i] = share[i], f, f1[i] * (0.5 if before is not None and f * last[i] > 0 else 1.0)
-            else:
-                high[i], f1[i], f0[i] = share[i], f, f0[i] * (0.5 if before is not None and f * last[i] > 0 else 1.0)
-            last[i] = f
-            moved = np.inf if before is None else np.linalg.norm(point.u - before.u)
-            active[i] = f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
-    return best
+    return zeros(curves, follower.given, ends, lambda i, points: signals(follower, points)[wanted[i][2]])
 
 
 def _branch(

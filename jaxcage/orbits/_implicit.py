@@ -19,6 +19,7 @@ import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
+from .._types import Scalar
 from ._newton import DampedNewton, NewtonState
 from ._problem import frozen
 
@@ -44,13 +45,23 @@ class Found(eqx.Module):
     aux: Any
 
 
-def solve(equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40) -> Any:
+TOLERANCE = 1e-9
+"""Newton's last step is below this, in the unknowns' units; the error is of the order of its square."""
+
+
+def solve(
+    equations: AbstractEquations,
+    given: Any,
+    guess: Float[Array, " n"],
+    max_steps: int = 40,
+    tolerance: Scalar = TOLERANCE,
+) -> tuple[Float[Array, " n"], Found]:
     """Newton's method from `guess`. **Returns:** the root and `Found`."""
 
     def fn(u: Array, given: Any) -> tuple[Array, Any]:
         return equations.residual(u, equations.prepare(u, given))
 
-    solver = DampedNewton()
+    solver = DampedNewton(tolerance, tolerance)
     got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
     return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux)

@@ -1,10 +1,10 @@
 """Synchronous-loss zones: the speeds between the stable stretches of the synchronous orbit, with exact edges.
 
 Several synchronous orbits coexist at many speeds, so what a zone is needs a rule. The **principal** stretch is the one
-on which most simulations from the conventional start (a cage: at rest on the rib) settled; stretches of its own branch that overlap it or follow within a window that is closed
-belong to it. Other stretches count where they do not overlap it; those that do are coexisting orbits, which a cage
-meets only from other starts. Zones are what is left between, windows and stretches narrower than a stated width closed
-as for chaotic zones.
+on which most simulations from the conventional start (a cage: at rest on the rib) settled; stretches of its own branch
+that overlap it or follow within a window that is closed belong to it. Other stretches count where they do not overlap
+it; those that do are coexisting orbits, which a cage meets only from other starts. Zones are what is left between,
+windows and stretches narrower than a stated width closed as for chaotic zones.
 """
 
 import dataclasses

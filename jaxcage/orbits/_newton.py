@@ -34,8 +34,8 @@ class DampedNewton(optx.AbstractRootFinder):
     of the result is of the order of its square.
     """
 
-    rtol: float = 1e-9
-    atol: float = 1e-9
+    rtol: Any = 1e-9
+    atol: Any = 1e-9
     norm: Callable = optx.max_norm
     longest: float = 1.0
     """Longest step in any component."""

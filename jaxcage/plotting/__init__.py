@@ -10,8 +10,17 @@
 | `_impact`        | impact of a roller on a cage bar                                        |
 | `_statics`       | load of every roller                                                    |
 | `_waterfall`     | spectra over speed                                                      |
+| `_branches`      | branches of periodic orbits over speed, alone or over an orbit diagram  |
+| `_multipliers`   | Floquet multipliers in the complex plane                                |
+| `_elasticities`  | elasticities of edges as bars                                           |
+| `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
 """
 
+from ._branches import (
+    branch_diagram as branch_diagram,
+    orbit_diagram_with_branches as orbit_diagram_with_branches,
+)
+from ._elasticities import elasticity_bars as elasticity_bars
 from ._history import (
     force_history as force_history,
     orbit as orbit,
@@ -24,6 +33,7 @@ from ._marks import (
     published_edges as published_edges,
     shade_zones as shade_zones,
 )
+from ._multipliers import multiplier_circle as multiplier_circle
 from ._orbit_diagram import (
     exponent_strip as exponent_strip,
     orbit_diagram as orbit_diagram,
@@ -31,6 +41,7 @@ from ._orbit_diagram import (
     zoomed_diagram as zoomed_diagram,
 )
 from ._section import strobe_section as strobe_section
+from ._stability_map import stability_map as stability_map
 from ._statics import load_bars as load_bars
 from ._style import enlarge_dots as enlarge_dots, new_figure as new_figure
 from ._waterfall import waterfall_map as waterfall_map

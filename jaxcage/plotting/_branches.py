@@ -13,7 +13,20 @@ from .._glossary import component_names, quantity
 from ..analysis import Sweep
 from ..orbits import Branch, SpecialPoint
 from ._orbit_diagram import label_speed, orbit_diagram
-from ._style import BLACK, BLUE, GREEN, GREY, KIND_COLOURS, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, padded_limits
+from ._style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    KIND_COLOURS,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    axes_or_new,
+    enlarge_dots,
+    padded_limits,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,6 +52,11 @@ _LABEL_SIZE = 7.5
 def mark_of(kind: str) -> Mark:
     """How `kind` is drawn; an unknown kind is a purple cross and keeps its name."""
     return MARKS.get(kind, Mark("P", PURPLE, kind))
+
+
+def words(kind: str) -> str:
+    """What a legend calls `kind`."""
+    return f"{kind.replace('branch-p', 'branch p')} ({mark_of(kind).short})" if kind in MARKS else kind
 
 
 def period_colour(periods: int) -> str:
@@ -100,7 +118,8 @@ def orbit_diagram_with_branches(
     ax = orbit_diagram(sweep, component, axes_or_new(ax, 9.0, 5.0), limits_rpm=limits_rpm)
     clouds = [line for line in ax.get_lines() if line.get_label() in KIND_COLOURS]
     for i, line in enumerate(clouds):
-        line.set(color=GREY, alpha=0.45, markersize=2.2, zorder=1, label="simulated" if i == 0 else "_simulated")
+        label = "simulated" if i == 0 else "_simulated"
+        line.set(color=GREY, alpha=0.5, markersize=1.4 * line.get_markersize(), zorder=1, label=label)
     limits, (low, high) = ax.get_xlim(), ax.get_ylim()
     branch_diagram(branches, component, ax, label_points=label_points, limits_rpm=limits)
     bottom, top = ax.get_ylim()
@@ -137,8 +156,8 @@ def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.nda
     colour = period_colour(periods)
     light = [0.5 + 0.5 * c for c in to_rgb(colour)]
     styles = (
-        ("unstable", {"color": light, "linewidth": 0.8, "linestyle": (0, (4, 1.5)), "zorder": 2.0}),
         ("stable", {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}),
+        ("unstable", {"color": light, "linewidth": 0.8, "linestyle": (0, (4, 1.5)), "zorder": 2.0}),
     )
     for word, style in styles:
         parts = [_runs(x, y, pieces if word == "stable" else ~pieces) for x, y, pieces in paths]
@@ -164,13 +183,15 @@ def _mark_points(ax: Axes, points: Sequence[SpecialPoint], component: int, facto
             if not mine:
                 continue
             x, y = [p.speed_rpm for p in mine], [float(p.state[component]) * factor for p in mine]
-            named = f"{kind.replace('-p', ' p')} ({mark.short})"
             style = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
             if edge:
                 style |= {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 5.0}
             else:
                 style |= {"markersize": 3.5, "markerfacecolor": "white", "markeredgewidth": 0.8, "zorder": 4.0}
-            ax.plot(x, y, **style, label=named if edge else f"{named}, unstable on both sides")
+            ax.plot(x, y, **style, label=words(kind) if edge else f"_{words(kind)}, hollow")
+    if any(not p.edge for p in points):
+        style = {"marker": "o", "linestyle": "none", "color": GREY, "markersize": 4.5, "markerfacecolor": "white"}
+        ax.plot([], [], **style, label="hollow: unstable on both sides")
 
 
 def _write_above(ax: Axes, points: Iterable[SpecialPoint]) -> None:
@@ -221,7 +242,4 @@ def move_apart(at: np.ndarray, gap: float, low: float, high: float) -> np.ndarra
 
 def _legend_beneath(ax: Axes) -> None:
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
-    legend = ax.legend(**place, frameon=False, fontsize=8, handlelength=2.0, columnspacing=1.4)
-    for handle in legend.get_lines():
-        if handle.get_marker() == ".":
-            handle.set(markersize=7, alpha=1.0)
+    enlarge_dots(ax.legend(**place, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))

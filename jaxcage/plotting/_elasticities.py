@@ -28,8 +28,10 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
         raise ValueError("Argument `sensitivities` must hold at least one sensitivity, but it is empty.")
     names = _largest(sensitivities, most)
     count = len(sensitivities)
-    ax = axes_or_new(ax, 9.0, 1.3 + len(names) * (0.16 + 0.19 * count))
+    ax = axes_or_new(ax, 9.0, 1.2 + len(names) * (0.1 + 0.125 * count))
     thick = 0.8 / count
+    row = ax.get_window_extent().height * 72 / ax.figure.dpi / len(names)
+    size = float(np.clip(1.05 * row * thick, 4.5, 7.5))
     for i, s in enumerate(sensitivities):
         value = np.array([s.elasticity.get(name, np.nan) for name in names])
         place = np.arange(len(names)) + (i - (count - 1) / 2) * thick
@@ -38,14 +40,16 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
         label = f"{s.name} ({s.value_rpm:.0f} rpm{note})"
         hatch = None if s.trusted else "///"
         ax.barh(place, value, height=0.9 * thick, **style, hatch=hatch, edgecolor="white", linewidth=0, label=label)
-        _write_values(ax, place, value)
+        _write_values(ax, place, value, size)
+    for k in range(0, len(names), 2):
+        ax.axhspan(k - 0.5, k + 0.5, color="#F5F5F5", linewidth=0, zorder=0)
     ax.axvline(0, color=BLACK, linewidth=0.8)
     ax.set_yticks(np.arange(len(names)), [readable(name) for name in names])
     ax.tick_params(axis="y", length=0)
     ax.grid(False, axis="y")
     ax.set(ylim=(len(names) - 0.5, -0.5), xlim=_room_for_text(sensitivities, names))
     ax.set_xlabel("Elasticity: relative change of the speed over relative change of the parameter")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(count, 4), frameon=False, fontsize=9)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(count, 2), frameon=False, fontsize=9)
     return ax
 
 
@@ -65,19 +69,19 @@ def _largest(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
     return [*first, *rest][:most]
 
 
-def _write_values(ax: Axes, place: np.ndarray, value: np.ndarray) -> None:
+def _write_values(ax: Axes, place: np.ndarray, value: np.ndarray, size: float) -> None:
     for y, v in zip(place, value, strict=True):
         if np.isfinite(v):
             side = {"ha": "left", "xytext": (3, 0)} if v >= 0 else {"ha": "right", "xytext": (-3, 0)}
-            style = {"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": BLACK}
+            style = {"textcoords": "offset points", "va": "center", "fontsize": size, "color": BLACK}
             ax.annotate(_number(v), (v, y), **side, **style)
 
 
 def _number(value: float) -> str:
-    """Two decimals, more digits for what would vanish."""
-    if value == 0:
-        return "0"
-    text = f"{value:+.2f}" if abs(value) >= 0.095 else f"{value:+.1g}"
+    """Two digits, not more than three decimals."""
+    if abs(value) < 5e-4:
+        return "0" if value == 0 else "≈0"
+    text = f"{value:+.2f}" if abs(value) >= 0.1 else f"{value:+.3f}"
     return text.replace("-", "−")
 
 

@@ -6,16 +6,19 @@ import numpy as np
 from jaxtyping import Complex
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 
 from .._glossary import quantity
 from ..orbits import Branch, SpecialPoint
-from ._branches import mark_of, move_apart
+from ._branches import mark_of, move_apart, words
 from ._style import BLACK, BLUE, GREY, axes_or_new
 
 
 REACH = 1.6
 """The figure ends at this real and imaginary part: what matters happens on the unit circle."""
 _ROWS = 9
+_GLYPHS = {"s": "■□", "D": "◆◇", "o": "●○", "^": "▲△"}
+_HALO = [withStroke(linewidth=2.0, foreground="white")]
 _LABEL_SIZE = 7.5
 
 
@@ -51,11 +54,10 @@ def _shown(mu: np.ndarray) -> np.ndarray:
 
 
 def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
-    seen = set()
+    named = {p.kind: p for p in sorted(points, key=lambda p: p.edge)}
     for p in sorted(points, key=lambda p: p.edge):
         mark, mu = mark_of(p.kind), p.critical
-        label = None if p.kind in seen else p.kind.replace("-p", " p") + f" ({mark.short})"
-        seen.add(p.kind)
+        label = words(p.kind) if named[p.kind] is p else None
         size, face = (6.0, mark.colour) if p.edge else (4.5, "white")
         both = (mu, mu.conjugate()) if p.kind == "torus" else (complex(mu.real, 0.0),)
         style = {"marker": mark.marker, "linestyle": "none", "color": mark.colour, "markerfacecolor": face}
@@ -63,12 +65,13 @@ def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
     _write_column(ax, [p for p in points if p.critical.real < 0 and p.kind != "torus"], -1)
     _write_column(ax, [p for p in points if p.critical.real > 0 and p.kind != "torus"], 1)
     _write_around(ax, [p for p in points if p.kind == "torus"])
-    if seen:
+    if named:
         ax.legend(loc="upper left", frameon=False, fontsize=8, handletextpad=0.2, borderaxespad=0.2)
 
 
 def _text(point: SpecialPoint) -> str:
-    return f"{mark_of(point.kind).short} {point.speed_rpm:.0f}"
+    filled, hollow = _GLYPHS.get(mark_of(point.kind).marker, "✚✛")
+    return f"{filled if point.edge else hollow} {mark_of(point.kind).short} {point.speed_rpm:.0f}"
 
 
 def _write_column(ax: Axes, points: Sequence[SpecialPoint], side: int) -> None:
@@ -76,7 +79,13 @@ def _write_column(ax: Axes, points: Sequence[SpecialPoint], side: int) -> None:
     points = sorted(points, key=lambda p: (not p.edge, p.speed_rpm))
     rows = [_text(p) for p in points[:_ROWS]] + ([f"+ {len(points) - _ROWS} more"] if len(points) > _ROWS else [])
     if rows:
-        style = {"ha": "right" if side < 0 else "left", "va": "top", "fontsize": _LABEL_SIZE, "linespacing": 1.25}
+        style = {
+            "ha": "right" if side < 0 else "left",
+            "va": "top",
+            "fontsize": _LABEL_SIZE,
+            "linespacing": 1.25,
+            "path_effects": _HALO,
+        }
         ax.text(side * 1.09, -0.06, "\n".join(rows), color=mark_of(points[0].kind).colour, **style, zorder=6)
 
 
@@ -87,6 +96,12 @@ def _write_around(ax: Axes, points: Sequence[SpecialPoint]) -> None:
     for p, a in zip(points, angle, strict=True):
         place = (1.12 * np.cos(a), 1.12 * np.sin(a))
         side = "center" if abs(np.cos(a)) < 0.2 else "right" if np.cos(a) < 0 else "left"
-        style = {"ha": side, "va": "center", "fontsize": _LABEL_SIZE, "color": mark_of(p.kind).colour}
+        style = {
+            "ha": side,
+            "va": "center",
+            "fontsize": _LABEL_SIZE,
+            "color": mark_of(p.kind).colour,
+            "path_effects": _HALO,
+        }
         line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
         ax.annotate(_text(p), (p.critical.real, p.critical.imag), place, **style, arrowprops=line, zorder=6)

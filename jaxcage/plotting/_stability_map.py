@@ -30,7 +30,9 @@ Exponents = tuple[
 STEEPEST = 0.3
 """The colours end at this exponent: what lies beyond looks like it."""
 _HALO = [withStroke(linewidth=2.6, foreground="white")]
-_CORNERS = [(dx, dy) for far in (1, 2, 3.5) for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1)) for dx, dy in [(far * dx, far * dy)]]
+_LABEL_SIZE = 8.5
+_OFFSETS = [(9.0 * r * dx, 7.0 * r * dy) for r in (1, 2, 3.5) for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1))]
+"""Where a name may begin beside its point [points], the best first."""
 
 
 def stability_map(
@@ -79,7 +81,7 @@ def _colour_exponents(ax: Axes, exponents: Exponents, factor: float) -> None:
     ax.grid(False)
     shown = np.ma.masked_invalid(largest).T
     style = {"cmap": "RdBu_r", "vmin": -STEEPEST, "vmax": STEEPEST, "shading": "nearest", "rasterized": True}
-    mesh = ax.pcolormesh(rpm, np.asarray(values) * factor, shown, **style, alpha=0.75, zorder=0)
+    mesh = ax.pcolormesh(rpm, np.asarray(values) * factor, shown, **style, alpha=0.85, zorder=0)
     label = quantity("largest_exponent").label
     ax.figure.colorbar(mesh, ax=ax, label=label, pad=0.01, extend="both")
 
@@ -110,54 +112,49 @@ def _name_points(
         return
     style = {"marker": "o", "linestyle": "none", "color": BLACK, "markerfacecolor": "white", "markersize": 6}
     ax.plot([p[0] for p in kept], [p[1] for p in kept], **style, zorder=5, label="_codimension two")
-    scale = 72 / ax.figure.dpi
-    pixels = lambda x, y: ax.transData.transform(np.column_stack([x, y])) * scale
-    hidden = np.concatenate([_dense(pixels(x, y)) for x, y in lines] + [np.repeat(pixels(*zip(*[p[:2] for p in kept], strict=True)), 9, axis=0)])
-    frame = ax.get_window_extent()
-    frame = Bbox(frame.get_points() * scale)
+    on_paper = lambda x, y: ax.transData.transform(np.column_stack([x, y])) * 72 / ax.figure.dpi
+    points_at = on_paper([p[0] for p in kept], [p[1] for p in kept])
+    hidden = np.concatenate([_dense(on_paper(x, y)) for x, y in lines] + [np.repeat(points_at, 9, axis=0)])
+    frame = Bbox(ax.get_window_extent().get_points() * 72 / ax.figure.dpi)
     taken: list[Bbox] = []
-    for x, y, text in kept:
-        (at,) = pixels([x], [y])
-        boxes = [_box(at, corner, text) for corner in _CORNERS]
-        cost = [_cost(box, taken, hidden, frame) for box in boxes]
-        best = int(np.argmin(cost))
+    for (x, y, text), at in zip(kept, points_at, strict=True):
+        boxes = [_box(at, offset, text) for offset in _OFFSETS]
+        best = int(np.argmin([_cost(box, taken, hidden, frame) for box in boxes]))
         taken.append(boxes[best])
-        dx, dy = _offset(_CORNERS[best])
-        line = {"arrowstyle": "-", "color": BLACK, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3}
-        ax.annotate(
-            text,
-            (x, y),
-            (dx, dy),
-            textcoords="offset points",
-            ha="left" if dx > 0 else "right",
-            va="bottom" if dy > 0 else "top",
-            fontsize=8.5,
-            arrowprops=line | {"relpos": (0.0 if dx > 0 else 1.0, 0.0 if dy > 0 else 1.0)},
-            path_effects=_HALO,
-            zorder=6,
-        )
+        _write(ax, (x, y), _OFFSETS[best], text)
 
 
-def _offset(corner: tuple[float, float]) -> tuple[float, float]:
-    return 9.0 * corner[0], 7.0 * corner[1]
+def _write(ax: Axes, point: tuple[float, float], offset: tuple[float, float], text: str) -> None:
+    right, up = offset[0] > 0, offset[1] > 0
+    line = {"arrowstyle": "-", "color": BLACK, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3}
+    style = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": _LABEL_SIZE}
+    ax.annotate(
+        text,
+        point,
+        offset,
+        textcoords="offset points",
+        **style,
+        arrowprops=line | {"relpos": (0.0 if right else 1.0, 0.0 if up else 1.0)},
+        path_effects=_HALO,
+        zorder=6,
+    )
 
 
-def _box(at: np.ndarray, corner: tuple[float, float], text: str) -> Bbox:
+def _box(at: np.ndarray, offset: tuple[float, float], text: str) -> Bbox:
     """Where a text would be [points], about."""
-    dx, dy = _offset(corner)
-    width, height = 0.58 * 8.5 * len(text), 1.3 * 8.5
-    x, y = at[0] + dx, at[1] + dy
-    return Bbox.from_extents(min(x, x + np.sign(dx) * width), min(y, y + np.sign(dy) * height), max(x, x + np.sign(dx) * width), max(y, y + np.sign(dy) * height))
+    corner = at + np.array(offset)
+    far = corner + np.sign(offset) * _LABEL_SIZE * np.array([0.58 * len(text), 1.3])
+    return Bbox([np.minimum(corner, far), np.maximum(corner, far)])
 
 
 def _dense(points: np.ndarray) -> np.ndarray:
-    """Points along a polyline about every 4 points of length."""
+    """Points along a polyline, about one for every 4 points of length."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    along = np.arange(0.0, max(min(length[-1], 4e4), 1.0), 4.0)
+    along = np.linspace(0.0, length[-1], 2 + int(min(length[-1], 4e4) / 4))
     return np.column_stack([np.interp(along, length, points[:, i]) for i in (0, 1)])
 
 
 def _cost(box: Bbox, taken: Sequence[Bbox], hidden: np.ndarray, frame: Bbox) -> float:
-    """How much a text at `box` would hide: other texts, curves, or the frame."""
+    """How much a text at `box` would hide: the frame, other texts, curves and points."""
     outside = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
-    return 1e4 * outside + 1e3 * box.count_overlaps(list(taken)) + int(box.padded(1.0).count_contains(hidden))
+    return 1e4 * outside + 1e3 * box.count_overlaps(list(taken)) + box.padded(1.0).count_contains(hidden)

@@ -1,0 +1,181 @@
+"""Bifurcations, stable stretches and synchronous-loss zones, as documents and as tables."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..analysis import Zone
+from ..bearing import PublishedCase
+from ..orbits import LossZones, SpecialPoint, Stretch, SynchronousOrbits
+from ._report import Table, number
+from ._zone_report import Span, published_zones, zone_document
+
+
+AT_LIMIT_RPM = 1e-6
+
+
+def angle_deg(point: SpecialPoint) -> float:
+    """Angle [deg] of the critical multiplier: 180 at a period doubling, 0 at a fold."""
+    exact = {"period-doubling": 180.0, "fold": 0.0, "branch-point": 0.0}
+    return exact.get(point.kind, abs(math.degrees(np.angle(point.critical))))
+
+
+def pairs(multipliers: Sequence[complex] | np.ndarray) -> list[list[float]]:
+    """Complex numbers for programs: real and imaginary part."""
+    return [[float(mu.real), float(mu.imag)] for mu in multipliers]
+
+
+def point_document(point: SpecialPoint, branch: int | None) -> dict[str, Any]:
+    """A bifurcation for programs."""
+    return {
+        "kind": point.kind,
+        "speed_rpm": point.speed_rpm,
+        "multiplier": pairs([point.critical])[0],
+        "angle_deg": angle_deg(point),
+        "edge": point.edge,
+        "branch": branch,
+        "state": point.state,
+    }
+
+
+def branch_of(found: SynchronousOrbits, point: SpecialPoint) -> int | None:
+    """Number of the branch that a point is on."""
+    return next((i for i, b in enumerate(found.branches) if any(p is point for p in b.special)), None)
+
+
+def end_kinds(stretch: Stretch, found: SynchronousOrbits) -> tuple[str, str]:
+    """How a stretch begins and ends: a kind of bifurcation, `range` where it runs past the range, or `unknown` where
+    the branch was not followed further.
+    """
+    at = lambda rpm, limit: "range" if abs(rpm - limit) < AT_LIMIT_RPM else "unknown"
+    lower = at(stretch.lower_rpm, found.lower_rpm) if stretch.lower is None else stretch.lower.kind
+    upper = at(stretch.upper_rpm, found.upper_rpm) if stretch.upper is None else stretch.upper.kind
+    return lower, upper
+
+
+def stretch_document(stretch: Stretch, found: SynchronousOrbits) -> dict[str, Any]:
+    """A stable stretch for programs."""
+    lower, upper = end_kinds(stretch, found)
+    return {
+        "lower_rpm": stretch.lower_rpm,
+        "upper_rpm": stretch.upper_rpm,
+        "lower_kind": lower,
+        "upper_kind": upper,
+        "branch": stretch.branch,
+        "met": stretch.met,
+    }
+
+
+def edge_document(name: str, found: SynchronousOrbits, loss: LossZones) -> dict[str, Any]:
+    """A named edge for programs, with the orbits there are at its speed."""
+    point = loss.edges[name]
+    orbits = [
+        {"branch": i, "stable": stable, "state": state, "multipliers": pairs(multipliers)}
+        for i, stable, state, multipliers in loss.coexisting[name]
+    ]
+    return {"name": name, **point_document(point, branch_of(found, point)), "coexisting": orbits}
+
+
+def orbits_document(
+    name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None
+) -> dict[str, Any]:
+    """All that a search found, for programs."""
+    return {
+        "case": name,
+        "range_rpm": [found.lower_rpm, found.upper_rpm],
+        "points": [point_document(p, branch_of(found, p)) for p in found.points],
+        "stretches": [stretch_document(s, found) for s in found.stretches],
+        "close_below_rpm": loss.close_below_rpm,
+        "zones": [zone_document(zone) for zone in loss.zones],
+        "edges": [edge_document(edge, found, loss) for edge in loss.edges],
+        "published": [
+            {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
+            for i, (onset, exit_) in enumerate(published_zones(published), start=1)
+        ],
+        "missed": found.missed,
+    }
+
+
+def stretch_table(name: str, found: SynchronousOrbits) -> Table:
+    """Where a synchronous orbit is stable, and what happens to it at either end [rpm]."""
+    rows = []
+    for s in found.stretches:
+        lower, upper = end_kinds(s, found)
+        speeds = [number(rpm, 2) for rpm in (s.lower_rpm, s.upper_rpm, s.width_rpm)]
+        rows.append((speeds[0], lower, speeds[1], upper, speeds[2], str(s.met), str(s.branch)))
+    columns = ("from", "by", "to", "by", "width", "settled", "branch")
+    return Table(f"Stable synchronous orbits of {name} [rpm]", columns, rows or [("none", *6 * ("-",))])
+
+
+def loss_table(name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None) -> Table:
+    """Synchronous-loss zones, each published (chaotic) zone beside the one it shares most speeds with [rpm]."""
+    spans = published_zones(published)
+    partner = [_partner(span, loss.zones) for span in spans]
+    rows = []
+    for i, zone in enumerate(loss.zones):
+        beside = [_span_cell(span) for span, k in zip(spans, partner, strict=True) if k == i]
+        rows.append((str(i + 1), *_zone_cells(zone), ", ".join(beside) or "-"))
+    for span in (span for span, k in zip(spans, partner, strict=True) if k is None):
+        met = span[0] <= found.upper_rpm and (span[1] is None or span[1] >= found.lower_rpm)
+        rows.append(("-", "not found" if met else "not searched", *4 * ("-",), _span_cell(span)))
+    title = f"Synchronous-loss zones of {name} [rpm], closed below {number(loss.close_below_rpm)} rpm"
+    columns = ("zone", "onset", "by", "exit", "by", "width", "published chaos")
+    return Table(title, columns, rows or [("none", *6 * ("-",))])
+
+
+def _zone_cells(zone: Zone) -> list[str]:
+    cells = []
+    for edge in (zone.onset, zone.exit):
+        cells += ["past range", "-"] if edge is None else [number(edge.speed_rpm, 2), edge.mechanism]
+    return [*cells, number(zone.width_rpm, 2, nothing="open")]
+
+
+def _span_cell(span: Span) -> str:
+    return number(span[0]) + (" and up" if span[1] is None else f" to {span[1]:.0f}")
+
+
+def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
+    """The zone that shares most speeds with a published one; None if none does."""
+    top = math.inf if span[1] is None else span[1]
+    low = [-math.inf if z.onset is None else z.onset.speed_rpm for z in zones]
+    high = [math.inf if z.exit is None else z.exit.speed_rpm for z in zones]
+    shared = [min(b, top) - max(a, span[0]) for a, b in zip(low, high, strict=True)]
+    best = max(range(len(shared)), key=shared.__getitem__, default=None)
+    return best if best is not None and shared[best] > 0 else None
+
+
+def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
+    """Bifurcations at which a stable synchronous orbit begins or ends."""
+    named = lambda p: next((name for name, q in loss.edges.items() if q is p), "-")
+    rows = [
+        (number(p.speed_rpm, 3), p.kind, multiplier_cell(p), number(angle_deg(p), 2), str(branch_of(found, p)), named(p))
+        for p in found.edges
+    ]
+    columns = ("speed [rpm]", "kind", "multiplier", "angle [°]", "branch", "edge of")
+    return Table(f"Ends of the stable synchronous orbits of {name}", columns, rows or [("none", *5 * ("-",))])
+
+
+def multiplier_cell(point: SpecialPoint) -> str:
+    """The critical multiplier; of a complex pair both."""
+    mu = point.critical
+    return f"{mu.real:.4f} ± {mu.imag:.4f}i" if point.kind == "torus" else f"{mu.real:.4f}"
+
+
+def coexisting_notes(loss: LossZones) -> list[str]:
+    """One line for each named edge at whose speed another synchronous orbit is stable."""
+    notes = []
+    for name, orbits in loss.coexisting.items():
+        point = loss.edges[name]
+        others = [state for _, stable, state, _ in orbits if stable and not _same(state, point.state)]
+        if others:
+            orbit = "another synchronous orbit is" if len(others) == 1 else f"{len(others)} other ones are"
+            notes.append(f"At {name} ({point.speed_rpm:.2f} rpm) {orbit} stable: not every start sees this edge.")
+    return notes
+
+
+def _same(state: np.ndarray, other: np.ndarray) -> bool:
+    half = state.size // 2
+    parts = (slice(0, half), slice(half, None))
+    return all(np.linalg.norm(state[p] - other[p]) < 0.03 * np.linalg.norm(other[p]) for p in parts)

@@ -1,0 +1,175 @@
+"""Period-doubling cascades: doubling after doubling along the doubled branches, and where they accumulate."""
+
+import dataclasses
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from .._checks import require_x64
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem
+from ._arclength import Corrected, Steps, correct, follow, stack
+from ._branch import (
+    Branch,
+    BranchEquations,
+    Follower,
+    SpecialPoint,
+    describe,
+    eigenvalues,
+    make_follower,
+)
+from ._lens import SPEED, Parameter
+from ._orbit import Period
+from ._point import BifurcationPoint, bifurcation
+from ._singularity import test_functions
+
+
+FEIGENBAUM = 4.669201609102990
+SMALLEST_AMPLITUDE = 1e-5
+
+
+@dataclasses.dataclass(frozen=True)
+class Cascade:
+    """Period doublings of orbits of period 1, 2, 4, ... times the first one's."""
+
+    points: tuple[BifurcationPoint, ...]
+    """Located exactly; fewer than asked for where the doubled branch was lost or does not double again."""
+    limit: float
+    """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
+    error: float
+    """Distance of the last two extrapolations; infinite with fewer than three points."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Values of the parameter [SI]."""
+        return tuple(float(p.value) for p in self.points)
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """Ratios of successive distances, which tend to 4.6692."""
+        d = np.diff(self.values)
+        return tuple((d[:-1] / d[1:]).tolist())
+
+    def __str__(self) -> str:
+        rows = [f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g}" for p in self.points]
+        return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}"])
+
+
+def extrapolated(values: tuple[float, ...]) -> tuple[float, float]:
+    """Limit of a cascade from its points, and the distance to the extrapolation with one point less."""
+    limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in zip(values[:-1], values[1:], strict=True)]
+    if not limits:
+        return float("nan"), float("inf")
+    return limits[-1], abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
+
+
+def doubled_branch(
+    system: AbstractForcedSystem,
+    point: SpecialPoint | BifurcationPoint,
+    parameter: Parameter = SPEED,
+    *,
+    lower: float,
+    upper: float,
+    periods: int = 1,
+    speed: Any = None,
+    period: Period = "driven",
+    steps: Steps = Steps(first=0.01, shortest=1e-7),
+    amplitude: float = 0.02,
+    until_doubling: bool = False,
+    method: AbstractMethod | None = None,
+) -> Branch:
+    """The branch of orbits of twice the period that begins at a period doubling.
+
+    **Arguments:**
+
+    - `point`: the period doubling of an orbit of `periods` revolutions.
+    - `lower`, `upper`, `speed`, `period`, `steps`: as for `branch`.
+    - `amplitude`: how far from the doubling it is entered, in units of the system's scale along the critical direction.
+    - `until_doubling`: end with the branch's own first period doubling.
+
+    **Raises:** `ValueError` if the branch is not found.
+    """
+    at = float(point.value)
+    follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
+    frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
+    curves = stack(BranchEquations(follower.problem, frame), 1)
+    scale = np.asarray(frame.scale)
+    free = [1.0] if follower.problem.free_speed else []
+    u = np.array([[*(np.asarray(point.state) / scale), *free, at / follower.unit]])
+    across = np.zeros_like(u)
+    across[0, : scale.size] = np.asarray(point.direction) / scale
+    across /= np.linalg.norm(across)
+    while amplitude > SMALLEST_AMPLITUDE:
+        start = correct(curves, follower.given, u + amplitude * across, across)
+        if start.converged[0] and _doubling(follower, start)[0] > 0 and abs(start.u[0, -1] - u[0, -1]) < 1.0:
+            break
+        amplitude /= 4
+    else:
+        raise ValueError(f"Argument `point` must be a period doubling, but no doubled branch begins at {at:g}.")
+    stop = lambda lane, points: until_doubling and _doubling(follower, points[-1]) < 0
+    (trace,) = follow(curves, follower.given, start, steps=steps, inside=follower.inside, stop=stop)
+    (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])
+    return found
+
+
+def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
+    return test_functions(eigenvalues(follower.monodromy(points)))["period-doubling"]
+
+
+def cascade(
+    system: AbstractForcedSystem,
+    point: SpecialPoint | BifurcationPoint,
+    parameter: Parameter = SPEED,
+    *,
+    lower: float,
+    upper: float,
+    levels: int = 4,
+    speed: Any = None,
+    period: Period = "driven",
+    method: AbstractMethod | None = None,
+) -> Cascade:
+    """Follow a period-doubling cascade from its first point.
+
+    **Arguments:** the first period doubling, of a period-1 orbit; parameter and its range [SI]; number of doublings.
+
+    **Returns:** `Cascade`.
+    """
+    require_x64()
+    options = dict(period=period, method=method)
+    fixed = None if parameter == SPEED else (point.speed if speed is None else speed)
+    exact = lambda p, n: bifurcation(
+        system,
+        "period-doubling",
+        (jnp.asarray(p.state), p.value),
+        parameter,
+        speed=fixed,
+        periods=n,
+        **options,  # pyright: ignore[reportArgumentType]
+    )
+    points = [exact(point, 1)]
+    amplitude = 0.02
+    while len(points) < levels and bool(points[-1].converged):
+        n = 2 ** (len(points) - 1)
+        try:
+            doubled = doubled_branch(
+                system,
+                points[-1],
+                parameter,
+                lower=lower,
+                upper=upper,
+                periods=n,
+                speed=fixed,
+                amplitude=amplitude,
+                until_doubling=True,
+                **options,  # pyright: ignore[reportArgumentType]
+            )
+        except ValueError:
+            break
+        following = [p for p in doubled.special if p.kind == "period-doubling"]
+        if not following:
+            break
+        points.append(exact(following[0], 2 * n))
+        amplitude /= 2
+    kept = tuple(p for p in points if bool(p.converged))
+    return Cascade(kept, *extrapolated(tuple(float(p.value) for p in kept)))

@@ -1,0 +1,245 @@
+"""Bifurcation points followed in two parameters: the curves of a stability map, with codimension-2 points flagged."""
+
+import dataclasses
+import itertools
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+
+from .._checks import require_x64
+from ..integrate import AbstractMethod, method as make_method
+from ..models import AbstractForcedSystem
+from ._arclength import Corrected, Steps, correct, follow, stack, take
+from ._branch import SpecialPoint, eigenvalues, turned
+from ._illinois import zeros
+from ._lens import SPEED, value as value_of
+from ._orbit import Period, is_free
+from ._point import BifurcationPoint, PointEquations, critical_matrix
+from ._problem import Given, OrbitProblem, ReturnMap, make_frame
+from ._singularity import Kind, null_vectors
+
+
+@dataclasses.dataclass(frozen=True)
+class CodimensionTwo:
+    """A point of a curve at which something else happens too."""
+
+    kind: str
+    """`cusp`; `1:1`, `1:2`, `1:3`, `1:4 resonance`; `fold-flip`, `fold-torus`, `flip-torus`, `double torus`; or
+    `extreme`, where the curve turns back in x: at the value of y two edges meet there, or are born."""
+    x_value: float
+    y_value: float
+    multipliers: Complex[np.ndarray, " dim"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Curve:
+    """Bifurcation points of one kind over two parameters, in order along the curve."""
+
+    kind: str
+    x: str
+    y: str
+    x_value: Float[np.ndarray, " points"]
+    """[SI]; a speed in rad/s."""
+    y_value: Float[np.ndarray, " points"]
+    state: Float[np.ndarray, "points dim"]
+    multipliers: Complex[np.ndarray, "points dim"]
+    genuine: Bool[np.ndarray, " points"]
+    """False where a curve of torus bifurcations has gone on, beyond a resonance, as neutral saddles."""
+    special: tuple[CodimensionTwo, ...]
+    ended: tuple[str, str]
+    name: str = ""
+
+    def __str__(self) -> str:
+        head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}, {self.x_value.size} points"
+        return "\n".join([head, *(f"  {p.kind} at {p.x_value:.8g}, {p.y_value:.8g}" for p in self.special)])
+
+
+def curve(
+    system: AbstractForcedSystem,
+    point: SpecialPoint | BifurcationPoint,
+    x: str = SPEED,
+    y: str = "guidance_gap",
+    *,
+    lower: float,
+    upper: float,
+    x_lower: float,
+    x_upper: float,
+    periods: int = 1,
+    period: Period = "driven",
+    name: str = "",
+    steps: Steps = Steps(first=0.05, longest=0.25, most=200),
+    method: AbstractMethod | None = None,
+) -> Curve:
+    """Follow a bifurcation point both ways in two parameters.
+
+    **Arguments:**
+
+    - `point`: a period doubling, torus bifurcation or fold with `x` as its parameter, from a branch or `bifurcation`.
+    - `x`, `y`: the two parameters, by name.
+    - `lower`, `upper`, `x_lower`, `x_upper`: the range of `y` and of `x` [SI]; the curve ends where it leaves them.
+    - `steps`: step lengths, in units of 1/20 of the ranges and of the system's scale.
+
+    **Returns:** `Curve`.
+
+    **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that cannot be followed.
+    """
+    require_x64()
+    if point.kind not in ("period-doubling", "torus", "fold"):
+        raise ValueError(f"Argument `point` must be a period-doubling, torus or fold, but it is a {point.kind}.")
+    if not (lower < upper and x_lower < x_upper):
+        raise ValueError("Arguments `lower` and `upper`, `x_lower` and `x_upper` must be in ascending order.")
+    chosen = make_method() if method is None else method
+    tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), periods, is_free(period), chosen)
+    start, equations = tracer.start(point)
+    if not bool(start.converged[0]):
+        raise ValueError(
+            f"Argument `point` must be a {point.kind} of the system, but Newton's method finds none there."
+        )
+    both = turned(take(start, np.zeros(2, dtype=int)), np.array([1.0, -1.0]))
+    up, down = follow(
+        take(equations, np.zeros(2, dtype=int)),
+        tracer.given,
+        both,
+        steps=steps,
+        inside=tracer.inside,
+        update=_fresh_borders,
+    )
+    special = [*tracer.special(down.points), *tracer.special(up.points)]
+    back = take(down.points, np.arange(len(down.points.u) - 1, 0, -1))
+    u, m = (np.concatenate([f(back), f(up.points)]) for f in (lambda p: p.u, lambda p: p.aux.monodromy))
+    multipliers = eigenvalues(m)
+    return Curve(
+        kind=point.kind,
+        x=x,
+        y=y,
+        x_value=u[:, -2] * tracer.units[0],
+        y_value=u[:, -1] * tracer.units[1],
+        state=u[:, : system.dimension] * np.asarray(tracer.scale),
+        multipliers=multipliers,
+        genuine=np.array([point.kind != "torus" or abs(_pair(mu)[1]) <= 1 for mu in multipliers]),
+        special=tuple(special),
+        ended=(down.ended, up.ended),
+        name=name,
+    )
+
+
+class _Tracer(eqx.Module):
+    """What both directions of a curve share."""
+
+    problem: OrbitProblem
+    given: Given
+    kind: Kind = eqx.field(static=True)
+    units: tuple[float, float]
+    lower: tuple[float, float]
+    upper: tuple[float, float]
+    frame: Any
+
+    @classmethod
+    def at(cls, system, point, names, lower, upper, periods, free, method) -> "_Tracer":
+        problem = OrbitProblem(method, system.dimension, free, names)
+        given = Given(system, jnp.asarray(point.speed, dtype=float))
+        units = tuple((b - a) / 20 for a, b in zip(lower, upper, strict=True))
+        frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), periods)
+        return cls(problem, given, point.kind, units, lower, upper, frame)
+
+    @property
+    def scale(self) -> Any:
+        return self.frame.scale
+
+    def inside(self, u: np.ndarray) -> np.ndarray:
+        values = u[..., -2:] * np.asarray(self.units)
+        return np.all((values > np.asarray(self.lower)) & (values < np.asarray(self.upper)), axis=-1)
+
+    def start(self, point: Any) -> tuple[Corrected, PointEquations]:
+        """The point itself, with `y` kept, and the equations of the curve; one lane."""
+        values = [float(value_of(self.given.system, self.given.speed, p)) for p in self.problem.parameters]
+        values[0] = float(point.value)
+        free = [1.0] if self.problem.free_speed else []
+        z = np.asarray(point.state) / np.asarray(self.scale)
+        u = np.array([*z, *free, *(v / w for v, w in zip(values, self.units, strict=True))])
+        strobe = self.problem.prepare(jnp.asarray(u), self.given, self.frame)
+        _, monodromy = ReturnMap(strobe, self.frame).with_monodromy(jnp.asarray(z))
+        a = critical_matrix(self.problem, self.kind, strobe, jnp.asarray(z), monodromy, self.frame)
+        equations = stack(PointEquations(self.problem, self.frame, *null_vectors(a), self.kind), 1)
+        normal = np.zeros((1, u.size))
+        normal[0, -1] = 1.0
+        return correct(equations, self.given, u[None], normal), equations
+
+    def special(self, points: Corrected) -> list[CodimensionTwo]:
+        """Codimension-2 points between the points of one direction, located."""
+        signals = self.signals(points)
+        wanted = [(kind, int(k)) for kind, f in signals.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0)]
+        if not wanted:
+            return []
+        ends = [take(points, np.array([k, k + 1])) for _, k in wanted]
+        borders = take(points, np.array([k for _, k in wanted]))
+        base = stack(PointEquations(self.problem, self.frame, jnp.zeros(1), jnp.zeros(1), self.kind), len(wanted))
+        curves = _fresh_borders(base, borders, np.arange(len(wanted)))
+        located = zeros(curves, self.given, ends, lambda i, p: self.signals(p)[wanted[i][0]])
+        found = []
+        for (kind, _), p in zip(wanted, located, strict=True):
+            if p is not None and _real(kind, self.kind, eigenvalues(p.aux.monodromy)):
+                x, y = p.u[-2:] * np.asarray(self.units)
+                found.append(CodimensionTwo(kind, float(x), float(y), eigenvalues(p.aux.monodromy)))
+        # At a cusp the curve turns back in every parameter.
+        cusps = [p for p in found if p.kind == "cusp"]
+        near = lambda p, q: abs(p.x_value - q.x_value) < 1e-6 * abs(q.x_value)
+        return [p for p in found if p.kind != "extreme" or not any(near(p, q) for q in cusps)]
+
+    def signals(self, points: Corrected) -> dict[str, np.ndarray]:
+        """Functions along the curve that change sign at codimension-2 points."""
+        rows = [_others(self.kind, mu) for mu in eigenvalues(points.aux.monodromy)]
+        product = lambda shift: np.array([np.prod(others + shift).real for others, _ in rows])
+        pairs = np.array([np.prod([a * b - 1 for a, b in itertools.combinations(o, 2)]).real for o, _ in rows])
+        found = {"extreme": points.tangent[..., -2]}
+        if self.kind == "torus":
+            cosine = np.array([c for _, c in rows])
+            found |= {f"1:{k} resonance": cosine - at for k, at in ((1, 1.0), (2, -1.0), (3, -0.5), (4, 0.0))}
+            return found | {"fold-torus": product(-1), "flip-torus": product(1), "double torus": pairs}
+        if self.kind == "period-doubling":
+            return found | {"1:2 resonance": product(1), "fold-flip": product(-1), "flip-torus": pairs}
+        n = self.problem.dimension
+        bend = np.sum(points.jacobian[..., -1, :n] * points.aux.right[..., :n], axis=-1)
+        return found | {"cusp": bend, "1:1 resonance": product(-1), "fold-flip": product(1), "fold-torus": pairs}
+
+
+def _pair(multipliers: np.ndarray) -> tuple[tuple[int, int], float]:
+    """The two multipliers whose product is closest to 1, and half their sum: the cosine of the angle on the circle."""
+    pairs = itertools.combinations(range(multipliers.size), 2)
+    i, j = min(pairs, key=lambda p: abs(multipliers[p[0]] * multipliers[p[1]] - 1))
+    return (i, j), float((multipliers[i] + multipliers[j]).real / 2)
+
+
+def _others(kind: str, multipliers: np.ndarray) -> tuple[np.ndarray, float]:
+    """The multipliers that are not critical, and the cosine of the critical angle."""
+    if kind == "torus":
+        taken, cosine = _pair(multipliers)
+        return np.delete(multipliers, taken), cosine
+    target = -1.0 if kind == "period-doubling" else 1.0
+    return np.delete(multipliers, np.argmin(np.abs(multipliers - target))), target
+
+
+def _real(what: str, kind: str, multipliers: np.ndarray) -> bool:
+    """Whether a change of sign is what it is named for, and not that of a neutral saddle."""
+    others, cosine = _others(kind, multipliers)
+    if what in ("fold-torus", "flip-torus", "double torus") and kind != "torus":
+        return bool(np.any(np.abs(others.imag) > 1e-9))
+    return kind != "torus" or abs(cosine) <= 1 + 1e-6
+
+
+def _fresh_borders(curves: Any, points: Corrected, lanes: np.ndarray) -> Any:
+    """Borders from the null vectors at the last points, so that they stay far from singular."""
+    unit = lambda v: v / np.linalg.norm(v, axis=-1, keepdims=True)
+    left, right = unit(np.asarray(points.aux.left)), unit(np.asarray(points.aux.right))
+
+    def renewed(old: Any, new: np.ndarray) -> np.ndarray:
+        if old.shape[1:] != new.shape[1:]:
+            return new
+        whole = np.array(old)
+        whole[lanes] = new
+        return whole
+
+    return eqx.tree_at(lambda c: (c.left, c.right), curves, (renewed(curves.left, left), renewed(curves.right, right)))

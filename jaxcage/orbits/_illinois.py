@@ -1,0 +1,68 @@
+"""Where a function along a curve vanishes, between two of its points: the Illinois variant of regula falsi.
+
+The function is evaluated at points of the curve itself, on planes across the chord between the two ends; many curves
+are treated at a time.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ._arclength import Corrected, correct, take
+from ._implicit import AbstractEquations
+
+
+MOST = 40
+LOCATED = 1e-9
+"""Places are refined until they move by less than this in the unknowns' units."""
+
+
+def zeros(
+    curves: AbstractEquations,
+    given: Any,
+    ends: Sequence[Corrected],
+    signal: Callable[[int, Corrected], np.ndarray],
+) -> list[Corrected | None]:
+    """Points at which `signal` vanishes.
+
+    **Arguments:**
+
+    - `curves`, `given`: as for `correct`, one curve per pair of ends.
+    - `ends`: pairs of neighbouring points, between which the signal changes sign.
+    - `signal`: values for the lane's number and some points of its curve.
+
+    **Returns:** a point per pair, None where the curve was lost.
+    """
+    lanes = len(ends)
+    u0, u1 = (np.stack([e.u[j] for e in ends]) for j in (0, 1))
+    f0, f1 = np.array([signal(i, e) for i, e in enumerate(ends)]).T.copy()
+    chord = u1 - u0
+    length = np.linalg.norm(chord, axis=1)
+    normal = chord / length[:, None]
+    low, high, last = np.zeros(lanes), np.ones(lanes), np.zeros(lanes)
+    best: list[Corrected | None] = [None] * lanes
+    active = np.ones(lanes, dtype=bool)
+    for _ in range(MOST):
+        index = np.flatnonzero(active)
+        if index.size == 0:
+            break
+        margin = 1e-3 * (high - low)
+        share = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
+        at = u0[index] + share[index, None] * chord[index]
+        got = correct(take(curves, index), given, at, normal[index])
+        for k, i in enumerate(index):
+            if not got.converged[k]:
+                best[i], active[i] = None, False
+                continue
+            before, best[i] = best[i], take(got, np.array(k))
+            f = float(signal(i, take(got, np.array([k])))[0])
+            halve = 0.5 if f * last[i] > 0 else 1.0  # the same end was kept twice
+            if f * f1[i] < 0:
+                low[i], f0[i], f1[i] = share[i], f, f1[i] * halve
+            else:
+                high[i], f1[i], f0[i] = share[i], f, f0[i] * halve
+            last[i] = f
+            moved = np.inf if before is None else np.linalg.norm(got.u[k] - before.u)
+            active[i] = f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
+    return best

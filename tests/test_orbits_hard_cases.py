@@ -1,0 +1,303 @@
+"""Orbits and bifurcation points where things go wrong, or nearly: each must say so, or still be right."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import jaxcage as jc
+
+
+METHOD = jc.method("rodas4", steps=512)
+
+
+def numbers(**values):
+    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
+
+
+class Well(eqx.Module):
+    """x'' = c - k x + e x^2 - b x^3 - d x' + f cos(tau)."""
+
+    c: jax.Array
+    k: jax.Array
+    e: jax.Array
+    b: jax.Array
+    d: jax.Array
+    f: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (self.c - self.k * x + self.e * x**2 - self.b * x**3 - self.d * u + self.f * jnp.cos(tau),)
+
+
+def well(c=0.0, k=1.0, e=0.0, b=0.0, d=0.2, f=0.1):
+    return jc.ForcedOscillator(Well(**numbers(c=c, k=k, e=e, b=b, d=d, f=f)), coordinates=1)
+
+
+def orbit_of(system, speed=1.0, guess=(0.1, 0.0)):
+    return jc.periodic_orbit(system, speed, guess=guess, method=METHOD)
+
+
+# A constant force on a free mass drifts, and M - I is singular; over the rim of its well it is gone in finite time; just
+# past the fold of the well nothing singular happens, but there is no orbit.
+NO_ORBIT = {
+    "drift": dict(c=1.0, k=0.0),
+    "blow-up": dict(c=1.0, k=0.0, e=1.0),
+    "past the fold": dict(c=0.4, k=1.0, e=1.0),
+}
+
+
+@pytest.mark.parametrize("name", NO_ORBIT)
+def test_no_orbit(name):
+    orbit = orbit_of(well(**NO_ORBIT[name]))
+    assert not bool(orbit.converged) and not bool(orbit.stable)
+    assert orbit.status == "no orbit"
+    assert np.all(np.isnan(orbit.state)) and np.all(np.isnan(orbit.multipliers))
+    assert np.all(np.isnan(orbit.monodromy))
+    assert str(orbit).startswith("No orbit found")
+    assert int(orbit.iterations) <= 40
+
+
+def test_no_orbit_and_so_no_point():
+    point = jc.bifurcation(well(c=1.0, k=0.0), "fold", ((0.1, 0.0), 1.0), method=METHOD)
+    assert point.status == "no such point"
+    assert not bool(point.converged) and not bool(point.trusted)
+    assert np.isnan(point.value) and np.isnan(point.speed) and np.all(np.isnan(point.state))
+    assert np.isnan(point.angle) and np.isnan(point.transversality) and np.all(np.isnan(point.multipliers))
+    assert str(point).startswith("No fold found: no such point")
+
+
+def test_a_failing_lane_leaves_its_neighbours_alone():
+    """Bit for bit, orbits and points."""
+
+    def lanes(e, c):
+        def one(e, c):
+            system = well(e=e, c=c, b=1.0 - c)
+            orbit = orbit_of(system)
+            point = jc.bifurcation(system, "fold", ((-0.2, -0.2), 1.0), method=METHOD)
+            return orbit.state, orbit.multipliers, orbit.converged, point.value, point.outcome
+
+        return run(one, jnp.asarray(e), jnp.asarray(c))
+
+    run = eqx.filter_jit(lambda f, *x: jax.vmap(f)(*x))
+    well_behaved = lanes([0.2, 0.3, 0.4, 0.5], [0.0, 0.0, 0.0, 0.0])
+    one_fails = lanes([0.2, 1.0, 0.4, 0.5], [0.0, 1.0, 0.0, 0.0])
+    assert np.all(well_behaved[2]) and np.array_equal(one_fails[2], [True, False, True, True])
+    kept = np.array([0, 2, 3])
+    for good, mixed in zip(well_behaved, one_fails, strict=True):
+        assert np.array_equal(np.asarray(good)[kept], np.asarray(mixed)[kept], equal_nan=True)
+    assert np.all(np.isnan(one_fails[0][1])) and int(one_fails[4][1]) == 1
+
+
+def test_strongly_unstable_orbit_of_the_double_well():
+    """On the hill between the wells; monodromy and state by DOP853."""
+    speed, d, f = 0.8, 0.3, 0.25
+
+    def rates(t, y):
+        x, u, *m = y
+        stiffness = 1 - 3 * x * x
+        return [u, x - x**3 - d * u + f * np.cos(speed * t)] + [
+            m[2],
+            m[3],
+            stiffness * m[0] - d * m[2],
+            stiffness * m[1] - d * m[3],
+        ]
+
+    orbit = orbit_of(well(k=-1.0, b=1.0, d=d, f=f), speed, (0.0, 0.0))
+    start = [*np.asarray(orbit.state), 1, 0, 0, 1]
+    end = solve_ivp(rates, (0, 2 * np.pi / speed), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    expected = np.sort(np.linalg.eigvals(end[2:].reshape(2, 2)).real)[::-1]
+    assert bool(orbit.converged) and not bool(orbit.stable) and expected[0] > 100
+    np.testing.assert_allclose(end[:2], orbit.state, atol=1e-7)  # an error of 1e-10 grows by the multiplier
+    np.testing.assert_allclose(orbit.multipliers.real, expected, rtol=1e-7)
+    assert np.max(np.abs(orbit.state)) < 0.5
+
+
+class Planted(eqx.Module):
+    """A driven orbit p(tau) around which the state turns by `turn` revolutions a period.
+
+    In the turning frame it grows with the rates g and g - s, or turns by b: the multipliers are those of
+    exp([[g, -b], [b, g - s]] T), with the opposite sign for half a turn. g(a) vanishes at a = 1.
+    """
+
+    a: jax.Array
+    slope: jax.Array
+    touch: jax.Array
+    bend: jax.Array
+    s: jax.Array
+    b: jax.Array
+    turn: jax.Array
+    square: jax.Array
+
+    def __call__(self, tau, y, speed):
+        away = self.a - 1
+        growth = away * (self.slope + away * (self.touch + away * self.bend))
+        p, drift = (jnp.cos(tau), 0.5 * jnp.sin(tau)), (-speed * jnp.sin(tau), 0.5 * speed * jnp.cos(tau))
+        x, z = y[0] - p[0], y[1] - p[1]
+        c, s = jnp.cos(self.turn * tau), jnp.sin(self.turn * tau)
+        e, f = c * x + s * z, -s * x + c * z
+        cubic = e * e + f * f
+        de = (growth - cubic) * e - self.b * f + self.square * e * e
+        df = (growth - self.s - cubic) * f + self.b * e
+        spin = self.turn * speed
+        return (c * de - s * df - spin * z + drift[0], s * de + c * df + spin * x + drift[1])
+
+
+def planted(a=0.9, slope=1.0, touch=0.0, bend=0.0, s=0.0, b=0.0, turn=0.5, square=0.0):
+    values = numbers(a=a, slope=slope, touch=touch, bend=bend, s=s, b=b, turn=turn, square=square)
+    return jc.ForcedSystem(Planted(**values), dimension=2)
+
+
+def point_of(kind, a=0.93, speed=1.1, **settings):
+    system = planted(a=a, **settings)
+    return jc.bifurcation(system, kind, ((0.99, 0.01), a), "a", speed=speed, method=METHOD)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+def test_neutral_saddle_is_no_torus_bifurcation(turn):
+    """Real multipliers mu and 1/mu (at a = 1.15): their product is 1, too."""
+    point = point_of("torus", a=1.12, s=0.3, turn=turn)
+    assert point.status == "other kind"
+    assert not bool(point.converged) and not bool(point.trusted)
+    assert np.isnan(point.value) and np.isnan(point.angle) and np.all(np.isnan(point.state))
+    exact = np.exp(np.array([0.15, -0.15]) * 2 * np.pi / 1.1) * (1 - 4 * turn if turn else 1)
+    np.testing.assert_allclose(point.multipliers, exact, rtol=1e-7)
+
+
+# What is asked for, and what the system has instead.
+ELSEWHERE = {
+    "torus asked as period doubling": ("period-doubling", dict(b=0.3)),
+    "torus asked as fold": ("fold", dict(b=0.3, turn=0.0)),
+    "torus asked as branch point": ("branch-point", dict(b=0.3, turn=0.0)),
+    "branch point asked as period doubling": ("period-doubling", dict(s=0.3, turn=0.0)),
+    "period doubling asked as fold": ("fold", dict(s=0.3)),
+    "period doubling asked as branch point": ("branch-point", dict(s=0.3)),
+}
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_another_kind_than_asked(name):
+    kind, settings = ELSEWHERE[name]
+    point = point_of(kind, **settings)
+    assert point.status in ("no such point", "other kind")
+    assert np.isnan(point.value) and not bool(point.trusted)
+
+
+def test_multiplier_one_that_is_no_fold():
+    """A pitchfork is crossed by its orbit: as a fold its place is ill-determined, and must not be trusted."""
+    assert not bool(point_of("fold", s=0.3, turn=0.0).trusted)
+
+
+@pytest.mark.parametrize("square", [0.0, 0.4], ids=["pitchfork", "transcritical"])
+@pytest.mark.parametrize("slope", [1.0, 0.5])
+def test_branch_point_and_its_rate(square, slope):
+    """The multiplier exp(g T) crosses 1 at a = 1 with rate T dg/da: exact."""
+    point = point_of("branch-point", s=0.3, turn=0.0, square=square, slope=slope)
+    assert abs(point.value - 1) < 1e-8
+    np.testing.assert_allclose(point.multipliers, [1.0, np.exp(-0.3 * 2 * np.pi / 1.1)], rtol=1e-8)
+    assert point.status == "converged"
+    np.testing.assert_allclose(abs(point.transversality), slope * 2 * np.pi / 1.1, rtol=1e-6)
+
+
+TANGENT = {"hardly crosses": dict(slope=1e-4, bend=1.0), "touches": dict(slope=0.0, touch=-1.0)}
+CRITICAL = {"period-doubling": dict(s=0.3), "torus": dict(b=0.3)}
+
+
+@pytest.mark.parametrize("name", TANGENT)
+@pytest.mark.parametrize("kind", CRITICAL)
+def test_tangential_crossing(kind, name):
+    """Found, but not trusted: its place is not a function of the design."""
+    point = point_of(kind, **CRITICAL[kind], **TANGENT[name])
+    assert point.status == "tangential"
+    assert bool(point.converged) and not bool(point.trusted)
+    assert abs(point.value - 1) < 1e-5
+    np.testing.assert_allclose(point.transversality, TANGENT[name]["slope"] * 2 * np.pi / 1.1, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", CRITICAL)
+def test_crossing_with_the_cube_is_never_trusted(kind):
+    """Newton's method gains but a third a step."""
+    point = point_of(kind, slope=0.0, bend=1.0, **CRITICAL[kind])
+    assert point.status in ("tangential", "no such point") and not bool(point.trusted)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+@pytest.mark.parametrize("angle", [0.02, 0.002])
+def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
+    """Where the pair is close to 1 or -1, exp(i phi) is a poor unknown; the product of the pair is not."""
+    period = 2 * np.pi / 1.1
+    point = point_of("torus", b=angle / period, turn=turn)
+    assert point.status == "converged"
+    assert abs(point.value - 1) < 1e-9
+    assert abs(point.angle - abs(2 * np.pi * turn - angle)) < 1e-6
+    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
+
+
+@pytest.mark.parametrize("growth, s", [(1.0, 1.5), (1.6, 2.5)])
+def test_planted_multipliers_of_a_strongly_unstable_orbit(growth, s):
+    orbit = orbit_of(planted(a=1 + growth, s=s), 1.1, (0.999, 0.001))
+    exact = -np.exp(np.array([growth, growth - s]) * 2 * np.pi / 1.1)
+    assert abs(exact[0]) > 100
+    np.testing.assert_allclose(orbit.state, [1.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(orbit.multipliers, exact, rtol=1e-7)
+    assert orbit.status == "converged" and not bool(orbit.stable)
+
+
+def test_bad_arguments():
+    system = planted()
+    start = ((1.0, 0.0), 0.9)
+    with pytest.raises(
+        ValueError, match="`kind` must be one of period-doubling, torus, fold, branch-point, but 'hopf'"
+    ):
+        jc.bifurcation(system, "hopf", start, "a", speed=1.1)
+    with pytest.raises(ValueError, match="`parameter` must be one of speed, a, .*, but 'x' was given"):
+        jc.bifurcation(system, "torus", start, "x", speed=1.1)
+    with pytest.raises(ValueError, match="`speed` must be given where the parameter is `a`"):
+        jc.bifurcation(system, "torus", start, "a")
+    for find in (
+        lambda: jc.periodic_orbit(system, 1.1, period="long"),
+        lambda: jc.bifurcation(system, "torus", start, "a", speed=1.1, period="long"),
+    ):
+        with pytest.raises(ValueError, match="`period` must be one of driven, free, but 'long'"):
+            find()
+    with pytest.raises(ValueError, match="`guess` must be a state of 2 numbers"):
+        jc.periodic_orbit(system, 1.1, guess=(1.0, 0.0, 0.0))
+
+
+# Unbalance in units of the published one, speed [rpm], peak of the relative eccentricity: a rim that is pressed, and one
+# that is just grazed (contact sets in at 0.97).
+CONTACT = {"pressed": (10.0, 20000.0, 0.998), "grazed": (3.0, 20000.0, 0.971)}
+
+
+@pytest.mark.parametrize("name", CONTACT)
+def test_cage_in_contact_with_its_land(name):
+    factor, rpm, expected_peak = CONTACT[name]
+    model, speed = jc.case("1a"), jc.rpm(rpm)
+    model = jc.replace(model, eccentricity=factor * jc.parameters(model)["eccentricity"])
+    orbit = jc.periodic_orbit(model, speed, revolutions=300)
+    assert orbit.status == "converged" and orbit.residual < 1e-10
+    assert abs(orbit.liouville) < 1e-3
+    scale = jnp.stack(model.scale(speed))
+
+    def image(z):
+        end = strobe(model, jnp.asarray(speed), z * scale)
+        return end[0] / scale, end[1]
+
+    z = orbit.state / scale
+    again, peak = image(z)
+    assert abs(peak - expected_peak) < 1e-3 and peak > 0.97
+    np.testing.assert_allclose(again, z, atol=1e-10)
+    h, columns = 1e-5, []
+    for move in h * jnp.eye(4):
+        values = [image(z + i * move)[0] for i in (-2.0, -1.0, 1.0, 2.0)]
+        columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
+    size = jnp.max(jnp.abs(orbit.monodromy))
+    np.testing.assert_allclose(orbit.monodromy / size, jnp.stack(columns, -1) / size, atol=1e-6)
+
+
+@eqx.filter_jit
+def strobe(model, speed, y):
+    stretch = jc.strobe_map(model, speed)(tuple(y[i] for i in range(4)))
+    return jnp.stack(stretch.y), stretch.peak

@@ -1,0 +1,361 @@
+"""Figures of branches, multipliers, elasticities and stability maps show what they should."""
+
+import itertools
+from types import SimpleNamespace
+
+import matplotlib.colors as colours
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.patches import Circle
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from test_io_dataset import sweep_of
+
+from jaxcage.orbits import Branch, Sensitivity, SpecialPoint
+from jaxcage.plotting import (
+    branch_diagram,
+    elasticity_bars,
+    multiplier_circle,
+    new_figure,
+    orbit_diagram_with_branches,
+    stability_map,
+)
+from jaxcage.plotting._branches import MARKS, move_apart, polyline
+from jaxcage.plotting._style import BLUE, GREY, ORANGE
+
+
+PER_RPM = np.pi / 30
+CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0, "branch-point": 1.0}
+
+
+def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> SpecialPoint:
+    mu = np.array([CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5, 0.2, 0.1], dtype=complex)
+    state = np.array([0.0, y, 0.0, 0.0])
+    return SpecialPoint(kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge)
+
+
+def branch_of(rpm: np.ndarray, y: np.ndarray, stable: np.ndarray, points=(), periods: int = 1, mu=None) -> Branch:
+    """A branch on which only the vertical displacement [m] is not zero."""
+    state = np.stack([0 * y, y, 0 * y, 0 * y], axis=1)
+    mu = np.full(state.shape, 0.5 + 0j) if mu is None else mu
+    return Branch("speed", rpm * PER_RPM, rpm * PER_RPM, state, mu, stable, tuple(points), periods, ("range", "range"))
+
+
+def s_rpm(t: np.ndarray | float) -> np.ndarray | float:
+    return 9000 + 50 * (t**3 - 3 * t)
+
+
+T = np.linspace(-2.0, 2.0, 40)
+
+
+def s_curve(periods: int = 1) -> Branch:
+    """Stable, turning at t = -1 and 9100 rpm, unstable, turning at t = 1 and 8900 rpm, stable; the vertical
+    displacement is t [0.1 mm]."""
+    before = lambda t: int(np.flatnonzero(t > T)[-1])
+    points = [
+        special(kind, s_rpm(t), t * 1e-4, before(t), edge)
+        for kind, t, edge in (("fold", -1.0, True), ("period-doubling", 0.2, False), ("fold", 1.0, True))
+    ]
+    return branch_of(np.asarray(s_rpm(T)), T * 1e-4, np.abs(T) > 1, points, periods)
+
+
+def data(ax: Axes, label: str) -> np.ndarray:
+    """Points of the line with `label`, as rows (x, y), NaN between runs."""
+    (line,) = [line for line in ax.get_lines() if line.get_label() == label]
+    return np.asarray(line.get_xydata())
+
+
+def finite(points: np.ndarray) -> np.ndarray:
+    return points[np.all(np.isfinite(points), axis=1)]
+
+
+def extents(ax: Axes) -> list[Bbox]:
+    """Where texts are on the page, without the lines to what they name."""
+    ax.figure.draw_without_rendering()  # pyright: ignore[reportAttributeAccessIssue]
+    return [Text.get_window_extent(text) for text in ax.texts]
+
+
+def overlaps(boxes: list[Bbox]) -> int:
+    return sum(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+def test_branch_is_thick_where_it_is_stable_up_to_the_bifurcations():
+    ax = branch_diagram([s_curve()])
+    stable, unstable = data(ax, "period-1, stable"), data(ax, "period-1, unstable")
+    inner, outer = T[np.abs(T) < 1], T[np.abs(T) > 1]
+    np.testing.assert_allclose(finite(stable)[:, 1], 0.1 * np.sort([*outer, -1.0, 1.0]))
+    np.testing.assert_allclose(finite(unstable)[:, 1], 0.1 * np.sort([*inner, -1.0, 0.2, 1.0]))
+    for points in (finite(stable), finite(unstable)):
+        np.testing.assert_allclose(points[:, 0], s_rpm(10 * points[:, 1]))
+    assert np.sum(np.isnan(stable[:-1, 0])) == 1 and np.sum(np.isnan(unstable[:-1, 0])) == 0
+    thick, thin = (
+        next(li for li in ax.get_lines() if li.get_label() == f"period-1, {w}") for w in ("stable", "unstable")
+    )
+    assert thick.get_linewidth() > 2 * thin.get_linewidth()
+    assert thick.get_linestyle() == "-" and thin.get_linestyle() == "--"
+    assert np.mean(colours.to_rgb(thin.get_color())) > np.mean(colours.to_rgb(thick.get_color()))
+    assert ax.get_xlabel() == "Cage speed $n$ [rpm]" and ax.get_ylabel() == "Vertical displacement $Y_C$ [mm]"
+
+
+def test_edges_are_filled_and_named_and_other_bifurcations_hollow():
+    ax = branch_diagram([s_curve()])
+    np.testing.assert_allclose(data(ax, "fold (F)"), [[9100, -0.1], [8900, 0.1]])
+    hollow = next(line for line in ax.get_lines() if line.get_label() == "_period-doubling (PD), hollow")
+    np.testing.assert_allclose(np.asarray(hollow.get_xydata()), [[s_rpm(0.2), 0.02]])
+    filled = next(line for line in ax.get_lines() if line.get_label() == "fold (F)")
+    assert (hollow.get_marker(), filled.get_marker()) == ("s", "o")
+    assert hollow.get_markerfacecolor() == "white" and filled.get_markerfacecolor() == MARKS["fold"].colour
+    assert [text.get_text() for text in ax.texts] == ["F 8900", "F 9100"]
+    assert [a.xy[0] for a in ax.texts] == pytest.approx([8900, 9100])
+    assert not branch_diagram([s_curve()], label_points=False).texts
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["period-1, stable", "period-1, unstable", "fold (F)", "hollow: unstable on both sides"]
+
+
+def test_each_number_of_periods_has_its_colour():
+    first, second = s_curve(), s_curve(2)
+    ax = branch_diagram([first, second, first])
+    colour = {line.get_label(): line.get_color() for line in ax.get_lines()}
+    assert (colour["period-1, stable"], colour["period-2, stable"]) == (BLUE, ORANGE)
+    assert len(finite(data(ax, "period-1, stable"))) == 2 * len(finite(data(ax, "period-2, stable")))
+    assert len(ax.texts) == 2, "edges that branches share are named once"
+
+
+def test_two_bifurcations_between_the_same_points_are_in_order():
+    rpm, y = np.array([8000.0, 8100.0, 8200.0]), np.array([0.0, 1e-4, 2e-4])
+    points = [special("torus", 8180.0, 1.8e-4, 1, False), special("period-doubling", 8120.0, 1.2e-4, 1, True)]
+    x, shown, stable = polyline(branch_of(rpm, y, np.array([True, True, False]), points), 1)
+    np.testing.assert_allclose(x, [8000, 8100, 8120, 8180, 8200])
+    np.testing.assert_allclose(shown, [0, 0.1, 0.12, 0.18, 0.2])
+    assert stable.tolist() == [True, True, False, False]
+
+
+def test_zoomed_branches_fit_what_is_in_the_range():
+    ax = branch_diagram([s_curve()], limits_rpm=(9050.0, 9200.0))
+    assert ax.get_xlim() == (9050, 9200)
+    inside = 0.1 * T[(s_rpm(T) >= 9050) & (s_rpm(T) <= 9200)]
+    low, high = ax.get_ylim()
+    assert low < inside.min() and high > inside.max()
+    assert high - low < 1.15 * np.ptp(inside)
+    assert [text.get_text() for text in ax.texts] == ["F 9100"]
+
+
+@pytest.mark.parametrize("count", [8, 30, 200])
+def test_names_of_crowded_edges_do_not_overlap(count: int):
+    rng = np.random.default_rng(0)
+    rpm, y = np.linspace(2500, 27500, 401), np.linspace(0, 1e-4, 401)
+    speeds = np.sort(np.concatenate([rng.normal(8000, 150, count // 2), rng.uniform(2600, 27400, count - count // 2)]))
+    kinds = itertools.cycle(MARKS)
+    points = [special(k, s, 1e-5, int(np.searchsorted(rpm, s)) - 1, True) for s, k in zip(speeds, kinds, strict=False)]
+    ax = branch_diagram([branch_of(rpm, y, np.ones(401, bool), points)])
+    boxes = extents(ax)
+    panel, label, legend = ax.get_window_extent(), ax.xaxis.label.get_window_extent(), ax.get_legend()
+    assert overlaps(boxes) == 0
+    assert len(boxes) == count if count < 60 else 45 < len(boxes) < 75
+    assert all(b.y0 > panel.y1 and panel.x0 - 20 < b.x0 and b.x1 < panel.x1 + 20 for b in boxes)
+    shown = [float(text.get_text().split()[-1]) for text in ax.texts]
+    assert shown == sorted(shown) and [b.x0 for b in boxes] == sorted(b.x0 for b in boxes)
+    assert legend.get_window_extent().y1 <= label.y0
+
+
+def test_places_are_moved_apart_no_more_than_needed():
+    np.testing.assert_allclose(move_apart(np.array([0.1, 0.5, 0.9]), 0.2, 0.0, 1.0), [0.1, 0.5, 0.9])
+    np.testing.assert_allclose(move_apart(np.array([0.1, 0.5, 0.5]), 0.2, 0.0, 1.0), [0.1, 0.4, 0.6])
+    np.testing.assert_allclose(move_apart(np.array([0.9, 0.99]), 0.2, 0.0, 1.0), [0.8, 1.0])
+    assert move_apart(np.zeros(0), 0.2, 0.0, 1.0).size == 0
+
+
+@pytest.mark.parametrize("parameter", ["guidance_gap", None])
+def test_branches_must_be_over_speed(parameter: str | None):
+    b = s_curve()
+    other = Branch("guidance_gap", b.value, b.speed, b.state, b.multipliers, b.stable, (), 1, b.ended)
+    with pytest.raises(ValueError, match="guidance_gap was given" if parameter else "no branch was given"):
+        branch_diagram([b, other] if parameter else [])
+
+
+def test_orbit_diagram_is_grey_beneath_the_branches():
+    sweep = sweep_of()
+    rpm = np.linspace(7900, 8500, 31)
+    ax = orbit_diagram_with_branches(sweep, [branch_of(rpm, (rpm - 7900) * 1e-6, rpm < 8205)])
+    clouds = [line for line in ax.get_lines() if line.get_label().endswith("simulated")]
+    assert {line.get_color() for line in clouds} == {GREY}
+    assert sum(len(finite(np.asarray(line.get_xydata()))) for line in clouds) == (5 * 3 - 1) * 16
+    stable = next(line for line in ax.get_lines() if line.get_label() == "period-1, stable")
+    assert max(line.get_zorder() for line in clouds) < stable.get_zorder()
+    assert ax.get_xlim() == pytest.approx((8000, 8400))
+    low, high = ax.get_ylim()
+    shown = 1e3 * sweep.strobe[..., 1][np.isfinite(sweep.strobe[..., 1])]
+    assert low < min(shown.min(), 0.1) and high > max(shown.max(), 0.5)
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["simulated", "failed", "period-1, stable", "period-1, unstable"]
+
+
+def test_multipliers_along_a_branch():
+    rpm = np.linspace(8000, 9000, 11)
+    angle = np.linspace(0.5, 3.0, 11)
+    mu = np.stack([0.9 * np.exp(1j * angle), 0.9 * np.exp(-1j * angle), 0.1 + 0j * angle, -0.5 * np.arange(11)], axis=1)
+    points = [
+        special("torus", 8300.0, 0.0, 2, True),
+        special("period-doubling", 8700.0, 0.0, 6, True),
+        special("period-doubling", 8400.0, 0.0, 3, False),
+    ]
+    ax = multiplier_circle(branch_of(rpm, 1e-7 * rpm, rpm < 8300, points, mu=mu))
+    (circle,) = [p for p in ax.patches if isinstance(p, Circle)]
+    assert circle.get_radius() == 1 and circle.center == (0, 0)
+    assert ax.get_aspect() == 1.0 and ax.get_xlim() == ax.get_ylim() == (-1.6, 1.6)
+    (cloud,) = [c for c in ax.collections if isinstance(c, PathCollection)]
+    place, shade = np.asarray(cloud.get_offsets()), np.asarray(cloud.get_array())
+    far = np.abs(mu.real) > 1.6
+    assert len(place) == 44 - np.sum(far)
+    np.testing.assert_allclose(place, np.stack([mu[~far].real, mu[~far].imag], axis=1))
+    np.testing.assert_allclose(shade, np.repeat(rpm, 4)[~far.ravel()])
+    assert cloud.get_clim() == pytest.approx((8000, 9000))
+    assert ax.figure.axes[1].get_ylabel() == "Cage speed $n$ [rpm]"
+    pair = data(ax, "torus (T)")
+    np.testing.assert_allclose(pair, [[np.cos(2.5), np.sin(2.5)], [np.cos(2.5), -np.sin(2.5)]])
+    np.testing.assert_allclose(data(ax, "period-doubling (PD)"), [[-1, 0]])
+    assert sorted(text.get_text() for text in ax.texts) == sorted(["◆ T 8300", "■ PD 8700\n□ PD 8400"])
+
+
+def test_names_of_many_multipliers_do_not_overlap():
+    rpm = np.linspace(8000, 9000, 31)
+    kinds = ["torus"] * 6 + ["fold"] * 4 + ["period-doubling"] * 12
+    points = [special(kind, 8000 + 40 * i, 0.0, i, i % 2 == 0) for i, kind in enumerate(kinds)]
+    ax = multiplier_circle(branch_of(rpm, 1e-7 * rpm, rpm < 8300, points))
+    boxes = extents(ax)
+    assert overlaps(boxes) == 0
+    panel = ax.get_window_extent()
+    assert all(panel.x0 <= b.x0 and b.x1 <= panel.x1 for b in boxes)
+    column = next(text.get_text() for text in ax.texts if "PD" in text.get_text()).split("\n")
+    assert len(column) == 10 and column[0] == "■ PD 8400" and column[6] == "□ PD 8440" and column[-1] == "+ 3 more"
+
+
+def test_multipliers_alone():
+    ax = multiplier_circle(np.array([0.5 + 0.5j, 0.5 - 0.5j, -3.0]))
+    np.testing.assert_allclose(data(ax, "multipliers"), [[0.5, 0.5], [0.5, -0.5]])
+    assert len(ax.figure.axes) == 1
+
+
+def edge(name: str, status: str = "converged", **elasticity: float) -> Sensitivity:
+    return Sensitivity(name, "fold", 9100.0, dict(elasticity), dict(elasticity), {}, 1.0, status)
+
+
+def test_elasticities_are_in_order_with_the_designers_two_on_top():
+    onset = edge("zone 1 onset", load=0.01, eccentricity=-0.02, **{"oil.density": -0.3}, guidance_gap=0.1, bore=0.0)
+    exit_ = edge("zone 1 exit", "fold", load=1.25, eccentricity=0.04, **{"oil.density": 0.2}, guidance_gap=0.0004)
+    ax = elasticity_bars([onset, exit_])
+    assert [t.get_text() for t in ax.get_yticklabels()] == ["guidance gap", "eccentricity", "load", "oil density"]
+    low, high = ax.get_ylim()
+    assert low > high, "the first is on top"
+    first, second = ax.containers
+    assert [bar.get_width() for bar in first] == pytest.approx([0.1, -0.02, 0.01, -0.3])
+    assert [bar.get_width() for bar in second] == pytest.approx([0.0004, 0.04, 1.25, 0.2])
+    middle = lambda bars: [bar.get_y() + bar.get_height() / 2 for bar in bars]
+    np.testing.assert_allclose((np.array(middle(first)) + middle(second)) / 2, range(4), atol=1e-12)
+    assert len({bar.get_facecolor()[:3] for bar in (*first, *second)}) == 2
+    assert not first[0].get_hatch() and second[0].get_hatch()
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["zone 1 onset (9100 rpm)", "zone 1 exit (9100 rpm, not trusted)"]
+    texts = {(float(t.xy[0]), round(float(t.xy[1]))): t.get_text() for t in ax.texts}
+    assert texts[1.25, 2] == "+1.25" and texts[-0.3, 3] == "−0.30" and texts[0.04, 1] == "+0.040"
+    assert texts[0.0004, 0] == "≈0"
+    frame = ax.get_window_extent()
+    assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in extents(ax))
+
+
+def test_only_the_largest_elasticities_are_shown():
+    many = {f"p_{i}": 0.1 * i for i in range(1, 20)} | {"guidance_gap": 0.0, "eccentricity": 1e-6}
+    ax = elasticity_bars([edge("onset", **many)], most=5)
+    assert [t.get_text() for t in ax.get_yticklabels()] == ["guidance gap", "eccentricity", "p 19", "p 18", "p 17"]
+    assert ax.texts[0].get_text() == "0"
+    with pytest.raises(ValueError, match="at least one"):
+        elasticity_bars([])
+
+
+def test_values_of_many_bars_do_not_overlap():
+    rng = np.random.default_rng(1)
+    all_of = [edge(f"edge {k}", **{f"p_{i}": v for i, v in enumerate(rng.uniform(0.1, 1, 12))}) for k in range(3)]
+    ax = elasticity_bars(all_of, new_figure(9.0, 5.0).subplots())
+    assert len(ax.texts) == 36
+    # A line of text is higher than its figures: what is left above and below them may overlap.
+    assert (
+        overlaps([Bbox.from_extents(b.x0, b.y0 + 0.15 * b.height, b.x1, b.y1 - 0.15 * b.height) for b in extents(ax)])
+        == 0
+    )
+
+
+def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, special=(), x: str = "speed", y: str = "guidance_gap"):
+    points = tuple(SimpleNamespace(kind=k, x_value=r * PER_RPM, y_value=g) for k, r, g in special)
+    return SimpleNamespace(name=kind, kind=kind, x=x, y=y, x_value=rpm * PER_RPM, y_value=gap, special=points)
+
+
+def two_curves() -> list[SimpleNamespace]:
+    """A period-doubling and a torus curve that meet at 10000 rpm and 0.5 mm."""
+    gap = np.linspace(4e-4, 6e-4, 21)
+    meet = ("1:2 resonance", 10000.0, 5e-4)
+    doubling = curve_of("period-doubling", 10000 + (gap - 5e-4) * 5e6, gap, [meet, ("cusp", 9750.0, 4.5e-4)])
+    torus = curve_of("torus", 10000 + np.linspace(0, 900, 10), 5e-4 - np.linspace(0, 0.8e-4, 10), [meet])
+    return [doubling, torus]
+
+
+def test_curves_have_the_colour_of_their_kind_and_the_unit_of_the_parameter():
+    ax = stability_map(two_curves(), y_unit="mm", y_factor=1e3)
+    doubling, torus = (next(li for li in ax.get_lines() if li.get_label() == k) for k in ("period-doubling", "torus"))
+    assert (doubling.get_color(), torus.get_color()) == (MARKS["period-doubling"].colour, MARKS["torus"].colour)
+    np.testing.assert_allclose(data(ax, "torus")[[0, -1]], [[10000, 0.5], [10900, 0.42]])
+    assert ax.get_ylabel() == "Guidance gap [mm]" and ax.get_xlabel() == "Cage speed $n$ [rpm]"
+    assert stability_map(two_curves(), y_label="Gap $C_r$", y_unit="m").get_ylabel() == "Gap $C_r$ [m]"
+    low, high = ax.get_ylim()
+    assert low < 0.4 and high > 0.6 and len(ax.figure.axes) == 1
+
+
+def test_points_of_codimension_two_are_named_once_where_nothing_is_hidden():
+    ax = stability_map(two_curves(), y_unit="mm", y_factor=1e3)
+    np.testing.assert_allclose(data(ax, "_codimension two"), [[10000, 0.5], [9750, 0.45]])
+    assert [text.get_text() for text in ax.texts] == ["1:2 resonance", "cusp"]
+    boxes = extents(ax)
+    assert overlaps(boxes) == 0
+    for kind in ("period-doubling", "torus"):
+        points = data(ax, kind)
+        fine = np.stack(
+            [np.interp(np.linspace(0, 1, 999), np.linspace(0, 1, len(points)), c) for c in points.T], axis=1
+        )
+        assert all(box.count_contains(ax.transData.transform(fine)) == 0 for box in boxes)
+
+
+def test_exponents_beneath_the_curves_are_white_at_zero():
+    rpm, gap = np.linspace(9000, 11000, 5), np.array([4e-4, 5e-4, 6e-4])
+    largest = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3])
+    largest[0, 0] = np.nan
+    ax = stability_map(two_curves(), exponents=(rpm, gap, largest), y_unit="mm", y_factor=1e3)
+    (mesh,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
+    shown = np.ma.asarray(mesh.get_array()).reshape(3, 5)
+    np.testing.assert_allclose(shown.filled(0), np.nan_to_num(largest.T))
+    assert np.ma.getmaskarray(shown)[0, 0] and np.sum(np.ma.getmaskarray(shown)) == 1
+    assert mesh.get_clim() == (-0.3, 0.3)
+    assert min(mesh.cmap(mesh.norm(0.0))[:3]) > 0.95
+    red, blue = mesh.cmap(mesh.norm(0.3)), mesh.cmap(mesh.norm(-0.3))
+    assert red[0] > red[2] and blue[2] > blue[0]
+    assert ax.figure.axes[1].get_ylabel() == "Largest exponent per revolution $\\lambda_1$"
+    assert ax.get_xlim() == pytest.approx((8750, 11250)) and ax.get_ylim() == pytest.approx((0.35, 0.65))
+    assert mesh.get_zorder() < min(line.get_zorder() for line in ax.get_lines())
+
+
+@pytest.mark.parametrize("other", [{"y": "load"}, {"x": "load"}])
+def test_curves_must_share_their_parameters(other: dict[str, str]):
+    with pytest.raises(ValueError, match="one parameter over speed, but .*load"):
+        stability_map([*two_curves(), curve_of("fold", np.ones(2), np.ones(2), **other)])
+
+
+def test_axes_that_are_given_are_used():
+    ax = new_figure(9.0, 5.0).subplots()
+    for made in (
+        lambda a: branch_diagram([s_curve()], 1, a),
+        lambda a: multiplier_circle(s_curve(), a),
+        lambda a: elasticity_bars([edge("onset", bore=1.0)], a),
+        lambda a: stability_map(two_curves(), a),
+    ):
+        ax = new_figure(9.0, 5.0).subplots()
+        assert made(ax) is ax
