@@ -1,7 +1,6 @@
 """Figures of branches, multipliers, elasticities and stability maps show what they should."""
 
 import itertools
-from types import SimpleNamespace
 
 import matplotlib.colors as colours
 import numpy as np
@@ -13,7 +12,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from test_io_dataset import sweep_of
 
-from jaxcage.orbits import Branch, Sensitivity, SpecialPoint
+from jaxcage.orbits import Branch, CodimensionTwo, Curve, Sensitivity, SpecialPoint
 from jaxcage.plotting import (
     branch_diagram,
     elasticity_bars,
@@ -212,7 +211,7 @@ def test_multipliers_along_a_branch():
     np.testing.assert_allclose(place, np.stack([mu[~far].real, mu[~far].imag], axis=1))
     np.testing.assert_allclose(shade, np.repeat(rpm, 4)[~far.ravel()])
     assert cloud.get_clim() == pytest.approx((8000, 9000))
-    assert ax.figure.axes[1].get_ylabel() == "Cage speed $n$ [rpm]"
+    assert [inner.get_ylabel() for inner in ax.child_axes] == ["Cage speed $n$ [rpm]"]
     pair = data(ax, "torus (T)")
     np.testing.assert_allclose(pair, [[np.cos(2.5), np.sin(2.5)], [np.cos(2.5), -np.sin(2.5)]])
     np.testing.assert_allclose(data(ax, "period-doubling (PD)"), [[-1, 0]])
@@ -235,7 +234,7 @@ def test_names_of_many_multipliers_do_not_overlap():
 def test_multipliers_alone():
     ax = multiplier_circle(np.array([0.5 + 0.5j, 0.5 - 0.5j, -3.0]))
     np.testing.assert_allclose(data(ax, "multipliers"), [[0.5, 0.5], [0.5, -0.5]])
-    assert len(ax.figure.axes) == 1
+    assert not ax.child_axes
 
 
 def edge(name: str, status: str = "converged", **elasticity: float) -> Sensitivity:
@@ -287,11 +286,13 @@ def test_values_of_many_bars_do_not_overlap():
 
 
 def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, special=(), x: str = "speed", y: str = "guidance_gap"):
-    points = tuple(SimpleNamespace(kind=k, x_value=r * PER_RPM, y_value=g) for k, r, g in special)
-    return SimpleNamespace(name=kind, kind=kind, x=x, y=y, x_value=rpm * PER_RPM, y_value=gap, special=points)
+    mu = np.full((rpm.size, 4), 0.5 + 0j)
+    points = tuple(CodimensionTwo(k, r * PER_RPM, g, mu[0]) for k, r, g in special)
+    genuine = np.ones(rpm.size, bool)
+    return Curve(kind, x, y, rpm * PER_RPM, gap, 0 * mu.real, mu, genuine, points, ("range", "range"), kind)
 
 
-def two_curves() -> list[SimpleNamespace]:
+def two_curves() -> list[Curve]:
     """A period-doubling and a torus curve that meet at 10000 rpm and 0.5 mm."""
     gap = np.linspace(4e-4, 6e-4, 21)
     meet = ("1:2 resonance", 10000.0, 5e-4)
@@ -304,11 +305,22 @@ def test_curves_have_the_colour_of_their_kind_and_the_unit_of_the_parameter():
     ax = stability_map(two_curves(), y_unit="mm", y_factor=1e3)
     doubling, torus = (next(li for li in ax.get_lines() if li.get_label() == k) for k in ("period-doubling", "torus"))
     assert (doubling.get_color(), torus.get_color()) == (MARKS["period-doubling"].colour, MARKS["torus"].colour)
-    np.testing.assert_allclose(data(ax, "torus")[[0, -1]], [[10000, 0.5], [10900, 0.42]])
+    np.testing.assert_allclose(finite(data(ax, "torus"))[[0, -1]], [[10000, 0.5], [10900, 0.42]])
     assert ax.get_ylabel() == "Guidance gap [mm]" and ax.get_xlabel() == "Cage speed $n$ [rpm]"
     assert stability_map(two_curves(), y_label="Gap $C_r$", y_unit="m").get_ylabel() == "Gap $C_r$ [m]"
     low, high = ax.get_ylim()
     assert low < 0.4 and high > 0.6 and len(ax.figure.axes) == 1
+
+
+def test_neutral_saddles_are_dotted_and_named_once():
+    doubling, torus = two_curves()
+    torus.genuine[6:] = False
+    ax = stability_map([doubling, torus, torus])
+    np.testing.assert_allclose(finite(data(ax, "torus"))[:, 0], 10000 + 100 * np.arange(6))
+    np.testing.assert_allclose(finite(data(ax, "neutral saddles"))[:, 0], 10000 + 100 * np.arange(5, 10))
+    assert next(line for line in ax.get_lines() if line.get_label() == "neutral saddles").get_linestyle() == ":"
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert sorted(names) == ["neutral saddles", "period-doubling", "torus"]
 
 
 def test_points_of_codimension_two_are_named_once_where_nothing_is_hidden():
@@ -318,7 +330,7 @@ def test_points_of_codimension_two_are_named_once_where_nothing_is_hidden():
     boxes = extents(ax)
     assert overlaps(boxes) == 0
     for kind in ("period-doubling", "torus"):
-        points = data(ax, kind)
+        points = finite(data(ax, kind))
         fine = np.stack(
             [np.interp(np.linspace(0, 1, 999), np.linspace(0, 1, len(points)), c) for c in points.T], axis=1
         )

@@ -104,10 +104,11 @@ def _notes(searched: Searched, files: dict[str, str]) -> list[str]:
 
 
 def _figures(searched: Searched) -> dict[str, str]:
-    """Orbit diagram with all branches, and the multipliers along the branch with the longest stable part."""
+    """Orbit diagram with all branches, and the multipliers along the branch on which most simulations settled."""
     found, name = searched.found, searched.subject.name
     diagram = new_figure(10.0, 6.0)
     orbit_diagram_with_branches(found.sweep, found.branches, 1, diagram.subplots())
+    diagram.suptitle(f"{name}: synchronous orbits", fontsize=11)
     stem = searched.folder / f"bifurcations_{name}"
     files = {"figure": save_figure(diagram, stem.with_name(stem.name + ".png"))}
     principal = searched.loss.principal

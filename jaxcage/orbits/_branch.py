@@ -60,6 +60,8 @@ class SpecialPoint:
     edge: bool
     """Whether a stable orbit is on one side of it."""
     parameter: str = SPEED
+    periods: int = 1
+    """Revolutions after which the orbit closes."""
 
     @property
     def speed_rpm(self) -> float:
@@ -212,10 +214,13 @@ def turned(points: Corrected, sign: Any) -> Corrected:
     return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
 
 
-def follow_both_ways(follower: Follower, starts: Sequence[Start], periods: int, steps: Steps) -> list[Branch | None]:
+def follow_both_ways(
+    follower: Follower, starts: Sequence[Start], periods: int, steps: Steps, patience: int | None = None
+) -> list[Branch | None]:
     """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one.
 
-    A lane that comes upon what another has followed ends there: one branch may come in two parts.
+    A lane that comes upon what another has followed ends there: one branch may come in two parts. With `patience`, a
+    lane also ends after so many unstable orbits in a row: there is no end to how such a branch can wind.
     """
     frame = follower.frame(jnp.asarray(starts[0][0]), starts[0][1], periods)
     curves, first = seeds(follower, frame, starts)
@@ -223,12 +228,15 @@ def follow_both_ways(follower: Follower, starts: Sequence[Start], periods: int, 
     lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
     taken = ~first.converged
     walked: dict[int, list[Corrected]] = {}
+    unstable = dict.fromkeys(range(2 * count), 0)
 
     def stop(lane: int, points: list[Corrected]) -> bool:
         walked[lane] = points
         own = lane % count
         step = points[-2].u, points[-1].u
-        if taken[own]:
+        calm = is_stable(eigenvalues(follower.monodromy(points[-1])), follower.problem.free_speed)
+        unstable[lane] = 0 if calm else unstable[lane] + 1
+        if taken[own] or (patience is not None and unstable[lane] >= patience):
             return True
         for other in range(own + 1, count):
             taken[other] |= passes(*step, first.u[other][None])
@@ -347,7 +355,11 @@ def _branch(
             direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])  # pyright: ignore[reportArgumentType]
         edge = bool(stable[k] or stable[k + 1])
         at = float(p.u[-1] * follower.unit)
-        special.append(SpecialPoint(kind, at, float(speed(p.u)), p.u[:n] * scale, mu, direction * scale, k, edge, name))
+        special.append(
+            SpecialPoint(
+                kind, at, float(speed(p.u)), p.u[:n] * scale, mu, direction * scale, k, edge, name, int(frame.periods)
+            )
+        )
     return Branch(
         parameter=name,
         value=points.u[:, -1] * follower.unit,

@@ -21,7 +21,7 @@ from ._branch import (
 )
 from ._lens import SPEED, Parameter
 from ._orbit import Period
-from ._point import BifurcationPoint, bifurcation
+from ._point import BifurcationPoint
 from ._singularity import test_functions
 
 
@@ -33,8 +33,8 @@ SMALLEST_AMPLITUDE = 1e-5
 class Cascade:
     """Period doublings of orbits of period 1, 2, 4, ... times the first one's."""
 
-    points: tuple[BifurcationPoint, ...]
-    """Located exactly; fewer than asked for where the doubled branch was lost or does not double again."""
+    points: tuple[SpecialPoint | BifurcationPoint, ...]
+    """Fewer than asked for where the doubled branch was lost or does not double again."""
     limit: float
     """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
     error: float
@@ -71,7 +71,6 @@ def doubled_branch(
     *,
     lower: float,
     upper: float,
-    periods: int = 1,
     speed: Any = None,
     period: Period = "driven",
     steps: Steps = Steps(first=0.01, shortest=1e-7),
@@ -83,14 +82,14 @@ def doubled_branch(
 
     **Arguments:**
 
-    - `point`: the period doubling of an orbit of `periods` revolutions.
+    - `point`: a period doubling, of an orbit of any number of revolutions.
     - `lower`, `upper`, `speed`, `period`, `steps`: as for `branch`.
     - `amplitude`: how far from the doubling it is entered, in units of the system's scale along the critical direction.
     - `until_doubling`: end with the branch's own first period doubling.
 
     **Raises:** `ValueError` if the branch is not found.
     """
-    at = float(point.value)
+    at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
     curves = stack(BranchEquations(follower.problem, frame), 1)
@@ -136,21 +135,10 @@ def cascade(
     **Returns:** `Cascade`.
     """
     require_x64()
-    options = dict(period=period, method=method)
     fixed = None if parameter == SPEED else (point.speed if speed is None else speed)
-    exact = lambda p, n: bifurcation(
-        system,
-        "period-doubling",
-        (jnp.asarray(p.state), p.value),
-        parameter,
-        speed=fixed,
-        periods=n,
-        **options,  # pyright: ignore[reportArgumentType]
-    )
-    points = [exact(point, 1)]
+    points = [point]
     amplitude = 0.02
-    while len(points) < levels and bool(points[-1].converged):
-        n = 2 ** (len(points) - 1)
+    while len(points) < levels:
         try:
             doubled = doubled_branch(
                 system,
@@ -158,18 +146,17 @@ def cascade(
                 parameter,
                 lower=lower,
                 upper=upper,
-                periods=n,
                 speed=fixed,
+                period=period,
                 amplitude=amplitude,
                 until_doubling=True,
-                **options,  # pyright: ignore[reportArgumentType]
+                method=method,
             )
         except ValueError:
             break
         following = [p for p in doubled.special if p.kind == "period-doubling"]
         if not following:
             break
-        points.append(exact(following[0], 2 * n))
+        points.append(following[0])
         amplitude /= 2
-    kept = tuple(p for p in points if bool(p.converged))
-    return Cascade(kept, *extrapolated(tuple(float(p.value) for p in kept)))
+    return Cascade(tuple(points), *extrapolated(tuple(float(p.value) for p in points)))

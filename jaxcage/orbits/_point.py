@@ -152,7 +152,7 @@ def bifurcation(
     parameter: Parameter = SPEED,
     *,
     speed: Scalar | None = None,
-    periods: Any = 1,
+    periods: Any = None,
     period: Period = "driven",
     method: AbstractMethod | None = None,
 ) -> BifurcationPoint:
@@ -166,7 +166,7 @@ def bifurcation(
         special point of a branch; or a pair (state, value of the parameter).
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
     - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
-    - `periods`: revolutions after which the orbit closes.
+    - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
 
     **Returns:** `BifurcationPoint`; it does not raise if there is none. Works under `jit` and `vmap`; value, speed and
@@ -181,6 +181,7 @@ def bifurcation(
     problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
+    periods = getattr(guess, "periods", 1) if periods is None else periods
     return _find_point(problem, given, kind, start, jnp.asarray(first, dtype=float), at, jnp.asarray(periods), spin)
 
 
@@ -250,7 +251,7 @@ def _describe(
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     critical, matches = critical_multiplier(kind, multipliers)
-    rate = _transversality(problem, kind, frozen(found.newton.jacobian), known)
+    rate = critical_rate(kind, problem.equations, frozen(found.newton.jacobian), known)
     value = problem.values(u, frame)[0]
     tangential = jnp.abs(rate * frozen(u[problem.equations])) < TANGENTIAL
     outcome = jnp.where(found.converged, jnp.where(matches, jnp.where(tangential, 3, 0), 2), 1)
@@ -289,9 +290,12 @@ def critical_multiplier(kind: Kind, multipliers: Complex[Array, " dim"]) -> tupl
     return mu[i], off[i] < jnp.sqrt(ON_CIRCLE)
 
 
-def _transversality(problem: OrbitProblem, kind: Kind, jacobian: Array, known: Singular) -> Array:
-    """Rate of the critical multiplier in the parameter's unit, from the derivative of the equations at the point."""
-    m = problem.equations
+def critical_rate(kind: Kind, equations: int, jacobian: Array, known: Singular) -> Array:
+    """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
+
+    **Arguments:** kind; number of the orbit's own equations; derivative of all equations at the point; null vectors.
+    """
+    m = equations
     of_orbit, drift = jacobian[:m, :m], jacobian[:m, m]
     overlap = known.left @ known.right
     if kind in ("fold", "branch-point"):

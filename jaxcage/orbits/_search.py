@@ -34,6 +34,8 @@ from ._lens import SPEED
 ROUND = 4
 """Branches followed at a time."""
 ROUNDS = 8
+PATIENCE = 150
+"""Unstable orbits in a row after which a branch is left."""
 ON_BRANCH = 0.03
 """An orbit lies on a branch if it is within this distance of it, in units of the system's scale."""
 Progress = Callable[[str, int, int], None]
@@ -216,7 +218,9 @@ def synchronous_orbits(
         if not waiting:
             break
         say("branches", turn, ROUNDS)
-        branches += [b for b in follow_both_ways(follower, _spread(waiting, ROUND), 1, steps) if b is not None]
+        branches += [
+            b for b in follow_both_ways(follower, _spread(waiting, ROUND), 1, steps, PATIENCE) if b is not None
+        ]
         waiting = [w for w in waiting if not any(_covers(follower, b, w) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi

@@ -8,20 +8,30 @@ These hold for every kind of edge and test a gradient without any reference.
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from .._parameters import get, parameter_dimensions, parameter_paths
-from ..integrate import AbstractMethod
+from .._checks import require_x64
+from .._parameters import get, parameter_dimensions, parameter_paths, parameters
+from ..integrate import AbstractMethod, method as make_method
 from ..models import AbstractForcedSystem
 from ._branch import SpecialPoint
-from ._point import POINT_OUTCOMES, BifurcationPoint, bifurcation
+from ._implicit import numbers_of
+from ._lens import SPEED
+from ._point import TANGENTIAL, BifurcationPoint, Singular, critical_rate
+from ._problem import Frame, Given, OrbitProblem, ReturnMap, make_frame
+from ._singularity import Kind, bordered, null_vectors, singular_matrix
 
 
 PER_RPM = np.pi / 30
+POLISHING = 6
+POLISHED = 1e-11
+"""Newton's steps, in units of the system's scale and of a tenth of the speed."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,14 +62,61 @@ class Sensitivity:
         return "\n".join([f"{self.name}: {self.kind} at {self.value_rpm:.3f} rpm, elasticities", *rows])
 
 
-@eqx.filter_jit
-def _speed_and_gradient(system: AbstractForcedSystem, guess: Any, kind: Any, method: Any) -> Any:
-    def speed(s: AbstractForcedSystem) -> tuple[Any, BifurcationPoint]:
-        point = bifurcation(s, kind, guess, method=method)
-        return point.speed, point
+class _Expansion(NamedTuple):
+    """The return map and its monodromy matrix around an orbit, in the state and the field's numbers k."""
 
-    (_, point), gradient = eqx.filter_value_and_grad(speed, has_aux=True)(system)
-    return point, gradient
+    image: Float[Array, " dim"]
+    monodromy: Float[Array, "dim dim"]
+    image_slope: Float[Array, "dim x"]
+    monodromy_slope: Float[Array, "dim dim x"]
+    drift: Float[Array, " k"]
+    """dk / d parameter, in the frame's unit."""
+
+
+@eqx.filter_jit
+def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, " n"]) -> _Expansion:
+    n = problem.dimension
+    row = lambda v: numbers_of(problem.prepare(v, given, frame))[0]
+    k, remake = numbers_of(problem.prepare(u, given, frame))
+
+    def both(x: Array) -> tuple[Any, Any]:
+        found = ReturnMap(remake(x[n:]), frame).with_monodromy(x[:n])
+        return found, found
+
+    slopes, values = jax.jacfwd(both, has_aux=True)(jnp.concatenate([u[:n], k]))
+    return _Expansion(*values, *slopes, jax.jacfwd(row)(u)[:, n])
+
+
+@eqx.filter_jit
+def _pull_back(problem: OrbitProblem, given: Given, frame: Frame, u: Array, weight: Array) -> AbstractForcedSystem:
+    """d(weight . k) / d system."""
+    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed), frame))[0]
+    _, pull = eqx.filter_vjp(row, given.system)
+    return pull(weight)[0]
+
+
+class _Unfolding(NamedTuple):
+    """The equations of a bifurcation point and their derivatives at one orbit."""
+
+    residual: Float[Array, " m"]
+    of_unknowns: Float[Array, "m m"]
+    of_numbers: Float[Array, "m k"]
+    rate: Array
+    """d|mu| / d parameter in the frame's unit (at a fold: the drift along the critical direction)."""
+
+
+def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
+    n = z.size
+    left, right = null_vectors(singular_matrix(kind, around.monodromy))
+    scalar = lambda m: bordered(singular_matrix(kind, m), left, right)[0]
+    g, slope = jax.value_and_grad(scalar)(around.monodromy)
+    known = Singular(around.monodromy, *bordered(singular_matrix(kind, around.monodromy), left, right)[1:])
+    closing = around.image_slope - jnp.eye(n, around.image_slope.shape[1])
+    whole = jnp.concatenate([closing, jnp.einsum("ij,ijx->x", slope, around.monodromy_slope)[None]])
+    of_numbers = whole[:, n:]
+    of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.drift)[:, None]], axis=1)
+    residual = jnp.append(around.image - z, g)
+    return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known))
 
 
 def sensitivity(
@@ -68,27 +125,46 @@ def sensitivity(
     name: str = "edge",
     method: AbstractMethod | None = None,
 ) -> Sensitivity:
-    """Derivatives of an edge speed, exact for the equations as integrated.
+    """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
+
+    The point is located to rounding by Newton's method first. One expansion of the return map to second order serves
+    that, every kind of bifurcation and all parameters; `bifurcation` gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
     **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again.
     """
-    guess = (jnp.asarray(point.state), jnp.asarray(point.speed))
-    found, gradient = _speed_and_gradient(system, guess, point.kind, method)
-    paths = parameter_paths(system)
-    speed = float(found.speed)
-    slope = {n: float(get(gradient, path)) for n, path in paths.items()}
-    change = {n: slope[n] * float(get(system, path)) / speed for n, path in paths.items()}
+    require_x64()
+    kind: Any = point.kind
+    chosen = make_method() if method is None else method
+    problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
+    given, state = Given(system, jnp.asarray(point.speed, dtype=float)), jnp.asarray(point.state)
+    frame = make_frame(problem, given, state, given.speed, 0.1 * given.speed[None], point.periods)
+    u = jnp.append(state / frame.scale, 10.0)
+    for _ in range(POLISHING):
+        here = _unfold(kind, u[:-1], _expand(problem, given, frame, u))
+        step = jnp.linalg.solve(here.of_unknowns, here.residual)
+        if bool(jnp.max(jnp.abs(step)) < POLISHED):
+            break
+        u = u - step
+    near = bool(jnp.max(jnp.abs(u[:-1] - state / frame.scale)) < 0.1) and bool(jnp.max(jnp.abs(step)) < 1e-6)
+    speed = float(problem.values(u, frame)[0])
+    adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(u.size).at[-1].set(1.0))
+    pulled = _pull_back(problem, given, frame, u, -(adjoint @ here.of_numbers) * frame.units[0])
+    slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
+    value = {n: float(v) for n, v in parameters(system).items()}
+    change = {n: slope[n] * value[n] / speed for n in slope}
+    rate = float(here.rate / frame.units[0])
+    lost = 1.0 if near else float("nan")
     return Sensitivity(
         name=name,
-        kind=point.kind,
-        value_rpm=speed / PER_RPM,
-        derivative={n: s / PER_RPM for n, s in slope.items()},
-        elasticity=change,
-        homogeneity=_homogeneity(system, change),
-        transversality=float(found.transversality),
-        status=POINT_OUTCOMES[int(found.outcome)],
+        kind=kind,
+        value_rpm=lost * speed / PER_RPM,
+        derivative={n: lost * s / PER_RPM for n, s in slope.items()},
+        elasticity={n: lost * e for n, e in change.items()},
+        homogeneity={base: lost * r for base, r in _homogeneity(system, change).items()},
+        transversality=lost * rate,
+        status="no such point" if not near else "tangential" if abs(rate * speed) < TANGENTIAL else "converged",
     )
 
 

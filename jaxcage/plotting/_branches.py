@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -91,8 +92,9 @@ def branch_diagram(
     everywhere = np.concatenate([x for _, x, _, _ in paths])
     low, high = (float(everywhere.min()), float(everywhere.max())) if limits_rpm is None else limits_rpm
     inside = [y[(x >= low) & (x <= high)] for _, x, y, _ in paths]
-    for periods in sorted({b.periods for b in branches}):
-        _draw_paths(ax, periods, [path[1:] for path in paths if path[0] == periods])
+    met = [path for path in paths if path[1].min() <= high and path[1].max() >= low]
+    for periods in sorted({path[0] for path in met}):
+        _draw_paths(ax, periods, [path[1:] for path in met if path[0] == periods])
     ax.set(xlim=(low, high), ylim=padded_limits(np.concatenate(inside)), ylabel=quantity(name).label)
     special = [p for b in branches for p in b.special if low <= p.speed_rpm <= high]
     _mark_points(ax, special, component, quantity(name).factor)
@@ -154,19 +156,25 @@ def _share(branch: Branch, point: SpecialPoint) -> float:
 
 def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
     colour = period_colour(periods)
-    light = [0.5 + 0.5 * c for c in to_rgb(colour)]
+    light = lighter(colour)
     styles = (
         ("stable", {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}),
         ("unstable", {"color": light, "linewidth": 0.8, "linestyle": (0, (4, 1.5)), "zorder": 2.0}),
     )
     for word, style in styles:
-        parts = [_runs(x, y, pieces if word == "stable" else ~pieces) for x, y, pieces in paths]
+        parts = [runs(x, y, pieces if word == "stable" else ~pieces) for x, y, pieces in paths]
         x, y = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
         if x.size:
             ax.plot(x, y, **style, label=f"period-{periods}, {word}")
 
 
-def _runs(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def lighter(colour: str) -> tuple[float, float, float]:
+    """Half way to white."""
+    r, g, b = to_rgb(colour)
+    return 0.5 + 0.5 * r, 0.5 + 0.5 * g, 0.5 + 0.5 * b
+
+
+def runs(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The chosen pieces of a polyline, with NaN between those that are not neighbours."""
     change = np.diff(np.concatenate([[0], chosen.astype(int), [0]]))
     ends = zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True)
@@ -183,14 +191,20 @@ def _mark_points(ax: Axes, points: Sequence[SpecialPoint], component: int, facto
             if not mine:
                 continue
             x, y = [p.speed_rpm for p in mine], [float(p.state[component]) * factor for p in mine]
-            style = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
+            style: dict[str, Any] = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
             if edge:
                 style |= {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 5.0}
             else:
                 style |= {"markersize": 3.5, "markerfacecolor": "white", "markeredgewidth": 0.8, "zorder": 4.0}
             ax.plot(x, y, **style, label=words(kind) if edge else f"_{words(kind)}, hollow")
     if any(not p.edge for p in points):
-        style = {"marker": "o", "linestyle": "none", "color": GREY, "markersize": 4.5, "markerfacecolor": "white"}
+        style: dict[str, Any] = {
+            "marker": "o",
+            "linestyle": "none",
+            "color": GREY,
+            "markersize": 4.5,
+            "markerfacecolor": "white",
+        }
         ax.plot([], [], **style, label="hollow: unstable on both sides")
 
 

@@ -1,6 +1,7 @@
 """Floquet multipliers in the complex plane."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Complex
@@ -36,13 +37,16 @@ def multiplier_circle(branch: Branch | Complex[np.ndarray, "*points dim"], ax: A
         mu = branch.multipliers
         speed = np.repeat(branch.speed_rpm, mu.shape[1])
         shown = _shown(mu)
-        cloud = ax.scatter(mu.real[shown], mu.imag[shown], c=speed[shown.ravel()], s=7, cmap="viridis", linewidths=0)
+        cloud = ax.scatter(
+            np.real(mu)[shown], np.imag(mu)[shown], c=speed[shown.ravel()], s=7, cmap="viridis", linewidths=0
+        )
         cloud.set(clim=(float(speed.min()), float(speed.max())), zorder=3)
-        ax.figure.colorbar(cloud, ax=ax, label=quantity("speed_rpm").label, pad=0.02, format="{x:.0f}")
+        beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+        ax.figure.colorbar(cloud, cax=beside, label=quantity("speed_rpm").label, format="{x:.0f}")
         _mark_critical(ax, branch.special)
     else:
         mu = branch[_shown(branch)]
-        ax.plot(mu.real, mu.imag, "o", color=BLUE, markersize=4, zorder=3, label="multipliers")
+        ax.plot(np.real(mu), np.imag(mu), "o", color=BLUE, markersize=4, zorder=3, label="multipliers")
     limits = (-REACH, REACH)
     ax.set(xlim=limits, ylim=limits, aspect="equal")
     ax.set(xlabel=r"Real part of the multiplier $\mu$", ylabel=r"Imaginary part of the multiplier $\mu$")
@@ -50,7 +54,7 @@ def multiplier_circle(branch: Branch | Complex[np.ndarray, "*points dim"], ax: A
 
 
 def _shown(mu: np.ndarray) -> np.ndarray:
-    return (np.abs(mu.real) <= REACH) & (np.abs(mu.imag) <= REACH)
+    return (np.abs(np.real(mu)) <= REACH) & (np.abs(np.imag(mu)) <= REACH)
 
 
 def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
@@ -60,13 +64,19 @@ def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
         label = words(p.kind) if named[p.kind] is p else None
         size, face = (6.0, mark.colour) if p.edge else (4.5, "white")
         both = (mu, mu.conjugate()) if p.kind == "torus" else (complex(mu.real, 0.0),)
-        style = {"marker": mark.marker, "linestyle": "none", "color": mark.colour, "markerfacecolor": face}
+        style: dict[str, Any] = {
+            "marker": mark.marker,
+            "linestyle": "none",
+            "color": mark.colour,
+            "markerfacecolor": face,
+        }
         ax.plot([m.real for m in both], [m.imag for m in both], **style, markersize=size, zorder=5, label=label)
     _write_column(ax, [p for p in points if p.critical.real < 0 and p.kind != "torus"], -1)
     _write_column(ax, [p for p in points if p.critical.real > 0 and p.kind != "torus"], 1)
     _write_around(ax, [p for p in points if p.kind == "torus"])
     if named:
-        ax.legend(loc="upper left", frameon=False, fontsize=8, handletextpad=0.2, borderaxespad=0.2)
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 4}
+        ax.legend(**place, frameon=False, fontsize=8, handletextpad=0.1, columnspacing=1.0)
 
 
 def _text(point: SpecialPoint) -> str:
@@ -90,18 +100,15 @@ def _write_column(ax: Axes, points: Sequence[SpecialPoint], side: int) -> None:
 
 
 def _write_around(ax: Axes, points: Sequence[SpecialPoint]) -> None:
-    """Points with complex multipliers, outside the circle at their angle, moved apart."""
-    points = sorted(points, key=lambda p: np.angle(p.critical))
-    angle = move_apart(np.array([np.angle(p.critical) for p in points]), 0.1, 0.1, np.pi - 0.1)
-    for p, a in zip(points, angle, strict=True):
-        place = (1.12 * np.cos(a), 1.12 * np.sin(a))
-        side = "center" if abs(np.cos(a)) < 0.2 else "right" if np.cos(a) < 0 else "left"
-        style = {
-            "ha": side,
-            "va": "center",
-            "fontsize": _LABEL_SIZE,
-            "color": mark_of(p.kind).colour,
-            "path_effects": _HALO,
-        }
-        line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
-        ax.annotate(_text(p), (p.critical.real, p.critical.imag), place, **style, arrowprops=line, zorder=6)
+    """Points with complex multipliers, outside the circle beside their place, moved apart."""
+    frame = ax.get_window_extent()
+    gap = 1.3 * _LABEL_SIZE * ax.figure.dpi / 72 * 2 * REACH / min(frame.width, frame.height)
+    for side in (-1, 1):
+        mine = sorted((p for p in points if (p.critical.real >= 0) == (side > 0)), key=lambda p: p.critical.imag)
+        heights = move_apart(1.1 * np.array([p.critical.imag for p in mine]), gap, 0.1, REACH - gap)
+        for p, y in zip(mine, heights, strict=True):
+            place = (side * max(0.05, np.sqrt(max(0.0, 1.12**2 - y**2))), y)
+            style = {"ha": "right" if side < 0 else "left", "va": "center", "fontsize": _LABEL_SIZE}
+            line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+            style |= {"color": mark_of(p.kind).colour, "path_effects": _HALO, "zorder": 6, "arrowprops": line}
+            ax.annotate(_text(p), (p.critical.real, p.critical.imag), place, **style)

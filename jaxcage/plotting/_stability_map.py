@@ -1,7 +1,6 @@
 """Bifurcation curves in the plane of speed and a parameter, over the largest exponent."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -10,16 +9,12 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 
 from .._glossary import quantity
-from ._branches import mark_of
+from ..orbits import Curve
+from ._branches import mark_of, runs
 from ._elasticities import readable
 from ._orbit_diagram import label_speed
 from ._style import BLACK, axes_or_new, padded_limits
 
-
-if TYPE_CHECKING:
-    from ..orbits import Curve
-else:
-    Curve = Any
 
 Exponents = tuple[
     Float[np.ndarray, " speeds"],
@@ -60,20 +55,36 @@ def stability_map(
         _colour_exponents(ax, exponents, y_factor)
     rpm = quantity("speed").factor
     lines = [(np.asarray(c.x_value) * rpm, np.asarray(c.y_value) * y_factor) for c in curves]
-    seen = set()
     for c, (x, y) in zip(curves, lines, strict=True):
-        label = None if c.kind in seen else c.kind
-        seen.add(c.kind)
-        halo = [withStroke(linewidth=3.6, foreground="white")]
-        ax.plot(x, y, color=mark_of(c.kind).colour, linewidth=2.0, label=label, path_effects=halo, zorder=3)
+        _draw_curve(ax, c, x, y)
     _fit(ax, lines, exponents, y_factor)
     name = y_label if y_label is not None else readable("".join(others)).capitalize()
     ax.set_ylabel(f"{name} [{y_unit}]" if y_unit else name)
     label_speed(ax)
-    if seen:
+    if curves:
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=9)
     _name_points(ax, [(p.x_value * rpm, p.y_value * y_factor, p.kind) for c in curves for p in c.special], lines)
     return ax
+
+
+def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
+    """The curve, dotted where its points are no bifurcations but neutral saddles."""
+    drawn = {line.get_label() for line in ax.get_lines()}
+    genuine = np.asarray(curve.genuine[:-1] & curve.genuine[1:])
+    colour = mark_of(curve.kind).colour
+    halo = [withStroke(linewidth=3.6, foreground="white")]
+    for label, chosen, style in (
+        ("neutral saddles", ~genuine, {"linewidth": 1.6, "linestyle": ":", "zorder": 2.9}),
+        (curve.kind, genuine, {"linewidth": 2.0, "zorder": 3.0}),
+    ):
+        if np.any(chosen):
+            ax.plot(
+                *runs(x, y, chosen),
+                color=colour,
+                path_effects=halo,
+                **style,
+                label=f"_{label}" if label in drawn else label,
+            )
 
 
 def _colour_exponents(ax: Axes, exponents: Exponents, factor: float) -> None:
