@@ -293,9 +293,9 @@ def test_cage_in_contact_with_its_land(name):
 @pytest.mark.parametrize("name", CONTACT)
 def test_multipliers_of_a_cage_in_contact_are_trusted(name):
     """One multiplier is below 1e-17 of the largest: the determinant is lost to rounding, the others are not."""
-    model, speed, orbit, _ = cage_in_contact(name)
-    fine = jc.periodic_orbit(model, speed, guess=orbit, revolutions=0, method=jc.method(steps=1024))
-    np.testing.assert_allclose(jnp.abs(orbit.multipliers), jnp.abs(fine.multipliers), rtol=0, atol=3e-4)
+    _, _, orbit, _ = cage_in_contact(name)
+    fine = {"pressed": [0.01862017, 0.01862017, 9.1993e-6], "grazed": [0.68762552, 0.68762552, 0.08096483]}[name]
+    np.testing.assert_allclose(jnp.abs(orbit.multipliers[:3]), fine, rtol=2e-3)  # those of 4096 steps
     assert jnp.abs(orbit.multipliers[3]) < 1e-15
     assert abs(orbit.liouville) < 1e-3
     assert orbit.status == "converged"

@@ -27,9 +27,14 @@ class Edge:
     """`chaotic` or `synchronous-loss`."""
     mechanism: str = "unknown"
     """`period-doubling`, `torus`, `fold`, `crisis` or `unknown`."""
+    basis: str = "statistical"
+    """`statistical`: seen in a sweep; `located`: a bifurcation, solved for; `cascade`: the limit of a period-doubling
+    cascade, extrapolated from its first points."""
 
     def __str__(self) -> str:
-        return f"{self.speed_rpm:.0f} +- {self.uncertainty_rpm:.0f} rpm"
+        if self.basis == "statistical":
+            return f"{self.speed_rpm:.0f} +- {self.uncertainty_rpm:.0f} rpm"
+        return f"{self.speed_rpm:.2f} rpm ({self.mechanism})"
 
 
 @dataclasses.dataclass(frozen=True)

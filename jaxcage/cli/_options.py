@@ -59,9 +59,12 @@ class SweepOptions(IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ZonesOptions(SweepOptions):
-    """Chaotic zones of a case over speed, beside the published ones."""
+    """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones."""
 
     implementation: ClassVar[str] = "_zones"
+
+    quick: bool = False
+    """Leave out the gradients of the edges, which take about a minute to compile."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -33,6 +33,7 @@ def zone_document(zone: Zone) -> dict[str, Any]:
         "mechanism": known[0] if known else None,
         "onset_mechanism": onset and onset.mechanism,
         "exit_mechanism": exit_ and exit_.mechanism,
+        "width_kind": zone.kind,
         "width_rpm": zone.width_rpm,
         "share": zone.share,
     }
@@ -74,15 +75,6 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     return Table(title, (*columns, "published"), rows)
 
 
-def synchronous_table(name: str, zones: Zones) -> Table:
-    """Stretches in which some start settled on the synchronous (period-1) orbit; their ends are synchronous-loss edges,
-    bracketed by the grid only [rpm].
-    """
-    rows = [(_edge_cell(z.onset), _edge_cell(z.exit), f"{z.share:.0%}") for z in zones.synchronous]
-    title = f"Synchronous orbit of {name} met [rpm], resolution {number(zones.resolution_rpm)} rpm"
-    return Table(title, ("from", "to", "share"), rows or [("none", "-", "-")])
-
-
 def _zone_cells(zone: Zone) -> tuple[str, ...]:
     known = [edge.mechanism for edge in (zone.onset, zone.exit) if edge is not None]
     mechanism = " / ".join(dict.fromkeys(known)) or "-"
@@ -91,7 +83,13 @@ def _zone_cells(zone: Zone) -> tuple[str, ...]:
 
 
 def _edge_cell(edge: Edge | None) -> str:
-    return "past range" if edge is None else f"{edge.speed_rpm:.0f} ± {edge.uncertainty_rpm:.0f}"
+    if edge is None:
+        return "past range"
+    return (
+        f"{edge.speed_rpm:.0f} ± {edge.uncertainty_rpm:.0f}"
+        if edge.basis == "statistical"
+        else number(edge.speed_rpm, 1)
+    )
 
 
 def _published_cell(spans: list[Span]) -> str:

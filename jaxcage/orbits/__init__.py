@@ -15,6 +15,7 @@
 | `_branch`      | branches of orbits with their bifurcations located                                 |
 | `_search`      | the synchronous orbits of a speed range, found without a hint                      |
 | `_loss`        | synchronous-loss zones and their edges                                             |
+| `_mechanism`   | chaotic edges matched with bifurcations and cascade limits                         |
 | `_sensitivity` | derivatives and elasticities of an edge, homogeneity                               |
 | `_curve`       | bifurcation points followed in two parameters                                      |
 | `_cascade`     | period-doubling cascades and their limit                                           |
@@ -25,6 +26,7 @@ from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as b
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
 from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve
 from ._loss import LossZones as LossZones, loss_zones as loss_zones
+from ._mechanism import Explained as Explained, explain as explain
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from ._point import BifurcationPoint as BifurcationPoint, bifurcation as bifurcation
 from ._search import (
@@ -34,6 +36,7 @@ from ._search import (
 )
 from ._sensitivity import (
     Sensitivity as Sensitivity,
+    edge_speed as edge_speed,
     sensitivities as sensitivities,
     sensitivity as sensitivity,
     width as width,

@@ -82,7 +82,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float = CLOSE_BELOW_RP
     if not found.stretches:
         return LossZones((), {}, {}, None, close_below_rpm)
     principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))
-    own = [s for s in found.stretches if s.branch == principal.branch]
+    own = [s for s in found.stretches if s.family == principal.family]
     groups = [_grown(_Group((principal,)), own, close_below_rpm)]
     left = [s for s in found.stretches if groups[0].apart(_Group((s,))) >= 0]
     while left:
@@ -125,4 +125,4 @@ def _share(found: SynchronousOrbits, onset: SpecialPoint | None, leaves: Special
 
 
 def _edge(point: SpecialPoint | None) -> Edge | None:
-    return None if point is None else Edge(point.speed_rpm, LOCATED_RPM, "synchronous-loss", point.kind)
+    return None if point is None else Edge(point.speed_rpm, LOCATED_RPM, "synchronous-loss", point.kind, "located")

@@ -50,6 +50,8 @@ class Stretch:
     lower_rpm: float
     upper_rpm: float
     branch: int
+    family: int = 0
+    """The same for all branches that are parts of one."""
     met: int = 0
     """How many simulations settled on it."""
     met_first: int = 0
@@ -188,29 +190,31 @@ def synchronous_orbits(
     count: int = 101,
     discard: int = 250,
     steps: Steps = Steps(most=1500),
+    settled: Sweep | None = None,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> SynchronousOrbits:
     """Find and follow the synchronous orbits between two speeds [rad/s].
 
     **Arguments:** system and range; number of speeds that are simulated from each of the system's starts, and
-    revolutions left out; steps of the continuation, in units of 1/20 of the range.
+    revolutions left out; or a sweep that was made before; steps of the continuation, in units of 1/20 of the range.
 
     **Returns:** `SynchronousOrbits`. Stable orbits with a small basin can escape the simulations: `missed` counts those
     that were met but not followed; those that were not met cannot be counted.
     """
     say = progress or (lambda what, done, of: None)
-    settled = sweep(
-        system,
-        np.linspace(lower, upper, count),
-        discard=discard,
-        revolutions=8,
-        blocks=1,
-        keep=8,
-        exponents=0,
-        method=method,
-        progress=lambda done, of: say("simulations", done, of),
-    )
+    if settled is None:
+        settled = sweep(
+            system,
+            np.linspace(lower, upper, count),
+            discard=discard,
+            revolutions=8,
+            blocks=1,
+            keep=8,
+            exponents=0,
+            method=method,
+            progress=lambda done, of: say("simulations", done, of),
+        )
     follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
     orbits = waiting = _stable_orbits(follower, settled)
     branches: list[Branch] = []
@@ -226,10 +230,12 @@ def synchronous_orbits(
     limits = lower * 30 / np.pi, upper * 30 / np.pi
     scale = lambda rpm: _scale(follower, rpm * np.pi / 30)
     pieces = _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale)
+    families = _families(follower, branches)
     stretches = []
     for piece in pieces:
         met = [o.start for o in orbits if piece.holds(o.speed * 30 / np.pi, o.state, _scale(follower, o.speed))]
-        stretches.append(dataclasses.replace(piece.stretch, met=len(met), met_first=met.count(0)))
+        family = families[piece.stretch.branch]
+        stretches.append(dataclasses.replace(piece.stretch, family=family, met=len(met), met_first=met.count(0)))
     return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
 
 
@@ -266,6 +272,18 @@ def _covers(follower: Follower, branch: Branch, orbit: _Settled) -> bool:
     scale = _scale(follower, orbit.speed)
     apart = (np.max(np.abs(s - orbit.state) / scale) for _, s, _ in crossings(branch, orbit.speed))
     return any(a < ON_BRANCH for a in apart)
+
+
+def _families(follower: Follower, branches: Sequence[Branch]) -> list[int]:
+    """A number for each branch, the same for parts of one: a part that was stopped on another ends there."""
+    family = list(range(len(branches)))
+    for i, b in enumerate(branches):
+        for end, why in zip((0, -1), b.ended, strict=True):
+            last = _Settled(b.state[end], float(b.speed[end]), 0)
+            for j, other in enumerate(branches):
+                if why == "stopped" and i != j and _covers(follower, other, last):
+                    family = [family[j] if f == family[i] else f for f in family]
+    return family
 
 
 def _scale(follower: Follower, speed: float) -> np.ndarray:

@@ -30,8 +30,9 @@ from ._singularity import Kind, bordered, null_vectors, singular_matrix
 
 PER_RPM = np.pi / 30
 POLISHING = 6
-POLISHED = 1e-11
-"""Newton's steps, in units of the system's scale and of a tenth of the speed."""
+POLISHED, SETTLED, NEARBY = 1e-11, 1e-7, 0.5
+"""Newton's steps end below the first, must be below the second, and may lead no further than the third, in units of the
+system's scale and of a tenth of the speed."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,6 +120,49 @@ def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
     return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known))
 
 
+class _Edge(NamedTuple):
+    """An edge located to rounding."""
+
+    problem: OrbitProblem
+    given: Given
+    frame: Frame
+    u: Array
+    unfolding: _Unfolding
+    found: bool
+
+    @property
+    def speed(self) -> float:
+        return float(self.problem.values(self.u, self.frame)[0])
+
+
+def _located(system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoint, method: Any) -> _Edge:
+    kind: Any = point.kind
+    chosen = make_method() if method is None else method
+    problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
+    given, state = Given(system, jnp.asarray(point.speed, dtype=float)), jnp.asarray(point.state)
+    frame = make_frame(problem, given, state, given.speed, 0.1 * given.speed[None], point.periods)
+    u = first = jnp.append(state / frame.scale, 10.0)
+    size = jnp.inf
+    for _ in range(POLISHING):
+        here = _unfold(kind, u[:-1], _expand(problem, given, frame, u))
+        step = jnp.linalg.solve(here.of_unknowns, here.residual)
+        size = jnp.max(jnp.abs(step))
+        if not bool(size > POLISHED):
+            break
+        u = u - step
+    found = bool(size < SETTLED) and bool(jnp.max(jnp.abs(u - first)) < NEARBY)
+    return _Edge(problem, given, frame, u, here, found)
+
+
+def edge_speed(
+    system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoint, method: AbstractMethod | None = None
+) -> float:
+    """Speed [rad/s] of the edge near `point`, located to rounding; NaN if Newton's method does not find it."""
+    require_x64()
+    edge = _located(system, point, method)
+    return edge.speed if edge.found else float("nan")
+
+
 def sensitivity(
     system: AbstractForcedSystem,
     point: SpecialPoint | BifurcationPoint,
@@ -135,36 +179,25 @@ def sensitivity(
     **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again.
     """
     require_x64()
-    kind: Any = point.kind
-    chosen = make_method() if method is None else method
-    problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
-    given, state = Given(system, jnp.asarray(point.speed, dtype=float)), jnp.asarray(point.state)
-    frame = make_frame(problem, given, state, given.speed, 0.1 * given.speed[None], point.periods)
-    u = jnp.append(state / frame.scale, 10.0)
-    for _ in range(POLISHING):
-        here = _unfold(kind, u[:-1], _expand(problem, given, frame, u))
-        step = jnp.linalg.solve(here.of_unknowns, here.residual)
-        if bool(jnp.max(jnp.abs(step)) < POLISHED):
-            break
-        u = u - step
-    near = bool(jnp.max(jnp.abs(u[:-1] - state / frame.scale)) < 0.1) and bool(jnp.max(jnp.abs(step)) < 1e-6)
-    speed = float(problem.values(u, frame)[0])
-    adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(u.size).at[-1].set(1.0))
-    pulled = _pull_back(problem, given, frame, u, -(adjoint @ here.of_numbers) * frame.units[0])
+    edge = _located(system, point, method)
+    unit, here, speed = float(edge.frame.units[0]), edge.unfolding, edge.speed
+    adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(edge.u.size).at[-1].set(1.0))
+    weight = -(adjoint @ here.of_numbers) * unit
+    pulled = _pull_back(edge.problem, edge.given, edge.frame, edge.u, weight)
     slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
-    value = {n: float(v) for n, v in parameters(system).items()}
-    change = {n: slope[n] * value[n] / speed for n in slope}
-    rate = float(here.rate / frame.units[0])
-    lost = 1.0 if near else float("nan")
+    change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
+    rate = float(here.rate) / unit
+    lost = 1.0 if edge.found else float("nan")
+    crossing = "tangential" if abs(rate * speed) < TANGENTIAL else "converged"
     return Sensitivity(
         name=name,
-        kind=kind,
+        kind=point.kind,
         value_rpm=lost * speed / PER_RPM,
         derivative={n: lost * s / PER_RPM for n, s in slope.items()},
         elasticity={n: lost * e for n, e in change.items()},
         homogeneity={base: lost * r for base, r in _homogeneity(system, change).items()},
         transversality=lost * rate,
-        status="no such point" if not near else "tangential" if abs(rate * speed) < TANGENTIAL else "converged",
+        status=crossing if edge.found else "no such point",
     )
 
 

@@ -73,18 +73,14 @@ def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
     genuine = np.asarray(curve.genuine[:-1] & curve.genuine[1:])
     colour = mark_of(curve.kind).colour
     halo = [withStroke(linewidth=3.6, foreground="white")]
-    for label, chosen, style in (
-        ("neutral saddles", ~genuine, {"linewidth": 1.6, "linestyle": ":", "zorder": 2.9}),
-        (curve.kind, genuine, {"linewidth": 2.0, "zorder": 3.0}),
+    for label, chosen, width, dash in (
+        ("neutral saddles", ~genuine, 1.6, ":"),
+        (curve.kind, genuine, 2.0, "-"),
     ):
         if np.any(chosen):
-            ax.plot(
-                *runs(x, y, chosen),
-                color=colour,
-                path_effects=halo,
-                **style,
-                label=f"_{label}" if label in drawn else label,
-            )
+            name = f"_{label}" if label in drawn else label
+            style = {"linestyle": dash, "color": colour, "path_effects": halo, "zorder": 3}
+            ax.plot(*runs(x, y, chosen), linewidth=width, **style, label=name)
 
 
 def _colour_exponents(ax: Axes, exponents: Exponents, factor: float) -> None:

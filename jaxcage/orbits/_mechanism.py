@@ -1,0 +1,87 @@
+"""Why a chaotic zone ends where it does: statistical edges matched with bifurcations and cascade limits."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..analysis import Edge, Zone, Zones
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem
+from ._branch import SpecialPoint
+from ._cascade import Cascade, cascade
+from ._loss import LOCATED_RPM
+from ._search import SynchronousOrbits
+
+
+CASCADE_REACH_RPM = 500.0
+"""Period doublings this far on the calm side of a chaotic edge are tried for a cascade that ends there."""
+CASCADE_LEVELS = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class Explained:
+    """Chaotic zones with the mechanisms of their edges, and what these were taken from."""
+
+    zones: Zones
+    sources: dict[str, SpecialPoint | Cascade]
+    """By edge, e.g. `zone 1 exit`: what the edge coincides with. Other edges stay statistical."""
+
+
+def explain(
+    zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
+) -> Explained:
+    """Give each chaotic edge the mechanism it coincides with, within its uncertainty.
+
+    An onset can be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations themselves are
+    tried first, then the limits of the cascades that begin at period doublings on the calm side.
+
+    **Returns:** `Explained`; edges that coincide with nothing that was located are left as they were.
+    """
+    sources: dict[str, SpecialPoint | Cascade] = {}
+    changed: list[Zone] = []
+    for number, zone in enumerate(zones.zones, start=1):
+        ends = {}
+        for end, edge, calm in (("onset", zone.onset, -1), ("exit", zone.exit, 1)):
+            source = None if edge is None else _source(edge, calm, found, system, method)
+            if edge is not None and source is not None:
+                sources[f"zone {number} {end}"] = source
+                edge = _taken(edge, source)
+            ends[end] = edge
+        changed.append(dataclasses.replace(zone, **ends))
+    return Explained(dataclasses.replace(zones, zones=tuple(changed)), sources)
+
+
+def _source(
+    edge: Edge, calm: int, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None
+) -> SpecialPoint | Cascade | None:
+    ends = [s.upper if calm < 0 else s.lower for s in found.stretches]
+    points = [p for p in ends if p is not None]
+    away = lambda p: abs(p.speed_rpm - edge.speed_rpm)
+    here = [p for p in points if away(p) <= edge.uncertainty_rpm]
+    if here:
+        return min(here, key=away)
+    beyond = lambda p: 0 < calm * (p.speed_rpm - edge.speed_rpm) <= CASCADE_REACH_RPM
+    return _cascade_at(edge, [p for p in points if p.kind == "period-doubling" and beyond(p)], system, method)
+
+
+def _cascade_at(
+    edge: Edge, doublings: Sequence[SpecialPoint], system: AbstractForcedSystem, method: AbstractMethod | None
+) -> Cascade | None:
+    reach = 2 * CASCADE_REACH_RPM * np.pi / 30
+    for point in sorted(doublings, key=lambda p: abs(p.speed_rpm - edge.speed_rpm)):
+        tried = cascade(
+            system, point, lower=point.speed - reach, upper=point.speed + reach, levels=CASCADE_LEVELS, method=method
+        )
+        if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - edge.speed_rpm) <= edge.uncertainty_rpm:
+            return tried
+    return None
+
+
+def _taken(edge: Edge, source: SpecialPoint | Cascade) -> Edge:
+    """The chaotic edge at the place of what it coincides with."""
+    if isinstance(source, Cascade):
+        per_rpm = 30 / np.pi
+        limit, error = source.limit * per_rpm, source.error * per_rpm
+        return Edge(limit, max(error, LOCATED_RPM), edge.kind, "period-doubling", "cascade")
+    return Edge(source.speed_rpm, LOCATED_RPM, edge.kind, source.kind, "located")
