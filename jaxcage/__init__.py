@@ -87,9 +87,27 @@ from .models import (
 )
 from .orbits import (
     BifurcationPoint as BifurcationPoint,
+    Branch as Branch,
+    Cascade as Cascade,
+    Curve as Curve,
+    LossZones as LossZones,
     Orbit as Orbit,
+    Sensitivity as Sensitivity,
+    SpecialPoint as SpecialPoint,
+    Steps as Steps,
+    SynchronousOrbits as SynchronousOrbits,
     bifurcation as bifurcation,
+    branch as branch,
+    cascade as cascade,
+    coexisting_orbits as coexisting_orbits,
+    curve as curve,
+    doubled_branch as doubled_branch,
+    explain as explain,
+    loss_zones as loss_zones,
     periodic_orbit as periodic_orbit,
+    sensitivities as sensitivities,
+    sensitivity as sensitivity,
+    synchronous_orbits as synchronous_orbits,
 )
 from .sweeps import (
     Hysteresis as Hysteresis,

@@ -89,12 +89,20 @@ def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Tab
     order = sorted(moving, key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])))
     info, value = parameter_info(model), parameters(model)
     rows = [
-        (n, f"{float(value[n]):.6g}", unit_cell(info[n].unit), f"{slope[n]:+.6g}", f"{change[n]:+.6f}") for n in order
+        (n, f"{float(value[n]):.6g}", unit_cell(info[n].unit), f"{slope[n]:+.6g}", elasticity_cell(change[n]))
+        for n in order
     ]
     title = f"{sensitivity.name.capitalize()} of {name}: {sensitivity.value_rpm:.3f} rpm, {sensitivity.kind}"
     still = len(slope) - len(moving)
     columns = ("parameter", "value", "unit", "rpm per unit", "elasticity")
     return Table(title + (f"; {still} other parameters do not move it" if still else ""), columns, rows)
+
+
+def elasticity_cell(value: float) -> str:
+    """An elasticity to six decimals; what they would hide as zero is shown by its size."""
+    if value == 0.0:
+        return "0"
+    return f"{value:+.6f}" if abs(value) >= 5e-7 else f"{value:+.0e}"
 
 
 def unit_cell(unit: str) -> str:

@@ -7,6 +7,7 @@
 | `_newton`      | damped Newton as an optimistix solver                                              |
 | `_implicit`    | roots with derivatives by the implicit function theorem                            |
 | `_orbit`       | periodic orbits and their multipliers                                              |
+| `_coexisting`  | all orbits that many starts lead to                                                |
 | `_liouville`   | the determinant that every monodromy matrix must have                              |
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
 | `_point`       | bifurcation points                                                                 |
@@ -24,6 +25,7 @@
 from ._arclength import Steps as Steps
 from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as branch
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
+from ._coexisting import coexisting_orbits as coexisting_orbits
 from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve
 from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._mechanism import Explained as Explained, explain as explain
