@@ -98,6 +98,7 @@ from .orbits import (
     SynchronousOrbits as SynchronousOrbits,
     bifurcation as bifurcation,
     branch as branch,
+    branches as branches,
     cascade as cascade,
     coexisting_orbits as coexisting_orbits,
     curve as curve,

@@ -44,10 +44,14 @@ def check_search(options: SearchOptions) -> None:
     require_at_least("--discard", options.discard, 0)
 
 
-def search_case(options: SearchOptions) -> Searched:
-    """Check everything, and search for the synchronous orbits that the options describe."""
+def search_case(options: SearchOptions, about: Subject | None = None) -> Searched:
+    """Check everything, and search for the synchronous orbits that the options describe, of the model `about` if it
+    is loaded already.
+    """
     check_search(options)
-    chosen, about, folder = integration(options), subject(options), output_folder(options)
+    chosen = integration(options)
+    about = subject(options) if about is None else about
+    folder = output_folder(options)
     began = time.perf_counter()
     with progress_in_stages(f"synchronous orbits of {about.name}") as bar:
         found = synchronous_orbits(
@@ -63,6 +67,15 @@ def search_case(options: SearchOptions) -> Searched:
     if not found.branches:
         raise ComputationError(_nothing(found))
     return Searched(about, found, loss_zones(found), chosen, folder, seconds)
+
+
+def require_edges(searched: Searched, what: str) -> None:
+    """Refuse to go on where there is no edge to do anything to."""
+    if not searched.loss.edges:
+        between = f"{searched.found.lower_rpm:g} and {searched.found.upper_rpm:g} rpm"
+        raise ComputationError(
+            f"No zone without a stable synchronous orbit begins or ends between {between}: there is no edge to {what}."
+        )
 
 
 def _nothing(found: SynchronousOrbits) -> str:

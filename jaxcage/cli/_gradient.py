@@ -7,7 +7,7 @@ from .._parameters import parameter_info, parameters
 from ..models import CageModel
 from ..orbits import Sensitivity, sensitivities, width
 from ..plotting import elasticity_bars, new_figure
-from ._bifurcations import Searched, search_case
+from ._bifurcations import Searched, require_edges, search_case
 from ._console import progress
 from ._errors import ComputationError
 from ._inputs import save_figure
@@ -26,11 +26,7 @@ def run(options: GradientOptions) -> Report:
     """Carry out `jaxcage gradient`."""
     searched = search_case(options)
     about = searched.subject
-    if not searched.loss.edges:
-        raise ComputationError(
-            f"No zone without a stable synchronous orbit begins or ends between {options.first:g} and "
-            f"{options.last:g} rpm, so there is no edge to differentiate."
-        )
+    require_edges(searched, "differentiate")
     began = time.perf_counter()
     with progress(f"gradients of {about.name}"):
         edges = sensitivities(about.model, searched.loss.edges, method=searched.method)

@@ -114,7 +114,7 @@ class MapOptions(SearchOptions):
     columns: int = 50
     """Speeds at which the exponent is computed."""
     revolutions: int = 100
-    """Revolutions over which the exponent is computed, a multiple of 10."""
+    """Revolutions over which the exponent is computed."""
     starts: int = 1
     """Starts of which the largest exponent is taken."""
 

@@ -23,7 +23,7 @@
 """
 
 from ._arclength import Steps as Steps
-from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as branch
+from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as branch, branches as branches
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
 from ._coexisting import coexisting_orbits as coexisting_orbits
 from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve

@@ -120,6 +120,12 @@ class Follower(eqx.Module):
     lower: float
     upper: float
     unit: float
+    designs: bool = eqx.field(static=True, default=False)
+    """Whether every lane has a system of its own, stacked in `given`."""
+
+    def of(self, lanes: Any) -> Given:
+        """What is given in these lanes."""
+        return take(self.given, np.asarray(lanes)) if self.designs else self.given
 
     @property
     def parameter(self) -> Parameter:
@@ -127,7 +133,8 @@ class Follower(eqx.Module):
 
     def frame(self, state: Array, at: Scalar, periods: Any) -> Frame:
         """The frame of all lanes, around one of their orbits."""
-        system, speed = with_value(self.given.system, self.given.speed, self.parameter, jnp.asarray(at, dtype=float))
+        given = self.of(0)
+        system, speed = with_value(given.system, given.speed, self.parameter, jnp.asarray(at, dtype=float))
         return make_frame(self.problem, Given(system, speed), state, speed, jnp.full(1, self.unit), periods)
 
     def inside(self, u: np.ndarray) -> np.ndarray:
@@ -182,6 +189,41 @@ def branch(
     return found
 
 
+def branches(
+    systems: Sequence[AbstractForcedSystem],
+    orbits: Sequence[Any],
+    parameter: Parameter = SPEED,
+    *,
+    lower: float,
+    upper: float,
+    speed: Scalar | None = None,
+    steps: Steps = Steps(),
+    method: AbstractMethod | None = None,
+) -> list[Branch | None]:
+    """The branches of many designs at a time, each from its own orbit: lanes of one continuation.
+
+    **Arguments:** systems that differ in their numbers only; an orbit of each, all of as many periods; the rest as for
+    `branch`.
+
+    **Returns:** a `Branch` per system; None where Newton's method finds no orbit to start from.
+    """
+    require_x64()
+    if not systems or len(systems) != len(orbits):
+        raise ValueError(
+            f"Arguments `systems` and `orbits` must be as many, above 0, but are {len(systems)} and {len(orbits)}."
+        )
+    starts = []
+    for system, orbit in zip(systems, orbits, strict=True):
+        at = orbit.speed if speed is None else speed
+        starts.append((np.asarray(orbit.state), float(value_of(system, at, parameter))))
+    known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
+    each = [Given(s, known_speed) for s in systems]
+    given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
+    single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)
+    follower = Follower(single.problem, given, lower, upper, single.unit, True)
+    return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
+
+
 def make_follower(
     system: AbstractForcedSystem,
     speed: Any,
@@ -206,7 +248,7 @@ def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> tuple[An
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return curves, correct(curves, follower.given, u, normal)
+    return curves, correct(curves, follower.of(np.arange(lanes)), u, normal, follower.designs)
 
 
 def turned(points: Corrected, sign: Any) -> Corrected:
@@ -238,15 +280,25 @@ def follow_both_ways(
         unstable[lane] = 0 if calm else unstable[lane] + 1
         if taken[own] or (patience is not None and unstable[lane] >= patience):
             return True
+        if follower.designs:
+            return False
         for other in range(own + 1, count):
             taken[other] |= passes(*step, first.u[other][None])
         others = [p.u for k, row in walked.items() if k % count != own and not taken[k % count] for p in row]
         return bool(others) and passes(*step, np.stack(others))
 
     both = turned(take(first, lanes), sign)
-    traces = follow(take(curves, lanes), follower.given, both, steps=steps, inside=follower.inside, stop=stop)
+    traces = follow(
+        take(curves, lanes),
+        follower.of(lanes),
+        both,
+        steps=steps,
+        inside=follower.inside,
+        stop=stop,
+        own_given=follower.designs,
+    )
     kept = [i for i in range(count) if not taken[i]]
-    found = describe(follower, frame, [_joined(follower, traces[i], traces[i + count]) for i in kept])
+    found = describe(follower, frame, [_joined(follower, traces[i], traces[i + count]) for i in kept], kept)
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
 
 
@@ -273,10 +325,15 @@ def _joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tupl
     return points, (down.ended, up.ended)
 
 
-def describe(follower: Follower, frame: Frame, traces: Sequence[tuple[Corrected, tuple[str, str]]]) -> list[Branch]:
-    """Branches from their points, with special points located, all at once."""
+def describe(
+    follower: Follower,
+    frame: Frame,
+    traces: Sequence[tuple[Corrected, tuple[str, str]]],
+    lanes: Sequence[int] = (0,),
+) -> list[Branch]:
+    """Branches from their points and lanes, with special points located, all at once."""
     found = [(i, *bracket) for i, (points, _) in enumerate(traces) for bracket in brackets(follower, points)]
-    located = locate(follower, frame, [(traces[i][0], k, kind) for i, k, kind in found])
+    located = locate(follower, frame, [(lanes[i], traces[i][0], k, kind) for i, k, kind in found])
     branches = []
     for i, (points, ended) in enumerate(traces):
         mine = [(k, kind, p) for (j, k, kind), p in zip(found, located, strict=True) if j == i and p is not None]
@@ -316,13 +373,17 @@ def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
     return sorted(found)
 
 
-def locate(follower: Follower, frame: Frame, wanted: Sequence[tuple[Corrected, int, str]]) -> list[Corrected | None]:
-    """The points at which the test functions of (points, index, kind) vanish; None where they could not be found."""
+def locate(
+    follower: Follower, frame: Frame, wanted: Sequence[tuple[int, Corrected, int, str]]
+) -> list[Corrected | None]:
+    """Where the test functions of (lane, points, index, kind) vanish; None where that could not be found."""
     if not wanted:
         return []
     curves = stack(BranchEquations(follower.problem, frame), len(wanted))
-    ends = [take(points, np.array([k, k + 1])) for points, k, _ in wanted]
-    return zeros(curves, follower.given, ends, lambda i, points: signals(follower, points)[wanted[i][2]])
+    ends = [take(points, np.array([k, k + 1])) for _, points, k, _ in wanted]
+    given = follower.of([lane for lane, *_ in wanted])
+    signal = lambda i, points: signals(follower, points)[wanted[i][3]]
+    return zeros(curves, given, ends, signal, follower.designs)
 
 
 def _branch(
@@ -342,7 +403,7 @@ def _branch(
     def speed(u: np.ndarray) -> np.ndarray:
         if name == SPEED:
             return u[..., -1] * follower.unit
-        return u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.given.speed))
+        return u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.of(0).speed))
 
     special = []
     for k, kind, p in located:

@@ -23,12 +23,13 @@ def zeros(
     given: Any,
     ends: Sequence[Corrected],
     signal: Callable[[int, Corrected], np.ndarray],
+    own_given: bool = False,
 ) -> list[Corrected | None]:
     """Points at which `signal` vanishes.
 
     **Arguments:**
 
-    - `curves`, `given`: as for `correct`, one curve per pair of ends.
+    - `curves`, `given`, `own_given`: as for `correct`, one curve per pair of ends.
     - `ends`: pairs of neighbouring points, between which the signal changes sign.
     - `signal`: values for the lane's number and some points of its curve.
 
@@ -50,7 +51,8 @@ def zeros(
         margin = 1e-3 * (high - low)
         share = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
         at = u0[index] + share[index, None] * chord[index]
-        got = correct(take(curves, index), given, at, normal[index])
+        mine = take(given, index) if own_given else given
+        got = correct(take(curves, index), mine, at, normal[index], own_given)
         for k, i in enumerate(index):
             if not got.converged[k]:
                 best[i], active[i] = None, False
