@@ -168,9 +168,20 @@ def follow_edges(
             if not bool(start.converged):
                 refused[name] = start.status
                 continue
-        ranges = {"lower": y.lower, "upper": y.upper, "x_lower": x.lower, "x_upper": x.upper}
         try:
-            curves.append(curve(model, start, x.name, y.name, **ranges, name=name, method=method))
+            found = curve(
+                model,
+                start,
+                x.name,
+                y.name,
+                lower=y.lower,
+                upper=y.upper,
+                x_lower=x.lower,
+                x_upper=x.upper,
+                name=name,
+                method=method,
+            )
+            curves.append(found)
         except ValueError:
             refused[name] = "Newton's method did not find it again"
     say("curves", len(edges), len(edges))

@@ -150,7 +150,14 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
     """Bifurcations at which a stable synchronous orbit begins or ends."""
     named = lambda p: next((name for name, q in loss.edges.items() if q is p), "-")
     rows = [
-        (number(p.speed_rpm, 3), p.kind, multiplier_cell(p), number(angle_deg(p), 2), str(branch_of(found, p)), named(p))
+        (
+            number(p.speed_rpm, 3),
+            p.kind,
+            multiplier_cell(p),
+            number(angle_deg(p), 2),
+            str(branch_of(found, p)),
+            named(p),
+        )
         for p in found.edges
     ]
     columns = ("speed [rpm]", "kind", "multiplier", "angle [°]", "branch", "edge of")

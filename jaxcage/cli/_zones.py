@@ -4,14 +4,17 @@ import time
 from typing import Any
 
 from ..analysis import zones
+from ..integrate import AbstractMethod
 from ..orbits import (
     Cascade,
     Explained,
     LossZones,
     Sensitivity,
     explain,
+    limit_sensitivity,
     loss_zones,
     sensitivities,
+    sensitivity,
     synchronous_orbits,
 )
 from ._console import progress_in_stages
@@ -38,12 +41,11 @@ def run(options: ZonesOptions) -> Report:
         )
         loss = loss_zones(found)
         explained = explain(zones(swept.sweep), found, about.model, chosen)
-        wanted = {} if options.quick else loss.edges
-        slopes = sensitivities(about.model, wanted, chosen)
+        slopes = {} if options.quick else _slopes(about, loss, explained, chosen)
     document = zones_document(about.name, explained.zones, about.published)
     document["synchronous_loss"] = [_loss_document(i, loss, slopes) for i in range(len(loss.zones))]
     for i, zone in enumerate(document["zones"], start=1):
-        zone |= _source_documents(i, explained, loss, slopes)
+        zone |= _source_documents(i, explained, slopes)
     document |= {
         "failed": failed_lanes(swept.sweep),
         "seconds": round(swept.seconds + time.perf_counter() - began, 2),
@@ -55,6 +57,15 @@ def run(options: ZonesOptions) -> Report:
         zones_table(about.name, explained.zones, about.published, swept.range_rpm),
     ]
     return Report(document, tables, [*_notes(explained), f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])
+
+
+def _slopes(about: Subject, loss: LossZones, explained: Explained, chosen: AbstractMethod) -> dict[str, Sensitivity]:
+    """Sensitivities of the synchronous-loss edges, and of chaotic edges that coincide with something exact."""
+    slopes = sensitivities(about.model, loss.edges, chosen)
+    for name, source in explained.sources.items():
+        of = limit_sensitivity if isinstance(source, Cascade) else sensitivity
+        slopes[f"chaotic {name}"] = of(about.model, source, f"chaotic {name}", chosen)  # pyright: ignore[reportArgumentType]
+    return slopes
 
 
 def _slopes_document(slopes: Sensitivity | None) -> dict[str, Any] | None:
@@ -75,7 +86,7 @@ def _loss_document(i: int, loss: LossZones, slopes: dict[str, Sensitivity]) -> d
     }
 
 
-def _source_documents(i: int, explained: Explained, loss: LossZones, slopes: dict[str, Sensitivity]) -> dict[str, Any]:
+def _source_documents(i: int, explained: Explained, slopes: dict[str, Sensitivity]) -> dict[str, Any]:
     """What the edges of a chaotic zone were taken from; a bifurcation brings its gradient."""
     found: dict[str, Any] = {}
     zone = explained.zones.zones[i - 1]
@@ -83,8 +94,7 @@ def _source_documents(i: int, explained: Explained, loss: LossZones, slopes: dic
         source = explained.sources.get(f"zone {i} {end}")
         found[f"{end}_basis"] = edge and edge.basis
         found[f"{end}_cascade_rpm"] = _cascade_rpm(source) if isinstance(source, Cascade) else None
-        name = next((n for n, p in loss.edges.items() if p is source), None)
-        found[f"{end}_gradient"] = None if name is None else _slopes_document(slopes.get(name))
+        found[f"{end}_gradient"] = _slopes_document(slopes.get(f"chaotic zone {i} {end}"))
     return found
 
 
@@ -93,13 +103,13 @@ def _cascade_rpm(cascade: Cascade) -> list[float]:
 
 
 def _gradient_table(about: Subject, slopes: dict[str, Sensitivity]) -> Table:
-    """Elasticities of the synchronous-loss edges: relative change of the edge per relative change of the parameter."""
+    """Elasticities: relative change of an edge per relative change of the parameter."""
     rows = [
         (name, s.kind, number(s.value_rpm, 2), *(f"{s.elasticity[n]:+.4f}" for n in SHOWN), s.status)
         for name, s in slopes.items()
     ]
     columns = ("edge", "by", "speed [rpm]", *(n.replace("_", " ") for n in SHOWN), "status")
-    return Table(f"Elasticities of the synchronous-loss edges of {about.name}", columns, rows)
+    return Table(f"Elasticities of the exact edges of {about.name}", columns, rows)
 
 
 def _notes(explained: Explained) -> list[str]:

@@ -39,6 +39,7 @@ from ._search import (
 from ._sensitivity import (
     Sensitivity as Sensitivity,
     edge_speed as edge_speed,
+    limit_sensitivity as limit_sensitivity,
     sensitivities as sensitivities,
     sensitivity as sensitivity,
     width as width,

@@ -14,7 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..sweeps import cores
 from ._implicit import TOLERANCE, AbstractEquations, solve
@@ -43,13 +43,13 @@ class OnPlane(AbstractEquations):
 
 
 class Corrected(NamedTuple):
-    """A point of a curve; the last two are the curve's own, with lanes first."""
+    """Points of curves, NumPy arrays with the lanes first: unknowns (n), tangent (n), Jacobian (m x n), and so on."""
 
-    u: Float[np.ndarray, "*lanes n"]
-    tangent: Float[np.ndarray, "*lanes n"]
+    u: Any
+    tangent: Any
     """Unit tangent, on the side of the normal of the plane."""
-    jacobian: Float[np.ndarray, "*lanes m n"]
-    converged: Bool[np.ndarray, "*lanes"]
+    jacobian: Any
+    converged: Any
     iterations: Any
     aux: Any
 
@@ -200,7 +200,7 @@ def follow(
             length[i] = min(steps.longest, length[i] * (1.5 if quick else 0.8))
             if not inside(got.u[k][None])[0]:
                 ended[i] = "range"
-            elif stop(i, points[i]):
+            elif stop(int(i), points[i]):
                 ended[i] = "stopped"
             elif _closed(points[i]):
                 ended[i] = "closed"

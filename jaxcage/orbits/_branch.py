@@ -18,7 +18,7 @@ from ._arclength import Corrected, Steps, Trace, correct, follow, stack, take
 from ._illinois import zeros
 from ._implicit import AbstractEquations
 from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._orbit import Period, guess_state, is_free
+from ._orbit import guess_state, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import matches, null_vectors, singular_matrix, test_functions
 
@@ -74,7 +74,7 @@ class SpecialPoint:
         target = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}.get(self.kind)
         mu = self.multipliers
         if target is None:
-            mu = mu[mu.imag > 0]
+            mu = mu[np.imag(mu) > 0]
             return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
         return complex(mu[np.argmin(np.abs(mu - target))])
 
@@ -156,7 +156,7 @@ def branch(
     upper: float,
     speed: Scalar | None = None,
     periods: int = 1,
-    period: Period = "driven",
+    period: str = "driven",
     steps: Steps = Steps(),
     method: AbstractMethod | None = None,
 ) -> Branch:
@@ -177,7 +177,7 @@ def branch(
     require_x64()
     if not lower < upper:
         raise ValueError(f"Argument `upper` must be above `lower`, but they are {upper:g} and {lower:g}.")
-    known_speed = getattr(orbit, "speed", speed)
+    known_speed: Any = getattr(orbit, "speed", speed)
     state, at = orbit if isinstance(orbit, tuple) else (orbit.state, value_of(system, known_speed, parameter))
     known_speed = at if parameter == SPEED else known_speed
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
@@ -230,7 +230,7 @@ def make_follower(
     parameter: Parameter,
     lower: float,
     upper: float,
-    period: Period = "driven",
+    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Follower:
     chosen = make_method() if method is None else method

@@ -20,7 +20,6 @@ from ._branch import (
     make_follower,
 )
 from ._lens import SPEED, Parameter
-from ._orbit import Period
 from ._point import BifurcationPoint
 from ._singularity import test_functions
 
@@ -72,7 +71,7 @@ def doubled_branch(
     lower: float,
     upper: float,
     speed: Any = None,
-    period: Period = "driven",
+    period: str = "driven",
     steps: Steps = Steps(first=0.01, shortest=1e-7),
     amplitude: float = 0.02,
     until_doubling: bool = False,
@@ -106,7 +105,7 @@ def doubled_branch(
         amplitude /= 4
     else:
         raise ValueError(f"Argument `point` must be a period doubling, but no doubled branch begins at {at:g}.")
-    stop = lambda lane, points: until_doubling and _doubling(follower, points[-1]) < 0
+    stop = lambda lane, points: until_doubling and bool(_doubling(follower, points[-1]) < 0)
     (trace,) = follow(curves, follower.given, start, steps=steps, inside=follower.inside, stop=stop)
     (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])
     return found
@@ -125,7 +124,7 @@ def cascade(
     upper: float,
     levels: int = 4,
     speed: Any = None,
-    period: Period = "driven",
+    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Cascade:
     """Follow a period-doubling cascade from its first point.

@@ -16,7 +16,7 @@ from ._arclength import Corrected, Steps, correct, follow, stack, take
 from ._branch import SpecialPoint, eigenvalues, turned
 from ._illinois import zeros
 from ._lens import SPEED, value as value_of
-from ._orbit import Period, is_free
+from ._orbit import is_free
 from ._point import BifurcationPoint, PointEquations, critical_matrix
 from ._problem import Given, OrbitProblem, ReturnMap, make_frame
 from ._singularity import Kind, null_vectors
@@ -68,7 +68,7 @@ def curve(
     x_lower: float,
     x_upper: float,
     periods: int = 1,
-    period: Period = "driven",
+    period: str = "driven",
     name: str = "",
     steps: Steps = Steps(first=0.05, longest=0.25, most=200),
     method: AbstractMethod | None = None,
@@ -226,7 +226,7 @@ def _real(what: str, kind: str, multipliers: np.ndarray) -> bool:
     """Whether a change of sign is what it is named for, and not that of a neutral saddle."""
     others, cosine = _others(kind, multipliers)
     if what in ("fold-torus", "flip-torus", "double torus") and kind != "torus":
-        return bool(np.any(np.abs(others.imag) > 1e-9))
+        return bool(np.any(np.abs(np.imag(others)) > 1e-9))
     return kind != "torus" or abs(cosine) <= 1 + 1e-6
 
 

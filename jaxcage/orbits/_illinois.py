@@ -58,7 +58,7 @@ def zeros(
                 best[i], active[i] = None, False
                 continue
             before, best[i] = best[i], take(got, np.array(k))
-            f = float(signal(i, take(got, np.array([k])))[0])
+            f = float(signal(int(i), take(got, np.array([k])))[0])
             halve = 0.5 if f * last[i] > 0 else 1.0  # the same end was kept twice
             if f * f1[i] < 0:
                 low[i], f0[i], f1[i] = share[i], f, f1[i] * halve

@@ -17,6 +17,7 @@ from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 
 
 Period = Literal["driven", "free"]
+ROUNDING = 1e-13
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 
@@ -60,7 +61,8 @@ class Orbit(eqx.Module):
     residual: Float[Array, ""]
     """Largest component of P(z) - z, in units of the system's scale."""
     liouville: Float[Array, ""]
-    """log|det M| less the integral of the field's divergence over the orbit, which it must equal."""
+    """log|det M| less the integral of the field's divergence over the orbit, which it must equal; both not below what
+    rounding resolves of the smallest multiplier, so that orbits with strong damping are judged by the others."""
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
@@ -69,7 +71,7 @@ class Orbit(eqx.Module):
     @property
     def period(self) -> Array:
         """Duration [s]."""
-        return self.periods * 2 * jnp.pi / self.speed
+        return 2 * jnp.pi * self.periods.astype(float) / self.speed
 
     @property
     def stable(self) -> Bool[Array, ""]:
@@ -115,6 +117,12 @@ def _sorted_multipliers_jvp(primals: Any, tangents: Any) -> Any:
     return mu, jnp.diagonal(jnp.linalg.solve(v, m_dot.astype(v.dtype) @ v))
 
 
+def _resolved(m: Float[Array, "dim dim"]) -> Float[Array, ""]:
+    """log|det| of a matrix like `m` whose smallest singular value is at the level of rounding."""
+    size = jnp.linalg.svd(m, compute_uv=False)
+    return jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
+
+
 def settle(
     system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod, start: Array, revolutions: Any
 ) -> Float[Array, " dim"]:
@@ -138,6 +146,7 @@ def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, peri
     image, monodromy = by_columns(row, f=_Monodromy(frozen(strobe), frame))
     expected = divergence_integral(frozen(strobe), frozen(problem.state(u, frame)), frame.periods)
     finite = jnp.where(jnp.isfinite(monodromy), monodromy, 0.0)
+    floor = _resolved(frozen(finite))
     return Orbit(
         state=problem.state(u, frame),
         speed=jnp.asarray(problem.speed(u, given, frame), dtype=float),
@@ -146,7 +155,7 @@ def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, peri
         residual=frozen(
             jnp.where(found.converged, jnp.max(jnp.abs(image - z)), jnp.max(jnp.abs(found.newton.residual)))
         ),
-        liouville=jnp.linalg.slogdet(frozen(monodromy))[1] - expected,
+        liouville=jnp.maximum(jnp.linalg.slogdet(frozen(monodromy))[1], floor) - jnp.maximum(expected, floor),
         converged=found.converged,
         iterations=found.iterations,
         periods=frame.periods,
@@ -161,7 +170,7 @@ def periodic_orbit(
     *,
     guess: Any = None,
     revolutions: int | None = None,
-    period: Period = "driven",
+    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Orbit:
     """The orbit that closes after `periods` revolutions, by damped Newton on the strobe map.
@@ -190,7 +199,7 @@ def periodic_orbit(
     return _find(problem, given, start, first, jnp.asarray(periods), spin)
 
 
-def is_free(period: Period) -> bool:
+def is_free(period: str) -> bool:
     """Whether the period of an orbit is unknown."""
     if period not in get_args(Period):
         raise ValueError(f"Argument `period` must be one of driven, free, but '{period}' was given.")

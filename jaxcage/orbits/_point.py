@@ -1,6 +1,6 @@
 """Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
 
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 import equinox as eqx
 import jax
@@ -13,7 +13,7 @@ from ..integrate import AbstractMethod, StrobeMap, method as make_method
 from ..models import AbstractForcedSystem
 from ._implicit import AbstractEquations, Found, implicit_root, numbers_of, solve
 from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._orbit import OrbitEquations, Period, guess_state, is_free, settle, sorted_multipliers
+from ._orbit import OrbitEquations, guess_state, is_free, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 
@@ -147,13 +147,13 @@ class BifurcationPoint(eqx.Module):
 
 def bifurcation(
     system: AbstractForcedSystem,
-    kind: Kind,
+    kind: str,
     guess: Any,
     parameter: Parameter = SPEED,
     *,
     speed: Scalar | None = None,
     periods: Any = None,
-    period: Period = "driven",
+    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> BifurcationPoint:
     """The bifurcation of `kind` near `guess`, where `parameter` is free.
@@ -182,7 +182,9 @@ def bifurcation(
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     periods = getattr(guess, "periods", 1) if periods is None else periods
-    return _find_point(problem, given, kind, start, jnp.asarray(first, dtype=float), at, jnp.asarray(periods), spin)
+    return _find_point(
+        problem, given, cast(Kind, kind), start, jnp.asarray(first, dtype=float), at, jnp.asarray(periods), spin
+    )
 
 
 def _read_guess(
@@ -241,19 +243,19 @@ def _find_point(
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, frame, left, right, kind)
     u, found = implicit_root(equations, given, u0)
-    return _describe(problem, frame, kind, u, found, given)
+    return _describe(equations, u, found, given)
 
 
-def _describe(
-    problem: OrbitProblem, frame: Frame, kind: Kind, u: Array, found: Found, given: Given
-) -> BifurcationPoint:
+def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -> BifurcationPoint:
+    problem, frame, kind = equations.problem, equations.frame, equations.kind
     known: Singular = frozen(found.aux)
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     critical, matches = critical_multiplier(kind, multipliers)
-    rate = critical_rate(kind, problem.equations, frozen(found.newton.jacobian), known)
+    rate = critical_rate(kind, problem.equations, frozen(found.newton.jacobian), known, frozen(equations.borders))
     value = problem.values(u, frame)[0]
-    tangential = jnp.abs(rate * frozen(u[problem.equations])) < TANGENTIAL
+    # In the parameter's unit the guess is 10; the value itself may be zero.
+    tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(frozen(u[problem.equations])), 10.0) < TANGENTIAL
     outcome = jnp.where(found.converged, jnp.where(matches, jnp.where(tangential, 3, 0), 2), 1)
     keep = lambda x: jnp.where((outcome == 0) | (outcome == 3), x, jnp.nan)
     direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
@@ -290,17 +292,32 @@ def critical_multiplier(kind: Kind, multipliers: Complex[Array, " dim"]) -> tupl
     return mu[i], off[i] < jnp.sqrt(ON_CIRCLE)
 
 
-def critical_rate(kind: Kind, equations: int, jacobian: Array, known: Singular) -> Array:
+def critical_rate(kind: Kind, equations: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
     """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
 
-    **Arguments:** kind; number of the orbit's own equations; derivative of all equations at the point; null vectors.
+    At a fold, where it is infinite, the drift of the map along the critical direction instead.
+
+    **Arguments:** kind; number of the orbit's own equations; derivative of all equations at the point; null vectors;
+    the left and right border.
     """
     m = equations
     of_orbit, drift = jacobian[:m, :m], jacobian[:m, m]
     overlap = known.left @ known.right
-    if kind in ("fold", "branch-point"):
+    if kind == "fold":
         return jnp.abs(known.left[:m] @ drift / overlap)
     g = jacobian[m]
+    if kind == "branch-point":
+        return _branching_rate(m, jacobian, known, borders) / jnp.abs(overlap)
     along = g[:m] @ -jnp.linalg.solve(of_orbit, drift) + g[m]
     rate = -along / overlap
     return rate / 2 if kind == "torus" else -rate
+
+
+def _branching_rate(m: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
+    """Branches leave along a x^2 + 2 b x y + c y^2 = 0, x along the critical direction and y the parameter."""
+    of_orbit, drift, g, h = jacobian[:m, :m], jacobian[:m, m], jacobian[m], jacobian[m + 1]
+    left, right = borders
+    whole = jnp.block([[of_orbit, left[:, None]], [right[None, :], jnp.zeros((1, 1))]])
+    w = jnp.linalg.solve(whole, jnp.append(-drift, 0.0))[:m]
+    a, b, c = g[:m] @ known.right[:m], g[:m] @ w + g[m], h[:m] @ w + h[m]
+    return jnp.sqrt(jnp.maximum(b**2 + a * c, 0.0))

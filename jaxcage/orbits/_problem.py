@@ -124,14 +124,15 @@ def make_frame(
     periods: Any,
 ) -> Frame:
     """The frame around a first guess: `state` (SI) at `speed` [rad/s]."""
-    given, state, speed, units = frozen((given, state, jnp.asarray(speed, dtype=float), units))
+    at = frozen(jnp.asarray(speed, dtype=float))
+    given, state, units = frozen((given, state, units))
     system = given.system
-    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in system.scale(speed)])
+    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in system.scale(at)])
     z = state / scale
     if problem.free_speed:
-        rate = system.at_speed(speed)(jnp.zeros(()), tuple(state[i] for i in range(state.size)))
+        rate = system.at_speed(at)(jnp.zeros(()), tuple(state[i] for i in range(state.size)))
         direction = jnp.stack([jnp.asarray(c) for c in rate]) / scale
         direction = direction / jnp.linalg.norm(direction)
     else:
         direction = jnp.zeros_like(z)
-    return frozen(Frame(scale, speed, units, z, direction, jnp.asarray(periods, dtype=int)))
+    return frozen(Frame(scale, at, units, z, direction, jnp.asarray(periods, dtype=int)))

@@ -142,7 +142,7 @@ def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_P
         if rpm[0] > rpm[-1]:
             points, rpm, state = points[::-1], rpm[::-1], state[::-1]
         low, high = (float(r) if p is None else p.speed_rpm for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
-        stretch = Stretch(*points, max(low, limits[0]), min(high, limits[1]), number)
+        stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
         found.append(_Piece(stretch, rpm, state))
     return found
 

@@ -7,7 +7,7 @@ These hold for every kind of edge and test a gradient without any reference.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -21,6 +21,7 @@ from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, method as make_method
 from ..models import AbstractForcedSystem
 from ._branch import SpecialPoint
+from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import numbers_of
 from ._lens import SPEED
 from ._point import TANGENTIAL, BifurcationPoint, Singular, critical_rate
@@ -49,7 +50,7 @@ class Sensitivity:
     homogeneity: dict[str, float]
     """Relative residuals of the identities for mass, length and time."""
     transversality: float
-    """d|mu|/d speed [s]; of a width the smaller one."""
+    """d|mu|/d speed [s] (see `BifurcationPoint`); of a width or limit the smallest one."""
     status: str
 
     @property
@@ -85,7 +86,7 @@ def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, "
         return found, found
 
     slopes, values = jax.jacfwd(both, has_aux=True)(jnp.concatenate([u[:n], k]))
-    return _Expansion(*values, *slopes, jax.jacfwd(row)(u)[:, n])
+    return _Expansion(values[0], values[1], slopes[0], slopes[1], jax.jacfwd(row)(u)[:, n])
 
 
 @eqx.filter_jit
@@ -117,7 +118,7 @@ def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
     of_numbers = whole[:, n:]
     of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.drift)[:, None]], axis=1)
     residual = jnp.append(around.image - z, g)
-    return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known))
+    return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known, (left, right)))
 
 
 class _Edge(NamedTuple):
@@ -139,17 +140,19 @@ def _located(system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoin
     kind: Any = point.kind
     chosen = make_method() if method is None else method
     problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
-    given, state = Given(system, jnp.asarray(point.speed, dtype=float)), jnp.asarray(point.state)
-    frame = make_frame(problem, given, state, given.speed, 0.1 * given.speed[None], point.periods)
+    speed, state = jnp.asarray(point.speed, dtype=float), jnp.asarray(point.state)
+    given = Given(system, speed)
+    frame = make_frame(problem, given, state, speed, 0.1 * speed[None], point.periods)
     u = first = jnp.append(state / frame.scale, 10.0)
-    size = jnp.inf
+    unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, frame, u))
+    here = unfold(u)
     for _ in range(POLISHING):
-        here = _unfold(kind, u[:-1], _expand(problem, given, frame, u))
         step = jnp.linalg.solve(here.of_unknowns, here.residual)
-        size = jnp.max(jnp.abs(step))
-        if not bool(size > POLISHED):
+        if not bool(jnp.max(jnp.abs(step)) > POLISHED):
             break
         u = u - step
+        here = unfold(u)
+    size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
     found = bool(size < SETTLED) and bool(jnp.max(jnp.abs(u - first)) < NEARBY)
     return _Edge(problem, given, frame, u, here, found)
 
@@ -215,20 +218,36 @@ def sensitivities(
     return {name: sensitivity(system, point, name, method) for name, point in points.items()}
 
 
+def limit_sensitivity(
+    system: AbstractForcedSystem, cascade: Cascade, name: str = "limit", method: AbstractMethod | None = None
+) -> Sensitivity:
+    """The sensitivity of the speed at which a cascade accumulates, extrapolated like that speed itself.
+
+    **Raises:** `ValueError` for a cascade over another parameter than speed, or of fewer than two points.
+    """
+    if len(cascade.points) < 2 or any(p.parameter != SPEED for p in cascade.points):
+        raise ValueError(f"Argument `cascade` must have two points over speed, but has {len(cascade.points)}.")
+    before, last = (sensitivity(system, p, name, method) for p in cascade.points[-2:])
+    return _combined(name, "period-doubling", ((1 + 1 / (FEIGENBAUM - 1), last), (-1 / (FEIGENBAUM - 1), before)))
+
+
 def width(onset: Sensitivity, exit_: Sensitivity, name: str = "width") -> Sensitivity:
     """The sensitivity of the width between two edges."""
-    value = exit_.value_rpm - onset.value_rpm
-    slope = {n: exit_.derivative[n] - onset.derivative[n] for n in onset.derivative}
-    weighted = lambda a, b: (exit_.value_rpm * b - onset.value_rpm * a) / value
-    pairs = lambda a, b: {n: weighted(a[n], b[n]) for n in a}
-    worst = next((s.status for s in (onset, exit_) if not s.trusted), "converged")
+    return _combined(name, "synchronous-loss", ((1.0, exit_), (-1.0, onset)))
+
+
+def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) -> Sensitivity:
+    """A weighted sum of edges."""
+    total = sum(w * s.value_rpm for w, s in parts)
+    first = parts[0][1]
+    weighted = lambda rows: sum(w * s.value_rpm * row for (w, s), row in zip(parts, rows, strict=True)) / total
     return Sensitivity(
         name=name,
-        kind="synchronous-loss",
-        value_rpm=value,
-        derivative=slope,
-        elasticity=pairs(onset.elasticity, exit_.elasticity),
-        homogeneity=pairs(onset.homogeneity, exit_.homogeneity),
-        transversality=min(abs(onset.transversality), abs(exit_.transversality)),
-        status=worst,
+        kind=kind,
+        value_rpm=total,
+        derivative={n: sum(w * s.derivative[n] for w, s in parts) for n in first.derivative},
+        elasticity={n: weighted([s.elasticity[n] for _, s in parts]) for n in first.elasticity},
+        homogeneity={b: weighted([s.homogeneity[b] for _, s in parts]) for b in first.homogeneity},
+        transversality=min(abs(s.transversality) for _, s in parts),
+        status=next((s.status for _, s in parts if not s.trusted), "converged"),
     )

@@ -81,4 +81,4 @@ def matches(kind: str, multipliers: Complex[np.ndarray, " n"]) -> bool:
     mu = np.asarray(multipliers)
     if kind != "torus":
         return bool(np.min(np.abs(mu - (-1 if kind == "period-doubling" else 1))) < 1e-3)
-    return bool(np.any((np.abs(mu.imag) > 1e-9) & (np.abs(np.abs(mu) - 1) < 1e-4)))
+    return bool(np.any((np.abs(np.imag(mu)) > 1e-9) & (np.abs(np.abs(mu) - 1) < 1e-4)))
