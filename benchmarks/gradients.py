@@ -31,7 +31,7 @@ def difference(model, point, name: str, step: float) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Elasticities of edges against differences.")
     parser.add_argument("case", nargs="?", default="1a")
     parser.add_argument("--step", type=float, default=1e-3, help="relative step of the differences")
     options = parser.parse_args()

@@ -24,6 +24,8 @@ def test_python_blocks_run_in_order():
     per_time = space["got"].exponents[0, :, 0].mean() / (2 * np.pi)
     error = np.max(space["got"].standard_error) / (2 * np.pi)
     assert per_time == pytest.approx(0.1034, abs=0.004 + 2 * error)
+    assert float(space["force"]) == pytest.approx(0.265581786, abs=1e-7)
+    assert float(space["slope"].acceleration.cubic / space["force"]) == pytest.approx(-0.5, abs=1e-9)
 
 
 def test_set_up_commands_are_those_of_the_check():

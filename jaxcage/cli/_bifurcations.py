@@ -145,6 +145,6 @@ def _data(searched: Searched) -> str:
     for k, name in enumerate(component_names(count)):
         columns[f"{name} [{quantity(name).unit}]"] = joined(b.state[:, k] for b in branches)
     for k in range(count):
-        columns[f"multiplier {k + 1} (real part)"] = joined(b.multipliers[:, k].real for b in branches)
-        columns[f"multiplier {k + 1} (imaginary part)"] = joined(b.multipliers[:, k].imag for b in branches)
+        columns[f"multiplier {k + 1} (real part)"] = joined(np.real(b.multipliers[:, k]) for b in branches)
+        columns[f"multiplier {k + 1} (imaginary part)"] = joined(np.imag(b.multipliers[:, k]) for b in branches)
     return str(write_columns(searched.folder / f"bifurcations_{searched.subject.name}.csv", columns))

@@ -64,7 +64,9 @@ def stretch_document(stretch: Stretch, found: SynchronousOrbits) -> dict[str, An
         "lower_kind": lower,
         "upper_kind": upper,
         "branch": stretch.branch,
+        "family": stretch.family,
         "met": stretch.met,
+        "met_first": stretch.met_first,
     }
 
 
@@ -175,7 +177,10 @@ def coexisting_notes(loss: LossZones) -> list[str]:
     notes = []
     for name, orbits in loss.coexisting.items():
         point = loss.edges[name]
-        others = [state for _, stable, state, _ in orbits if stable and not _same(state, point.state)]
+        others: list[np.ndarray] = []
+        for state in (state for _, stable, state, _ in orbits if stable):
+            if not any(_same(state, known) for known in (point.state, *others)):
+                others.append(state)
         if others:
             orbit = "another synchronous orbit is" if len(others) == 1 else f"{len(others)} other ones are"
             notes.append(f"At {name} ({point.speed_rpm:.2f} rpm) {orbit} stable: not every start sees this edge.")

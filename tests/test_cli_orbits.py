@@ -1,0 +1,365 @@
+"""Commands about synchronous orbits: bifurcations, gradient, map."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from jaxcage.analysis import Sweep
+from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.cli import _bifurcations, main
+from jaxcage.cli._gradient import gradient_document, gradient_table, homogeneity_notes, missing_notes
+from jaxcage.cli._map import shown_unit
+from jaxcage.cli._orbit_report import (
+    coexisting_notes,
+    edge_table,
+    loss_table,
+    multiplier_cell,
+    orbits_document,
+    stretch_table,
+)
+from jaxcage.cli._report import plain
+from jaxcage.io import read_columns
+from jaxcage.orbits import (
+    Branch,
+    Sensitivity,
+    SpecialPoint,
+    Stretch,
+    SynchronousOrbits,
+    loss_zones,
+    synchronous_orbits,
+    width,
+)
+
+
+PNG = b"\x89PNG\r\n"
+PER_RPM = np.pi / 30
+SEARCH = ["--first", "11500", "--last", "13000", "--count", "7", "--discard", "150"]
+PERIOD_DOUBLING_RPM = 12266.0855
+"""Period doubling of case 1a, found by the search over the whole range and by Newton's method."""
+
+
+def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> SpecialPoint:
+    others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
+    multipliers = np.array([critical, *others, 0.1], dtype=complex)
+    state = np.array([1e-5, 2e-5, 0.1, 0.2])
+    return SpecialPoint(kind, rpm * PER_RPM, rpm * PER_RPM, state, multipliers, np.zeros(4), index, edge)
+
+
+def branch(rpm: np.ndarray, stable: np.ndarray, *special: SpecialPoint, height: float = 2e-5) -> Branch:
+    state = np.tile([1e-5, height, 0.1, 0.2], (rpm.size, 1))
+    size = np.where(stable, 0.5, 1.5)[:, None]
+    mu = size * np.array([1.0, 0.5, 0.4, 0.1], dtype=complex)
+    speed = rpm * PER_RPM
+    return Branch("speed", speed, speed, state, mu, stable, special, 1, ("range", "range"))
+
+
+@pytest.fixture(scope="module")
+def found() -> SynchronousOrbits:
+    """One orbit that is lost from 7000 to 12000 rpm and from 20000 rpm on, where another one is stable."""
+    rpm = np.linspace(2500.0, 27500.0, 51)
+    fold, doubling = point("fold", 7000.0, 1.0, 8), point("period-doubling", 12000.0, -1.0, 19)
+    torus = point("torus", 20000.0, np.exp(2.0j), 35)
+    inner = point("fold", 9000.0, 1.0, 13, edge=False)
+    stable = (rpm < 7000) | ((rpm > 12000) & (rpm < 20000))
+    first = branch(rpm, stable, fold, inner, doubling, torus)
+    above = np.linspace(18000.0, 27500.0, 20)
+    second = branch(above, above > 0, height=9e-5)
+    stretches = (
+        Stretch(None, fold, 2500.0, 7000.0, 0, 0, 4, 2),
+        Stretch(doubling, torus, 12000.0, 20000.0, 0, 0, 30, 20),
+        Stretch(None, None, 18000.0, 27500.0, 1, 1, 3, 0),
+    )
+    shape = (3, 1)
+    sweep = Sweep(
+        speed=np.array([3000.0, 10000.0, 15000.0]) * PER_RPM,
+        strobe=np.zeros((*shape, 8, 4)),
+        last=np.zeros((*shape, 4)),
+        block_growth=np.zeros((*shape, 1, 0)),
+        peak=np.zeros(shape),
+        outcome=np.zeros(shape, dtype=int),
+        scale=np.ones((3, 4)),
+        discard=0,
+        revolutions=8,
+    )
+    return SynchronousOrbits((first, second), stretches, sweep, 2, 2500.0, 27500.0)
+
+
+def test_document_of_a_search(found: SynchronousOrbits):
+    document = plain(orbits_document("1a", found, loss_zones(found), PUBLISHED_CASES["1a"]))
+    assert document["range_rpm"] == [2500.0, 27500.0]
+    assert [p["speed_rpm"] for p in document["points"]] == pytest.approx([7000, 9000, 12000, 20000])
+    assert [p["edge"] for p in document["points"]] == [True, False, True, True]
+    assert [p["angle_deg"] for p in document["points"]] == pytest.approx([0, 0, 180, np.degrees(2.0)])
+    assert document["points"][3]["multiplier"] == pytest.approx([np.cos(2.0), np.sin(2.0)])
+    assert document["points"][0]["state"] == [1e-5, 2e-5, 0.1, 0.2]
+    ends = [(s["lower_kind"], s["upper_kind"], s["branch"], s["met"]) for s in document["stretches"]]
+    assert ends == [
+        ("range", "fold", 0, 4),
+        ("period-doubling", "torus", 0, 30),
+        ("unknown", "range", 1, 3),
+    ]
+    zone = document["zones"][0]
+    assert (zone["kind"], zone["onset_mechanism"], zone["exit_mechanism"]) == (
+        "synchronous-loss",
+        "fold",
+        "period-doubling",
+    )
+    assert zone["width_rpm"] == pytest.approx(5000)
+    edges = {e["name"]: e for e in document["edges"]}
+    assert list(edges)[:2] == ["zone 1 onset", "zone 1 exit"]
+    assert [(o["branch"], o["stable"]) for o in edges["zone 2 onset"]["coexisting"]][-1] == (1, True)
+    assert document["published"][1] == {"zone": 2, "onset_rpm": 25500.0, "exit_rpm": None}
+    assert document["missed"] == 2
+    json.dumps(document, allow_nan=False)
+
+
+def test_tables_of_a_search(found: SynchronousOrbits):
+    loss = loss_zones(found)
+    stretches = stretch_table("1a", found)
+    assert stretches.rows[1] == ("12000.00", "period-doubling", "20000.00", "torus", "8000.00", "30", "0")
+    zones = loss_table("1a", found, loss, PUBLISHED_CASES["1a"])
+    assert zones.rows[0] == (
+        "1",
+        "7000.00",
+        "fold",
+        "12000.00",
+        "period-doubling",
+        "5000.00",
+        "9100 to 12000",
+    )
+    assert zones.rows[1] == ("2", "20000.00", "torus", "past range", "-", "open", "25500 and up")
+    edges = edge_table("1a", found, loss)
+    assert edges.rows[0] == ("7000.000", "fold", "1.0000", "0.00", "0", "zone 1 onset")
+    assert edges.rows[2] == (
+        "20000.000",
+        "torus",
+        "-0.4161 ± 0.9093i",
+        "114.59",
+        "0",
+        "zone 2 onset",
+    )
+    (note,) = coexisting_notes(loss)
+    assert note.startswith("At zone 2 onset (20000.00 rpm) another synchronous orbit is stable")
+
+
+def test_published_zone_that_was_not_searched_has_its_own_row(found: SynchronousOrbits):
+    loss = loss_zones(found)
+    rows = loss_table("1a", SynchronousOrbits((), (), found.sweep, 0, 1e3, 2e3), loss, PUBLISHED_CASES["1a"]).rows
+    assert [row[-1] for row in rows] == ["9100 to 12000", "25500 and up"]
+    empty = SynchronousOrbits((), (), found.sweep, 0, 1e3, 2e3)
+    rows = loss_table("1a", empty, loss_zones(empty), PUBLISHED_CASES["1a"]).rows
+    assert [row[1] for row in rows] == ["not searched", "not searched"]
+    assert loss_table("design", empty, loss_zones(empty), None).rows[0][0] == "none"
+    assert (
+        stretch_table("design", empty).rows[0][0] == edge_table("design", empty, loss_zones(empty)).rows[0][0] == "none"
+    )
+
+
+def test_multipliers_read_as_people_write_them():
+    assert multiplier_cell(point("period-doubling", 1.0, -1.0, 0)) == "-1.0000"
+    assert multiplier_cell(point("torus", 1.0, 0.6 + 0.8j, 0)) == "0.6000 ± 0.8000i"
+
+
+def edge(name: str, rpm: float, status: str = "converged", **elasticity: float) -> Sensitivity:
+    model = jc.case("1a")
+    value = {n: float(v) for n, v in jc.parameters(model).items()}
+    change = dict.fromkeys(value, 0.0) | elasticity
+    slope = {n: e * rpm / value[n] if e else 0.0 for n, e in change.items()}
+    residual = {"mass": 1e-12, "length": -3e-12, "time": 0.0}
+    return Sensitivity(name, "fold", rpm, slope, change, residual, 1e-3, status)
+
+
+def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_move():
+    model = jc.case("1a")
+    found = edge("zone 1 onset", 7000.0, gravity=0.5, cage_mass=-0.75, guidance_gap=0.1)
+    table = gradient_table("1a", model, found)
+    assert [row[0] for row in table.rows] == ["guidance_gap", "eccentricity", "cage_mass", "gravity"]
+    assert table.rows[0] == ("guidance_gap", "0.00045", "m", "+1.55556e+06", "+0.100000")
+    assert table.rows[1][3:] == ("+0", "0")
+    assert table.title.startswith("Zone 1 onset of 1a: 7000.000 rpm, fold; ")
+    assert f"; {len(jc.parameters(model)) - 4} other parameters do not move it" in table.title
+
+
+def test_gradient_document_has_the_width_and_the_worst_residuals():
+    onset, leaves = edge("zone 1 onset", 7000.0, cage_mass=-0.75), edge("zone 1 exit", 12000.0, cage_mass=-1.0)
+    wide = width(onset, leaves, "zone 1 width")
+    document = plain(gradient_document("1a", {"zone 1 onset": onset, "zone 1 exit": leaves}, wide))
+    assert document["width"]["value_rpm"] == pytest.approx(5000)
+    assert document["width"]["kind"] == "synchronous-loss"
+    assert document["width"]["elasticity"]["cage_mass"] == pytest.approx((-1.0 * 12000 + 0.75 * 7000) / 5000)
+    assert document["homogeneity"] == {"mass": 1e-12, "length": 3e-12, "time": 0.0}
+    assert document["edges"][0]["trusted"] is True
+    assert "length 3.0e-12" in homogeneity_notes(document)[0]
+    without = plain(gradient_document("1a", {}, None))
+    assert without["width"] is None and without["homogeneity"]["mass"] is None
+
+
+def test_edges_that_are_missing_or_not_trusted_are_said_in_a_line_each():
+    good, bad = edge("zone 1 exit", 12000.0), edge("zone 1 onset", 7000.0, status="tangential")
+    notes = missing_notes({"zone 1 onset": bad, "zone 1 exit": good})
+    assert notes == [
+        "There is no zone 2 onset in the range.",
+        "Left out: zone 1 onset, fold (tangential).",
+        "Without both edges zone 1 has no width.",
+    ]
+
+
+@pytest.mark.parametrize(
+    "unit, value, shown",
+    [("m", 4.5e-4, ("mm", 1e3)), ("m", 2.3e-5, ("µm", 1e6)), ("1", 0.9, ("", 1.0)), ("kg", 0.2, ("kg", 1.0))],
+)
+def test_lengths_on_the_map_have_units_that_people_read(unit: str, value: float, shown: tuple[str, float]):
+    assert shown_unit(unit, value) == shown
+
+
+@pytest.fixture(scope="module")
+def search_once():
+    """The real search; as it is always the same, it is made once for all commands."""
+    kept: list[SynchronousOrbits] = []
+
+    def search(*arguments: Any, **options: Any) -> SynchronousOrbits:
+        if not kept:
+            kept.append(synchronous_orbits(*arguments, **options))
+        return kept[0]
+
+    return search
+
+
+def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    """The only thing that `arguments` with --json print on standard output."""
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+def test_bifurcations_of_a_narrow_range(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_once: Any
+):
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", search_once)
+    got = document(capsys, "bifurcations", "1a", *SEARCH, "--out", str(tmp_path))
+    doublings = [p for p in got["points"] if p["kind"] == "period-doubling" and p["edge"]]
+    nearest = min(doublings, key=lambda p: abs(p["speed_rpm"] - PERIOD_DOUBLING_RPM))
+    assert nearest["speed_rpm"] == pytest.approx(PERIOD_DOUBLING_RPM, abs=0.01)
+    assert nearest["multiplier"] == pytest.approx([-1.0, 0.0], abs=1e-6)
+    assert [p["speed_rpm"] for p in got["points"]] == sorted(p["speed_rpm"] for p in got["points"])
+    assert Path(got["figure"]).read_bytes().startswith(PNG)
+    assert Path(got["multipliers"]).read_bytes().startswith(PNG)
+    columns = read_columns(got["data"])
+    size = np.hypot(columns["multiplier 1 (real part)"], columns["multiplier 1 (imaginary part)"])
+    assert np.array_equal(columns["stable"] == 1, size < 1)
+    at = [o for e in got["edges"] for o in e["coexisting"]]
+    assert all(len(o["multipliers"]) == 4 for o in at)
+
+
+def test_gradient_of_a_narrow_range(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_once: Any
+):
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", search_once)
+    arguments = ["gradient", "1a", *SEARCH, "--out", str(tmp_path)]
+    got = document(capsys, *arguments)
+    (only,) = got["edges"]
+    assert (only["name"], only["kind"], only["trusted"]) == ("zone 1 exit", "period-doubling", True)
+    assert got["width"] is None
+    assert max(got["homogeneity"].values()) < 1e-9
+    # Halving the cage's mass and every force on it changes nothing: so says the identity for mass, and these carry it.
+    assert only["elasticity"]["cage_mass"] < -0.5
+    assert only["derivative"]["cage_mass"] == pytest.approx(
+        only["elasticity"]["cage_mass"] * only["speed_rpm"] / 0.212227
+    )
+    assert Path(got["figure"]).read_bytes().startswith(PNG)
+
+
+def test_map_of_a_narrow_range(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_once: Any
+):
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", search_once)
+    small = ["--lower", "0.445 mm", "--upper", "4.55e-4", "--rows", "2", "--columns", "3", "--revolutions", "10"]
+    got = document(capsys, "map", "1a", *SEARCH, *small, "--out", str(tmp_path))
+    (only,) = got["curves"]
+    assert (got["x"], got["y"], only["kind"]) == ("speed", "guidance_gap", "period-doubling")
+    x, y = np.array(only["x"]), np.array(only["y"])
+    k = int(np.argmin(np.abs(y - 4.5e-4)))
+    assert y[k] == pytest.approx(4.5e-4, rel=1e-9)
+    assert got["y_range"] == pytest.approx([4.45e-4, 4.55e-4])
+    assert any(x[k] == pytest.approx(p, abs=0.01) for p in (12200.0876, PERIOD_DOUBLING_RPM, 12886.0410))
+    assert got["exponents"]["x"] == pytest.approx([11500, 12250, 13000])
+    assert np.shape(got["exponents"]["largest"]) == (2, 3)
+    assert Path(got["figure"]).read_bytes().startswith(PNG)
+    assert read_columns(got["exponent_data"])["largest exponent"].size == 6
+
+
+REFUSALS = [
+    ("bifurcations 4z", "'4z' is unknown: it must be one of 1a, 1b, 2a, 2b, 3a, 3b"),
+    ("bifurcations 1a --first 0", "--first must be a speed above 0 rpm, but 0 was given"),
+    ("bifurcations 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
+    ("bifurcations 1a --count 1", "--count must be at least 2, but 1 was given"),
+    ("bifurcations 1a --discard -1", "--discard must be at least 0, but -1 was given"),
+    ("bifurcations 1a --solver euler", "--solver must be one of rodas3, rodas4"),
+    ("gradient 1a --last nan", "--last must be a speed above 0 rpm, but nan was given"),
+    ("gradient 1a --steps 0", "--steps must be at least 1"),
+    ("gradient nowhere.toml", "nowhere.toml' must be a readable TOML file"),
+    ("map 1a --y gap", "--y must be one of guidance_gap, "),
+    ("map 1a --y speed", "but 'speed' was given"),
+    ("map 1a --x gap", "--x must be one of speed, guidance_gap, "),
+    ("map 1a --x guidance_gap", "must be two different parameters, but both are guidance_gap"),
+    ("map 1a --rows 1", "--rows must be at least 2, but 1 was given"),
+    ("map 1a --columns 1", "--columns must be at least 2, but 1 was given"),
+    ("map 1a --revolutions 0", "--revolutions must be at least 1, but 0 was given"),
+    ("map 1a --starts 0", "--starts must be at least 1, but 0 was given"),
+    ("map 1a --starts 4", "--starts must be at most 3, but 4 was given"),
+    ("map 1a --lower 0.4kg", '--lower has the unit "kg"'),
+    ("map 1a --lower wide", '--lower is "wide", which is not a number with a unit'),
+    ("map 1a --upper 1", "--upper must be a value of guidance_gap from 1e-05 to 0.005 m, but 1 m was given"),
+    ("map 1a --lower 0.5mm", "must have guidance_gap = 0.00045 m between them, but the range is 0.0005 to"),
+    ("map 1a --y supply_pressure", "must have supply_pressure = 0 Pa between them, but the range is 0 to 0 Pa"),
+]
+
+
+@pytest.mark.parametrize("arguments, said", REFUSALS, ids=[a for a, _ in REFUSALS])
+def test_bad_input_is_refused_before_the_search(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: str, said: str
+):
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: pytest.fail("the search was started"))
+    assert main([*arguments.split(), "--out", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
+    assert out == "" and len(lines) == 1
+    assert said in lines[0].replace("`", "")
+    assert lines[0].endswith((".", ".)"))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["bifurcations", "gradient", "map"])
+def test_search_without_a_result_says_so(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    found: SynchronousOrbits,
+    command: str,
+):
+    nothing = SynchronousOrbits((), (), found.sweep, 0, 2500.0, 27500.0)
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: nothing)
+    assert main([command, "1a", "--out", str(tmp_path)]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "No simulation between 2500 and 27500 rpm settled on a synchronous orbit" in err
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command, what", [("gradient", "differentiate"), ("map", "follow")])
+def test_search_without_an_edge_says_so(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    found: SynchronousOrbits,
+    command: str,
+    what: str,
+):
+    whole = Stretch(None, None, 18000.0, 27500.0, 0, 0, 3, 3)
+    steady = SynchronousOrbits(found.branches[1:], (whole,), found.sweep, 0, 18000.0, 27500.0)
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: steady)
+    assert main([command, "1a", "--out", str(tmp_path)]) == 1
+    assert f"between 18000 and 27500 rpm: there is no edge to {what}." in capsys.readouterr().err
