@@ -221,7 +221,8 @@ def test_table_on_a_terminal_keeps_its_brackets_and_fits(
 def test_help_of_every_command(capsys: pytest.CaptureFixture[str]):
     assert main(["--help"]) == 0
     listed = capsys.readouterr().out
-    for command in ("simulate", "sweep", "zones", "poincare", "statics", "impact"):
+    commands = ("simulate", "sweep", "zones", "bifurcations", "gradient", "map", "poincare", "statics", "impact")
+    for command in commands:
         assert command in listed
         assert main([command, "--help"]) == 0
         text = capsys.readouterr().out

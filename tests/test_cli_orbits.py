@@ -10,7 +10,7 @@ import pytest
 import jaxcage as jc
 from jaxcage.analysis import Sweep
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.cli import _bifurcations, main
+from jaxcage.cli import _bifurcations, _gradient, _map, main
 from jaxcage.cli._gradient import gradient_document, gradient_table, homogeneity_notes, missing_notes
 from jaxcage.cli._map import shown_unit
 from jaxcage.cli._orbit_report import (
@@ -25,19 +25,19 @@ from jaxcage.cli._report import plain
 from jaxcage.io import read_columns
 from jaxcage.orbits import (
     Branch,
+    CodimensionTwo,
+    Curve,
     Sensitivity,
     SpecialPoint,
     Stretch,
     SynchronousOrbits,
     loss_zones,
-    synchronous_orbits,
     width,
 )
 
 
 PNG = b"\x89PNG\r\n"
 PER_RPM = np.pi / 30
-SEARCH = ["--first", "11500", "--last", "13000", "--count", "7", "--discard", "150"]
 PERIOD_DOUBLING_RPM = 12266.0855
 """Period doubling of case 1a, found by the search over the whole range and by Newton's method."""
 
@@ -216,17 +216,8 @@ def test_lengths_on_the_map_have_units_that_people_read(unit: str, value: float,
     assert shown_unit(unit, value) == shown
 
 
-@pytest.fixture(scope="module")
-def search_once():
-    """The real search; as it is always the same, it is made once for all commands."""
-    kept: list[SynchronousOrbits] = []
-
-    def search(*arguments: Any, **options: Any) -> SynchronousOrbits:
-        if not kept:
-            kept.append(synchronous_orbits(*arguments, **options))
-        return kept[0]
-
-    return search
+def is_png(path: str) -> bool:
+    return Path(path).read_bytes().startswith(PNG)
 
 
 def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
@@ -235,60 +226,121 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, A
     return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
-def test_bifurcations_of_a_narrow_range(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_once: Any
-):
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", search_once)
-    got = document(capsys, "bifurcations", "1a", *SEARCH, "--out", str(tmp_path))
+def test_bifurcations_of_a_narrow_range(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    narrow = ["--first", "12000", "--last", "13000", "--count", "5", "--discard", "150"]
+    got = document(capsys, "bifurcations", "1a", *narrow, "--out", str(tmp_path))
     doublings = [p for p in got["points"] if p["kind"] == "period-doubling" and p["edge"]]
     nearest = min(doublings, key=lambda p: abs(p["speed_rpm"] - PERIOD_DOUBLING_RPM))
     assert nearest["speed_rpm"] == pytest.approx(PERIOD_DOUBLING_RPM, abs=0.01)
     assert nearest["multiplier"] == pytest.approx([-1.0, 0.0], abs=1e-6)
     assert [p["speed_rpm"] for p in got["points"]] == sorted(p["speed_rpm"] for p in got["points"])
-    assert Path(got["figure"]).read_bytes().startswith(PNG)
-    assert Path(got["multipliers"]).read_bytes().startswith(PNG)
+    assert is_png(got["figure"]) and is_png(got["multipliers"])
     columns = read_columns(got["data"])
     size = np.hypot(columns["multiplier 1 (real part)"], columns["multiplier 1 (imaginary part)"])
     assert np.array_equal(columns["stable"] == 1, size < 1)
-    at = [o for e in got["edges"] for o in e["coexisting"]]
-    assert all(len(o["multipliers"]) == 4 for o in at)
+    assert np.ptp(columns["speed [rpm]"]) > 700
 
 
-def test_gradient_of_a_narrow_range(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_once: Any
+def test_gradient_command(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits
 ):
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", search_once)
-    arguments = ["gradient", "1a", *SEARCH, "--out", str(tmp_path)]
-    got = document(capsys, *arguments)
-    (only,) = got["edges"]
-    assert (only["name"], only["kind"], only["trusted"]) == ("zone 1 exit", "period-doubling", True)
-    assert got["width"] is None
-    assert max(got["homogeneity"].values()) < 1e-9
-    # Halving the cage's mass and every force on it changes nothing: so says the identity for mass, and these carry it.
-    assert only["elasticity"]["cage_mass"] < -0.5
-    assert only["derivative"]["cage_mass"] == pytest.approx(
-        only["elasticity"]["cage_mass"] * only["speed_rpm"] / 0.212227
+    def sensitivities(system: Any, points: dict[str, SpecialPoint], method: Any) -> dict[str, Sensitivity]:
+        moved = {n: edge(n, float(p.speed_rpm), cage_mass=-0.75, guidance_gap=0.1) for n, p in points.items()}
+        return moved | {"zone 2 onset": edge("zone 2 onset", float("nan"), status="no such point")}
+
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: found)
+    monkeypatch.setattr(_gradient, "sensitivities", sensitivities)
+    got = document(capsys, "gradient", "1a", "--out", str(tmp_path))
+    assert [(e["name"], e["trusted"]) for e in got["edges"]] == [
+        ("zone 1 onset", True),
+        ("zone 1 exit", True),
+        ("zone 2 onset", False),
+    ]
+    assert got["edges"][2]["speed_rpm"] is None
+    assert got["width"]["elasticity"]["cage_mass"] == pytest.approx(-0.75)
+    assert is_png(got["figure"])
+    assert main(["gradient", "1a", "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert out.index("Zone 1 width of 1a: 5000.000 rpm") < out.index("Zone 1 onset of 1a: 7000.000 rpm")
+    assert "Left out: zone 2 onset, fold (no such point)." in out
+    assert "Zone 2 onset of 1a" not in out
+
+
+def test_gradient_without_an_edge_to_be_trusted_fails(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits
+):
+    lost = {"zone 1 onset": edge("zone 1 onset", 7000.0, status="tangential")}
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: found)
+    monkeypatch.setattr(_gradient, "sensitivities", lambda *_, **__: lost)
+    assert main(["gradient", "1a", "--out", str(tmp_path)]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and "No edge is a function of the design here (zone 1 onset: tangential)" in err
+
+
+def lines_through(system: Any, point: Any, x: str, y: str, **given: Any) -> Curve:
+    """In place of the continuation: straight up, and none through a torus bifurcation."""
+    if point.kind == "torus":
+        raise ValueError("none there")
+    height = np.linspace(given["lower"], given["upper"], 5)
+    special = CodimensionTwo("cusp", point.value, height[2], point.multipliers)
+    return Curve(
+        kind=point.kind,
+        x=x,
+        y=y,
+        x_value=np.full(5, point.value),
+        y_value=height,
+        state=np.tile(point.state, (5, 1)),
+        multipliers=np.tile(point.multipliers, (5, 1)),
+        genuine=np.ones(5, dtype=bool),
+        special=(special,),
+        ended=("range", "range"),
+        name=given["name"],
     )
-    assert Path(got["figure"]).read_bytes().startswith(PNG)
 
 
-def test_map_of_a_narrow_range(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search_once: Any
-):
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", search_once)
-    small = ["--lower", "0.445 mm", "--upper", "4.55e-4", "--rows", "2", "--columns", "3", "--revolutions", "10"]
-    got = document(capsys, "map", "1a", *SEARCH, *small, "--out", str(tmp_path))
-    (only,) = got["curves"]
-    assert (got["x"], got["y"], only["kind"]) == ("speed", "guidance_gap", "period-doubling")
-    x, y = np.array(only["x"]), np.array(only["y"])
-    k = int(np.argmin(np.abs(y - 4.5e-4)))
-    assert y[k] == pytest.approx(4.5e-4, rel=1e-9)
-    assert got["y_range"] == pytest.approx([4.45e-4, 4.55e-4])
-    assert any(x[k] == pytest.approx(p, abs=0.01) for p in (12200.0876, PERIOD_DOUBLING_RPM, 12886.0410))
-    assert got["exponents"]["x"] == pytest.approx([11500, 12250, 13000])
-    assert np.shape(got["exponents"]["largest"]) == (2, 3)
-    assert Path(got["figure"]).read_bytes().startswith(PNG)
-    assert read_columns(got["exponent_data"])["largest exponent"].size == 6
+@pytest.fixture
+def map_of_lines(monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits):
+    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: found)
+    monkeypatch.setattr(_map, "curve", lines_through)
+
+
+def test_map_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, map_of_lines: None):
+    small = ["--first", "3000", "--last", "9000", "--rows", "2", "--columns", "3", "--revolutions", "10"]
+    small += ["--discard", "10", "--steps", "64", "--starts", "2", "--lower", "0.4 mm", "--upper", "5e-4"]
+    got = document(capsys, "map", "1a", *small, "--out", str(tmp_path))
+    assert (got["x"], got["y"]) == ("speed", "guidance_gap")
+    assert got["x_range"] == pytest.approx([3000, 9000])
+    assert got["y_range"] == pytest.approx([4e-4, 5e-4])
+    assert [c["name"] for c in got["curves"]] == ["zone 1 onset", "zone 1 exit"]
+    assert got["refused"] == {"zone 2 onset": "Newton's method did not find it again"}
+    onset = got["curves"][0]
+    assert onset["x"] == pytest.approx([7000] * 5)
+    assert onset["y"] == pytest.approx(np.linspace(4e-4, 5e-4, 5))
+    assert onset["special"] == [{"kind": "cusp", "x": pytest.approx(7000), "y": pytest.approx(4.5e-4)}]
+    assert is_png(got["figure"])
+    assert read_columns(got["data"])["guidance_gap [mm]"][:2] == pytest.approx([0.4, 0.425])
+    grid = got["exponents"]
+    assert grid["x"] == pytest.approx([3000, 6000, 9000])
+    model = jc.replace(jc.case("1a"), guidance_gap=5e-4)
+    speeds, method = jc.rpm(3000, 9000, 3), jc.method(steps=64)
+    one = jc.sweep(model, speeds, discard=10, revolutions=10, blocks=1, keep=1, method=method)
+    assert grid["largest"][1] == pytest.approx(np.max(one.exponents[:, :2, 0], axis=1), rel=1e-6)
+    stored = read_columns(got["exponent_data"])
+    assert stored["largest exponent"][1::2] == pytest.approx(grid["largest"][1])
+
+
+def test_map_without_exponents(capsys: pytest.CaptureFixture[str], tmp_path: Path, map_of_lines: None):
+    arguments = ["map", "1a", "--rows", "0", "--y", "eccentricity", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "Edges of 1a over speed and eccentricity" in out
+    assert any(row.split()[:6] == "zone 1 onset fold 7000.00 7000.00".split() for row in out.splitlines())
+    assert "18.4" in out and "28.75" in out  # 0.8 and 1.25 of 23 micrometres
+    assert "Not followed: zone 2 onset (Newton's method did not find it again)" in out
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "map_1a_speed_eccentricity.csv",
+        "map_1a_speed_eccentricity.png",
+    ]
 
 
 REFUSALS = [
@@ -301,9 +353,9 @@ REFUSALS = [
     ("gradient 1a --last nan", "--last must be a speed above 0 rpm, but nan was given"),
     ("gradient 1a --steps 0", "--steps must be at least 1"),
     ("gradient nowhere.toml", "nowhere.toml' must be a readable TOML file"),
-    ("map 1a --y gap", "--y must be one of guidance_gap, "),
+    ("map 1a --y gap", "--y must be one of bore, "),
     ("map 1a --y speed", "but 'speed' was given"),
-    ("map 1a --x gap", "--x must be one of speed, guidance_gap, "),
+    ("map 1a --x gap", "--x must be one of speed, bore, "),
     ("map 1a --x guidance_gap", "must be two different parameters, but both are guidance_gap"),
     ("map 1a --rows 1", "--rows must be at least 2, but 1 was given"),
     ("map 1a --columns 1", "--columns must be at least 2, but 1 was given"),

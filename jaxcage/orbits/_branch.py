@@ -40,7 +40,7 @@ class BranchEquations(AbstractEquations):
         return self.problem.residual(u, prepared, self.frame), None
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class SpecialPoint:
     """A bifurcation on a branch."""
 
@@ -347,7 +347,7 @@ def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
     return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
 
 
-def is_stable(multipliers: np.ndarray, free: bool) -> np.ndarray:
+def is_stable(multipliers: np.ndarray, free: bool) -> Any:
     """Whether all multipliers are inside the unit circle, but for the one at 1 of a self-excited orbit."""
     size = np.abs(multipliers)
     if free:

@@ -41,7 +41,7 @@ ON_BRANCH = 0.03
 Progress = Callable[[str, int, int], None]
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Stretch:
     """A stable part of a branch of synchronous orbits; an end is None where it leaves the range."""
 
@@ -93,7 +93,12 @@ class SynchronousOrbits:
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
         """Orbits at `speed` [rad/s]: branch, whether stable, state [SI], multipliers; to the accuracy of the steps."""
-        return [(i, *orbit) for i, b in enumerate(self.branches) for orbit in crossings(b, speed)]
+        found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
+        for i, b in enumerate(self.branches):
+            for stable, state, multipliers in crossings(b, speed):
+                if not any(np.allclose(state, other, rtol=1e-2) for _, _, other, _ in found):  # parts may overlap
+                    found.append((i, stable, state, multipliers))
+        return found
 
     def __str__(self) -> str:
         head = f"{len(self.branches)} branches of synchronous orbits, {len(self.stretches)} stable stretches"
@@ -104,7 +109,7 @@ def crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.n
     """Where a branch over speed passes `speed`: stable or not, state, multipliers, by linear interpolation."""
     v = branch.value
     found = []
-    for k in np.flatnonzero((v[:-1] - speed) * (v[1:] - speed) <= 0):
+    for k in np.flatnonzero(((v[:-1] - speed) * (v[1:] - speed) < 0) | (v[:-1] == speed)):
         share = 0.0 if v[k + 1] == v[k] else (speed - v[k]) / (v[k + 1] - v[k])
         state = branch.state[k] + share * (branch.state[k + 1] - branch.state[k])
         near = k + int(round(share))
