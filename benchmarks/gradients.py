@@ -24,7 +24,7 @@ STENCIL = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
 
 
 STEPS = (1e-3, 1e-4, 1e-5, 1e-6)
-"""Relative steps: edges of orbits that touch the rib bend within the contact's regularisation length, 4e-4 of the gap."""
+"""Relative steps: edges of orbits that touch the rib bend within the contact's regularisation length, 4e-4 of it."""
 
 
 def best_difference(model, point, name: str) -> float:

@@ -181,3 +181,260 @@ def test_cascade_that_does_not_go_on_is_shorter(doubling):
     found = jc.cascade(double_well(), doubling, "g", lower=0.1, upper=0.29, levels=4, method=FINE)
     assert len(found.points) == 2
     assert found.error == np.inf and abs(found.limit - 0.2924) < 2e-4
+
+
+class Mathieu(eqx.Module):
+    """x'' + 2 z x' + (a - 2 cos 2t) x + x^3 = 0 with tau = 2 t."""
+
+    a: jax.Array
+    z: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-2 * self.z * u - (self.a - 2 * jnp.cos(tau)) * x - x**3,)
+
+
+def mathieu_trace(a):
+    """Trace of the monodromy matrix of the undamped linear equation over pi."""
+
+    def rates(t, y):
+        stiffness = a - 2 * np.cos(2 * t)
+        return [y[1], -stiffness * y[0], y[3], -stiffness * y[2]]
+
+    end = solve_ivp(rates, (0, np.pi), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    return end[0] + end[3]
+
+
+def test_branch_point_and_period_doublings_of_the_rest_state():
+    """x = exp(-z t) y turns it into the undamped equation at a - z^2, whose trace is then +-2 cosh(z pi) (SciPy)."""
+    z = 0.1
+    system = jc.ForcedOscillator(Mathieu(**numbers(a=0.5, z=z)), coordinates=1)
+    branch = jc.branch(system, ((0.0, 0.0), 0.5), "a", lower=-0.8, upper=2.5, speed=2.0, method=FINE)
+    ordered = sorted(branch.special, key=lambda p: p.value)
+    assert [p.kind for p in ordered] == ["branch-point", "period-doubling", "period-doubling"]
+    brackets = [(-0.6, -0.3, 1), (-0.2, 0.0, -1), (1.7, 1.9, -1)]
+    edge = lambda a, sign: mathieu_trace(a - z * z) - 2 * sign * np.cosh(z * np.pi)
+    exact = [brentq(edge, low, high, args=(sign,), xtol=1e-12) for low, high, sign in brackets]
+    np.testing.assert_allclose([p.value for p in ordered], exact, rtol=0, atol=1e-8)
+    for point, (_, _, sign) in zip(ordered, brackets, strict=True):
+        assert abs(point.critical - sign) < 1e-7 and point.edge
+    inside = (branch.value > exact[0]) & (branch.value < exact[1])
+    assert np.array_equal(branch.stable, inside | (branch.value > exact[2]))
+    np.testing.assert_allclose(branch.state, 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.prod(branch.multipliers, axis=1), np.exp(-2 * z * np.pi), rtol=1e-6)
+
+
+class Ring(eqx.Module):
+    """x' = (p - 2)^2 + x^2 - r^2, and beside it what the drive makes of u: orbits are the points of a circle."""
+
+    p: jax.Array
+    r: jax.Array
+
+    def __call__(self, tau, y, speed):
+        x, u = y
+        return ((self.p - 2) ** 2 + x * x - self.r**2, -0.5 * u + jnp.cos(tau))
+
+
+@pytest.mark.parametrize("degrees", [-90, -3, -0.3, 60, 176])
+def test_closed_branch_is_covered_once(degrees):
+    """Folds at p = 2 +- r, wherever on the circle it begins; multipliers exp(2 x T) and exp(-T/2): exact."""
+    radius, speed = 0.3, 1.5
+    system = jc.ForcedSystem(Ring(**numbers(p=2, r=radius)), dimension=2)
+    angle = np.deg2rad(degrees)
+    u = 0.5 / (0.25 + speed**2)
+    start = ((radius * np.sin(angle), u), 2 + radius * np.cos(angle))
+    branch = jc.branch(system, start, "p", lower=1.5, upper=2.5, speed=speed, method=METHOD)
+    assert branch.ended == ("closed", "closed")
+    assert kinds(branch) == ["fold", "fold"]
+    np.testing.assert_allclose(sorted(p.value for p in branch.special), [2 - radius, 2 + radius], rtol=0, atol=1e-9)
+    np.testing.assert_allclose([p.state[0] for p in branch.special], 0.0, atol=1e-7)
+    np.testing.assert_allclose(np.hypot(branch.value - 2, branch.state[:, 0]), radius, atol=1e-9)
+    turned = np.diff(np.unwrap(np.arctan2(branch.state[:, 0], branch.value - 2)))
+    assert np.all(turned > 0) or np.all(turned < 0)
+    np.testing.assert_allclose(abs(np.sum(turned)), 2 * np.pi, atol=1e-9)  # the first point again at the end
+    assert np.array_equal(branch.stable, branch.state[:, 0] < 0)
+    period = 2 * np.pi / speed
+    exact = np.sort([np.exp(2 * branch.state[:, 0] * period), np.full(branch.value.size, np.exp(-period / 2))], axis=0)
+    # Those of Newton's last iterate but one, at a distance of up to 1e-5.
+    np.testing.assert_allclose(np.sort(branch.multipliers.real, axis=1).T, exact, rtol=5e-4)
+
+
+class Planted(eqx.Module):
+    """The orbit (cos, sin, cos, sin) with the multipliers of exp(A T), A of two blocks [[g + s, -b], [b, g - s]].
+
+    g = a + c p. A coupling from the first to the second does not change the multipliers.
+
+    The second block turns by half a revolution a period: its multipliers have the opposite sign.
+    """
+
+    p: jax.Array
+    a: jax.Array
+    c: jax.Array
+    s: jax.Array
+    b: jax.Array
+
+    def __call__(self, tau, y, speed):
+        cos, sin = jnp.cos(tau), jnp.sin(tau)
+        z = [y[0] - cos, y[1] - sin, y[2] - cos, y[3] - sin]
+        half, side = jnp.cos(tau / 2), jnp.sin(tau / 2)
+        frames = [(z[0], z[1], 1.0, 0.0, 0.0), (*self._turned(half, side, z[2], z[3]), half, side, speed / 2)]
+        rates = []
+        for i, (e, f, along, across, spin) in enumerate(frames):
+            growth = self.a[i] + self.c[i] * self.p
+            de = (growth + self.s[i]) * e - self.b[i] * f - (e * e + f * f) * e
+            df = (growth - self.s[i]) * f + self.b[i] * e - (e * e + f * f) * f
+            x, v = along * de - across * df, across * de + along * df
+            rates += [x - spin * z[2 * i + 1] - speed * sin, v + spin * z[2 * i] + speed * cos]
+        rates[2] += 0.3 * z[0]
+        return tuple(rates)
+
+    @staticmethod
+    def _turned(half, side, x, v):
+        return half * x + side * v, -side * x + half * v
+
+
+def planted(a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
+    return jc.ForcedSystem(Planted(**numbers(p=0.0, a=a, c=c, s=s, b=b)), dimension=4)
+
+
+def planted_branch(speed=1.1, lower=-0.2, upper=0.2, **settings):
+    start = ((1.0, 0.0, 1.0, 0.0), lower + 0.01)
+    return jc.branch(planted(**settings), start, "p", lower=lower, upper=upper, speed=speed, method=METHOD)
+
+
+def planted_multipliers(branch, a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
+    """Exact, at all points of a branch."""
+    rows = []
+    for i, sign in enumerate((1, -1)):
+        root = np.sqrt(complex(s[i] ** 2 - b[i] ** 2))
+        rows += [sign * np.exp((a[i] + c[i] * branch.value + r) * 2 * np.pi / branch.speed) for r in (root, -root)]
+    return np.array(rows).T
+
+
+def assert_same_sets(found, exact, rtol):
+    """Each exact multiplier is there, point by point."""
+    away = np.abs(found[:, :, None] - exact[:, None, :]) / np.max(np.abs(exact), axis=1)[:, None, None]
+    assert np.max(np.min(away, axis=1)) < rtol
+
+
+def test_torus_of_a_planted_orbit():
+    """The pair exp((p - 0.03 +- 0.4i) T) crosses at p = 0.03; the real pair of the other block stays inside."""
+    settings = dict(a=(-0.03, -0.3), c=(1.0, 0.2), s=(0.0, 0.1), b=(0.4, 0.0))
+    branch = planted_branch(**settings)
+    (point,) = branch.special
+    assert point.kind == "torus" and point.edge
+    assert abs(point.value - 0.03) < 1e-9
+    assert abs(point.critical - np.exp(0.4j * 2 * np.pi / 1.1)) < 1e-8
+    np.testing.assert_array_equal(point.direction, 0.0)
+    np.testing.assert_allclose(point.state, [1, 0, 1, 0], atol=1e-8)
+    assert np.array_equal(branch.stable, branch.value < 0.03)
+    assert_same_sets(branch.multipliers, planted_multipliers(branch, **settings), 1e-7)
+
+
+# What happens inside the unit circle, or outside, without anything crossing it.
+QUIET = {
+    "real pair and complex pair change order": dict(a=(-0.3, -0.3), c=(1.0, -1.0), s=(0.0, 0.05), b=(0.4, 0.0)),
+    "four real ones cross each other": dict(a=(-0.4, -0.4), c=(1.0, -1.0), s=(0.1, 0.15), b=(0.0, 0.0)),
+    "neutral saddle": dict(a=(0.0, -0.3), c=(1.0, 0.0), s=(0.3, 0.1), b=(0.0, 0.0)),
+    "neutral saddle, negative": dict(a=(-0.3, 0.0), c=(0.0, 1.0), s=(0.1, 0.3), b=(0.0, 0.0)),
+    "neutral saddle of two blocks": dict(a=(-0.3, 0.2), c=(1.0, 0.5), s=(0.05, 0.05), b=(0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", QUIET)
+def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
+    branch = planted_branch(**QUIET[name])
+    exact = planted_multipliers(branch, **QUIET[name])
+    assert_same_sets(branch.multipliers, exact, 1e-7)
+    if "saddle" in name:  # the product of some two passes 1, of opposite signs in the last
+        assert not np.any(branch.stable)
+    else:
+        order = np.sign(np.abs(exact[:, 0]) - np.abs(exact[:, 3]))
+        assert order[0] != order[-1] and np.all(branch.stable)
+    assert branch.special == ()
+
+
+@pytest.mark.parametrize("first", ["period-doubling", "branch-point"])
+def test_crossings_within_one_step_are_in_order(first):
+    """One at p = 0.02 and one at 0.0204, both between the same two points: only the first is next to stable orbits."""
+    places = [0.02, 0.0204] if first == "period-doubling" else [0.0204, 0.02]
+    a = (-places[1] - 0.2, -places[0] - 0.2)
+    branch = planted_branch(a=a, c=(1.0, 1.0), s=(0.2, 0.2))
+    assert branch.special[0].index == branch.special[1].index
+    np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0204], rtol=0, atol=1e-8)
+    assert branch.special[0].kind == first and sorted(kinds(branch)) == ["branch-point", "period-doubling"]
+    assert [p.edge for p in branch.special] == [True, False]
+
+
+class VanDerPol(eqx.Module):
+    mu: jax.Array
+
+    def __call__(self, tau, y, speed):
+        x, u = y
+        return (u, self.mu * (1 - x * x) * u - x)
+
+
+def test_branch_of_a_self_excited_system_over_its_damping():
+    """Periods of van der Pol's limit cycle at mu = 0.1 and 1 as published; multiplier exp(-7.05893281) by DOP853."""
+    system = jc.ForcedSystem(VanDerPol(**numbers(mu=0.3)), dimension=2)
+    orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=30, period="free", method=FINE)
+    branch = jc.branch(system, orbit, "mu", lower=0.05, upper=1.2, period="free", method=FINE)
+    assert branch.ended == ("range", "range") and branch.special == () and np.all(branch.stable)
+    up = np.argsort(branch.value)
+    at = lambda y: CubicSpline(branch.value[up], y[up])
+    np.testing.assert_allclose(
+        2 * np.pi / at(branch.speed)([0.1, 1.0]), [6.2871112723, 6.6632868593], rtol=0, atol=1e-6
+    )
+    trivial, other = np.sort(branch.multipliers.real, axis=1).T[::-1]
+    # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
+    np.testing.assert_allclose(trivial, 1.0, atol=1e-5)
+    np.testing.assert_allclose(at(np.log(other))([0.1, 1.0]), [np.log(0.5330692592), -7.05893281], atol=5e-5)
+
+
+@pytest.mark.parametrize(
+    "settings, sentence",
+    [
+        (dict(lower=2.0, upper=1.0), "`upper` must be above `lower`, but they are 1 and 2"),
+        (dict(lower=1.0, upper=1.0), "`upper` must be above `lower`, but they are 1 and 1"),
+        (dict(parameter="m", lower=0.0, upper=1.0), "`parameter` must be one of speed, d, k, g, but 'm' was given"),
+    ],
+)
+def test_bad_arguments(settings, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        jc.branch(hardening(), ((0.5, 0.0), 0.8), method=METHOD, speed=0.8, **settings)
+
+
+def test_parameter_without_a_speed():
+    with pytest.raises(ValueError, match="`speed` must be given where the parameter is"):
+        jc.branch(hardening(), ((0.5, 0.0), 0.3), "g", lower=0.1, upper=0.5, method=METHOD)
+
+
+def test_no_orbit_to_start_from():
+    """x' = p^2 + x^2 has none for p > 0."""
+    system = jc.ForcedSystem(Ring(**numbers(p=2.5, r=0.0)), dimension=2)
+    with pytest.raises(ValueError, match="`orbit` must be near a periodic orbit, but none is near it at 2.5"):
+        jc.branch(system, ((0.1, 0.0), 2.5), "p", lower=1.5, upper=3.0, speed=1.5, method=METHOD)
+
+
+def test_no_doubled_branch_begins_at_a_fold(over_speed):
+    with pytest.raises(ValueError, match="`point` must be a period doubling, but no doubled branch begins at 1.77"):
+        jc.orbits.doubled_branch(hardening(), over_speed.special[0], lower=0.5, upper=2.5, method=METHOD)
+
+
+@pytest.mark.parametrize("steps", [dict(first=0.2), dict(shortest=0.05), dict(shortest=0.0), dict(longest=0.01)])
+def test_lengths_of_steps_must_be_in_order(steps):
+    with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
+        jc.Steps(**steps)
+    assert dataclasses.replace(jc.Steps(), first=0.1).first == 0.1
+
+
+def test_shorter_steps_change_no_bifurcation(over_speed):
+    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
+    steps = jc.Steps(first=0.01, longest=0.04, most=2000)
+    fine = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=steps, method=METHOD)
+    assert fine.value.size > 2 * over_speed.value.size
+    np.testing.assert_allclose(
+        [p.value for p in fine.special], [p.value for p in over_speed.special], rtol=0, atol=1e-9
+    )
+    few = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=jc.Steps(most=5), method=METHOD)
+    assert few.ended == ("steps", "steps") and few.value.size == 11

@@ -4,6 +4,8 @@ Laws are modules as a user would write them. "DOP853" in a comment means: comput
 1e-12 and Newton's method on the variational equations, sharing nothing with this library.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -224,7 +226,7 @@ DAMPED = [
 @pytest.mark.parametrize("kind, z, bracket, sign", DAMPED)
 def test_edges_of_damped_mathieu(kind, z, bracket, sign):
     """A multiplier is +-1 where the undamped trace at a - z^2 is +-2 cosh(z pi); the trace here is SciPy's."""
-    exact = brentq(lambda a: mathieu_trace(a - z * z) - sign * 2 * np.cosh(z * np.pi), *bracket, xtol=1e-12)
+    exact: Any = brentq(lambda a: mathieu_trace(a - z * z) - sign * 2 * np.cosh(z * np.pi), *bracket, xtol=1e-12)
     system = mathieu(z=z)
     point = jc.bifurcation(system, kind, ((0.0, 0.0), exact + 0.02), "a", speed=2.0, method=METHOD)
     assert abs(point.value - exact) < 1e-8

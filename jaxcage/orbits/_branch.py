@@ -180,6 +180,8 @@ def branch(
     known_speed: Any = getattr(orbit, "speed", speed)
     state, at = orbit if isinstance(orbit, tuple) else (orbit.state, value_of(system, known_speed, parameter))
     known_speed = at if parameter == SPEED else known_speed
+    if known_speed is None:
+        raise ValueError(f"Argument `speed` must be given where the parameter is `{parameter}`, but it is not.")
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
     state = guess_state(system, known_speed, state)
     count = int(getattr(orbit, "periods", periods))
@@ -317,8 +319,8 @@ def _joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tupl
     """
     if up.ended == "closed":
         stable = is_stable(eigenvalues(follower.monodromy(up.points)), follower.problem.free_speed)
-        count = stable.size
-        order = (np.arange(count + 1) + int(np.argmin(stable))) % count
+        count = stable.size - 1  # the last point is past the first
+        order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
         return take(up.points, order), (up.ended, up.ended)
     back = turned(take(down.points, np.arange(len(down.points.u) - 1, 0, -1)), -1.0)
     points = jax.tree.map(lambda a, b: np.concatenate([a, b]), back, up.points)
@@ -337,6 +339,8 @@ def describe(
     branches = []
     for i, (points, ended) in enumerate(traces):
         mine = [(k, kind, p) for (j, k, kind), p in zip(found, located, strict=True) if j == i and p is not None]
+        along = lambda k, p: float(np.dot(p.u - points.u[k], points.u[k + 1] - points.u[k]))
+        mine.sort(key=lambda found: (found[0], along(found[0], found[2])))
         branches.append(_branch(follower, frame, points, ended, mine))
     return branches
 
@@ -402,19 +406,21 @@ def _branch(
 
     def speed(u: np.ndarray) -> np.ndarray:
         if name == SPEED:
-            return u[..., -1] * follower.unit
-        return u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.of(0).speed))
+            return np.asarray(u[..., -1] * follower.unit)
+        found = u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.of(0).speed))
+        return np.asarray(found)
 
     special = []
-    for k, kind, p in located:
+    located = [found for found in located if matches(found[1], eigenvalues(follower.monodromy(found[2])))]
+    before = [k for k, _, _ in located]
+    for i, (k, kind, p) in enumerate(located):
         mu = eigenvalues(follower.monodromy(p))
-        if not matches(kind, mu):
-            continue
         direction = np.zeros(n)
         if kind != "torus":
             m = jnp.asarray(follower.monodromy(p))
             direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])  # pyright: ignore[reportArgumentType]
-        edge = bool(stable[k] or stable[k + 1])
+        # Of several between two points, the outer ones only are next to orbits whose stability is known.
+        edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)
         special.append(
             SpecialPoint(

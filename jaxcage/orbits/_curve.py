@@ -186,7 +186,7 @@ class _Tracer(eqx.Module):
                 found.append(CodimensionTwo(kind, float(x), float(y), eigenvalues(p.aux.monodromy)))
         # At a cusp the curve turns back in every parameter.
         cusps = [p for p in found if p.kind == "cusp"]
-        near = lambda p, q: abs(p.x_value - q.x_value) < 1e-6 * abs(q.x_value)
+        near = lambda p, q: abs(p.x_value - q.x_value) < 1e-4 * self.units[0]
         return [p for p in found if p.kind != "extreme" or not any(near(p, q) for q in cusps)]
 
     def signals(self, points: Corrected) -> dict[str, np.ndarray]:

@@ -7,6 +7,7 @@ are treated at a time.
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import jax
 import numpy as np
 
 from ._arclength import Corrected, correct, take
@@ -16,6 +17,9 @@ from ._implicit import AbstractEquations
 MOST = 40
 LOCATED = 1e-9
 """Places are refined until they move by less than this in the unknowns' units."""
+ASIDE = 1e-5
+"""At a branch point the curve's equations are singular, and no point is found where the function vanishes: it is then
+bracketed this closely, and interpolated."""
 
 
 def zeros(
@@ -41,7 +45,8 @@ def zeros(
     chord = u1 - u0
     length = np.linalg.norm(chord, axis=1)
     normal = chord / length[:, None]
-    low, high, last = np.zeros(lanes), np.ones(lanes), np.zeros(lanes)
+    low, high, last, aside = np.zeros(lanes), np.ones(lanes), np.zeros(lanes), np.zeros(lanes)
+    sides = [[take(e, np.array(j)) for j in (0, 1)] for e in ends]
     best: list[Corrected | None] = [None] * lanes
     active = np.ones(lanes, dtype=bool)
     for _ in range(MOST):
@@ -49,16 +54,23 @@ def zeros(
         if index.size == 0:
             break
         margin = 1e-3 * (high - low)
-        share = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
+        aimed = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
+        share = np.clip(aimed + aside, low, high)
         at = u0[index] + share[index, None] * chord[index]
         mine = take(given, index) if own_given else given
         got = correct(take(curves, index), mine, at, normal[index], own_given)
         for k, i in enumerate(index):
             if not got.converged[k]:
-                best[i], active[i] = None, False
+                near = (high[i] - low[i]) * length[i] < 4 * ASIDE
+                best[i] = _between(*sides[i], (aimed[i] - low[i]) / (high[i] - low[i])) if near else None
+                active[i] = not near and aside[i] == 0.0
+                aside[i] = ASIDE / length[i]
                 continue
             before, best[i] = best[i], take(got, np.array(k))
             f = float(signal(int(i), take(got, np.array([k])))[0])
+            sides[i][int(f * f1[i] >= 0)] = best[i]
+            if aside[i] != 0.0:
+                aside[i] = -aside[i] if aside[i] > 0 else 0.0
             halve = 0.5 if f * last[i] > 0 else 1.0  # the same end was kept twice
             if f * f1[i] < 0:
                 low[i], f0[i], f1[i] = share[i], f, f1[i] * halve
@@ -66,5 +78,11 @@ def zeros(
                 high[i], f1[i], f0[i] = share[i], f, f0[i] * halve
             last[i] = f
             moved = np.inf if before is None else np.linalg.norm(got.u[k] - before.u)
-            active[i] = f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
+            active[i] = aside[i] != 0.0 or f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
     return best
+
+
+def _between(a: Corrected, b: Corrected, share: float) -> Corrected:
+    """Linear interpolation of two near points."""
+    mix = lambda x, y: (1 - share) * x + share * y if np.issubdtype(np.asarray(x).dtype, np.floating) else x
+    return jax.tree.map(mix, a, b)

@@ -9,7 +9,6 @@ With monodromy matrix M an orbit is at a
 The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
 """
 
-import itertools
 from typing import Literal
 
 import jax.numpy as jnp
@@ -23,7 +22,7 @@ KINDS: tuple[Kind, ...] = ("period-doubling", "torus", "fold", "branch-point")
 
 def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     """All 2 x 2 minors of `m`, k = n (n - 1)/2: its eigenvalues are the products of pairs of eigenvalues of `m`."""
-    i, j = np.array(list(itertools.combinations(range(m.shape[0]), 2))).T
+    i, j = np.triu_indices(m.shape[0], 1)
     return m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)]
 
 
@@ -64,11 +63,12 @@ def bordered(
 def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, Float[np.ndarray, "*points"]]:
     """Real functions of all multipliers that change sign at a bifurcation of each kind."""
     mu = np.asarray(multipliers)
-    i, j = np.array(list(itertools.combinations(range(mu.shape[-1]), 2))).T
+    i, j = np.triu_indices(mu.shape[-1], 1)
+    product = lambda factors: np.asarray(np.prod(factors, axis=-1).real)
     return {
-        "period-doubling": np.prod(mu + 1, axis=-1).real,
-        "torus": np.prod(mu[..., i] * mu[..., j] - 1, axis=-1).real,
-        "fold": np.prod(mu - 1, axis=-1).real,
+        "period-doubling": product(mu + 1),
+        "torus": product(mu[..., i] * mu[..., j] - 1),
+        "fold": product(mu - 1),
     }
 
 

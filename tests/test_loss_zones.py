@@ -1,0 +1,303 @@
+"""Synchronous-loss zones between stable stretches, and chaotic edges matched with bifurcations."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from jaxcage.orbits import SpecialPoint, Stretch, SynchronousOrbits
+
+
+METHOD = jc.method("rodas4", steps=256)
+PER_RPM = np.pi / 30
+CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0}
+
+
+def special(rpm, kind="fold"):
+    pair = [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5]
+    speed = rpm * PER_RPM
+    return SpecialPoint(kind, speed, speed, np.zeros(2), np.array(pair, dtype=complex), np.zeros(2), 0, True)
+
+
+def stretch(lower, upper, family=0, met=10, first=None, open_below=False, open_above=False, kinds=("fold", "torus")):
+    """A stretch between two speeds [rpm], of a branch with the number of its family."""
+    return Stretch(
+        None if open_below else special(lower, kinds[0]),
+        None if open_above else special(upper, kinds[1]),
+        float(lower),
+        float(upper),
+        family,
+        family,
+        met,
+        met if first is None else first,
+    )
+
+
+def simulations(rpm, synchronous):
+    """A sweep of one start, settled on the synchronous orbit where `synchronous`, else wandering about."""
+    count = rpm.size
+    strobe = np.zeros((count, 1, 8, 2))
+    strobe[~synchronous] = np.linspace(0.1, 0.9, 16).reshape(8, 2)
+    return jc.Sweep(
+        speed=rpm * PER_RPM,
+        strobe=strobe,
+        last=strobe[:, :, -1],
+        block_growth=np.zeros((count, 1, 1, 0)),
+        peak=np.zeros((count, 1)),
+        outcome=np.zeros((count, 1), dtype=int),
+        scale=np.ones((count, 2)),
+        discard=0,
+        revolutions=8,
+    )
+
+
+def found(*stretches, lower=2000.0, upper=20000.0):
+    rpm = np.arange(lower, upper + 1, 100.0)
+    inside = np.zeros(rpm.size, dtype=bool)
+    for s in stretches:
+        inside |= (rpm >= s.lower_rpm) & (rpm <= s.upper_rpm)
+    ordered = tuple(sorted(stretches, key=lambda s: s.lower_rpm))
+    return SynchronousOrbits((), ordered, simulations(rpm, inside), 0, lower, upper)
+
+
+def ends(zones):
+    """Onset and exit of each zone [rpm]; None where it is open."""
+    speed = lambda edge: None if edge is None else round(edge.speed_rpm, 6)
+    return [(speed(z.onset), speed(z.exit)) for z in zones.zones]
+
+
+BELOW = stretch(2000, 6000, met=30, open_below=True)
+ABOVE = stretch(15000, 20000, family=3, open_above=True)
+# Stretches, and the zones that are left between them.
+LAYOUTS = {
+    "open ends": ([BELOW, ABOVE], [(6000, 15000)]),
+    "stable throughout": ([stretch(2000, 20000, open_below=True, open_above=True)], []),
+    "one in the middle": ([stretch(6000, 9000)], [(None, 6000), (9000, None)]),
+    "stable until the range ends": ([BELOW, stretch(9000, 19800, family=1)], [(6000, 9000)]),
+    "stable since the range began": ([stretch(2300, 9000), ABOVE], [(9000, 15000)]),
+    "three": (
+        [BELOW, stretch(9000, 10000, family=1), ABOVE],
+        [(6000, 9000), (10000, 15000)],
+    ),
+    "a window of 499 rpm is closed": ([BELOW, stretch(6499, 9000, family=1), ABOVE], [(9000, 15000)]),
+    "a window of 501 rpm is not": (
+        [BELOW, stretch(6501, 9000, family=1), ABOVE],
+        [(6000, 6501), (9000, 15000)],
+    ),
+    "a stretch of 499 rpm is not counted": ([BELOW, stretch(9000, 9499, family=1), ABOVE], [(6000, 15000)]),
+    "a stretch of 501 rpm is": (
+        [BELOW, stretch(9000, 9501, family=1), ABOVE],
+        [(6000, 9000), (9501, 15000)],
+    ),
+    "windows closed one after another": (
+        [BELOW, stretch(6400, 6500, family=1), stretch(6900, 7000, family=2), ABOVE],
+        [(7000, 15000)],
+    ),
+    "another branch that overlaps only coexists": ([BELOW, stretch(5000, 9000, family=1), ABOVE], [(6000, 15000)]),
+    "the same branch that overlaps belongs to it": ([BELOW, stretch(5000, 9000, family=0), ABOVE], [(9000, 15000)]),
+    "the same branch within a window belongs to it": ([BELOW, stretch(6300, 9000, family=0), ABOVE], [(9000, 15000)]),
+    "the same branch far away is on its own": (
+        [BELOW, stretch(9000, 10000, family=0), ABOVE],
+        [(6000, 9000), (10000, 15000)],
+    ),
+    "others that overlap each other are one": (
+        [BELOW, stretch(9000, 11000, family=1), stretch(10000, 12000, family=2), ABOVE],
+        [(6000, 9000), (12000, 15000)],
+    ),
+    "none": ([], []),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_zones_are_what_is_left_between_the_stretches(name):
+    stretches, expected = LAYOUTS[name]
+    result = jc.loss_zones(found(*stretches))
+    assert ends(result) == [tuple(None if e is None else float(e) for e in pair) for pair in expected]
+    assert result.close_below_rpm == 500.0
+    names = [f"zone {i} {end}" for i, pair in enumerate(expected, 1) for end, e in zip(("onset", "exit"), pair) if e]
+    assert list(result.edges) == names and list(result.coexisting) == names
+    for zone in result.zones:
+        assert zone.kind == "synchronous-loss"
+        if zone.onset is not None:
+            assert zone.onset.mechanism == "torus" and zone.onset.basis == "located"
+        if zone.exit is not None:
+            assert zone.exit.mechanism == "fold" and zone.exit.kind == "synchronous-loss"
+        for edge in (zone.onset, zone.exit):
+            assert edge is None or 0 < edge.uncertainty_rpm < 0.01
+    if not stretches:
+        assert result.principal is None
+
+
+def test_width_and_share_of_a_zone():
+    """Of the simulated speeds 6100, ..., 14900 rpm those from 9000 to 9400 settled on the short stretch."""
+    (zone,) = jc.loss_zones(found(BELOW, stretch(9000, 9499, family=1), ABOVE)).zones
+    assert abs(zone.width_rpm - 9000) < 1e-9
+    assert abs(zone.share - (1 - 5 / 89)) < 1e-12
+    (zone,) = jc.loss_zones(found(BELOW, stretch(6050, 20000, family=1, open_above=True)), close_below_rpm=10.0).zones
+    assert np.isnan(zone.share)  # no simulation is inside
+
+
+def test_principal_stretch_is_the_one_of_the_conventional_start():
+    """The first start decides; then all of them; then the width. What overlaps the principal one only coexists."""
+    long = stretch(2000, 9000, family=0, met=40, first=5, open_below=True)
+    usual = stretch(8000, 12000, family=1, met=20, first=15)
+    result = jc.loss_zones(found(long, usual, ABOVE))
+    assert result.principal == usual
+    assert ends(result) == [(None, 8000.0), (12000.0, 15000.0)]
+    tied = stretch(2000, 9000, family=0, met=40, first=15, open_below=True)
+    result = jc.loss_zones(found(tied, usual, ABOVE))
+    assert result.principal == tied and ends(result) == [(9000.0, 15000.0)]
+    narrow = stretch(8000, 8900, family=1, met=40, first=15)
+    assert jc.loss_zones(found(tied, narrow, ABOVE)).principal == tied
+
+
+def test_width_below_which_is_closed_is_an_argument():
+    stretches = (BELOW, stretch(6499, 7200, family=1), ABOVE)
+    assert ends(jc.loss_zones(found(*stretches), close_below_rpm=400.0)) == [(6000.0, 6499.0), (7200.0, 15000.0)]
+    assert ends(jc.loss_zones(found(*stretches), close_below_rpm=500.0)) == [(7200.0, 15000.0)]
+    assert ends(jc.loss_zones(found(BELOW, stretch(9000, 9700, family=1), ABOVE), 800.0)) == [(6000.0, 15000.0)]
+
+
+def chaotic(onset=None, leaves=None, uncertainty=100.0):
+    edge = lambda rpm: None if rpm is None else jc.Edge(float(rpm), uncertainty, "chaotic")
+    zone = jc.Zone("chaotic", edge(onset), edge(leaves), 0.8)
+    return jc.Zones((zone,), (), uncertainty, 500.0)
+
+
+def explained(zones, *stretches):
+    return jc.explain(zones, found(*stretches), hardening_system())
+
+
+def test_chaotic_edges_at_bifurcations_take_their_mechanism():
+    result = explained(chaotic(6090, 14950), BELOW, ABOVE)
+    onset, leaves = result.zones.zones[0].onset, result.zones.zones[0].exit
+    assert (onset.mechanism, onset.basis, onset.kind) == ("torus", "located", "chaotic")
+    assert (leaves.mechanism, leaves.basis, leaves.kind) == ("fold", "located", "chaotic")
+    assert abs(onset.speed_rpm - 6000) < 1e-9 and abs(leaves.speed_rpm - 15000) < 1e-9
+    assert onset.uncertainty_rpm < 0.01
+    assert result.sources == {"zone 1 onset": BELOW.upper, "zone 1 exit": ABOVE.lower}
+    assert str(onset) == "6000.00 rpm (torus)"
+    assert result.zones.zones[0].share == 0.8 and result.zones.resolution_rpm == 100.0
+
+
+# Edges at which nothing that was located explains the zone.
+UNEXPLAINED = {
+    "beyond the uncertainty": (chaotic(6101, 14899), (BELOW, ABOVE)),
+    "an onset where an orbit begins": (chaotic(15000, None), (BELOW, ABOVE)),
+    "an exit where an orbit ends": (chaotic(None, 6000), (BELOW, ABOVE)),
+    "open ends of stretches": (chaotic(20000, 2000), (BELOW, ABOVE)),
+    "no stretches": (chaotic(6000, 15000), ()),
+    "a fold on the calm side has no cascade": (chaotic(6300, 14800), (BELOW, ABOVE)),
+    "a period doubling on the other side": (
+        chaotic(6300, 14700),
+        (
+            stretch(6400, 6500, kinds=("period-doubling", "period-doubling")),
+            stretch(14500, 14600, kinds=("period-doubling", "period-doubling")),
+        ),
+    ),
+    "a period doubling too far away": (
+        chaotic(7001, 13000),
+        (stretch(5000, 6500, kinds=("period-doubling", "period-doubling")),),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", UNEXPLAINED)
+def test_other_chaotic_edges_stay_statistical(name):
+    zones, stretches = UNEXPLAINED[name]
+    result = explained(zones, *stretches)
+    assert result.sources == {} and result.zones == zones
+    for edge in (result.zones.zones[0].onset, result.zones.zones[0].exit):
+        assert edge is None or (edge.basis, edge.mechanism) == ("statistical", "unknown")
+
+
+def test_the_nearest_of_several_bifurcations_is_taken():
+    near = stretch(2000, 6050, family=1, kinds=("fold", "fold"), open_below=True)
+    result = explained(chaotic(6040, None), BELOW, near, ABOVE)
+    assert result.sources == {"zone 1 onset": near.upper}
+    assert result.zones.zones[0].onset.mechanism == "fold" and result.zones.zones[0].exit is None
+
+
+class Hardening(eqx.Module):
+    """x'' + 0.1 x' + x + x^3 = f cos(w t)."""
+
+    f: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-0.1 * u - x - x**3 + self.f * jnp.cos(tau),)
+
+
+def hardening_system():
+    return jc.ForcedOscillator(Hardening(jnp.asarray(0.3)), coordinates=1)
+
+
+FOLDS = 1.3242362, 1.77971952  # by SciPy's DOP853 and Newton's method, all digits
+LOWER, UPPER = 0.6, 2.4
+GRID = np.linspace(LOWER, UPPER, 13)
+
+
+@pytest.fixture(scope="module")
+def hardening():
+    starts = ((0.1, 0.2), (2.0, 1.0), (-1.5, 2.0))
+    system = jc.ForcedOscillator(Hardening(jnp.asarray(0.3)), coordinates=1, starts=starts)
+    return jc.synchronous_orbits(system, LOWER, UPPER, count=GRID.size, discard=100, method=METHOD)
+
+
+def test_synchronous_orbits_of_the_hardening_duffing(hardening):
+    """Two stable stretches that overlap between the folds, on one branch."""
+    low, high = hardening.stretches
+    assert low.lower is None and high.upper is None
+    assert (low.upper.kind, high.lower.kind) == ("fold", "fold")
+    assert abs(low.upper.speed - FOLDS[1]) < 1e-6 and abs(high.lower.speed - FOLDS[0]) < 1e-6
+    assert abs(low.upper_rpm * PER_RPM - FOLDS[1]) < 1e-6 and abs(high.lower_rpm * PER_RPM - FOLDS[0]) < 1e-6
+    assert abs(low.lower_rpm - LOWER / PER_RPM) < 1e-9 and abs(high.upper_rpm - UPPER / PER_RPM) < 1e-9
+    assert low.family == high.family and hardening.missed == 0
+    np.testing.assert_allclose([p.speed for p in hardening.edges], FOLDS, rtol=0, atol=1e-6)
+    assert len(hardening.points) == 2
+    # Every simulation is on one of the two, and from the first start each speed is counted once.
+    periodic = hardening.sweep.label == "periodic-1"
+    assert low.met + high.met == np.sum(periodic) >= 0.9 * periodic.size
+    assert low.met_first + high.met_first == np.sum(periodic[:, 0])
+    outside = (GRID < FOLDS[0]) | (GRID > FOLDS[1])
+    assert np.all(periodic[outside]) and min(low.met, high.met) >= 3 * 4
+    assert "2 stable stretches" in str(hardening) and "(fold)" in str(hardening)
+
+
+def test_orbits_that_coexist(hardening):
+    """Three between the folds, the middle one unstable; one outside. Responses on the upper branch are larger."""
+    for speed, count in ((1.0, 1), (1.5, 3), (2.1, 1)):
+        orbits = hardening.coexisting(speed)
+        assert len(orbits) == count
+        assert sorted(stable for _, stable, _, _ in orbits) == sorted([True, False, True][:count])
+        for _, stable, state, multipliers in orbits:
+            assert stable == bool(np.all(np.abs(multipliers) < 1))
+            guess = tuple(float(c) for c in state)
+            orbit = jc.periodic_orbit(hardening_system(), speed, guess=guess, method=METHOD)
+            np.testing.assert_allclose(orbit.state, state, atol=2e-3)  # by linear interpolation
+            assert bool(orbit.stable) == stable
+    size = {stable: np.hypot(s[0], s[1] / 1.5) for _, stable, s, _ in hardening.coexisting(1.5)}
+    assert max(size.values()) > 0.5
+    assert hardening.coexisting(0.3) == []
+
+
+def test_overlapping_stretches_of_one_branch_leave_no_zone(hardening):
+    result = jc.loss_zones(hardening, close_below_rpm=1.0)
+    assert result.zones == () and result.edges == {}
+    assert result.principal in hardening.stretches
+
+
+def test_edges_of_a_range_that_a_fold_ends(hardening):
+    """With the upper stretch left out the orbit is lost at the fold; what coexists there is the other branch's part."""
+    alone = SynchronousOrbits(hardening.branches, hardening.stretches[:1], hardening.sweep, 0, LOWER / PER_RPM, 22.9)
+    result = jc.loss_zones(alone, close_below_rpm=1.0)
+    ((onset, leaves),) = ends(result)
+    assert leaves is None and abs(onset * PER_RPM - FOLDS[1]) < 1e-6
+    orbits = result.coexisting["zone 1 onset"]
+    assert any(stable for _, stable, _, _ in orbits)
+    small = min(orbits, key=lambda o: np.linalg.norm(o[2]))
+    other = jc.periodic_orbit(hardening_system(), FOLDS[1], guess=(0.0, 0.0), method=METHOD)
+    np.testing.assert_allclose(small[2], other.state, atol=2e-3)
+    assert small[1] and bool(other.stable)
