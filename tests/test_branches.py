@@ -183,6 +183,27 @@ def test_cascade_that_does_not_go_on_is_shorter(doubling):
     assert found.error == np.inf and abs(found.limit - 0.2924) < 2e-4
 
 
+class Parabola(eqx.Module):
+    """x' = p - x^2."""
+
+    p: jax.Array
+
+    def __call__(self, tau, y, speed):
+        return (self.p - y[0] ** 2,)
+
+
+def test_system_of_one_state():
+    """Orbits x = +-sqrt(p) with the multiplier exp(-2 x T), and a fold at p = 0: exact."""
+    system = jc.ForcedSystem(Parabola(**numbers(p=0.25)), dimension=1)
+    branch = jc.branch(system, ((0.5,), 0.25), "p", lower=-0.5, upper=0.5, speed=2.0, method=METHOD)
+    (fold,) = branch.special
+    assert fold.kind == "fold" and fold.edge and abs(fold.value) < 1e-9
+    np.testing.assert_allclose(branch.value, branch.state[:, 0] ** 2, atol=1e-9)
+    assert np.array_equal(branch.stable, branch.state[:, 0] > 0)
+    # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
+    np.testing.assert_allclose(branch.multipliers[:, 0], np.exp(-2 * branch.state[:, 0] * np.pi), rtol=1e-3)
+
+
 class Mathieu(eqx.Module):
     """x'' + 2 z x' + (a - 2 cos 2t) x + x^3 = 0 with tau = 2 t."""
 

@@ -62,7 +62,7 @@ def zeros(
         for k, i in enumerate(index):
             if not got.converged[k]:
                 near = (high[i] - low[i]) * length[i] < 4 * ASIDE
-                best[i] = _between(*sides[i], (aimed[i] - low[i]) / (high[i] - low[i])) if near else None
+                best[i] = _between(sides[i], (aimed[i] - low[i]) / (high[i] - low[i])) if near else None
                 active[i] = not near and aside[i] == 0.0
                 aside[i] = ASIDE / length[i]
                 continue
@@ -82,7 +82,7 @@ def zeros(
     return best
 
 
-def _between(a: Corrected, b: Corrected, share: float) -> Corrected:
+def _between(sides: list[Corrected], share: float) -> Corrected:
     """Linear interpolation of two near points."""
     mix = lambda x, y: (1 - share) * x + share * y if np.issubdtype(np.asarray(x).dtype, np.floating) else x
-    return jax.tree.map(mix, a, b)
+    return jax.tree.map(mix, *sides)

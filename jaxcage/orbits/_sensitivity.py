@@ -148,13 +148,13 @@ def _located(system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoin
     here = unfold(u)
     for _ in range(POLISHING):
         step = jnp.linalg.solve(here.of_unknowns, here.residual)
-        if not bool(jnp.max(jnp.abs(step)) > POLISHED):
+        leads = jnp.max(jnp.abs(u - step - first))
+        if not bool((jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)):  # there, lost, or not a number
             break
         u = u - step
         here = unfold(u)
     size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
-    found = bool(size < SETTLED) and bool(jnp.max(jnp.abs(u - first)) < NEARBY)
-    return _Edge(problem, given, frame, u, here, found)
+    return _Edge(problem, given, frame, u, here, bool(size < SETTLED))
 
 
 def edge_speed(
@@ -183,6 +183,8 @@ def sensitivity(
     """
     require_x64()
     edge = _located(system, point, method)
+    if not edge.found:
+        return _nowhere(system, point.kind, name)
     unit, here, speed = float(edge.frame.units[0]), edge.unfolding, edge.speed
     adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(edge.u.size).at[-1].set(1.0))
     weight = -(adjoint @ here.of_numbers) * unit
@@ -190,18 +192,23 @@ def sensitivity(
     slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
     change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
     rate = float(here.rate) / unit
-    lost = 1.0 if edge.found else float("nan")
-    crossing = "tangential" if abs(rate * speed) < TANGENTIAL else "converged"
     return Sensitivity(
         name=name,
         kind=point.kind,
-        value_rpm=lost * speed / PER_RPM,
-        derivative={n: lost * s / PER_RPM for n, s in slope.items()},
-        elasticity={n: lost * e for n, e in change.items()},
-        homogeneity={base: lost * r for base, r in _homogeneity(system, change).items()},
-        transversality=lost * rate,
-        status=crossing if edge.found else "no such point",
+        value_rpm=speed / PER_RPM,
+        derivative={n: s / PER_RPM for n, s in slope.items()},
+        elasticity=change,
+        homogeneity=_homogeneity(system, change),
+        transversality=rate,
+        status="tangential" if abs(rate * speed) < TANGENTIAL else "converged",
     )
+
+
+def _nowhere(system: AbstractForcedSystem, kind: str, name: str) -> Sensitivity:
+    """What is known of an edge that was not found again."""
+    nan = float("nan")
+    row = dict.fromkeys(parameter_paths(system), nan)
+    return Sensitivity(name, kind, nan, row, row, dict.fromkeys(("mass", "length", "time"), nan), nan, "no such point")
 
 
 def _homogeneity(system: AbstractForcedSystem, elasticity: Mapping[str, float]) -> dict[str, float]:
