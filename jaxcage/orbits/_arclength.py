@@ -22,7 +22,7 @@ from ._implicit import TOLERANCE, AbstractEquations, solve
 
 CHUNK = 4
 """Lanes per call: one program for any number of curves, and work for every core."""
-FOLLOWING = 1e-5
+FOLLOWING = 1e-7
 """Newton's last step while following, in the unknowns' units: points are then good to about its square."""
 CORRECTIONS = 8
 

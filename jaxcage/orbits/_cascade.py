@@ -88,6 +88,8 @@ def doubled_branch(
 
     **Raises:** `ValueError` if the branch is not found.
     """
+    if point.kind != "period-doubling":
+        raise ValueError(f"Argument `point` must be a period doubling, but it is a {point.kind}.")
     at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
