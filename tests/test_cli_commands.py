@@ -59,8 +59,9 @@ def test_zones(capsys: pytest.CaptureFixture[str], tmp_path: Path):
         {"zone": 2, "onset_rpm": 25500.0, "exit_rpm": None},
     ]
     for zone in found["zones"]:
-        assert set(zone) == ZONE_KEYS
-        assert zone["kind"] == "chaotic"
+        ends = {f"{end}_{what}" for end in ("onset", "exit") for what in ("basis", "cascade_rpm", "gradient")}
+        assert set(zone) == ZONE_KEYS | ends | {"width_kind"}
+        assert zone["kind"] == zone["width_kind"] == "chaotic"
         assert (zone["onset_rpm"] is None) == (zone["onset_uncertainty_rpm"] is None)
         if zone["onset_rpm"] is None or zone["exit_rpm"] is None:
             assert zone["width_rpm"] is None
