@@ -12,32 +12,18 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from .._checks import require_x64
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, method as make_method
+from ..integrate import AbstractMethod, method as make_method
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, correct, follow, stack, take
 from ._illinois import zeros
-from ._implicit import AbstractEquations
 from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._orbit import guess_state, is_free
+from ._orbit import OrbitEquations, guess_state, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import matches, null_vectors, singular_matrix, test_functions
 
 
 Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
-
-
-class BranchEquations(AbstractEquations):
-    """The orbit's equations with one parameter free."""
-
-    problem: OrbitProblem
-    frame: Frame
-
-    def prepare(self, u: Array, given: Given) -> StrobeMap:
-        return self.problem.prepare(u, given, self.frame)
-
-    def residual(self, u: Array, prepared: StrobeMap) -> tuple[Array, None]:
-        return self.problem.residual(u, prepared, self.frame), None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -246,7 +232,7 @@ def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> tuple[An
     **Returns:** equations and points, the lanes first.
     """
     lanes, free = len(starts), follower.problem.free_speed
-    curves = stack(BranchEquations(follower.problem, frame), lanes)
+    curves = stack(OrbitEquations(follower.problem, frame), lanes)
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
@@ -383,7 +369,7 @@ def locate(
     """Where the test functions of (lane, points, index, kind) vanish; None where that could not be found."""
     if not wanted:
         return []
-    curves = stack(BranchEquations(follower.problem, frame), len(wanted))
+    curves = stack(OrbitEquations(follower.problem, frame), len(wanted))
     ends = [take(points, np.array([k, k + 1])) for _, points, k, _ in wanted]
     given = follower.of([lane for lane, *_ in wanted])
     signal = lambda i, points: signals(follower, points)[wanted[i][3]]

@@ -12,7 +12,6 @@ from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, correct, follow, stack
 from ._branch import (
     Branch,
-    BranchEquations,
     Follower,
     SpecialPoint,
     describe,
@@ -20,6 +19,7 @@ from ._branch import (
     make_follower,
 )
 from ._lens import SPEED, Parameter
+from ._orbit import OrbitEquations
 from ._point import BifurcationPoint
 from ._singularity import test_functions
 
@@ -93,7 +93,7 @@ def doubled_branch(
     at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
-    curves = stack(BranchEquations(follower.problem, frame), 1)
+    curves = stack(OrbitEquations(follower.problem, frame), 1)
     scale = np.asarray(frame.scale)
     free = [1.0] if follower.problem.free_speed else []
     u = np.array([[*(np.asarray(point.state) / scale), *free, at / follower.unit]])

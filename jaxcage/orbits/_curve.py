@@ -67,7 +67,6 @@ def curve(
     upper: float,
     x_lower: float,
     x_upper: float,
-    periods: int = 1,
     period: str = "driven",
     name: str = "",
     steps: Steps = Steps(first=0.05, longest=0.25, most=200),
@@ -92,7 +91,7 @@ def curve(
     if not (lower < upper and x_lower < x_upper):
         raise ValueError("Arguments `lower` and `upper`, `x_lower` and `x_upper` must be in ascending order.")
     chosen = make_method() if method is None else method
-    tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), periods, is_free(period), chosen)
+    tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), is_free(period), chosen)
     start, equations = tracer.start(point)
     if not bool(start.converged[0]):
         raise ValueError(
@@ -138,11 +137,11 @@ class _Tracer(eqx.Module):
     frame: Any
 
     @classmethod
-    def at(cls, system, point, names, lower, upper, periods, free, method) -> "_Tracer":
+    def at(cls, system, point, names, lower, upper, free, method) -> "_Tracer":
         problem = OrbitProblem(method, system.dimension, free, names)
         given = Given(system, jnp.asarray(point.speed, dtype=float))
         units = tuple((b - a) / 20 for a, b in zip(lower, upper, strict=True))
-        frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), periods)
+        frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), point.periods)
         return cls(problem, given, point.kind, units, lower, upper, frame)
 
     @property

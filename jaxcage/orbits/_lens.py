@@ -23,15 +23,16 @@ def _is_number(leaf: Any) -> bool:
 
 
 def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
-    """Numbers of a user's own module by the last word of their path."""
+    """Numbers of a user's own module by the last word of their path, dotted where that alone is ambiguous."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(system)
-    found: dict[str, tuple[str, ...]] = {}
+    paths: list[tuple[str, ...]] = []
     for path, leaf in leaves:
         if all(isinstance(key, jax.tree_util.GetAttrKey) for key in path) and _is_number(leaf):
             names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
             if not any(name.startswith("_") for name in names):
-                found[names[-1]] = names
-    return found
+                paths.append(names)
+    last = [path[-1] for path in paths]
+    return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
 
 
 def pick(system: AbstractForcedSystem, parameter: Parameter) -> Callable[[Any], Any]:

@@ -8,8 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from ..integrate import FixedSteps, StrobeMap
-from ..integrate._method import REVOLUTION
+from ..integrate import REVOLUTION, FixedSteps, StrobeMap
 
 
 ADAPTIVE_PARTS = 256

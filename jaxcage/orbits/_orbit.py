@@ -23,7 +23,9 @@ LIOUVILLE_TOLERANCE = 1e-3
 
 
 class OrbitEquations(AbstractEquations):
-    """P(z) = z, and the phase condition of a self-excited orbit."""
+    """P(z) = z, and the phase condition of a self-excited orbit: as many equations as unknowns, or, with a parameter of
+    the problem free, those of a branch.
+    """
 
     problem: OrbitProblem
     frame: Frame

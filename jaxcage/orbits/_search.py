@@ -43,7 +43,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stable part of a branch of synchronous orbits; an end is None where it leaves the range."""
+    """A stable part of a branch of synchronous orbits; an end is None where it leaves the range or was left."""
 
     lower: SpecialPoint | None
     upper: SpecialPoint | None

@@ -162,6 +162,8 @@ def edge_speed(
 ) -> float:
     """Speed [rad/s] of the edge near `point`, located to rounding; NaN if Newton's method does not find it."""
     require_x64()
+    if point.kind == "branch-point":
+        raise ValueError("Argument `point` must be a period-doubling, torus or fold, but it is a branch-point.")
     edge = _located(system, point, method)
     return edge.speed if edge.found else float("nan")
 
@@ -179,9 +181,11 @@ def sensitivity(
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
-    **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again.
+    **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again, and for a branch point.
     """
     require_x64()
+    if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design
+        return _nowhere(system, point.kind, name)
     edge = _located(system, point, method)
     if not edge.found:
         return _nowhere(system, point.kind, name)
