@@ -135,7 +135,8 @@ def test_pressure_solves_the_short_bearing_equation():
 
 def matrix(model, r, v, omega=1.0, smoothing=SMOOTHING):
     px, py = film_drive(r[0], r[1], v[0], v[1], omega)
-    m = film_resistance(model, r[0], r[1], px, py, omega, smoothing)
+    n = np.asarray(r) / np.hypot(*r)
+    m = film_resistance(model, *r, tuple(n), px, py, omega, smoothing)
     return np.array([[m.xx, m.xy], [m.xy, m.yy]], dtype=float)
 
 
@@ -178,11 +179,12 @@ def test_models_relate_through_half_circles():
     """Two opposite half circles make the whole; the fixed half trails the line of centres."""
     for eps, phi, *_ in random_states(6):
         x, y = eps * np.cos(phi), eps * np.sin(phi)
-        whole = np.array(film_resistance("full", x, y, 1.0, 0.0, 1.0, SMOOTHING))
+        n = np.cos(phi), np.sin(phi)
+        whole = np.array(film_resistance("full", x, y, n, 1.0, 0.0, 1.0, SMOOTHING))
         ux, uy = np.cos(1.1), np.sin(1.1)
         halves = [np.array(half_circle_resistance(x, y, s * ux, s * uy)) for s in (1.0, -1.0)]
         np.testing.assert_allclose(halves[0] + halves[1], whole, rtol=1e-11)
-        fixed = np.array(film_resistance("fixed_half", x, y, 1.0, 0.0, 1.0, SMOOTHING))
+        fixed = np.array(film_resistance("fixed_half", x, y, n, 1.0, 0.0, 1.0, SMOOTHING))
         behind = np.array(half_circle_resistance(x, y, np.sin(phi), -np.cos(phi)))
         np.testing.assert_allclose(behind, fixed, rtol=1e-11, atol=1e-11 * np.abs(fixed).max())
 
@@ -294,7 +296,7 @@ def test_supply_pressure_pushes_with_its_projected_area(model, state):
     omega = 1.3
     r, v, *_ = polar_state(*state)
     px, py = film_drive(*r, *v, omega)
-    thrust = np.array(supply_force(model, *r, px, py, omega, SMOOTHING))
+    thrust = np.array(supply_force(model, tuple(r / np.hypot(*r)), px, py, omega, SMOOTHING))
     eps, phi, eps_rate, phi_rate = state
     ends = arcs(model, eps, eps_rate, phi_rate, omega)
     lo, hi = ends[0][0] + phi + np.pi, ends[-1][1] + phi + np.pi

@@ -12,7 +12,7 @@ from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
-from ._smooth import power_10_9
+from ._smooth import power_10_9, smooth_plus
 
 
 def _restitution_defect(s: Array, e: Array) -> Array:
@@ -48,8 +48,7 @@ def contact_force(
     Hunt-Crossley number chi and the approach speed v_0 [m/s] at which it gives the restitution asked for.
     """
     loading = 1 + (damping / approach_speed) * rate
-    hysteresis = (loading + jnp.sqrt(loading * loading + 1e-8)) / 2  # max(loading, 0), smooth; 1 + 2.5e-9 at rest
-    return stiffness * power_10_9(penetration) * hysteresis
+    return stiffness * power_10_9(penetration) * smooth_plus(loading, 1e-4)
 
 
 class LandContact(eqx.Module):

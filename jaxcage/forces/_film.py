@@ -20,8 +20,10 @@ from jaxtyping import Array
 
 from .._parameters import choice, count, parameter
 from .._types import Scalar
+from ._smooth import smooth_norm
 
 
+Vector = tuple[Scalar, Scalar]
 FilmModel = Literal["fixed_half", "positive_pressure", "full"]
 
 
@@ -43,22 +45,21 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
 
 
-def fixed_half_resistance(x: Scalar, y: Scalar, smoothing: Scalar) -> Resistance:
+def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance:
     """M over the half circle that trails the line of centres (alpha from 0 to pi), as in (27).
 
-    **Arguments:** position over clearance, and a small length over clearance that keeps the value differentiable at the
-    centre, where the arc loses its direction.
+    **Arguments:** position over clearance, and its direction as a unit vector, regularised where the arc loses it (at
+    the centre).
     """
-    eps2 = x * x + y * y
-    inverse = 1 / (1 - eps2)
-    root = jnp.sqrt(inverse)
-    isotropic = (jnp.pi / 2) * inverse * root
+    nx, ny = direction
+    inverse = 1 / (1 - (x * x + y * y))
+    isotropic = (jnp.pi / 2) * inverse * jnp.sqrt(inverse)
     radial = 3 * isotropic * inverse
-    skew = 2 * inverse * inverse / jnp.sqrt(eps2 + smoothing * smoothing)
+    skew = 2 * inverse * inverse
     return Resistance(
-        isotropic + radial * x * x + 2 * skew * x * y,
-        radial * x * y - skew * (x * x - y * y),
-        isotropic + radial * y * y - 2 * skew * x * y,
+        isotropic + radial * x * x + 2 * skew * nx * y,
+        radial * x * y - skew * (nx * x - ny * y),
+        isotropic + radial * y * y - 2 * skew * nx * y,
     )
 
 
@@ -100,14 +101,22 @@ def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> t
 
 
 def film_resistance(
-    model: FilmModel, x: Scalar, y: Scalar, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
+    model: FilmModel,
+    x: Scalar,
+    y: Scalar,
+    direction: Vector,
+    px: Scalar,
+    py: Scalar,
+    omega: Scalar,
+    smoothing: Scalar,
 ) -> Resistance:
     """M of one of the three film models at position (x, y) over clearance, for the drive P = (px, py).
 
-    `smoothing` is a small length over clearance; times `omega` it also regularises the direction of P where P = 0.
+    `direction` is the unit vector of (x, y). `smoothing`, a small length over clearance, times `omega` regularises the
+    direction of P where P = 0.
     """
     if model == "fixed_half":
-        return fixed_half_resistance(x, y, smoothing)
+        return fixed_half_resistance(x, y, direction)
     if model == "full":
         return full_resistance(x, y)
     per_norm = 1 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)  # 1e-300: no 0/0 at rest
@@ -115,17 +124,17 @@ def film_resistance(
 
 
 def supply_force(
-    model: FilmModel, x: Scalar, y: Scalar, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
+    model: FilmModel, direction: Vector, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
 ) -> tuple[Array, Array]:
     """Thrust -2 u of a uniform gauge pressure on the pressurised half circle centred on u, in units of R L p_0.
 
     The paper's last term of (27): +2 R L p_0 along +phi, since the fixed half is centred on -phi. Zero for `full`.
     """
+    nx, ny = direction
     if model == "full":
-        return jnp.zeros_like(jnp.asarray(x)), jnp.zeros_like(jnp.asarray(x))
+        return jnp.zeros_like(jnp.asarray(nx)), jnp.zeros_like(jnp.asarray(nx))
     if model == "fixed_half":
-        factor = 2 / jnp.sqrt(x * x + y * y + smoothing * smoothing)
-        return -factor * y, factor * x
+        return jnp.asarray(-2 * ny), jnp.asarray(2 * nx)
     factor = -2 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)
     return factor * px, factor * py
 
@@ -141,7 +150,8 @@ def short_film_force(
     **Returns:** (F_x, F_y) / S [1/s].
     """
     px, py = film_drive(x, y, vx, vy, omega)
-    m = film_resistance(model, x, y, px, py, omega, smoothing)
+    per_eps = 1 / smooth_norm(x, y, smoothing)
+    m = film_resistance(model, x, y, (x * per_eps, y * per_eps), px, py, omega, smoothing)
     return -(m.xx * px + m.xy * py) / 2, -(m.xy * px + m.yy * py) / 2
 
 

@@ -1,5 +1,6 @@
 """Regularised elementary functions: smooth to the order that Newton on orbits and their derivatives needs."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
@@ -24,8 +25,39 @@ def smooth_norm(x: Scalar, y: Scalar, length: Scalar) -> Array:
     return jnp.sqrt(x * x + y * y + length * length)
 
 
+@jax.custom_jvp
+def _inverse_ninth_root(p: Array) -> Array:
+    """p^(-1/9) for p > 0, to rounding: a guess within 3 % from the bits of p, then three steps of third order.
+
+    Made of products alone, it runs along the lanes; a logarithm and an exponential call libm once for each lane.
+    """
+    bits = jax.lax.bitcast_convert_type(p, jnp.int64)
+    ninth = (bits.astype(float) * (1 / 9)).astype(jnp.int64)
+    root = jax.lax.bitcast_convert_type(0x4709D0369D036C00 - ninth, jnp.float64)
+    for _ in range(3):
+        defect = 1 - p * _ninth_power(root)
+        root = root + root * defect * (1 / 9 + defect * (5 / 81))
+    return root
+
+
+def _ninth_power(y: Array) -> Array:
+    y2 = y * y
+    y4 = y2 * y2
+    return y4 * y4 * y
+
+
+@_inverse_ninth_root.defjvp
+def _inverse_ninth_root_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    (p,), (p_dot,) = primals, tangents
+    root = _inverse_ninth_root(p)
+    return root, root * _ninth_power(root) * (-1 / 9) * p_dot
+
+
 def power_10_9(p: Scalar) -> Array:
     """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)
-    return jnp.where(touching, p * jnp.exp(jnp.log(safe) / 9), 0.0)  # half the time of a power on a CPU
+    root = _inverse_ninth_root(safe)
+    root2 = root * root
+    root4 = root2 * root2
+    return jnp.where(touching, safe * (safe * (root4 * root4)), 0.0)

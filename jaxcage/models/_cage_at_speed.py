@@ -116,25 +116,25 @@ class CageAtSpeed(eqx.Module):
 
     def land_forces(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Vector, Vector]:
         """Film and contact force for the cage centre at (x, y) [m] from the rib centre, moving at (vx, vy) [m/s]."""
-        # Divisions are slow on a CPU and multiply under differentiation: constants are inverted once, eps once.
+        # Divisions and roots are what a step costs: constants are inverted once, the eccentricity once.
         c, per_c = self.clearance, 1 / self.clearance
         x, y, vx, vy = x * per_c, y * per_c, vx * per_c, vy * per_c
         eps = smooth_norm(x, y, self.film_smoothing)
         per_eps = 1 / eps
+        n = (x * per_eps, y * per_eps)
         excess = smooth_plus(eps - self.contact_onset, self.contact_smoothing)
         px, py = film_drive(x, y, vx, vy, self.omega)
         kept = 1 - excess * per_eps  # the film's coefficients stay at their value at the onset of contact
-        m = film_resistance(self.film_model, kept * x, kept * y, px, py, self.omega, self.film_smoothing)
+        m = film_resistance(self.film_model, kept * x, kept * y, n, px, py, self.omega, self.film_smoothing)
         half = -self.film_scale / 2
         film = half * (m.xx * px + m.xy * py), half * (m.xy * px + m.yy * py)
-        thrust = supply_force(self.film_model, x, y, px, py, self.omega, self.film_smoothing)
+        thrust = supply_force(self.film_model, n, px, py, self.omega, self.film_smoothing)
         film = film[0] + self.supply_scale * thrust[0], film[1] + self.supply_scale * thrust[1]
-        rate = (x * vx + y * vy) * per_eps
+        rate = n[0] * vx + n[1] * vy
         normal = contact_force(
             c * excess, c * rate, self.contact_stiffness, self.damping_number, self.contact_approach_speed
         )
-        push = -normal * per_eps
-        return film, (push * x, push * y)
+        return film, (-normal * n[0], -normal * n[1])
 
     def support_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Vector:
         """Force of the elastic support for the same relative motion."""
