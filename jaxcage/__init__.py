@@ -72,6 +72,7 @@ from .integrate import (
     Rodas4 as Rodas4,
     StrobeMap as StrobeMap,
     Trajectory as Trajectory,
+    controlled as controlled,
     method as method,
     ramp as ramp,
     simulate as simulate,
@@ -112,6 +113,7 @@ from .orbits import (
 )
 from .sweeps import (
     Hysteresis as Hysteresis,
+    monodromy as monodromy,
     rpm as rpm,
     run_up_down as run_up_down,
     sweep as sweep,

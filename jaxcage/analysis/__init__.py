@@ -3,7 +3,6 @@
 | module          | responsibility                                                                       |
 |-----------------|--------------------------------------------------------------------------------------|
 | `_observe`      | kernel of every sweep: strobe states and Lyapunov exponents of a batch of lanes      |
-| `_lanes`        | strobe maps of many lanes at once                                                    |
 | `_sweep`        | the result of a sweep                                                                |
 | `_labels`       | periodic, chaotic, quasi-periodic, undecided or failed                               |
 | `_zones`        | zones and both kinds of edge                                                         |
@@ -29,14 +28,19 @@ from ._equilibrium import (
     whirl_threshold as whirl_threshold,
 )
 from ._labels import CHAOS_THRESHOLD as CHAOS_THRESHOLD, closing_period as closing_period, label_lanes as label_lanes
-from ._lanes import StrobeLanes as StrobeLanes
 from ._measures import (
     OrbitMeasures as OrbitMeasures,
     cage_forces as cage_forces,
     film_drag_power as film_drag_power,
     orbit_measures as orbit_measures,
 )
-from ._observe import Observation as Observation, Plan as Plan, observe as observe
+from ._observe import (
+    Lanes as Lanes,
+    Observation as Observation,
+    Plan as Plan,
+    observe as observe,
+    settle as settle,
+)
 from ._spectra import (
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,

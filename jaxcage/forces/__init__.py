@@ -18,6 +18,7 @@ Frame: x to the right, y up, rotation positive counter-clockwise; forces act on 
 from ._contact import (
     LandContact as LandContact,
     contact_force as contact_force,
+    contact_slopes as contact_slopes,
     restitution_damping as restitution_damping,
 )
 from ._film import (
@@ -30,6 +31,7 @@ from ._film import (
     fixed_half_resistance as fixed_half_resistance,
     full_resistance as full_resistance,
     half_circle_resistance as half_circle_resistance,
+    polar_resistance as polar_resistance,
     short_film_force as short_film_force,
     supply_force as supply_force,
 )
@@ -52,7 +54,13 @@ from ._pocket_impact import (
     impact_time_scale as impact_time_scale,
 )
 from ._rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
-from ._smooth import power_10_9 as power_10_9, smooth_norm as smooth_norm, smooth_plus as smooth_plus
+from ._smooth import (
+    power_10_9 as power_10_9,
+    root_9 as root_9,
+    smooth_norm as smooth_norm,
+    smooth_plus as smooth_plus,
+    smooth_plus_slope as smooth_plus_slope,
+)
 from ._support import (
     Cross as Cross,
     Cubic as Cubic,
@@ -60,6 +68,7 @@ from ._support import (
     cross_force as cross_force,
     cubic_stiffness as cubic_stiffness,
     spring_force as spring_force,
+    support_slopes as support_slopes,
 )
 from ._unbalance import (
     UnbalanceReading as UnbalanceReading,

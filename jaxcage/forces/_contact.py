@@ -12,7 +12,7 @@ from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
-from ._smooth import power_10_9, smooth_plus
+from ._smooth import power_10_9, root_9, smooth_plus, smooth_plus_slope
 
 
 def _restitution_defect(s: Array, e: Array) -> Array:
@@ -49,6 +49,18 @@ def contact_force(
     """
     loading = 1 + (damping / approach_speed) * rate
     return stiffness * power_10_9(penetration) * smooth_plus(loading, 1e-4)
+
+
+def contact_slopes(
+    penetration: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, approach_speed: Scalar
+) -> tuple[Array, Array]:
+    """Derivatives of `contact_force` with respect to penetration [N/m] and its rate [N s/m]."""
+    ratio = damping / approach_speed
+    loading = 1 + ratio * rate
+    return (
+        stiffness * (10 / 9) * root_9(penetration) * smooth_plus(loading, 1e-4),
+        stiffness * power_10_9(penetration) * smooth_plus_slope(loading, 1e-4) * ratio,
+    )
 
 
 class LandContact(eqx.Module):

@@ -63,6 +63,34 @@ def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance
     )
 
 
+class PolarResistance(NamedTuple):
+    """M of a fixed arc in the frame (n, t) of the line of centres: M = a I + b n n^T - g (n t^T + t n^T).
+
+    Each coefficient depends on the eccentricity ratio alone; `d_` are derivatives with respect to it.
+    """
+
+    a: Scalar
+    b: Scalar
+    g: Scalar
+    d_a: Scalar
+    d_b: Scalar
+    d_g: Scalar
+
+
+def polar_resistance(model: FilmModel, eps: Scalar) -> PolarResistance:
+    """Coefficients of `fixed_half_resistance` or `full_resistance`, and how they change with eccentricity ratio."""
+    inverse = 1 / (1 - eps * eps)
+    a = (jnp.pi / 2 if model == "fixed_half" else jnp.pi) * inverse * jnp.sqrt(inverse)
+    steep = eps * inverse
+    d_a = 3 * steep * a
+    if model == "full":
+        g = d_g = jnp.zeros_like(inverse)
+    else:
+        g = 2 * steep * inverse
+        d_g = 2 * inverse * inverse * (1 + 4 * eps * steep)
+    return PolarResistance(a, eps * d_a, g, d_a, d_a * (2 + 5 * eps * steep), d_g)
+
+
 def full_resistance(x: Scalar, y: Scalar) -> Resistance:
     """M over the whole circle: pressure of both signs (full Sommerfeld condition)."""
     inverse = 1 / (1 - (x * x + y * y))

@@ -20,6 +20,12 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
     return jnp.where(u >= width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 
 
+def smooth_plus_slope(u: Scalar, width: Scalar) -> Array:
+    """Derivative of `smooth_plus`: the quintic smoothstep from 0 to 1."""
+    t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
+    return t**3 * (t * (6 * t - 15) + 10)
+
+
 def smooth_norm(x: Scalar, y: Scalar, length: Scalar) -> Array:
     """sqrt(x^2 + y^2 + length^2): the distance from the origin, differentiable at the origin."""
     return jnp.sqrt(x * x + y * y + length * length)
@@ -53,11 +59,16 @@ def _inverse_ninth_root_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tu
     return root, root * _ninth_power(root) * (-1 / 9) * p_dot
 
 
-def power_10_9(p: Scalar) -> Array:
-    """p^(10/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
+def root_9(p: Scalar) -> Array:
+    """p^(1/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)
     root = _inverse_ninth_root(safe)
     root2 = root * root
     root4 = root2 * root2
-    return jnp.where(touching, safe * (safe * (root4 * root4)), 0.0)
+    return jnp.where(touching, safe * (root4 * root4), 0.0)
+
+
+def power_10_9(p: Scalar) -> Array:
+    """p^(10/9) for p >= 0, in the same sense."""
+    return p * root_9(p)

@@ -31,6 +31,24 @@ def cross_force(cross: Cross, x: Scalar, y: Scalar, linear: Scalar, cubic: Scala
     return jnp.asarray(-(linear * y + cubic * y**3)), jnp.asarray(-(linear * x + cubic * x**3))
 
 
+def support_slopes(
+    cross: Cross,
+    x: Scalar,
+    y: Scalar,
+    stiffness_x: Scalar,
+    stiffness_y: Scalar,
+    cubic: Scalar,
+    linear: Scalar,
+    odd: Scalar,
+) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]:
+    """Derivatives of spring and cross-coupling force with respect to (x, y) [N/m], as rows; `odd` is K'_xy."""
+    r2, mixed = x * x + y * y, 2 * cubic * x * y
+    xx, yy = stiffness_x + cubic * (r2 + 2 * x * x), stiffness_y + cubic * (r2 + 2 * y * y)
+    if cross == "circulatory":
+        return (-xx, -mixed - linear), (linear - mixed, -yy)
+    return (-xx, -mixed - (linear + 3 * odd * y * y)), (-mixed - (linear + 3 * odd * x * x), -yy)
+
+
 def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffness: Scalar, clearance: Scalar) -> Array:
     """K_3 [N/m^3]: given as such, or as alpha K_s / c^2 with a dimensionless alpha, so that a larger gap softens it."""
     return jnp.asarray(absolute if reading == "absolute" else relative * stiffness / clearance**2)

@@ -2,7 +2,7 @@
 
 import abc
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -14,6 +14,7 @@ from jaxtyping import Array
 
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
+from ._explicit import ClassicalRK4
 from ._newmark import NewmarkBeta
 from ._results import RESULTS
 from ._rosenbrock import Rodas3, Rodas4
@@ -28,6 +29,8 @@ class Stretch(NamedTuple):
     y: State
     peak: Scalar
     result: RESULTS
+    error: Scalar = 0.0
+    """Sum of the error estimates of equal steps, in units of the system's scale."""
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -71,8 +74,62 @@ def judge(result: Any, y: State, excursion: Scalar, limit: float) -> RESULTS:
     return _worse(RESULTS.promote(result), RESULTS.where(finite, state, RESULTS.not_finite))  # pyright: ignore
 
 
-class FixedSteps(AbstractMethod):
-    """A number of equal steps per revolution: every lane of a batch does the same work."""
+class Rung(NamedTuple):
+    """A solver and its number of equal steps per revolution."""
+
+    solver: dfx.AbstractSolver
+    steps: int
+
+
+class EqualSteps(AbstractMethod):
+    """Equal steps within a revolution: every lane of a batch does the same work."""
+
+    @property
+    @abc.abstractmethod
+    def rungs(self) -> tuple[Rung, ...]:
+        """What is tried in turn, until the error estimate is small enough."""
+
+    @property
+    @abc.abstractmethod
+    def accepted(self) -> float:
+        """Largest sum of a revolution's error estimates, in units of the system's scale."""
+
+
+def run_rung(
+    rung: Rung, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+) -> Stretch:
+    """One `parts`-th of a revolution in a single lane."""
+    solver = rung.solver
+    if rung.steps % parts:
+        raise ValueError(f"Argument `parts` must divide the {rung.steps} steps per revolution, but it is {parts}.")
+    h, count = REVOLUTION / rung.steps, rung.steps // parts
+    term = _term(solver)
+    if isinstance(solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
+        field, y = ScaledField(field, scale), divide(y, scale)
+        unscale, unit = lambda state: multiply(state, scale), tuple(jnp.ones_like(jnp.asarray(c)) for c in scale)
+    else:
+        unscale, unit = lambda state: state, scale
+
+    def step(i: Array, carry: tuple) -> tuple:
+        y, peak, error, result, state = carry
+        t0 = phase + i.astype(float) * h
+        y, wrong, _, state, outcome = solver.step(term, t0, t0 + h, y, field, state, False)
+        if wrong is not None:
+            error = error + sum(jnp.abs(e / s) for e, s in zip(wrong, unit, strict=True))
+        if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
+            result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
+        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(unscale(y))))
+        return y, jnp.maximum(peak, excursion), error, result, state  # the maximum keeps a NaN
+
+    state = solver.init(term, phase, phase + h, y, field)
+    start = (y, jnp.zeros(()), jnp.zeros(()), dfx.RESULTS.successful, state)
+    y, peak, error, result, _ = jax.lax.fori_loop(0, count, step, start)
+    y = unscale(y)
+    return Stretch(y, peak, judge(result, y, peak, ESCAPE), error)
+
+
+class FixedSteps(EqualSteps):
+    """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
 
     solver: dfx.AbstractSolver
     steps: int = eqx.field(static=True)
@@ -81,33 +138,53 @@ class FixedSteps(AbstractMethod):
         if self.steps < 1:
             raise ValueError(f"Argument `steps` must be at least 1 per revolution, but {self.steps} was given.")
 
+    @property
+    def rungs(self) -> tuple[Rung, ...]:
+        return (Rung(self.solver, self.steps),)
+
+    @property
+    def accepted(self) -> float:
+        return math.inf
+
     def advance(
         self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
     ) -> Stretch:
-        if self.steps % parts:
-            raise ValueError(f"Argument `parts` must divide the {self.steps} steps per revolution, but it is {parts}.")
-        h = REVOLUTION / self.steps
-        term = _term(self.solver)
-        if isinstance(self.solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
-            field, y = ScaledField(field, scale), divide(y, scale)
-            unscale = lambda state: multiply(state, scale)
-        else:
-            unscale = lambda state: state
+        return run_rung(self.rungs[0], field, system, scale, y, phase, parts)
 
-        def step(i: Array, carry: tuple) -> tuple:
-            y, peak, result, state = carry
-            t0 = phase + i.astype(float) * h
-            y, _, _, state, outcome = self.solver.step(term, t0, t0 + h, y, field, state, False)
-            if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
-                result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
-            excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(unscale(y))))
-            return y, jnp.maximum(peak, excursion), result, state  # the maximum keeps a NaN
 
-        state = self.solver.init(term, phase, phase + h, y, field)
-        start = (y, jnp.zeros(()), dfx.RESULTS.successful, state)
-        y, peak, result, _ = jax.lax.fori_loop(0, self.steps // parts, step, start)
-        y = unscale(y)
-        return Stretch(y, peak, judge(result, y, peak, ESCAPE))
+class ControlledSteps(EqualSteps):
+    """As many equal steps as a revolution needs: the first rung of a ladder with a small enough error estimate.
+
+    A cage that stays off the rib for a revolution needs a quarter of the steps that a contact asks for, and neither is
+    stiff as a rule. Explicit rungs come first; the last ones are L-stable, for what is stiff. The last rung is accepted
+    whatever its error. The price of control is that the strobe map is smooth only between the states at which the rung
+    changes: for sweeps, not for Newton's method.
+    """
+
+    ladder: tuple[Rung, ...]
+    tolerance: float = eqx.field(static=True)
+
+    @property
+    def rungs(self) -> tuple[Rung, ...]:
+        return self.ladder
+
+    @property
+    def accepted(self) -> float:
+        return self.tolerance
+
+    def advance(
+        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+    ) -> Stretch:
+        attempts = [lambda r=r: run_rung(r, field, system, scale, y, phase, parts) for r in self.ladder]
+
+        def from_rung(i: int) -> Stretch:
+            tried = attempts[i]()
+            if i + 1 == len(attempts):
+                return tried
+            good = (tried.error <= self.tolerance) & (tried.result == RESULTS.successful)
+            return jax.lax.cond(good, lambda: tried, lambda: from_rung(i + 1))
+
+        return from_rung(0)
 
 
 class AdaptiveSteps(AbstractMethod):
@@ -150,6 +227,7 @@ _FIXED: dict[str, Callable[[], dfx.AbstractSolver]] = {
     "rodas3": Rodas3,
     "rodas4": Rodas4,
     "newmark": NewmarkBeta,
+    "rk4": lambda: ClassicalRK4(scan_kind="lax"),
     "tsit5": lambda: dfx.Tsit5(scan_kind="lax"),
     "kvaerno3": _implicit(dfx.Kvaerno3),
     "kvaerno5": _implicit(dfx.Kvaerno5),
@@ -158,6 +236,7 @@ _FIXED: dict[str, Callable[[], dfx.AbstractSolver]] = {
 _ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
     "rodas3": Rodas3,
     "rodas4": Rodas4,
+    "rk4": ClassicalRK4,
     "tsit5": dfx.Tsit5,
     "kvaerno3": dfx.Kvaerno3,
     "kvaerno5": dfx.Kvaerno5,
@@ -165,15 +244,19 @@ _ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
 }
 DEFAULT_SOLVER = "rodas4"
 DEFAULT_STEPS = 256
+DEFAULT_LADDER = (("rk4", 128), ("rk4", 384), ("rk4", 768), ("rodas4", 1024))
+DEFAULT_ERROR = 1e-2
 
 
-def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
+def method(
+    solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None
+) -> AbstractMethod:
     """An integration method by name.
 
     **Arguments:**
 
-    - `solver`: `rodas3`, `rodas4` (ours, structured), `newmark` (the paper's), `tsit5`, `kvaerno3`, `kvaerno5`,
-        `kencarp4` (diffrax's).
+    - `solver`: `rodas3`, `rodas4` (ours, structured), `rk4` (classical), `newmark` (the paper's), `tsit5`, `kvaerno3`,
+        `kvaerno5`, `kencarp4` (diffrax's).
     - `steps`: equal steps per revolution; the default is what `benchmarks/convergence.py` settled.
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
@@ -190,3 +273,20 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
     if not 0 < tolerance < 1:
         raise ValueError(f"Argument `tolerance` must lie between 0 and 1, but {tolerance} was given.")
     return AdaptiveSteps(_ADAPTIVE[solver](), tolerance, tolerance)
+
+
+def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] = DEFAULT_LADDER) -> ControlledSteps:
+    """The method of sweeps: in each revolution the first rung of `ladder` whose error estimate is at most `error`.
+
+    **Arguments:** sum of a revolution's error estimates, in units of the system's own scale; solvers by name with their
+    steps per revolution, in the order in which they are tried.
+
+    **Raises:** `ValueError` for an error that is not positive, an empty ladder, or a solver without an estimate.
+    """
+    known = [name for name, make in _FIXED.items() if isinstance(make(), dfx.AbstractAdaptiveSolver)]
+    bad = [name for name, _ in ladder if name not in known]
+    if bad or not ladder:
+        raise ValueError(f"Argument `ladder` must be made of {', '.join(known)}, but it is {ladder}.")
+    if not error > 0:
+        raise ValueError(f"Argument `error` must be positive, but {error} was given.")
+    return ControlledSteps(tuple(Rung(_FIXED[name](), int(steps)) for name, steps in ladder), float(error))

@@ -16,6 +16,7 @@ from jaxtyping import PyTree
 
 from .._types import Scalar, State
 from ..models import AbstractField
+from ._explicit import combine
 
 
 class RosenbrockTableau(NamedTuple):
@@ -68,13 +69,7 @@ RODAS4 = RosenbrockTableau(
 )
 
 
-def _combine(base: State, weights: tuple[float, ...], stages: list[State], factor: Scalar = 1.0) -> State:
-    """base + factor * sum of weights times stages, leaving out what is multiplied by zero."""
-    used = [(w, u) for w, u in zip(weights, stages, strict=False) if w != 0.0]
-    return tuple(b + factor * sum(w * u[i] for w, u in used) if used else b for i, b in enumerate(base))
-
-
-def _once(x: PyTree, t0: Scalar) -> PyTree:
+def computed_once(x: PyTree, t0: Scalar) -> PyTree:
     """x as it is, worked out in full before anything makes use of it.
 
     XLA's CPU backend computes each output of a fused loop by itself, so that a step written in one piece evaluates the
@@ -87,25 +82,63 @@ def _once(x: PyTree, t0: Scalar) -> PyTree:
 
 
 def rosenbrock_step(
-    tableau: RosenbrockTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State
+    tableau: RosenbrockTableau,
+    field: AbstractField,
+    t0: Scalar,
+    h: Scalar,
+    y0: State,
+    settle: Callable[[Any, Scalar], Any] = lambda x, t0: x,
 ) -> tuple[State, State, State]:
     """One step of size h from y0 at phase t0.
 
+    `settle` is told what had better be worked out in full before it is used: `computed_once` where the step is left to
+    XLA's fusions, nothing where it is one kernel.
+
     **Returns:** the new state, the error estimate of the embedded method, and dy/dtau at the beginning of the step.
     """
-    near = _once(field.linearise(t0, y0), t0)
+    near = settle(field.linearise(t0, y0), t0)
     solve = near.solver(1 / (tableau.gamma * h))
     zero = tuple(jnp.zeros_like(c) for c in near.value)
     stages: list[State] = []
     rates = near.value
     for i, a_row in enumerate(tableau.a):
         if any(a_row):  # else the stage is evaluated at (t0, y0) like the first
-            rates = field(t0 + tableau.alpha[i] * h, _combine(y0, a_row, stages))
-        r = _combine(rates, tableau.c[i], stages, 1 / h)
+            rates = field(t0 + tableau.alpha[i] * h, combine(y0, a_row, stages))
+        r = combine(rates, tableau.c[i], stages, 1 / h)
         if tableau.gamma_sum[i] != 0.0:
             r = tuple(c + tableau.gamma_sum[i] * h * s for c, s in zip(r, near.phase_derivative, strict=True))
-        stages.append(_once(solve(r), t0))
-    return _combine(y0, tableau.m, stages), _combine(zero, tableau.e, stages), near.value
+        stages.append(settle(solve(r), t0))
+    return combine(y0, tableau.m, stages), combine(zero, tableau.e, stages), near.value
+
+
+def rosenbrock_step_with_tangent(
+    tableau: RosenbrockTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State, tangent: State
+) -> tuple[State, State, State]:
+    """A step and its derivative along `tangent`, which uses the factorised stages of the step.
+
+    With (shift I - J) U = r in each stage, (shift I - J) U' = r' + J' U.
+
+    **Returns:** the new state, its derivative, the error estimate.
+    """
+    near, change = jax.jvp(lambda y: field.linearise(t0, y), (y0,), (tangent,))
+    solve = near.solver(1 / (tableau.gamma * h))
+    zero = tuple(jnp.zeros_like(c) for c in near.value)
+    stages: list[State] = []
+    slopes: list[State] = []
+    rates, rates_dot = near.value, change.value
+    for i, a_row in enumerate(tableau.a):
+        if any(a_row):
+            here = field.linearise(t0 + tableau.alpha[i] * h, combine(y0, a_row, stages))
+            rates, rates_dot = here.value, here.times(combine(tangent, a_row, slopes))
+        r, r_dot = combine(rates, tableau.c[i], stages, 1 / h), combine(rates_dot, tableau.c[i], slopes, 1 / h)
+        if tableau.gamma_sum[i] != 0.0:
+            late = tableau.gamma_sum[i] * h
+            r = tuple(c + late * s for c, s in zip(r, near.phase_derivative, strict=True))
+            r_dot = tuple(c + late * s for c, s in zip(r_dot, change.phase_derivative, strict=True))
+        stages.append(solve(r))
+        slopes.append(solve(tuple(c + d for c, d in zip(r_dot, near.change_times(change, stages[-1]), strict=True))))
+    moved = combine(y0, tableau.m, stages), combine(tangent, tableau.m, slopes)
+    return *moved, combine(zero, tableau.e, stages)
 
 
 _SolverState: TypeAlias = None
@@ -131,7 +164,7 @@ class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     ) -> tuple[Any, Any, dict[str, Any], _SolverState, dfx.RESULTS]:
         del terms, solver_state, made_jump
         h = t1 - t0
-        y1, error, rate0 = rosenbrock_step(self.tableau, args, t0, h, y0)
+        y1, error, rate0 = rosenbrock_step(self.tableau, args, t0, h, y0, computed_once)
         rate1 = args(t1, y1)
         k0, k1 = (tuple(h * c for c in rate) for rate in (rate0, rate1))
         return y1, error, dict(y0=y0, y1=y1, k0=k0, k1=k1), None, dfx.RESULTS.successful

@@ -14,20 +14,24 @@ from ..forces import (
     PulseTrain,
     RollerPassImpact,
     contact_force,
+    contact_slopes,
     cross_force,
     cubic_stiffness,
     effective_eccentricity,
     film_drive,
     film_resistance,
     film_scale,
+    polar_resistance,
     pulse_train,
     pulse_train_force,
     restitution_damping,
     rib_force,
     smooth_norm,
     smooth_plus,
+    smooth_plus_slope,
     spring_force,
     supply_force,
+    support_slopes,
     synchronous_amplitude,
     synchronous_force,
     unbalance_force,
@@ -40,6 +44,7 @@ if TYPE_CHECKING:
 
 
 Vector = tuple[Array, Array]
+Rows = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
 
 
 class CageForces(NamedTuple):
@@ -136,6 +141,64 @@ class CageAtSpeed(eqx.Module):
         )
         return film, (-normal * n[0], -normal * n[1])
 
+    def slopes(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Rows, Rows]:
+        """Derivatives of land and support forces with respect to position [N/m] and velocity [N s/m], as rows.
+
+        In closed form, in the frame (n, t) of the line of centres: dn = t (t.u)/eps and dt = -n (t.u)/eps for a
+        displacement u. For the film models with a fixed arc; exact outside the film's smoothing length of the centre.
+        """
+        c, per_c = self.clearance, 1 / self.clearance
+        ex, ey, ux, uy = x * per_c, y * per_c, vx * per_c, vy * per_c
+        eps = smooth_norm(ex, ey, self.film_smoothing)
+        per_eps = 1 / eps
+        nx, ny = ex * per_eps, ey * per_eps
+        gap = eps - self.contact_onset
+        excess, touch = smooth_plus(gap, self.contact_smoothing), smooth_plus_slope(gap, self.contact_smoothing)
+        px, py = film_drive(ex, ey, ux, uy, self.omega)
+        p_n, p_t = nx * px + ny * py, nx * py - ny * px
+        m = polar_resistance(self.film_model, eps - excess)
+        open_ = 1 - touch  # how much of a change of eps the film's coefficients see
+        half = -self.film_scale / 2 * per_c
+        at_centre, turning = p_n * per_eps, p_t * per_eps
+        film = (
+            (
+                open_ * ((m.d_a + m.d_b) * p_n - m.d_g * p_t) + m.g * self.omega,
+                (m.a + m.b) * self.omega + m.b * turning + 2 * m.g * at_centre,
+            ),
+            (
+                open_ * (m.d_a * p_t - m.d_g * p_n) - m.a * self.omega,
+                m.b * at_centre - m.g * (2 * turning + self.omega),
+            ),
+        )
+        thrust = self.supply_scale * per_c * per_eps * (2 if self.film_model == "fixed_half" else 0)
+        law = (self.contact_stiffness, self.damping_number, self.contact_approach_speed)
+        rate = c * (nx * ux + ny * uy)
+        normal = contact_force(c * excess, rate, *law)
+        stiff, damp = contact_slopes(c * excess, rate, *law)
+        slip = (nx * uy - ny * ux) * per_eps
+        polar = (
+            (half * film[0][0] - stiff * touch, half * film[0][1] - damp * slip - thrust),
+            (half * film[1][0], half * film[1][1] - normal * per_c * per_eps),
+        )
+        drag = 2 * half
+        moving = ((drag * (m.a + m.b) - damp, -drag * m.g), (-drag * m.g, drag * m.a))
+        held = support_slopes(
+            self.cross,
+            x,
+            y,
+            self.stiffness_x,
+            self.stiffness_y,
+            self.cubic_stiffness,
+            self.cross_stiffness,
+            self.cross_cubic,
+        )
+        of_q, of_v = _turned(polar, nx, ny), _turned(moving, nx, ny)
+        b = self.support_damping
+        return (
+            ((of_q[0][0] + held[0][0], of_q[0][1] + held[0][1]), (of_q[1][0] + held[1][0], of_q[1][1] + held[1][1])),
+            ((of_v[0][0] - b, of_v[0][1]), (of_v[1][0], of_v[1][1] - b)),
+        )
+
     def support_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Vector:
         """Force of the elastic support for the same relative motion."""
         spring = spring_force(x, y, self.stiffness_x, self.stiffness_y, self.cubic_stiffness)
@@ -164,6 +227,17 @@ class CageAtSpeed(eqx.Module):
         )
 
 
+def _turned(k: Rows, nx: Scalar, ny: Scalar) -> Rows:
+    """A matrix in the frame (n, t), with t = (-ny, nx), in Cartesian coordinates."""
+    (nn, nt), (tn, tt) = k
+    xx, xy, yy = nx * nx, nx * ny, ny * ny
+    both = nt + tn
+    return (
+        (nn * xx - both * xy + tt * yy, (nn - tt) * xy + nt * xx - tn * yy),
+        ((nn - tt) * xy + tn * xx - nt * yy, nn * yy + both * xy + tt * xx),
+    )
+
+
 def _impact(model: "CageModel", omega: Scalar) -> Array | PulseTrain:
     if not isinstance(model.impact, RollerPassImpact):
         law = model.impact
@@ -184,6 +258,15 @@ class RigidRibLaw(eqx.Module):
         f = self.cage.forces(tau, *q, *v)
         per_mass = 1 / self.cage.mass
         return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
+
+    def slopes(self, q: State, v: State) -> tuple[Rows, Rows] | None:
+        """Derivatives with respect to q and v, as rows, where the film's arc is fixed."""
+        if self.cage.film_model == "positive_pressure":
+            return None
+        per_mass = 1 / self.cage.mass
+        of_q, of_v = self.cage.slopes(*q, *v)
+        scaled = lambda rows: tuple(tuple(per_mass * c for c in row) for row in rows)
+        return scaled(of_q), scaled(of_v)
 
 
 class ElasticRibLaw(eqx.Module):

@@ -8,6 +8,7 @@ form, so that only a system of the size of the velocities is solved: with J = [[
 
 import abc
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -56,6 +57,10 @@ def _shifted(shift: Scalar, a: Matrix) -> Matrix:
     return tuple(tuple(shift - c if i == j else -c for j, c in enumerate(row)) for i, row in enumerate(a))
 
 
+def _times(a: Matrix, u: State) -> State:
+    return tuple(sum((c * x for c, x in zip(row, u, strict=True)), start=jnp.zeros(())) for row in a)
+
+
 def _trace(a: Matrix) -> Scalar:
     return sum((row[i] for i, row in enumerate(a)), start=jnp.zeros(()))
 
@@ -72,6 +77,14 @@ class AbstractLinearisation(eqx.Module):
         """Trace of the Jacobian."""
 
     @abc.abstractmethod
+    def times(self, u: State) -> State:
+        """Jacobian times a vector."""
+
+    @abc.abstractmethod
+    def change_times(self, change: Any, u: State) -> State:
+        """The same with the derivative of the Jacobian; `change` is what `jax.jvp` of `linearise` returns."""
+
+    @abc.abstractmethod
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         """r -> (shift I - J)^-1 r, factorised once."""
 
@@ -86,6 +99,12 @@ class DenseLinearisation(AbstractLinearisation):
     @property
     def divergence(self) -> Scalar:
         return _trace(self.jacobian)
+
+    def times(self, u: State) -> State:
+        return _times(self.jacobian, u)
+
+    def change_times(self, change: "DenseLinearisation", u: State) -> State:
+        return _times(change.jacobian, u)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         lu = lu_factor(_shifted(shift, self.jacobian))
@@ -105,6 +124,14 @@ class SecondOrderLinearisation(AbstractLinearisation):
     def divergence(self) -> Scalar:
         return _trace(self.a_v) / self.speed
 
+    def times(self, u: State) -> State:
+        rate = 1 / self.speed
+        return (*(rate * c for c in u[len(self.a_q) :]), *(rate * c for c in _pushed(self, u)))
+
+    def change_times(self, change: "SecondOrderLinearisation", u: State) -> State:
+        rate = 1 / self.speed
+        return (*(jnp.zeros_like(c) for c in u[len(self.a_q) :]), *(rate * c for c in _pushed(change, u)))
+
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         rate = 1 / self.speed
         per_shift = 1 / shift
@@ -123,6 +150,11 @@ class SecondOrderLinearisation(AbstractLinearisation):
             return (*((r_q[i] + rate * u_v[i]) * per_shift for i in range(n)), *u_v)
 
         return solve
+
+
+def _pushed(near: SecondOrderLinearisation, u: State) -> State:
+    n = len(near.a_q)
+    return tuple(a + b for a, b in zip(_times(near.a_q, u[:n]), _times(near.a_v, u[n:]), strict=True))
 
 
 class AbstractField(eqx.Module):
@@ -164,7 +196,11 @@ class FirstOrderField(AbstractField):
 
 
 class SecondOrderField(AbstractField):
-    """dq/dtau = v / speed, dv/dtau = acceleration(tau, q, v) / speed."""
+    """dq/dtau = v / speed, dv/dtau = acceleration(tau, q, v) / speed.
+
+    If `acceleration` has a method `slopes(q, v)` that returns its derivatives with respect to q and v as rows (or None
+    where it cannot), these are used; else it is differentiated.
+    """
 
     acceleration: Callable[[Scalar, State, State], State]
     speed: Scalar
@@ -179,9 +215,12 @@ class SecondOrderField(AbstractField):
         n = len(y) // 2
         q, v = y[:n], y[n:]
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
-        a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
-        a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
-        return SecondOrderLinearisation(value, slope, a_q, a_v, self.speed)
+        slopes = getattr(self.acceleration, "slopes", lambda q, v: None)(q, v)
+        if slopes is None:
+            a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
+            a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
+            slopes = a_q, a_v
+        return SecondOrderLinearisation(value, slope, *slopes, self.speed)
 
 
 class ScaledLinearisation(AbstractLinearisation):
@@ -195,6 +234,12 @@ class ScaledLinearisation(AbstractLinearisation):
     @property
     def divergence(self) -> Scalar:
         return self.inner.divergence
+
+    def times(self, u: State) -> State:
+        return divide(self.inner.times(multiply(u, self.scale)), self.scale)
+
+    def change_times(self, change: "ScaledLinearisation", u: State) -> State:
+        return divide(self.inner.change_times(change.inner, multiply(u, self.scale)), self.scale)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         solve = self.inner.solver(shift)

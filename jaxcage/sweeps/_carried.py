@@ -1,6 +1,8 @@
 """Run-up and run-down: the state is carried from one speed to the next, which shows hysteresis."""
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Any, overload
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -8,7 +10,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._types import State
 from ..analysis import Sweep
-from ..integrate import AbstractMethod, method as make_method
+from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ._engine import Progress, run_lanes
 from ._speed import assemble, checked_speeds, initial_states, make_plan
@@ -28,8 +30,18 @@ class Hysteresis:
         return np.max(np.abs(means[0] - means[1]), axis=-1)
 
 
+@overload
 def run_up_down(
-    system: AbstractForcedSystem,
+    system: AbstractForcedSystem, speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"], **options: Any
+) -> Hysteresis: ...
+@overload
+def run_up_down(
+    system: Sequence[AbstractForcedSystem],
+    speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    **options: Any,
+) -> list[Hysteresis]: ...
+def run_up_down(
+    system: AbstractForcedSystem | Sequence[AbstractForcedSystem],
     speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
     start: State | None = None,
@@ -40,33 +52,41 @@ def run_up_down(
     keep: int = 48,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
-) -> Hysteresis:
+) -> Hysteresis | list[Hysteresis]:
     """Sweep up and down in speed, each speed beginning with the state in which the last one ended.
 
-    Both directions run as two lanes of one batch. Where the carried state has failed, the next speed begins from the
+    Both directions of all systems (cases, designs that differ in their numbers only) run as lanes of one batch. Where the carried state has failed, the next speed begins from the
     start again, so that one failure does not spoil the rest.
 
     **Arguments:** as for `sweep`, with a single start.
 
-    **Returns:** `Hysteresis`, two sweeps of one start each.
+    **Returns:** `Hysteresis`, two sweeps of one start each; a list of them for several systems.
     """
     require_x64()
     speed = checked_speeds(speeds)
-    chosen = make_method() if method is None else method
-    plan = make_plan(discard, revolutions, blocks, keep, exponents, system.dimension)
-    fresh = initial_states(system, speed, None if start is None else [start])[:, 0]
-    pairs = list(zip(range(speed.size), reversed(range(speed.size)), strict=True))
-    state = fresh[list(pairs[0])]
-    seen = []
-    for n, pair in enumerate(pairs):
-        state = np.where(np.isfinite(state), state, fresh[list(pair)])
-        seen.append(run_lanes(system, chosen, plan, speed[list(pair)], state))
+    chosen = controlled() if method is None else method
+    systems = list(system) if isinstance(system, Sequence) else [system]
+    if not systems:
+        raise ValueError("Argument `system` must hold at least one system, but it is empty.")
+    plan = make_plan(discard, revolutions, blocks, keep, exponents, systems[0].dimension)
+    starts = None if start is None else [start]
+    fresh = np.stack([initial_states(s, speed, starts)[:, 0] for s in systems])  # systems, speeds, dim
+    which = np.repeat(np.arange(len(systems)), 2)  # up and down of the first, of the second, ...
+    state, seen = None, []
+    for n in range(speed.size):
+        place = np.tile([n, speed.size - 1 - n], len(systems))
+        start_here = fresh[which, place]
+        state = start_here if state is None else np.where(np.isfinite(state), state, start_here)
+        seen.append(run_lanes(systems, chosen, plan, speed[place], state, which=which))
         state = np.asarray(seen[-1].last).T
         if progress is not None:
             progress(n + 1, speed.size)
-    up, down = (_stacked([tuple(x[..., i] for x in o) for o in seen]) for i in (0, 1))
-    make = lambda parts: assemble(system, speed, chosen, plan, parts, (speed.size, 1))
-    return Hysteresis(make(up), make(tuple(x[..., ::-1] for x in down)))
+    found = []
+    for i, one in enumerate(systems):
+        up, down = (_stacked([tuple(x[..., 2 * i + j] for x in o) for o in seen]) for j in (0, 1))
+        make = lambda parts, one=one: assemble(one, speed, chosen, plan, parts, (speed.size, 1))
+        found.append(Hysteresis(make(up), make(tuple(x[..., ::-1] for x in down))))
+    return found if isinstance(system, Sequence) else found[0]
 
 
 def _stacked(rows: list[tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:

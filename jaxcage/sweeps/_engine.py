@@ -7,17 +7,18 @@ full size, so that the arithmetic of a lane does not depend on how many neighbou
 
 import concurrent.futures
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .._types import LaneState
-from ..analysis import Observation, Plan, StrobeLanes, observe
-from ..integrate import AbstractMethod
+from ..analysis import Lanes, Observation, Plan, observe, settle
+from ..integrate import AbstractMethod, StrobeLanes
 from ..models import AbstractForcedSystem
 
 
@@ -25,15 +26,59 @@ CHUNK = 128
 """Lanes per call on a CPU: large enough to hide the cost of dispatch, small enough to stay in cache (measured by
 `python -m benchmarks.chunks`)."""
 
+COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512, "xla_cpu_use_fusion_emitters": False}
+"""Eight lanes to an instruction where the processor can (XLA's default is four); and the older of XLA's two emitters:
+the newer one cuts the largest kernels, those with tangent vectors, into functions that compute shared terms again and
+again. Both say nothing to a GPU."""
+
 Progress = Callable[[int, int], None]
 """Called with lanes done and lanes in all."""
 
 
-@eqx.filter_jit
-def _run_chunk(
-    system: AbstractForcedSystem, method: AbstractMethod, plan: Plan, speed: Float[Array, " lanes"], y0: LaneState
+@eqx.filter_jit(compiler_options=COMPILER_OPTIONS)
+def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: int, part: "Part") -> Lanes:
+    return settle(designs.lanes(method, part), part.y, revolutions)
+
+
+@eqx.filter_jit(compiler_options=COMPILER_OPTIONS)
+def _observe_chunk(
+    designs: "Designs", method: AbstractMethod, plan: Plan, part: "Part", outcome: Array, level: Array
 ) -> Observation:
-    return observe(StrobeLanes.of(system, method, speed), y0, plan)
+    return observe(designs.lanes(method, part), Lanes(part.y, jnp.zeros_like(part.speed), outcome, level), plan)
+
+
+class Part(NamedTuple):
+    """The lanes of a chunk."""
+
+    speed: Float[Array, " lanes"]
+    which: Int[Array, " lanes"]
+    y: LaneState
+
+
+class Designs(eqx.Module):
+    """Systems of one structure: a single one, or several with their arrays stacked."""
+
+    systems: AbstractForcedSystem
+    count: int = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, systems: Sequence[AbstractForcedSystem]) -> "Designs":
+        """**Raises:** `ValueError` for systems that differ in more than their numbers."""
+        if len(systems) == 1:
+            return cls(systems[0], 1)
+        arrays, rests = zip(*(eqx.partition(_numbers(s), eqx.is_array) for s in systems), strict=True)
+        if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
+            raise ValueError("Argument `systems` must hold systems that differ in their numbers only.")
+        return cls(eqx.combine(jax.tree.map(lambda *x: jnp.stack(x), *arrays), rests[0]), len(systems))
+
+    def lanes(self, method: AbstractMethod, part: Part) -> StrobeLanes:
+        """The strobe maps of a chunk."""
+        return StrobeLanes.of(self.systems, method, part.speed, part.which if self.count > 1 else None)
+
+
+def _numbers(system: AbstractForcedSystem) -> AbstractForcedSystem:
+    """All numbers as arrays: a parameter may be a Python number in one design and an array in another."""
+    return jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, system)
 
 
 def cores() -> int:
@@ -50,40 +95,92 @@ def _padded(x: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([x, np.repeat(x[-1:], size - x.shape[0], axis=0)])
 
 
+def _in_chunks(
+    work: Callable[[np.ndarray], Any], order: np.ndarray, size: int, report: Callable[[int], None]
+) -> tuple[np.ndarray, ...]:
+    """`work` on the lanes of `order`, chunk by chunk on all cores; results in the order of the lanes."""
+    parts = [order[s] for s in _chunks(order.size, size)]
+    with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
+        futures = [pool.submit(lambda p: [np.asarray(x) for x in work(_padded(p, size))], part) for part in parts]
+        try:
+            for future, part in zip(futures, parts, strict=True):
+                future.result()
+                report(part.size)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    back = np.argsort(order, kind="stable")
+    columns = zip(*(future.result() for future in futures), strict=True)
+    return tuple(
+        np.concatenate([x[..., : part.size] for x, part in zip(column, parts, strict=True)], axis=-1)[..., back]
+        for column in columns
+    )
+
+
+def run_parts(
+    work: Callable[[Part], tuple[Any, ...]],
+    speed: Float[np.ndarray, " lanes"],
+    which: Int[np.ndarray, " lanes"],
+    y0: Float[np.ndarray, "lanes dim"],
+) -> tuple[np.ndarray, ...]:
+    """`work` on all lanes, chunk by chunk on all cores."""
+    begin = lambda lane: work(_part(speed, which, y0, lane))
+    return _in_chunks(begin, np.arange(speed.size), _chunk_size(speed.size), lambda _: None)
+
+
+def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
+    return Part(jnp.asarray(speed[lane]), jnp.asarray(which[lane]), tuple(map(jnp.asarray, y[lane].T)))
+
+
+def _chunk_size(lanes: int) -> int:
+    return min(CHUNK, lanes) if jax.default_backend() == "cpu" else lanes
+
+
 def run_lanes(
-    system: AbstractForcedSystem,
+    systems: AbstractForcedSystem | Sequence[AbstractForcedSystem],
     method: AbstractMethod,
     plan: Plan,
     speed: Float[np.ndarray, " lanes"],
     y0: Float[np.ndarray, "lanes dim"],
     progress: Progress | None = None,
+    which: Int[np.ndarray, " lanes"] | None = None,
 ) -> Observation:
-    """Observe lanes given by their speeds [rad/s] and initial states.
+    """Observe lanes given by their speeds [rad/s] and initial states, and with several systems by which they have.
+
+    Between the discarded and the observed revolutions the lanes are sorted by the number of steps that they need, so
+    that few chunks hold lanes of different needs.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
-    lanes = speed.shape[0]
-    on_cpu = jax.default_backend() == "cpu"
-    size = min(CHUNK, lanes) if on_cpu else lanes
+    lanes, dim = y0.shape
+    designs = Designs.of(list(systems) if isinstance(systems, Sequence) else [systems])
+    which = np.zeros(lanes, int) if which is None else which
+    size = _chunk_size(lanes)
     static = Plan(*map(int, plan))
+    first = static.discard - static.align
+    share = np.array([first, static.block * static.blocks + static.align]) / (static.discard + static.block * static.blocks)
+    done = [0, 0]
 
-    def work(part: slice) -> Observation:
-        s, y = _padded(speed[part], size), _padded(y0[part], size)
-        got = _run_chunk(system, method, static, jnp.asarray(s), tuple(jnp.asarray(c) for c in y.T))
-        count = part.stop - part.start
-        return Observation(*(np.asarray(x)[..., :count] for x in got))
+    def report(stage: int) -> Callable[[int], None]:
+        def add(count: int) -> None:
+            done[stage] += count
+            if progress is not None:
+                progress(int(np.dot(share, done) + 1e-9), lanes)
 
-    parts = list(_chunks(lanes, size))
-    done = 0
-    with concurrent.futures.ThreadPoolExecutor(cores() if on_cpu else 1) as pool:
-        futures = [pool.submit(work, part) for part in parts]
-        try:
-            for future, part in zip(futures, parts, strict=True):
-                future.result()
-                done += part.stop - part.start
-                if progress is not None:
-                    progress(done, lanes)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return Observation(*(np.concatenate(x, axis=-1) for x in zip(*(f.result() for f in futures), strict=True)))
+        return add
+
+    def begin(lane: np.ndarray) -> tuple[Any, ...]:
+        got = _settle_chunk(designs, method, first, _part(speed, which, y0, lane))
+        return *got.y, got.outcome, got.level
+
+    *y, outcome, level = _in_chunks(begin, np.arange(lanes), size, report(0))
+    settled = np.stack(y, axis=-1).reshape(lanes, dim)
+    if first == 0 and lanes > size:  # nothing has been run yet: one revolution tells what the lanes need
+        look = lambda lane: (_settle_chunk(designs, method, 1, _part(speed, which, y0, lane)).level,)
+        (level,) = _in_chunks(look, np.arange(lanes), size, lambda _: None)
+
+    def follow(lane: np.ndarray) -> Observation:
+        rest = jnp.asarray(outcome[lane]), jnp.asarray(level[lane])
+        return _observe_chunk(designs, method, static, _part(speed, which, settled, lane), *rest)
+
+    return Observation(*_in_chunks(follow, np.argsort(level, kind="stable"), size, report(1)))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import Any, overload
 
 import equinox as eqx
 import jax
@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._types import State
 from ..analysis import Plan, Sweep
-from ..integrate import AbstractMethod, method as make_method
+from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ._engine import Progress, run_lanes
 
@@ -50,8 +50,20 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
+@overload
 def sweep(
     system: AbstractForcedSystem,
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    **options: Any,
+) -> Sweep: ...
+@overload
+def sweep(
+    system: Sequence[AbstractForcedSystem],
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    **options: Any,
+) -> list[Sweep]: ...
+def sweep(
+    system: AbstractForcedSystem | Sequence[AbstractForcedSystem],
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
@@ -62,12 +74,12 @@ def sweep(
     keep: int = 64,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
-) -> Sweep:
+) -> Sweep | list[Sweep]:
     """Run a forced system over speed from several starts: strobe states, Lyapunov exponents, labels.
 
     **Arguments:**
 
-    - `system`: any `AbstractForcedSystem`.
+    - `system`: any `AbstractForcedSystem`, or several that differ in their numbers only: designs, cases.
     - `speeds`: ascending speeds [rad/s]; `jaxcage.rpm` makes them from revolutions per minute.
     - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; by default the
         system's own.
@@ -75,22 +87,31 @@ def sweep(
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
     - `keep`: number of strobe states kept, the last ones.
-    - `method`: integration method, by default the library's own.
+    - `method`: integration method, by default `jaxcage.controlled()`.
     - `progress`: called with lanes done and lanes in all.
 
-    **Returns:** `Sweep`. Lanes that fail are NaN with an outcome and leave their neighbours untouched.
+    **Returns:** `Sweep`, a list of them for several systems. Lanes that fail are NaN with an outcome and leave their neighbours untouched.
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
     `RuntimeError` without double precision.
     """
     require_x64()
     speed = checked_speeds(speeds)
-    chosen = make_method() if method is None else method
-    plan = make_plan(discard, revolutions, blocks, keep, exponents, system.dimension)
-    y0 = initial_states(system, speed, starts)
-    lanes = y0.reshape(-1, system.dimension)
-    seen = run_lanes(system, chosen, plan, np.repeat(speed, y0.shape[1]), lanes, progress)
-    return assemble(system, speed, chosen, plan, seen, y0.shape[:2])
+    chosen = controlled() if method is None else method
+    systems = list(system) if isinstance(system, Sequence) else [system]
+    if not systems:
+        raise ValueError("Argument `system` must hold at least one system, but it is empty.")
+    plan = make_plan(discard, revolutions, blocks, keep, exponents, systems[0].dimension)
+    y0 = [initial_states(s, speed, starts) for s in systems]
+    shape = y0[0].shape[:2]
+    lanes = np.concatenate([y.reshape(-1, systems[0].dimension) for y in y0])
+    each = shape[0] * shape[1]
+    which = np.repeat(np.arange(len(systems)), each)
+    lane_speed = np.tile(np.repeat(speed, shape[1]), len(systems))
+    seen = run_lanes(systems, chosen, plan, lane_speed, lanes, progress, which)
+    parts = [tuple(x[..., i * each : (i + 1) * each] for x in seen) for i in range(len(systems))]
+    found = [assemble(s, speed, chosen, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
+    return found if isinstance(system, Sequence) else found[0]
 
 
 def assemble(

@@ -1,0 +1,70 @@
+"""The classical fourth-order Runge-Kutta method with an error estimate, as a diffrax solver; a step of any such method.
+
+The estimate h/6 (k_4 - f(y_1)) is that of the embedded third-order method with weights (1, 2, 2, 0, 1)/6, whose last
+stage is the first of the next step.
+"""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import diffrax as dfx
+import numpy as np
+
+from .._types import Scalar, State
+from ..models import AbstractField
+
+
+class ClassicalRK4(dfx.AbstractERK):
+    """Kutta's method of 1901: four evaluations a step, order 4(3). Not for stiff systems."""
+
+    tableau: ClassVar[dfx.ButcherTableau] = dfx.ButcherTableau(
+        c=np.array([1 / 2, 1 / 2, 1, 1]),
+        a_lower=(
+            np.array([1 / 2]),
+            np.array([0, 1 / 2]),
+            np.array([0, 0, 1.0]),
+            np.array([1 / 6, 1 / 3, 1 / 3, 1 / 6]),
+        ),
+        b_sol=np.array([1 / 6, 1 / 3, 1 / 3, 1 / 6, 0]),
+        b_error=np.array([0, 0, 0, 1 / 6, -1 / 6]),
+    )
+    interpolation_cls: ClassVar[Callable[..., dfx.AbstractLocalInterpolation]] = (
+        dfx.ThirdOrderHermitePolynomialInterpolation.from_k
+    )
+
+    def order(self, terms: Any) -> int:
+        del terms
+        return 4
+
+
+def combine(base: State, weights: Any, stages: list[State], factor: Scalar = 1.0) -> State:
+    """base + factor * sum of weights times stages, leaving out what is multiplied by zero."""
+    used = [(float(w), u) for w, u in zip(weights, stages, strict=False) if w != 0.0]
+    return tuple(b + factor * sum(w * u[i] for w, u in used) if used else b for i, b in enumerate(base))
+
+
+def explicit_step(
+    tableau: dfx.ButcherTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State, tangents: tuple[State, ...]
+) -> tuple[State, tuple[State, ...], State, State]:
+    """One step of size h from y0 at phase t0, for a method whose last stage is the first of the next step.
+
+    Tangent vectors take the derivative of the same step: each stage is linearised once for all of them.
+
+    **Returns:** the new state, the new tangent vectors, the first stage, and the error estimate over h as far as it is
+    known before the last stage.
+    """
+    rows = ((), *tableau.a_lower)[:-1]
+    stages: list[State] = []
+    pushed: list[list[State]] = [[] for _ in tangents]
+    for c, row in zip((0.0, *tableau.c), rows, strict=False):
+        t, y = t0 + float(c) * h, combine(y0, row, stages, h)
+        if not tangents:
+            stages.append(field(t, y))
+            continue
+        near = field.linearise(t, y)
+        stages.append(near.value)
+        for start, images in zip(tangents, pushed, strict=True):
+            images.append(near.times(combine(start, row, images, h)))
+    zero = tuple(0.0 * c for c in y0)
+    ends = tuple(combine(start, tableau.b_sol, images, h) for start, images in zip(tangents, pushed, strict=True))
+    return combine(y0, tableau.b_sol, stages, h), ends, stages[0], combine(zero, tableau.b_error, stages)

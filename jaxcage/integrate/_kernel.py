@@ -1,0 +1,140 @@
+"""One step of a method as a scalar function, for `lanewise`, with and without tangent vectors.
+
+The numbers of field, system and scale are its inputs; the rest (structure, tableau) is fixed.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import diffrax as dfx
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Int
+
+from .._types import Scalar, State
+from ..models import AbstractField, AbstractForcedSystem
+from ._explicit import explicit_step
+from ._lanewise import ScalarFunction, is_lanewise, lanewise
+from ._rosenbrock import AbstractRosenbrock, rosenbrock_step, rosenbrock_step_with_tangent
+
+
+class Split(NamedTuple):
+    """The numbers of a module in two rows, and how to put the module together again."""
+
+    shared: tuple[Array, ...]
+    own: tuple[Array, ...]
+    remake: Callable[[Sequence[Any], Sequence[Any]], Any]
+    complete: bool  # no array is left that is not in one of the rows
+
+
+def split(shared: Any, own: Any = None) -> Split:
+    """Split a module into its arrays and the rest.
+
+    **Arguments:** the module; the same module with those arrays that differ from lane to lane, None elsewhere.
+    """
+    own = eqx.filter(shared, lambda _: False) if own is None else own
+    alike, static = eqx.partition(shared, eqx.is_inexact_array)
+    first, first_tree = jax.tree.flatten(alike)
+    second, second_tree = jax.tree.flatten(own)
+
+    def remake(a: Sequence[Any], b: Sequence[Any]) -> Any:
+        return eqx.combine(jax.tree.unflatten(second_tree, list(b)), jax.tree.unflatten(first_tree, list(a)), static)
+
+    complete = all(map(eqx.is_inexact_array, second)) and not any(map(eqx.is_array, jax.tree.leaves(static)))
+    return Split(tuple(first), tuple(second), remake, complete)
+
+
+class Lane(NamedTuple):
+    """What a step moves, scalars or lanes: state, largest excursion, error estimates so far, tangent vectors."""
+
+    y: State
+    peak: Scalar
+    error: Scalar
+    pending: State  # for methods whose estimate is complete with the first stage of the next step only
+    tangents: tuple[State, ...] = ()
+
+    def row(self) -> tuple[Any, ...]:
+        """All numbers one after the other."""
+        return tuple(jax.tree.leaves(self))
+
+    def filled(self, row: Sequence[Any]) -> "Lane":
+        """A lane of this form from the numbers of `row`; what follows them is left alone."""
+        leaves, form = jax.tree.flatten(self)
+        return jax.tree.unflatten(form, list(row[: len(leaves)]))
+
+
+Pieces = tuple[AbstractField, AbstractForcedSystem, State]
+"""Field, system and scale: what a step needs to know."""
+KernelSolver = AbstractRosenbrock | dfx.AbstractERK
+
+
+def can_be_kernel(solver: Any) -> bool:
+    """Whether a step of `solver` is a plain formula: ours, and explicit methods with the first stage last."""
+    return isinstance(solver, AbstractRosenbrock) or (isinstance(solver, dfx.AbstractERK) and solver.tableau.fsal)
+
+
+def start_lane(solver: KernelSolver, y: State, tangents: tuple[State, ...] = ()) -> Lane:
+    """A lane at the beginning of a revolution."""
+    zero = jnp.zeros_like(jnp.asarray(y[0]))
+    unknown = (zero + jnp.nan,) * (len(y) if isinstance(solver, dfx.AbstractERK) else 0)
+    return Lane(y, zero, zero, unknown, tangents)
+
+
+def step_function(solver: KernelSolver, numbers: Split, form: Lane, estimate: bool) -> ScalarFunction:
+    """One step for `lanewise`: shared (phase, step, shared numbers), lane (`Lane.row`, own numbers) -> `Lane.row`."""
+
+    def step(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> tuple[Any, ...]:
+        t0, h, *alike = shared
+        before = form.filled(lane)
+        field, system, scale = numbers.remake(alike, lane[len(form.row()) :])
+        pending = before.pending
+        if isinstance(solver, dfx.AbstractERK):
+            y, tangents, first, early = explicit_step(solver.tableau, field, t0, h, before.y, before.tangents)
+            last = float(solver.tableau.b_error[-1])
+            late = tuple(h * (p + last * k) for p, k in zip(pending, first, strict=True))
+            error = tuple(jnp.where(p == p, e, 0.0) for p, e in zip(pending, late, strict=True))  # not NaN: known
+            pending = early
+        elif before.tangents:
+            y, tangent, error = rosenbrock_step_with_tangent(
+                solver.tableau, field, t0, h, before.y, *before.tangents
+            )
+            tangents = (tangent,)
+        else:
+            (y, error, _), tangents = rosenbrock_step(solver.tableau, field, t0, h, before.y), ()
+        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
+        peak = jnp.maximum(before.peak, excursion)  # the maximum keeps a NaN
+        grown = sum(jnp.abs(e / s) for e, s in zip(error, scale, strict=True)) if estimate else 0.0
+        return Lane(y, peak, before.error + grown, pending if estimate else before.pending, tangents).row()
+
+    return step
+
+
+def runs_lanewise(solver: KernelSolver, numbers: Split, y: State) -> bool:
+    """Whether the step of this field can be one kernel: all its numbers scalars, all its operations elementary."""
+    scalars = all(x.ndim == 0 for x in numbers.shared) and all(x.ndim == 1 for x in numbers.own)
+    if not (numbers.complete and scalars):
+        return False
+    form = start_lane(solver, y)
+    step = step_function(solver, numbers, form, True)
+    return is_lanewise(step, 2 + len(numbers.shared), len(form.row()) + len(numbers.own))
+
+
+def run_steps(
+    solver: KernelSolver, numbers: Split, lane: Lane, h: Scalar, count: Int[Array, ""] | int, estimate: bool
+) -> Lane:
+    """`count` steps of size h from phase 0, in all lanes.
+
+    The tangent step of a Rosenbrock method is as large as a kernel can be, so that its tangents go one by one.
+    """
+    if isinstance(solver, AbstractRosenbrock) and len(lane.tangents) > 1:
+        each = [
+            run_steps(solver, numbers, lane._replace(tangents=(t,)), h, count, estimate) for t in lane.tangents
+        ]
+        return each[0]._replace(tangents=tuple(moved.tangents[0] for moved in each))
+    step = step_function(solver, numbers, lane, estimate)
+
+    def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
+        return lanewise(step, (i.astype(float) * h, h, *numbers.shared), (*row, *numbers.own))
+
+    return lane.filled(jax.lax.fori_loop(0, count, body, lane.row()))

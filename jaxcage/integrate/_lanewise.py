@@ -1,0 +1,93 @@
+"""A scalar function evaluated in every lane by one compiled loop.
+
+XLA's CPU backend cuts a step of an integrator into a hundred loops over the lanes and computes shared terms again in
+each of them. What is inside a reduction it leaves in one piece. `lanewise` therefore asks for a reduction over windows
+of one element, `f(init, x)` in every lane, with the numbers that all lanes share as `init`: LLVM gets one loop whose
+body is the whole of `f`, computes each term once, takes what depends on shared numbers alone out of the loop and runs
+along the lanes. Rodas4 on the cage is compiled in a third of the time and runs four times as fast as by fusions.
+"""
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.extend as jex
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .._types import Scalar
+
+
+ScalarFunction = Callable[[tuple[Any, ...], tuple[Any, ...]], tuple[Any, ...]]
+"""(shared numbers, numbers of one lane) -> numbers of that lane."""
+
+_CONTROL_FLOW = {"while", "scan", "cond"}
+
+
+def lanewise(f: ScalarFunction, shared: Sequence[Scalar], lanes: Sequence[Array]) -> tuple[Array, ...]:
+    """f(shared, lane) in every lane.
+
+    **Arguments:** a function made of elementary operations on scalars (`is_lanewise` tells); scalars; arrays of one
+    shape, at least one-dimensional. To be differentiated inside `f`, not from outside.
+
+    **Returns:** an array of that shape for each of f's results.
+    """
+    traced, used = _trace(f, len(shared), len(lanes))
+    constant = [i for i in range(len(shared)) if used[i]]
+    varying = [i for i in range(len(lanes)) if used[len(shared) + i]] or [0]
+
+    def body(first: tuple[Array, ...], second: tuple[Array, ...]) -> tuple[Array, ...]:
+        given = [jnp.zeros(())] * (len(shared) + len(lanes))
+        for place, x in zip(constant, first, strict=False):
+            given[place] = x
+        for place, x in zip(varying, second, strict=False):
+            given[len(shared) + place] = x
+        results = jax.core.eval_jaxpr(traced.jaxpr, traced.consts, *given)
+        return (*results, *second[len(results) :])
+
+    results = len(traced.jaxpr.outvars)
+    width = max(len(constant), len(varying), results)  # a reduction has as many results as operands
+    operands = [lanes[i] for i in varying]
+    operands += [operands[0]] * (width - len(operands))
+    inits = [jnp.asarray(shared[i], dtype=float) for i in constant] + [jnp.zeros(())] * (width - len(constant))
+    ones = (1,) * operands[0].ndim
+    reduced = jax.lax.reduce_window(tuple(operands), tuple(inits), body, ones, ones, "VALID")
+    return tuple(reduced[:results])
+
+
+def is_lanewise(f: ScalarFunction, shared: int, lanes: int) -> bool:
+    """Whether `f` of that many numbers is made of elementary operations on scalars alone."""
+    traced, _ = _trace(f, shared, lanes)
+    caught = any(isinstance(c, jax.core.Tracer) for c in traced.consts)
+    return not caught and _elementary(traced.jaxpr) and _in_order()
+
+
+def _elementary(jaxpr: Any) -> bool:
+    for equation in jaxpr.eqns:
+        if equation.primitive.name in _CONTROL_FLOW or any(v.aval.shape for v in (*equation.invars, *equation.outvars)):
+            return False
+        inner = [p for p in equation.params.values() if hasattr(p, "jaxpr") or hasattr(p, "eqns")]
+        if not all(_elementary(getattr(p, "jaxpr", p)) for p in inner):
+            return False
+    return True
+
+
+@functools.cache
+def _in_order() -> bool:
+    """Whether the backend reduces a window of one element as body(init, element): a reduction leaves the order free."""
+    with jax.ensure_compile_time_eval():
+        first, second = jnp.asarray([5.0, 7.0]), jnp.asarray([1.0, 2.0])
+        got = lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), (2.0,), (first, second))
+        return bool(jnp.all(got[0] == 2 - 3 * first) & jnp.all(got[1] == 2 * second))
+
+
+def _trace(f: ScalarFunction, shared: int, lanes: int) -> tuple[Any, list[bool]]:
+    """The program of f, and which of its inputs it uses."""
+    number = jax.ShapeDtypeStruct((), float)
+    traced = jax.make_jaxpr(lambda *x: tuple(f(x[:shared], x[shared:])))(*[number] * (shared + lanes))
+    needed = {v for v in traced.jaxpr.outvars if not isinstance(v, jex.core.Literal)}
+    for equation in reversed(traced.jaxpr.eqns):
+        if needed.intersection(equation.outvars):
+            needed.update(v for v in equation.invars if not isinstance(v, jex.core.Literal))
+    return traced, [v in needed for v in traced.jaxpr.invars]

@@ -1,0 +1,58 @@
+"""Monodromy matrices of many lanes at once: the strobe map and its derivative, by the kernels of the sweeps."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import require_x64
+from .._types import LaneState
+from ..integrate import AbstractMethod, controlled
+from ..models import AbstractForcedSystem
+from ._engine import COMPILER_OPTIONS, Designs, Part, run_parts
+
+
+@eqx.filter_jit(compiler_options=COMPILER_OPTIONS)
+def _monodromy_chunk(designs: Designs, method: AbstractMethod, part: Part) -> tuple[Array, ...]:
+    maps = designs.lanes(method, part)
+    zero, dim = jnp.zeros_like(part.speed), len(part.y)
+    basis: list[LaneState] = [tuple(zero + float(i == j) for j in range(dim)) for i in range(dim)]
+    moved = maps.revolution(part.y, tuple(basis))
+    columns = jnp.stack([jnp.stack(column) for column in moved.tangents])  # direction, component, lane
+    return jnp.stack(moved.y), jnp.swapaxes(columns, 0, 1), moved.outcome
+
+
+def monodromy(
+    system: AbstractForcedSystem | Sequence[AbstractForcedSystem],
+    speeds: Float[Array, " lanes"] | Float[np.ndarray, " lanes"],
+    states: Float[Array, "lanes dim"] | Float[np.ndarray, "lanes dim"],
+    *,
+    which: Any = None,
+    method: AbstractMethod | None = None,
+) -> tuple[Float[np.ndarray, "lanes dim"], Float[np.ndarray, "lanes dim dim"]]:
+    """One revolution from each state, and the derivative of where it ends with respect to where it began.
+
+    **Arguments:** system, or several of one structure; speed of each lane [rad/s]; its state at phase 0, in SI units;
+    with several systems, the place of each lane's; integration method, by default `jaxcage.controlled()`.
+
+    **Returns:** states after the revolution and the matrices, in SI units; NaN where the revolution failed.
+
+    **Raises:** `ValueError` for shapes that do not fit together.
+    """
+    require_x64()
+    speed, state = np.asarray(speeds, dtype=float), np.asarray(states, dtype=float)
+    systems = list(system) if isinstance(system, Sequence) else [system]
+    if speed.ndim != 1 or state.shape != (speed.size, systems[0].dimension):
+        raise ValueError(
+            f"Argument `states` must hold {systems[0].dimension} numbers for each of the {speed.size} speeds, but has "
+            f"shape {state.shape}."
+        )
+    place = np.zeros(speed.size, int) if which is None else np.asarray(which, int)
+    designs, chosen = Designs.of(systems), controlled() if method is None else method
+    image, matrix, outcome = run_parts(lambda part: _monodromy_chunk(designs, chosen, part), speed, place, state)
+    image, matrix = np.moveaxis(image, -1, 0), np.moveaxis(matrix, -1, 0)
+    ok = (outcome == 0)[:, None]
+    return np.where(ok, image, np.nan), np.where(ok[..., None], matrix, np.nan)
