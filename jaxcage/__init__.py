@@ -15,6 +15,7 @@
 SI units inside, always; y points up and rotation is positive counter-clockwise.
 """
 
+from ._cache import keep_compiled_programs as keep_compiled_programs
 from ._parameters import (
     parameter_info as parameter_info,
     parameters as parameters,

@@ -13,7 +13,6 @@ from jaxtyping import Array, Float, Int
 
 from .._types import LaneState
 from ..integrate import StrobeLanes, outcome_code
-from ..models import divide, multiply
 
 
 class Plan(NamedTuple):
@@ -87,12 +86,12 @@ def _advance(maps: StrobeLanes, lanes: Lanes, n: Int[Array, ""], tangents: Tange
     level = jnp.where((n + 1) % RETRY == 0, jnp.maximum(lanes.level - 1, 0), lanes.level)
     moved = maps.revolution(
         tuple(jnp.where(runs, c, 0.0) for c in lanes.y),
-        tuple(multiply(t, maps.scale) for t in tangents),
+        tuple(tuple(c * s for c, s in zip(t, maps.scale, strict=True)) for t in tangents),
         jnp.where(runs, level, 0),
     )
     outcome = jnp.where(runs, moved.outcome, lanes.outcome)
     after = Lanes(_blank(moved.y, outcome), jnp.maximum(lanes.peak, moved.peak), outcome, moved.level)
-    return after, tuple(divide(t, maps.scale) for t in moved.tangents)
+    return after, tuple(tuple(c / s for c, s in zip(t, maps.scale, strict=True)) for t in moved.tangents)
 
 
 def _blank(y: LaneState, outcome: Int[Array, " lanes"]) -> LaneState:

@@ -9,7 +9,6 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from jaxtyping import Complex, Float
-from scipy.signal import get_window
 
 from .._types import State
 from ..integrate import AbstractMethod, Trajectory, simulate
@@ -72,6 +71,8 @@ def _transform(
     if window not in get_args(Window):
         choices = ", ".join(get_args(Window))
         raise ValueError(f"Argument `window` must be one of {choices}, but '{window}' was given.")
+    from scipy.signal import get_window  # takes a second to import
+
     weights = get_window(window, len(signal))
     mean = np.sum(weights * signal) / np.sum(weights)
     lines = np.fft.fft(weights * (signal - mean)) / np.sum(weights)

@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Sequence
 
+from .._cache import keep_compiled_programs
 from ._console import leave_at_once_when_interrupted, say
 from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
 from ._options import Command, Options
@@ -41,6 +42,8 @@ def _carry_out(options: Options) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
+    if not options.no_cache:
+        keep_compiled_programs()
     implementation = importlib.import_module(f".{options.implementation}", __package__)
     show(implementation.run(options), options.json)
 

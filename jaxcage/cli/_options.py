@@ -21,6 +21,8 @@ class Options:
     """Print one JSON document on standard output instead of tables."""
     out: str = "out"
     """Folder for figures and data; it is made if need be."""
+    no_cache: bool = False
+    """Compile everything anew instead of using programs kept from earlier runs."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

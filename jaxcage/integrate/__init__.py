@@ -8,6 +8,7 @@
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
 | `_lanewise`    | a scalar function in every lane as one compiled loop                               |
 | `_kernel`      | a step as such a function, with tangent vectors                                    |
+| `_device`      | a revolution as one kernel on a GPU                                                |
 | `_strobe`      | the strobe map that everything uses                                                |
 | `_lanes`       | strobe maps of many lanes at once                                                  |
 | `_simulate`    | time histories, speed ramps                                                        |

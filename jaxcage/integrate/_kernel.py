@@ -10,10 +10,11 @@ import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Int
+from jaxtyping import Array, Bool, Int
 
-from .._types import Scalar, State
+from .._types import LaneState, Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
+from ._device import steps_on_device
 from ._explicit import explicit_step
 from ._lanewise import ScalarFunction, is_lanewise, lanewise
 from ._rosenbrock import AbstractRosenbrock, rosenbrock_step, rosenbrock_step_with_tangent
@@ -74,7 +75,7 @@ def can_be_kernel(solver: Any) -> bool:
     return isinstance(solver, AbstractRosenbrock) or (isinstance(solver, dfx.AbstractERK) and solver.tableau.fsal)
 
 
-def start_lane(solver: KernelSolver, y: State, tangents: tuple[State, ...] = ()) -> Lane:
+def start_lane(solver: KernelSolver, y: LaneState, tangents: tuple[LaneState, ...] = ()) -> Lane:
     """A lane at the beginning of a revolution."""
     zero = jnp.zeros_like(jnp.asarray(y[0]))
     unknown = (zero + jnp.nan,) * (len(y) if isinstance(solver, dfx.AbstractERK) else 0)
@@ -110,7 +111,7 @@ def step_function(solver: KernelSolver, numbers: Split, form: Lane, estimate: bo
     return step
 
 
-def runs_lanewise(solver: KernelSolver, numbers: Split, y: State) -> bool:
+def runs_lanewise(solver: KernelSolver, numbers: Split, y: LaneState) -> bool:
     """Whether the step of this field can be one kernel: all its numbers scalars, all its operations elementary."""
     scalars = all(x.ndim == 0 for x in numbers.shared) and all(x.ndim == 1 for x in numbers.own)
     if not (numbers.complete and scalars):
@@ -121,20 +122,28 @@ def runs_lanewise(solver: KernelSolver, numbers: Split, y: State) -> bool:
 
 
 def run_steps(
-    solver: KernelSolver, numbers: Split, lane: Lane, h: Scalar, count: Int[Array, ""] | int, estimate: bool
+    solver: KernelSolver,
+    numbers: Split,
+    lane: Lane,
+    h: Scalar,
+    count: Int[Array, ""] | int,
+    estimate: bool = False,
+    mine: Bool[Array, " lanes"] | None = None,
 ) -> Lane:
-    """`count` steps of size h from phase 0, in all lanes.
+    """`count` steps of size h from phase 0, in all lanes if any of them is `mine`, by default all.
 
     The tangent step of a Rosenbrock method is as large as a kernel can be, so that its tangents go one by one.
     """
     if isinstance(solver, AbstractRosenbrock) and len(lane.tangents) > 1:
-        each = [
-            run_steps(solver, numbers, lane._replace(tangents=(t,)), h, count, estimate) for t in lane.tangents
-        ]
+        one_by_one = [lane._replace(tangents=(t,)) for t in lane.tangents]
+        each = [run_steps(solver, numbers, one, h, count, estimate, mine) for one in one_by_one]
         return each[0]._replace(tangents=tuple(moved.tangents[0] for moved in each))
     step = step_function(solver, numbers, lane, estimate)
+    mine = jnp.ones(lane.y[0].shape, bool) if mine is None else mine
+    if jax.default_backend() != "cpu":
+        return lane.filled(steps_on_device(step, numbers.shared, lane.row(), numbers.own, h, count, mine))
 
     def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
         return lanewise(step, (i.astype(float) * h, h, *numbers.shared), (*row, *numbers.own))
 
-    return lane.filled(jax.lax.fori_loop(0, count, body, lane.row()))
+    return lane.filled(jax.lax.fori_loop(0, jnp.where(jnp.any(mine), count, 0), body, lane.row()))

@@ -16,7 +16,7 @@ import jax.extend as jex
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PyTree
 
-from .._types import LaneState, Scalar
+from .._types import LaneState, Scalar, State
 from ..models import ESCAPE, AbstractForcedSystem
 from ._kernel import Lane, Split, can_be_kernel, run_steps, runs_lanewise, split, start_lane
 from ._method import REVOLUTION, AbstractMethod, EqualSteps, judge
@@ -117,12 +117,12 @@ class StrobeLanes(eqx.Module):
         return Moved(after, tuple(zip(*moved, strict=True)), peak, code, level)
 
 
-def _coded(strobe: StrobeMap, y: LaneState) -> tuple[LaneState, Array, Array]:
+def _coded(strobe: StrobeMap, y: State) -> tuple[State, Array, Array]:
     stretch = strobe(y)
     return stretch.y, jnp.asarray(stretch.peak), outcome_code(stretch.result)
 
 
-def _code(y: LaneState, peak: Scalar) -> Int[Array, ""]:
+def _code(y: State, peak: Scalar) -> Int[Array, ""]:
     return outcome_code(judge(dfx.RESULTS.successful, y, peak, ESCAPE))
 
 
@@ -133,14 +133,14 @@ def _by_kernels(
     rungs = method.rungs
     last = len(rungs) - 1
 
-    def run(solver: Any, count: Array | int) -> Lane:
+    def run(solver: Any, count: Array | int, mine: Array | None = None) -> Lane:
         h = REVOLUTION / jnp.asarray(count, dtype=float)
-        return run_steps(solver, numbers, start_lane(solver, y, tangents), h, count, last > 0)
+        return run_steps(solver, numbers, start_lane(solver, y, tangents), h, count, last > 0, mine)
 
     def attempts(solver: Any, first: int, counts: Array, carry: Moved) -> Moved:
         def attempt(i: Array, carry: Moved) -> Moved:
             mine = carry.level == first + i
-            tried = run(solver, jnp.where(jnp.any(mine), counts[i], 0))
+            tried = run(solver, counts[i], mine)
             code = jax.vmap(_code)(tried.y, tried.peak)
             new = Moved(tried.y, tried.tangents, tried.peak, code, carry.level)
             kept = jax.tree.map(lambda a, b: jnp.where(mine, a, b), new, carry)
