@@ -117,7 +117,9 @@ from .sweeps import (
     monodromy as monodromy,
     rpm as rpm,
     run_up_down as run_up_down,
+    run_up_down_designs as run_up_down_designs,
     sweep as sweep,
+    sweep_designs as sweep_designs,
 )
 
 

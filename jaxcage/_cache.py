@@ -14,8 +14,8 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
     The `jaxcage` command calls this by default; a script or notebook may. It changes JAX's configuration of the whole
     process. Programs are made for the processor they were compiled on: each kind of processor has its own sub-folder.
 
-    **Arguments:** where to keep them, by default the user's cache folder. The environment variable `JAXCAGE_CACHE` names
-    another one, or switches this off if it is `off`.
+    **Arguments:** where to keep them, by default the user's cache folder. The environment variable `JAXCAGE_CACHE`
+    names another one, or switches this off if it is `off`.
 
     **Returns:** the folder, None if switched off.
     """
@@ -35,5 +35,7 @@ def _processor() -> str:
     about = [platform.machine(), platform.processor()]
     info = pathlib.Path("/proc/cpuinfo")
     if info.exists():
-        about += sorted({line for line in info.read_text().splitlines() if line.startswith(("flags", "Features", "model name"))})
+        about += sorted(
+            {line for line in info.read_text().splitlines() if line.startswith(("flags", "Features", "model name"))}
+        )
     return hashlib.sha256("\n".join(about).encode()).hexdigest()[:12]

@@ -17,7 +17,7 @@ from ..models import AbstractField
 class ClassicalRK4(dfx.AbstractERK):
     """Kutta's method of 1901: four evaluations a step, order 4(3). Not for stiff systems."""
 
-    tableau: ClassVar[dfx.ButcherTableau] = dfx.ButcherTableau(
+    tableau: ClassVar[dfx.ButcherTableau] = dfx.ButcherTableau(  # pyright: ignore[reportIncompatibleVariableOverride]
         c=np.array([1 / 2, 1 / 2, 1, 1]),
         a_lower=(
             np.array([1 / 2]),

@@ -49,11 +49,11 @@ def split(shared: Any, own: Any = None) -> Split:
 class Lane(NamedTuple):
     """What a step moves, scalars or lanes: state, largest excursion, error estimates so far, tangent vectors."""
 
-    y: State
-    peak: Scalar
-    error: Scalar
-    pending: State  # for methods whose estimate is complete with the first stage of the next step only
-    tangents: tuple[State, ...] = ()
+    y: tuple[Any, ...]
+    peak: Any
+    error: Any
+    pending: tuple[Any, ...]  # for methods whose estimate is complete with the first stage of the next step only
+    tangents: tuple[tuple[Any, ...], ...] = ()
 
     def row(self) -> tuple[Any, ...]:
         """All numbers one after the other."""
@@ -72,7 +72,9 @@ KernelSolver = AbstractRosenbrock | dfx.AbstractERK
 
 def can_be_kernel(solver: Any) -> bool:
     """Whether a step of `solver` is a plain formula: ours, and explicit methods with the first stage last."""
-    return isinstance(solver, AbstractRosenbrock) or (isinstance(solver, dfx.AbstractERK) and solver.tableau.fsal)
+    if isinstance(solver, dfx.AbstractERK):
+        return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
+    return isinstance(solver, AbstractRosenbrock)
 
 
 def start_lane(solver: KernelSolver, y: LaneState, tangents: tuple[LaneState, ...] = ()) -> Lane:
@@ -91,15 +93,15 @@ def step_function(solver: KernelSolver, numbers: Split, form: Lane, estimate: bo
         field, system, scale = numbers.remake(alike, lane[len(form.row()) :])
         pending = before.pending
         if isinstance(solver, dfx.AbstractERK):
-            y, tangents, first, early = explicit_step(solver.tableau, field, t0, h, before.y, before.tangents)
-            last = float(solver.tableau.b_error[-1])
+            tableau = solver.tableau
+            assert isinstance(tableau, dfx.ButcherTableau)
+            y, tangents, first, early = explicit_step(tableau, field, t0, h, before.y, before.tangents)
+            last = float(tableau.b_error[-1])
             late = tuple(h * (p + last * k) for p, k in zip(pending, first, strict=True))
             error = tuple(jnp.where(p == p, e, 0.0) for p, e in zip(pending, late, strict=True))  # not NaN: known
             pending = early
         elif before.tangents:
-            y, tangent, error = rosenbrock_step_with_tangent(
-                solver.tableau, field, t0, h, before.y, *before.tangents
-            )
+            y, tangent, error = rosenbrock_step_with_tangent(solver.tableau, field, t0, h, before.y, *before.tangents)
             tangents = (tangent,)
         else:
             (y, error, _), tangents = rosenbrock_step(solver.tableau, field, t0, h, before.y), ()

@@ -14,7 +14,8 @@ from typing import Any
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jax.core import Tracer, eval_jaxpr
+from jaxtyping import Array
 
 from .._types import Scalar
 
@@ -43,7 +44,7 @@ def lanewise(f: ScalarFunction, shared: Sequence[Scalar], lanes: Sequence[Array]
             given[place] = x
         for place, x in zip(varying, second, strict=False):
             given[len(shared) + place] = x
-        results = jax.core.eval_jaxpr(traced.jaxpr, traced.consts, *given)
+        results = eval_jaxpr(traced.jaxpr, traced.consts, *given)
         return (*results, *second[len(results) :])
 
     results = len(traced.jaxpr.outvars)
@@ -59,7 +60,7 @@ def lanewise(f: ScalarFunction, shared: Sequence[Scalar], lanes: Sequence[Array]
 def is_lanewise(f: ScalarFunction, shared: int, lanes: int) -> bool:
     """Whether `f` of that many numbers is made of elementary operations on scalars alone."""
     traced, _ = _trace(f, shared, lanes)
-    caught = any(isinstance(c, jax.core.Tracer) for c in traced.consts)
+    caught = any(isinstance(c, Tracer) for c in traced.consts)
     return not caught and _elementary(traced.jaxpr) and _in_order()
 
 

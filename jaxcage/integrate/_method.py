@@ -248,9 +248,7 @@ DEFAULT_LADDER = (("rk4", 128), ("rk4", 384), ("rk4", 768), ("rodas4", 1024))
 DEFAULT_ERROR = 1e-2
 
 
-def method(
-    solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None
-) -> AbstractMethod:
+def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
     """An integration method by name.
 
     **Arguments:**

@@ -227,6 +227,11 @@ class CageAtSpeed(eqx.Module):
         )
 
 
+def _times(factor: Scalar, k: Rows) -> Rows:
+    (xx, xy), (yx, yy) = k
+    return (factor * xx, factor * xy), (factor * yx, factor * yy)
+
+
 def _turned(k: Rows, nx: Scalar, ny: Scalar) -> Rows:
     """A matrix in the frame (n, t), with t = (-ny, nx), in Cartesian coordinates."""
     (nn, nt), (tn, tt) = k
@@ -265,8 +270,7 @@ class RigidRibLaw(eqx.Module):
             return None
         per_mass = 1 / self.cage.mass
         of_q, of_v = self.cage.slopes(*q, *v)
-        scaled = lambda rows: tuple(tuple(per_mass * c for c in row) for row in rows)
-        return scaled(of_q), scaled(of_v)
+        return _times(per_mass, of_q), _times(per_mass, of_v)
 
 
 class ElasticRibLaw(eqx.Module):

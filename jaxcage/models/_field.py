@@ -215,12 +215,13 @@ class SecondOrderField(AbstractField):
         n = len(y) // 2
         q, v = y[:n], y[n:]
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
-        slopes = getattr(self.acceleration, "slopes", lambda q, v: None)(q, v)
-        if slopes is None:
+        given = getattr(self.acceleration, "slopes", lambda q, v: None)(q, v)
+        if given is not None:
+            a_q, a_v = given
+        else:
             a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
             a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
-            slopes = a_q, a_v
-        return SecondOrderLinearisation(value, slope, *slopes, self.speed)
+        return SecondOrderLinearisation(value, slope, a_q, a_v, self.speed)
 
 
 class ScaledLinearisation(AbstractLinearisation):

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, overload
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -30,18 +29,8 @@ class Hysteresis:
         return np.max(np.abs(means[0] - means[1]), axis=-1)
 
 
-@overload
 def run_up_down(
-    system: AbstractForcedSystem, speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"], **options: Any
-) -> Hysteresis: ...
-@overload
-def run_up_down(
-    system: Sequence[AbstractForcedSystem],
-    speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
-    **options: Any,
-) -> list[Hysteresis]: ...
-def run_up_down(
-    system: AbstractForcedSystem | Sequence[AbstractForcedSystem],
+    system: AbstractForcedSystem,
     speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
     start: State | None = None,
@@ -52,22 +41,44 @@ def run_up_down(
     keep: int = 48,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
-) -> Hysteresis | list[Hysteresis]:
+) -> Hysteresis:
     """Sweep up and down in speed, each speed beginning with the state in which the last one ended.
 
-    Both directions of all systems (cases, designs that differ in their numbers only) run as lanes of one batch. Where the carried state has failed, the next speed begins from the
-    start again, so that one failure does not spoil the rest.
+    Where the carried state has failed, the next speed begins from the start again, so that one failure does not spoil
+    the rest.
 
     **Arguments:** as for `sweep`, with a single start.
 
-    **Returns:** `Hysteresis`, two sweeps of one start each; a list of them for several systems.
+    **Returns:** `Hysteresis`, two sweeps of one start each.
+    """
+    options = dict(discard=discard, revolutions=revolutions, exponents=exponents, blocks=blocks, keep=keep)
+    return run_up_down_designs([system], speeds, start=start, method=method, progress=progress, **options)[0]
+
+
+def run_up_down_designs(
+    systems: Sequence[AbstractForcedSystem],
+    speeds: Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    *,
+    start: State | None = None,
+    discard: int = 100,
+    revolutions: int = 60,
+    exponents: int = 1,
+    blocks: int = 10,
+    keep: int = 48,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> list[Hysteresis]:
+    """`run_up_down` for several designs or cases at once: both directions of all of them are lanes of one batch.
+
+    **Arguments:** systems that differ in their numbers only; the rest as for `run_up_down`.
+
+    **Returns:** a `Hysteresis` for each system.
     """
     require_x64()
     speed = checked_speeds(speeds)
     chosen = controlled() if method is None else method
-    systems = list(system) if isinstance(system, Sequence) else [system]
     if not systems:
-        raise ValueError("Argument `system` must hold at least one system, but it is empty.")
+        raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
     plan = make_plan(discard, revolutions, blocks, keep, exponents, systems[0].dimension)
     starts = None if start is None else [start]
     fresh = np.stack([initial_states(s, speed, starts)[:, 0] for s in systems])  # systems, speeds, dim
@@ -86,7 +97,7 @@ def run_up_down(
         up, down = (_stacked([tuple(x[..., 2 * i + j] for x in o) for o in seen]) for j in (0, 1))
         make = lambda parts, one=one: assemble(one, speed, chosen, plan, parts, (speed.size, 1))
         found.append(Hysteresis(make(up), make(tuple(x[..., ::-1] for x in down))))
-    return found if isinstance(system, Sequence) else found[0]
+    return found
 
 
 def _stacked(rows: list[tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:

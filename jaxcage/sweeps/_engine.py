@@ -35,12 +35,17 @@ Progress = Callable[[int, int], None]
 """Called with lanes done and lanes in all."""
 
 
-@eqx.filter_jit(compiler_options=COMPILER_OPTIONS)
+def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
+    """`equinox.filter_jit` for programs over lanes."""
+    return eqx.filter_jit(f, compiler_options=COMPILER_OPTIONS)  # pyright: ignore[reportCallIssue]
+
+
+@compiled
 def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: int, part: "Part") -> Lanes:
     return settle(designs.lanes(method, part), part.y, revolutions)
 
 
-@eqx.filter_jit(compiler_options=COMPILER_OPTIONS)
+@compiled
 def _observe_chunk(
     designs: "Designs", method: AbstractMethod, plan: Plan, part: "Part", outcome: Array, level: Array
 ) -> Observation:
@@ -158,7 +163,9 @@ def run_lanes(
     size = _chunk_size(lanes)
     static = Plan(*map(int, plan))
     first = static.discard - static.align
-    share = np.array([first, static.block * static.blocks + static.align]) / (static.discard + static.block * static.blocks)
+    share = np.array([first, static.block * static.blocks + static.align]) / (
+        static.discard + static.block * static.blocks
+    )
     done = [0, 0]
 
     def report(stage: int) -> Callable[[int], None]:

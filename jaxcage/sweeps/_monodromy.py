@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -12,10 +11,10 @@ from .._checks import require_x64
 from .._types import LaneState
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
-from ._engine import COMPILER_OPTIONS, Designs, Part, run_parts
+from ._engine import Designs, Part, compiled, run_parts
 
 
-@eqx.filter_jit(compiler_options=COMPILER_OPTIONS)
+@compiled
 def _monodromy_chunk(designs: Designs, method: AbstractMethod, part: Part) -> tuple[Array, ...]:
     maps = designs.lanes(method, part)
     zero, dim = jnp.zeros_like(part.speed), len(part.y)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Any, overload
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -50,20 +50,8 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
-@overload
 def sweep(
     system: AbstractForcedSystem,
-    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
-    **options: Any,
-) -> Sweep: ...
-@overload
-def sweep(
-    system: Sequence[AbstractForcedSystem],
-    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
-    **options: Any,
-) -> list[Sweep]: ...
-def sweep(
-    system: AbstractForcedSystem | Sequence[AbstractForcedSystem],
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
@@ -74,12 +62,12 @@ def sweep(
     keep: int = 64,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
-) -> Sweep | list[Sweep]:
+) -> Sweep:
     """Run a forced system over speed from several starts: strobe states, Lyapunov exponents, labels.
 
     **Arguments:**
 
-    - `system`: any `AbstractForcedSystem`, or several that differ in their numbers only: designs, cases.
+    - `system`: any `AbstractForcedSystem`.
     - `speeds`: ascending speeds [rad/s]; `jaxcage.rpm` makes them from revolutions per minute.
     - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; by default the
         system's own.
@@ -90,28 +78,49 @@ def sweep(
     - `method`: integration method, by default `jaxcage.controlled()`.
     - `progress`: called with lanes done and lanes in all.
 
-    **Returns:** `Sweep`, a list of them for several systems. Lanes that fail are NaN with an outcome and leave their neighbours untouched.
+    **Returns:** `Sweep`. Lanes that fail are NaN with an outcome and leave their neighbours untouched.
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
     `RuntimeError` without double precision.
     """
+    options = dict(discard=discard, revolutions=revolutions, exponents=exponents, blocks=blocks, keep=keep)
+    return sweep_designs([system], speeds, starts=starts, method=method, progress=progress, **options)[0]
+
+
+def sweep_designs(
+    systems: Sequence[AbstractForcedSystem],
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    *,
+    starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
+    discard: int = 300,
+    revolutions: int = 300,
+    exponents: int = 1,
+    blocks: int = 20,
+    keep: int = 64,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> list[Sweep]:
+    """`sweep` for several designs or cases at once, all lanes in one batch: one program, full chunks.
+
+    **Arguments:** systems that differ in their numbers only; the rest as for `sweep`.
+
+    **Returns:** a `Sweep` for each system, the same as one by one.
+    """
     require_x64()
     speed = checked_speeds(speeds)
     chosen = controlled() if method is None else method
-    systems = list(system) if isinstance(system, Sequence) else [system]
     if not systems:
-        raise ValueError("Argument `system` must hold at least one system, but it is empty.")
-    plan = make_plan(discard, revolutions, blocks, keep, exponents, systems[0].dimension)
-    y0 = [initial_states(s, speed, starts) for s in systems]
-    shape = y0[0].shape[:2]
-    lanes = np.concatenate([y.reshape(-1, systems[0].dimension) for y in y0])
+        raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
+    dim = systems[0].dimension
+    plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
+    y0 = np.stack([initial_states(s, speed, starts) for s in systems])  # systems, speeds, starts, dim
+    shape = y0.shape[1:3]
     each = shape[0] * shape[1]
     which = np.repeat(np.arange(len(systems)), each)
     lane_speed = np.tile(np.repeat(speed, shape[1]), len(systems))
-    seen = run_lanes(systems, chosen, plan, lane_speed, lanes, progress, which)
+    seen = run_lanes(systems, chosen, plan, lane_speed, y0.reshape(-1, dim), progress, which)
     parts = [tuple(x[..., i * each : (i + 1) * each] for x in seen) for i in range(len(systems))]
-    found = [assemble(s, speed, chosen, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
-    return found if isinstance(system, Sequence) else found[0]
+    return [assemble(s, speed, chosen, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
 
 
 def assemble(
