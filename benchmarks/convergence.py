@@ -25,6 +25,8 @@ REFERENCE = jc.method("rodas4", steps=8192)
 METHODS = [
     *(("rodas3", n) for n in (64, 128, 256, 512, 1024)),
     *(("rodas4", n) for n in (64, 96, 128, 192, 256, 512)),
+    *(("rk4", n) for n in (64, 96, 128, 192, 256, 384, 512, 768)),
+    ("controlled", 0),
     *(("newmark", n) for n in (128, 512, 2048)),
 ]
 PICTURES = [
@@ -35,7 +37,13 @@ PICTURES = [
     ("rodas4", 64),
     ("rodas4", 128),
     ("rodas4", 256),
+    ("controlled", 0),
 ]
+
+
+def make(solver: str, steps: int) -> jc.AbstractMethod:
+    """A method of the tables; `controlled` is the default of sweeps, which chooses its steps."""
+    return jc.controlled() if solver == "controlled" else jc.method(solver, steps=steps)
 
 
 def attractor_states(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
@@ -56,7 +64,7 @@ def errors(model: jc.CageModel, speeds: np.ndarray, states: np.ndarray, quick: b
     scale = np.asarray(model.clearance)
     rows = []
     for solver, steps in METHODS[:: 3 if quick else 1]:
-        method = jc.method(solver, steps=steps)
+        method = make(solver, steps)
         got = one_revolution(model, speeds, states, method)
         apart = np.max(np.abs(got - truth)[..., :2], axis=-1).ravel() / scale
         apart = np.where(np.isfinite(apart), apart, np.inf)
@@ -70,7 +78,7 @@ def pictures(model: jc.CageModel, speeds: np.ndarray, quick: bool) -> list[list[
     """Rows of table 2."""
     rows = []
     for solver, steps in PICTURES[:: 3 if quick else 1]:
-        got = jc.sweep(model, speeds, method=jc.method(solver, steps=steps))
+        got = jc.sweep(model, speeds, method=make(solver, steps))
         found = jc.zones(got)
         spans = [f"{z.onset or 'below'} to {z.exit or 'above'}" for z in found.zones if (z.width_rpm or 1e9) >= 500]
         failed = int(np.sum(got.failed))

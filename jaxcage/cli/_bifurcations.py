@@ -14,7 +14,7 @@ from ..orbits import LossZones, SynchronousOrbits, loss_zones, synchronous_orbit
 from ..plotting import multiplier_circle, new_figure, orbit_diagram_with_branches
 from ._console import progress_in_stages
 from ._errors import ComputationError, UsageError, require_at_least, require_speed
-from ._inputs import Subject, angular_speed, integration, output_folder, save_figure, subject
+from ._inputs import Subject, angular_speed, asks_for_a_method, integration, output_folder, save_figure, subject
 from ._options import BifurcationsOptions, SearchOptions
 from ._orbit_report import coexisting_notes, edge_table, loss_table, orbits_document, stretch_table
 from ._report import Report
@@ -60,7 +60,7 @@ def search_case(options: SearchOptions, about: Subject | None = None) -> Searche
             angular_speed(options.last),
             count=options.count,
             discard=options.discard,
-            method=chosen,
+            method=chosen if asks_for_a_method(options) else None,  # None: the sweep has a default of its own
             progress=bar,
         )
     seconds = time.perf_counter() - began

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
-from ..integrate import AbstractMethod, FixedSteps, method
+from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import check_writable, load_model, replacing
 from ..models import CageModel, case
 from ._console import say
@@ -57,6 +57,16 @@ def integration(options: IntegrationOptions) -> AbstractMethod:
         return method(options.solver, options.steps, options.tolerance)
     except ValueError as error:
         raise UsageError(_as_options(str(error))) from error
+
+
+def sweep_integration(options: IntegrationOptions) -> AbstractMethod:
+    """The same for sweeps, whose steps are controlled unless the options ask for something else."""
+    return integration(options) if asks_for_a_method(options) else controlled()
+
+
+def asks_for_a_method(options: IntegrationOptions) -> bool:
+    """Whether any option says how to integrate."""
+    return not (options.solver is None and options.steps is None and options.tolerance is None)
 
 
 def _as_options(sentence: str) -> str:

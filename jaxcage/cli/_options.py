@@ -30,7 +30,7 @@ class IntegrationOptions(Options):
     """How to integrate."""
 
     solver: str | None = None
-    """Integration method: rodas3, rodas4, newmark, tsit5, kvaerno3, kvaerno5, kencarp4."""
+    """Integration method: rodas3, rodas4, rk4, newmark, tsit5, kvaerno3, kvaerno5, kencarp4."""
     steps: int | None = None
     """Equal steps per revolution."""
     tolerance: float | None = None

@@ -10,7 +10,7 @@ from ..plotting import new_figure, strobe_section
 from ..sweeps import sweep
 from ._console import progress
 from ._errors import ComputationError, require_at_least, require_blocks, require_speed
-from ._inputs import angular_speed, integration, output_folder, save_figure, subject
+from ._inputs import angular_speed, output_folder, save_figure, subject, sweep_integration
 from ._options import PoincareOptions
 from ._report import Report, Table, number
 
@@ -20,7 +20,7 @@ def run(options: PoincareOptions) -> Report:
     require_speed("--speed", options.speed)
     require_at_least("--discard", options.discard, 0)
     blocks = require_blocks("--revolutions", options.revolutions)
-    chosen, about, folder = integration(options), subject(options), output_folder(options)
+    chosen, about, folder = sweep_integration(options), subject(options), output_folder(options)
     with progress(f"poincare {about.name}") as bar:
         found = sweep(
             about.model,

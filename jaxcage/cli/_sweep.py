@@ -15,7 +15,15 @@ from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
 from ..sweeps import rpm, sweep
 from ._console import progress, say
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
-from ._inputs import Subject, integration, output_folder, samples_per_revolution, save_figure, subject
+from ._inputs import (
+    Subject,
+    integration,
+    output_folder,
+    samples_per_revolution,
+    save_figure,
+    subject,
+    sweep_integration,
+)
 from ._options import SweepOptions
 from ._report import Report, Table
 from ._zone_report import zones_document, zones_table
@@ -54,7 +62,7 @@ def sweep_case(options: SweepOptions) -> Swept:
     """Check everything, run the sweep that the options describe, and store it."""
     _check(options)
     blocks = require_blocks("--revolutions", options.revolutions)
-    chosen = integration(options)
+    chosen = sweep_integration(options)
     about = subject(options)
     if options.exponents > about.model.dimension:
         raise UsageError(
