@@ -8,12 +8,13 @@ revolutions: exponents, monodromy matrices, an edge with its gradient, lanes by 
 
 import argparse
 import json
-import os
 import pathlib
 import tempfile
 import time
 from collections.abc import Callable
 from typing import Any
+
+from jaxcage.sweeps import cores as available_cores
 
 from . import sections
 from .plain import seconds
@@ -58,7 +59,7 @@ def main() -> None:
     """Run the sections and report."""
     given = arguments()
     begin = time.perf_counter()
-    cores = len(os.sched_getaffinity(0))
+    cores = available_cores()
     results: dict[str, Any] = {"machine": machine(cores)}
     print("states on the attractors", flush=True)
     problem = make_problem(512 if given.quick else 2048)

@@ -18,11 +18,12 @@ PACKAGES = ("jaxcage", "jax", "jaxlib", "diffrax", "equinox", "numpy", "scipy", 
 def machine(cores: int) -> dict[str, str]:
     """What the numbers were measured on."""
     cpu = pathlib.Path("/proc/cpuinfo")
-    models = [line.split(":")[1].strip() for line in cpu.read_text().splitlines() if line.startswith("model name")]
-    flags = [word for word in ("avx512f", "avx2") if cpu.exists() and word in cpu.read_text()]
+    about = cpu.read_text() if cpu.exists() else ""
+    models = [line.split(":")[1].strip() for line in about.splitlines() if line.startswith("model name")]
+    flags = [word for word in ("avx512f", "avx2") if word in about]
     load = "/".join(f"{x:.1f}" for x in os.getloadavg())
     return {
-        "processor": f"{models[0] if models else platform.processor()}, {', '.join(flags[:1])}",
+        "processor": ", ".join([models[0] if models else platform.processor(), *flags[:1]]),
         "cores": str(cores),
         "load before": load,
         "python": platform.python_version(),

@@ -30,7 +30,12 @@ class CRosenbrock:
         self.name, self.method, self.settings = f"C, {method}", method, settings
 
     def missing(self) -> str | None:
-        return None if shutil.which("cc") else "no compiler"
+        if not shutil.which("cc"):
+            return "no compiler"
+        probe = ["cc", *FLAGS, "-fsyntax-only", "-x", "c", "-"]
+        return (
+            "no OpenMP" if subprocess.run(probe, input=b"#include <omp.h>\n", capture_output=True).returncode else None
+        )
 
     def prepare(self, cores: int) -> None:
         self.cores = cores
