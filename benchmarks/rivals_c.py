@@ -33,9 +33,8 @@ class CRosenbrock:
         if not shutil.which("cc"):
             return "no compiler"
         probe = ["cc", *FLAGS, "-fsyntax-only", "-x", "c", "-"]
-        return (
-            "no OpenMP" if subprocess.run(probe, input=b"#include <omp.h>\n", capture_output=True).returncode else None
-        )
+        done = subprocess.run(probe, input=b"#include <omp.h>\n", capture_output=True)
+        return "no OpenMP" if done.returncode else None
 
     def prepare(self, cores: int) -> None:
         self.cores = cores

@@ -1,8 +1,9 @@
-/* The cage by Rosenbrock methods with equal steps, eight lanes to a vector, two vectors to a block, blocks on all cores.
+/* The cage by Rosenbrock methods and the classical Runge-Kutta method with equal steps: eight lanes to a vector, two
+   vectors to a block, blocks on all cores.
 
    The floor of the benchmark: the formulas of the fixed half film, the land contact and the elastic support in a rigid
-   rib, with their Jacobian, written out for this one model. Lengths in clearances, phase tau for time, so that a state is
-   (x, y, x', y') with x' = dx/dtau. Constants and states come as columns of `lanes` numbers, `lanes` a multiple of BLOCK.
+   rib, with their Jacobian, written out for this one model. Lengths in clearances, phase tau for time: a state is
+   (x, y, x', y') with x' = dx/dtau. Constants and states come as columns of `lanes` numbers, a multiple of 16.
 */
 #include <math.h>
 #include <stdlib.h>
@@ -22,7 +23,8 @@ typedef double V __attribute__((vector_size(8 * WIDTH)));
 typedef long long M __attribute__((vector_size(8 * WIDTH)));
 
 typedef struct {
-    V film, contact, hysteresis, onset, width, centre2, spring_x, spring_y, cubic, damping, cross, turning, impact, weight;
+    V film, contact, hysteresis, onset, width, centre2, spring_x, spring_y;
+    V cubic, damping, cross, turning, impact, weight;
 } Constants;
 #define N_CONSTANTS (sizeof(Constants) / sizeof(V))
 
@@ -68,7 +70,8 @@ INLINE V ninth_root(V a) {
     return a * (r4 * r4);
 }
 
-/* Where the cage is: film times its matrix is I iso + n n^T rad - (n t^T + t n^T) skew with n = kept (x, y), t = (-n_y, n_x). */
+/* Where the cage is. The film's scale times its matrix is I iso + n n^T rad - (n t^T + t n^T) skew with n = kept (x, y)
+   and t = (-n_y, n_x). */
 typedef struct {
     V per_eps, kept, nx, ny, inverse, iso, rad, skew, q2;
     M touching;
@@ -183,7 +186,8 @@ INLINE Pair linearise(const Constants *p, State z, double c, double s, Square *a
     Place g = place(p, z.x, z.y);
     Pair w = {2 * z.u + z.y, 2 * z.v - z.x};
     V a = g.nx * w.x + g.ny * w.y, b = g.nx * w.y - g.ny * w.x;
-    V xx = g.iso + g.rad * g.nx * g.nx + 2 * g.skew * g.nx * g.ny, yy = g.iso + g.rad * g.ny * g.ny - 2 * g.skew * g.nx * g.ny;
+    V xx = g.iso + g.rad * g.nx * g.nx + 2 * g.skew * g.nx * g.ny;
+    V yy = g.iso + g.rad * g.ny * g.ny - 2 * g.skew * g.nx * g.ny;
     V xy = g.rad * g.nx * g.ny - g.skew * (g.nx * g.nx - g.ny * g.ny);
     Pair by_x, by_y;
     if (__builtin_expect(g.contact, 0)) {

@@ -134,7 +134,7 @@ def edge(setup: Setup) -> dict[str, Any]:
 
 def scaling(setup: Setup) -> dict[str, Any]:
     """Time and memory over lanes and over revolutions, each run in a process of its own."""
-    lanes = [(1, 200), (16, 200), (256, 100), (1024, 20), (2048, 20), (4096, 10), (16384, 4), (100_000, 1)]
+    lanes = [(1, 200), (16, 200), (256, 100), (1024, 20), (2048, 20), (4096, 20), (16384, 10), (100_000, 5)]
     turns = [(256, 20), (256, 200), (256, 1000), (256, 4000)]
     single = [(256, 100), (2048, 20)]
     if setup.quick:

@@ -33,8 +33,9 @@ def ask(task: str, limit: float = 600.0, **numbers: Any) -> dict[str, Any] | Non
 
 
 def keep_cores(count: int) -> None:
-    """Leave this process only so many cores, where the system can. Threads that exist already keep theirs: to
-    be called before JAX starts.
+    """Leave this process only so many cores, where the system can.
+
+    Threads that exist already keep theirs: to be called before JAX starts.
     """
     if sys.platform == "linux":
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:count])
