@@ -1,7 +1,7 @@
 """How many lanes a call should hold on this machine: `python -m benchmarks.chunks`.
 
 Times a sweep with one exponent for several chunk sizes, after a run that compiles, and prints microseconds per
-revolution and lane. The best size goes into `jaxcage/sweeps/_engine.py`.
+revolution and lane. The best sizes go into `jaxcage/sweeps/_engine.py`.
 """
 
 import time
@@ -23,7 +23,7 @@ def main() -> None:
     """Print the table."""
     model, speeds = jc.case("1a"), jc.rpm(4000, 27500, LANES)
     for size in (32, 64, 128, 256, 512):
-        _engine.CHUNK = size
+        _engine.CHUNKS = (size,)
         run = lambda: jc.sweep(
             model, speeds, starts=[(0.0, -2e-4, 0.0, 0.0)], discard=0, revolutions=REVOLUTIONS, blocks=1
         )

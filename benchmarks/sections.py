@@ -134,9 +134,9 @@ def edge(setup: Setup) -> dict[str, Any]:
 
 def scaling(setup: Setup) -> dict[str, Any]:
     """Time and memory over lanes and over revolutions, each run in a process of its own."""
-    lanes = [(1, 200), (16, 200), (256, 100), (1024, 20), (2048, 20), (4096, 20), (16384, 10), (100_000, 5)]
+    lanes = [(1, 200), (16, 200), *((n, 50) for n in (256, 1024, 2048, 4096, 16384, 100_000))]
     turns = [(256, 20), (256, 200), (256, 1000), (256, 4000)]
-    single = [(256, 100), (2048, 20)]
+    single = [(256, 50), (2048, 50)]
     if setup.quick:
         lanes, turns, single = lanes[1:3], [], single[:1]
     plans = [(n, r, setup.cores) for n, r in [*lanes, *turns]]

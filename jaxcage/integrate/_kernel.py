@@ -3,6 +3,7 @@
 The numbers of field, system and scale are its inputs; the rest (structure, tableau) is fixed.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -123,6 +124,10 @@ def runs_lanewise(solver: KernelSolver, numbers: Split, y: LaneState) -> bool:
     return is_lanewise(step, 2 + len(numbers.shared), len(form.row()) + len(numbers.own))
 
 
+TOGETHER = 4
+"""Steps of an explicit method in one kernel, half as many with tangents: between kernels all numbers are copied."""
+
+
 def run_steps(
     solver: KernelSolver,
     numbers: Split,
@@ -131,21 +136,33 @@ def run_steps(
     count: Int[Array, ""] | int,
     estimate: bool = False,
     mine: Bool[Array, " lanes"] | None = None,
+    divisor: int = 1,
 ) -> Lane:
     """`count` steps of size h from phase 0, in all lanes if any of them is `mine`, by default all.
 
     The tangent step of a Rosenbrock method is as large as a kernel can be, so that its tangents go one by one.
+    `divisor` is a number that `count` is known to be a multiple of.
     """
     if isinstance(solver, AbstractRosenbrock) and len(lane.tangents) > 1:
-        one_by_one = [lane._replace(tangents=(t,)) for t in lane.tangents]
-        each = [run_steps(solver, numbers, one, h, count, estimate, mine) for one in one_by_one]
-        return each[0]._replace(tangents=tuple(moved.tangents[0] for moved in each))
+        along = lambda t: run_steps(solver, numbers, lane._replace(tangents=(t,)), h, count, estimate, mine, divisor)
+        each = jax.lax.map(along, jax.tree.map(lambda *t: jnp.stack(t), *lane.tangents))
+        pick = lambda i: jax.tree.map(lambda x: x[i], each)
+        return pick(0)._replace(tangents=tuple(pick(i).tangents[0] for i in range(len(lane.tangents))))
     step = step_function(solver, numbers, lane, estimate)
     mine = jnp.ones(lane.y[0].shape, bool) if mine is None else mine
     if jax.default_backend() != "cpu":
         return lane.filled(steps_on_device(step, numbers.shared, lane.row(), numbers.own, h, count, mine))
+    few = TOGETHER // 2 if lane.tangents else TOGETHER
+    together = math.gcd(divisor, few) if isinstance(solver, dfx.AbstractERK) else 1
+
+    def several(shared: tuple[Any, ...], given: tuple[Any, ...]) -> tuple[Any, ...]:
+        t0, h, *alike = shared
+        row, own = given[: len(given) - len(numbers.own)], given[len(given) - len(numbers.own) :]
+        for i in range(together):
+            row = step((t0 + i * h, h, *alike), (*row, *own))
+        return row
 
     def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
-        return lanewise(step, (i.astype(float) * h, h, *numbers.shared), (*row, *numbers.own))
+        return lanewise(several, (i.astype(float) * (together * h), h, *numbers.shared), (*row, *numbers.own))
 
-    return lane.filled(jax.lax.fori_loop(0, jnp.where(jnp.any(mine), count, 0), body, lane.row()))
+    return lane.filled(jax.lax.fori_loop(0, jnp.where(jnp.any(mine), count // together, 0), body, lane.row()))

@@ -6,6 +6,7 @@ same for all lanes: as scalars they stay in registers, and what follows from the
 """
 
 import itertools
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, PyTree
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from .._types import LaneState, Scalar, State
 from ..models import ESCAPE, AbstractForcedSystem
@@ -126,34 +127,63 @@ def _code(y: State, peak: Scalar) -> Int[Array, ""]:
     return outcome_code(judge(dfx.RESULTS.successful, y, peak, ESCAPE))
 
 
+BLOCK = 16
+"""Lanes packed together on a CPU: smaller blocks cost more calls, larger ones run more lanes for nothing."""
+
+
 def _by_kernels(
     method: EqualSteps, numbers: Split, y: LaneState, tangents: tuple[LaneState, ...], level: Int[Array, " lanes"]
 ) -> Moved:
     """Each rung in turn, for the lanes that ask for it: those whose error is too large ask for the next."""
     rungs = method.rungs
     last = len(rungs) - 1
+    if last == 0:
+        solver, count = rungs[0]
+        after = run_steps(solver, numbers, start_lane(solver, y, tangents), REVOLUTION / count, count, divisor=count)
+        return Moved(after.y, after.tangents, after.peak, jax.vmap(_code)(after.y, after.peak), level)
 
-    def run(solver: Any, count: Array | int, mine: Array | None = None) -> Lane:
-        h = REVOLUTION / jnp.asarray(count, dtype=float)
-        return run_steps(solver, numbers, start_lane(solver, y, tangents), h, count, last > 0, mine)
+    def attempts(solver: Any, first: int, steps: list[int], carry: Moved) -> Moved:
+        counts, divisor = jnp.asarray(steps), math.gcd(*steps)
 
-    def attempts(solver: Any, first: int, counts: Array, carry: Moved) -> Moved:
         def attempt(i: Array, carry: Moved) -> Moved:
             mine = carry.level == first + i
-            tried = run(solver, counts[i], mine)
+            tried = _run_those(mine, solver, counts[i], divisor, numbers, start_lane(solver, y, tangents))
             code = jax.vmap(_code)(tried.y, tried.peak)
             new = Moved(tried.y, tried.tangents, tried.peak, code, carry.level)
             kept = jax.tree.map(lambda a, b: jnp.where(mine, a, b), new, carry)
             poor = mine & ~((tried.error <= method.accepted) & (code == 0)) & (first + i < last)
             return kept._replace(level=jnp.where(poor, carry.level + 1, carry.level))
 
-        return jax.lax.fori_loop(0, counts.shape[0], attempt, carry)
+        return jax.lax.fori_loop(0, len(steps), attempt, carry)
 
-    if last == 0:
-        after = run(*rungs[0])
-        return Moved(after.y, after.tangents, after.peak, jax.vmap(_code)(after.y, after.peak), level)
     moved = Moved(y, tangents, jnp.zeros_like(y[0]), jnp.zeros_like(level), level)
     for solver, group in itertools.groupby(enumerate(rungs), key=lambda pair: pair[1].solver):
         places = list(group)
-        moved = attempts(solver, places[0][0], jnp.asarray([rung.steps for _, rung in places]), moved)
+        moved = attempts(solver, places[0][0], [rung.steps for _, rung in places], moved)
     return moved
+
+
+def _run_those(
+    mine: Bool[Array, " lanes"], solver: Any, count: Array, divisor: int, numbers: Split, start: Lane
+) -> Lane:
+    """A revolution of the lanes that are `mine`; what becomes of the others is of no account.
+
+    On a CPU those lanes are packed into blocks, so that the work is that of the lanes which ask for it, whatever their
+    neighbours need. On a GPU each block of the grid looks for itself whether it is asked for.
+    """
+    h, lanes = REVOLUTION / count.astype(float), mine.shape[0]
+    run = lambda own, lane, mine: run_steps(solver, numbers._replace(own=own), lane, h, count, True, mine, divisor)
+    if jax.default_backend() != "cpu" or lanes <= BLOCK:
+        return run(numbers.own, start, mine)
+    order = jnp.argsort(~mine, stable=True)
+    own, packed = jax.tree.map(lambda x: x[order], (numbers.own, start))
+
+    def run_block(i: Array, lane: Lane) -> Lane:
+        first = jnp.minimum(i * BLOCK, lanes - BLOCK)  # the last block begins earlier where it must
+        cut = lambda x: jax.lax.dynamic_slice_in_dim(x, first, BLOCK)
+        moved = run(*jax.tree.map(cut, (own, packed)), None)
+        return jax.tree.map(lambda x, new: jax.lax.dynamic_update_slice_in_dim(x, new, first, 0), lane, moved)
+
+    moved = jax.lax.fori_loop(0, (jnp.sum(mine) + BLOCK - 1) // BLOCK, run_block, packed)
+    back = jnp.argsort(order)
+    return jax.tree.map(lambda x: x[back], moved)

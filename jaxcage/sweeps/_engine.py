@@ -7,7 +7,7 @@ full size, so that the arithmetic of a lane does not depend on how many neighbou
 
 import concurrent.futures
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -22,9 +22,10 @@ from ..integrate import AbstractMethod, StrobeLanes
 from ..models import AbstractForcedSystem
 
 
-CHUNK = 128
-"""Lanes per call on a CPU: large enough to hide the cost of dispatch, small enough to stay in cache (measured by
-`python -m benchmarks.chunks`)."""
+CHUNKS = (16, 32, 64, 128, 256, 512)
+"""Lanes per call on a CPU: few sizes, as each is compiled (`python -m benchmarks.chunks` times them)."""
+CALL = 32
+"""What a call costs beside its lanes, in lanes."""
 
 COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512, "xla_cpu_use_fusion_emitters": False}
 """Eight lanes to an instruction where the processor can (XLA's default is four); and the older of XLA's two emitters:
@@ -91,20 +92,20 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
-def _chunks(lanes: int, size: int) -> Iterator[slice]:
-    return (slice(i, min(i + size, lanes)) for i in range(0, lanes, size))
-
-
 def _padded(x: np.ndarray, size: int) -> np.ndarray:
     """Repeat the last lane up to `size` lanes."""
     return np.concatenate([x, np.repeat(x[-1:], size - x.shape[0], axis=0)])
 
 
 def _in_chunks(
-    work: Callable[[np.ndarray], Any], order: np.ndarray, size: int, report: Callable[[int], None]
+    work: Callable[[np.ndarray], Any], lanes: np.ndarray, size: int, report: Callable[[int], None]
 ) -> tuple[np.ndarray, ...]:
-    """`work` on the lanes of `order`, chunk by chunk on all cores; results in the order of the lanes."""
-    parts = [order[s] for s in _chunks(order.size, size)]
+    """`work` on `lanes`, chunk by chunk on all cores; results in the order of their numbers.
+
+    Lanes are dealt out to the chunks like cards: neighbours need about as many steps, and so every chunk takes as long.
+    """
+    chunks = -(-lanes.size // size)
+    parts = [lanes[i::chunks] for i in range(chunks)]
     with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
         futures = [pool.submit(lambda p: [np.asarray(x) for x in work(_padded(p, size))], part) for part in parts]
         try:
@@ -114,7 +115,7 @@ def _in_chunks(
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    back = np.argsort(order, kind="stable")
+    back = np.argsort(np.concatenate(parts))
     columns = zip(*(future.result() for future in futures), strict=True)
     return tuple(
         np.concatenate([x[..., : part.size] for x, part in zip(column, parts, strict=True)], axis=-1)[..., back]
@@ -130,7 +131,8 @@ def run_parts(
 ) -> tuple[np.ndarray, ...]:
     """`work` on all lanes, chunk by chunk on all cores."""
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    return _in_chunks(begin, np.arange(speed.size), _chunk_size(speed.size), lambda _: None)
+    size = _chunk_size(speed.size)
+    return _in_chunks(begin, np.arange(speed.size), size, lambda _: None)
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
@@ -138,11 +140,11 @@ def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray)
 
 
 def _chunk_size(lanes: int) -> int:
-    """At least four chunks to a core where that leaves 32 lanes in each, so that no core waits long for the last."""
+    """The size with which all cores are done first, each taking one chunk after the other."""
     if jax.default_backend() != "cpu":
         return lanes
-    fair = -(-lanes // (4 * cores() * 16)) * 16
-    return min(CHUNK, max(32, fair), lanes)
+    rounds = lambda size: -(-lanes // (size * cores()))
+    return min(CHUNKS, key=lambda size: (rounds(size) * (size + CALL), size))
 
 
 def run_lanes(
@@ -156,8 +158,8 @@ def run_lanes(
 ) -> Observation:
     """Observe lanes given by their speeds [rad/s] and initial states, and with several systems by which they have.
 
-    Between the discarded and the observed revolutions the lanes are sorted by the number of steps that they need, the
-    most first, so that few chunks hold lanes of different needs and the long ones do not come last.
+    Lanes are dealt out to the chunks, first by their place and after the discarded revolutions by the number of steps
+    that they need, so that all chunks take about as long.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
@@ -186,9 +188,6 @@ def run_lanes(
 
     *y, outcome, level = _in_chunks(begin, np.arange(lanes), size, report(0))
     settled = np.stack(y, axis=-1).reshape(lanes, dim)
-    if first == 0 and lanes > size:  # nothing has been run yet: one revolution tells what the lanes need
-        look = lambda lane: (_settle_chunk(designs, method, 1, _part(speed, which, y0, lane)).level,)
-        (level,) = _in_chunks(look, np.arange(lanes), size, lambda _: None)
 
     def follow(lane: np.ndarray) -> Observation:
         rest = jnp.asarray(outcome[lane]), jnp.asarray(level[lane])
