@@ -9,6 +9,7 @@
 | `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
 | `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
 | `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
+| `design`    | constants identified from measured edges                                            |
 | `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
 | `cli`        | the `jaxcage` command                                                               |
 
@@ -51,6 +52,14 @@ from .bearing import (
     published_case as published_case,
     static_cage_displacement as static_cage_displacement,
     vg as vg,
+)
+from .design import (
+    Fit as Fit,
+    MeasuredEdge as MeasuredEdge,
+    TrackedEdges as TrackedEdges,
+    Unknown as Unknown,
+    fit_edges as fit_edges,
+    screen as screen,
 )
 from .forces import (
     ElasticRib as ElasticRib,

@@ -9,7 +9,20 @@ import jaxcage
 
 
 ROOT = pathlib.Path(jaxcage.__file__).parent
-LAYERS = ["bearing", "forces", "models", "integrate", "analysis", "sweeps", "orbits", "io", "plotting", "cli"]
+LAYERS = [
+    "bearing",
+    "forces",
+    "models",
+    "integrate",
+    "analysis",
+    "sweeps",
+    "orbits",
+    "design",
+    "io",
+    "plotting",
+    "reproduction",
+    "cli",
+]
 SAME_LEVEL = {"io": {"plotting"}, "plotting": {"io"}}
 OUTSIDE_CORE = {"matplotlib", "xarray", "zarr", "pint", "tyro", "rich", "dask"}
 FILES = sorted(p for layer in LAYERS for p in (ROOT / layer).glob("*.py"))

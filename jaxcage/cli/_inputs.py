@@ -12,7 +12,7 @@ from ..io import check_writable, load_model, replacing
 from ..models import CageModel, case
 from ._console import say
 from ._errors import UsageError, refusing
-from ._options import IntegrationOptions, Options
+from ._options import CommonOptions, IntegrationOptions, Options
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +83,7 @@ def samples_per_revolution(chosen: AbstractMethod, most: int = 64) -> int:
     return max(n for n in range(1, min(most, chosen.steps) + 1) if chosen.steps % n == 0)
 
 
-def output_folder(options: Options) -> Path:
+def output_folder(options: CommonOptions) -> Path:
     """The folder to write to, tried out before anything is computed."""
     with refusing():
         return check_writable(options.out)

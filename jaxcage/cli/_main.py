@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from .._cache import keep_compiled_programs
 from ._console import leave_at_once_when_interrupted, say
 from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
-from ._options import Command, Options
+from ._options import Command, CommonOptions
 from ._report import show
 
 
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _carry_out(options: Options) -> None:
+def _carry_out(options: CommonOptions) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -48,7 +48,7 @@ def _carry_out(options: Options) -> None:
     show(implementation.run(options), options.json)
 
 
-def _parse(arguments: list[str]) -> Options | None:
+def _parse(arguments: list[str]) -> CommonOptions | None:
     """Options, or None if help was asked for and given.
 
     **Raises:** `UsageError`: the boxes in which tyro reports errors are boiled down to one

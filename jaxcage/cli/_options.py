@@ -9,20 +9,29 @@ import tyro
 
 
 @dataclasses.dataclass(frozen=True)
-class Options:
+class CommonOptions:
     """What every command takes."""
 
     implementation: ClassVar[str] = ""
     """Module of this package whose `run` carries the command out."""
 
-    case: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CASE")]
-    """A published case (1a, 1b, 2a, 2b, 3a, 3b) or the path of a TOML file."""
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
     out: str = "out"
     """Folder for figures and data; it is made if need be."""
     no_cache: bool = False
     """Compile everything anew instead of using programs kept from earlier runs."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Case:
+    case: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CASE")]
+    """A published case (1a, 1b, 2a, 2b, 3a, 3b) or the path of a TOML file."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Options(CommonOptions, _Case):
+    """What every command about a case takes."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -173,6 +182,16 @@ class ImpactOptions(Options):
     """Length of the history [ms]."""
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ReproduceOptions(CommonOptions):
+    """The paper beside this model: edges, figures 5, 7, 8 and 9, conclusions, readings."""
+
+    implementation: ClassVar[str] = "_reproduce"
+
+    quick: bool = False
+    """A coarse grid, short runs and no exact edges: for trying."""
+
+
 Command = (
     Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
     | Annotated[SweepOptions, tyro.conf.subcommand("sweep")]
@@ -183,4 +202,5 @@ Command = (
     | Annotated[PoincareOptions, tyro.conf.subcommand("poincare")]
     | Annotated[StaticsOptions, tyro.conf.subcommand("statics")]
     | Annotated[ImpactOptions, tyro.conf.subcommand("impact")]
+    | Annotated[ReproduceOptions, tyro.conf.subcommand("reproduce")]
 )

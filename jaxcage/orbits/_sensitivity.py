@@ -52,6 +52,8 @@ class Sensitivity:
     transversality: float
     """d|mu|/d speed [s] (see `BifurcationPoint`); of a width or limit the smallest one."""
     status: str
+    state: Float[np.ndarray, " dim"] | None = None
+    """State of the orbit at phase 0 [SI]; of a width or limit None."""
 
     @property
     def trusted(self) -> bool:
@@ -205,6 +207,7 @@ def sensitivity(
         homogeneity=_homogeneity(system, change),
         transversality=rate,
         status="tangential" if abs(rate * speed) < TANGENTIAL else "converged",
+        state=np.asarray(edge.problem.state(edge.u, edge.frame)),
     )
 
 

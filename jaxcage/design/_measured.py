@@ -1,0 +1,55 @@
+"""Edges as a test rig or a publication gives them."""
+
+import dataclasses
+import re
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+@dataclasses.dataclass(frozen=True)
+class MeasuredEdge:
+    """One measured end of a zone."""
+
+    case: str
+    name: str
+    """`zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ... as in the zones that are found."""
+    rpm: float
+    uncertainty_rpm: float
+    """Standard deviation [rpm]."""
+    kind: str = "synchronous-loss"
+    """`synchronous-loss` or `chaotic`: the two are never mixed."""
+
+    def __post_init__(self):
+        if not re.fullmatch(r"zone [1-9]\d* (onset|exit)", self.name):
+            raise ValueError(f"Argument `name` must be like 'zone 1 onset' or 'zone 2 exit', but is '{self.name}'.")
+        if self.kind not in ("synchronous-loss", "chaotic"):
+            raise ValueError(f"Argument `kind` must be synchronous-loss or chaotic, but is '{self.kind}'.")
+        if not (np.isfinite([self.rpm, self.uncertainty_rpm]).all() and min(self.rpm, self.uncertainty_rpm) > 0):
+            given = f"{self.rpm} and {self.uncertainty_rpm}"
+            raise ValueError(f"Speed and uncertainty of an edge must be positive numbers, but {given} were given.")
+
+    @property
+    def zone(self) -> int:
+        """Number of the zone."""
+        return int(self.name.split()[1])
+
+    @property
+    def end(self) -> str:
+        """`onset` or `exit`."""
+        return self.name.split()[2]
+
+
+def of_case(edges: Iterable[MeasuredEdge], case: str) -> list[MeasuredEdge]:
+    """The edges of one case, by speed."""
+    return sorted((e for e in edges if e.case == case), key=lambda e: e.rpm)
+
+
+def inside_zones(edges: Sequence[MeasuredEdge], rpm: Float[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
+    """Which speeds lie in a measured zone of one case; a zone without an exit goes on."""
+    inside = np.zeros(rpm.shape, bool)
+    for zone in {e.zone for e in edges}:
+        ends = {e.end: e.rpm for e in edges if e.zone == zone}
+        inside |= (rpm >= ends.get("onset", 0.0)) & (rpm <= ends.get("exit", np.inf))
+    return inside

@@ -1,0 +1,110 @@
+"""What each ambiguous reading of the paper does to the zones of a case."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .._parameters import parameters, replace
+from ..analysis import Sweep, zones
+from ..bearing import PUBLISHED_CASES
+from ..forces import ElasticRib, PocketImpact, RollerPassImpact
+from ..integrate import AbstractMethod, method
+from ..models import CageModel
+from ..sweeps import rpm, sweep
+from ._edges import ComparedEdge, compare_edges, zones_in_range
+
+
+@dataclasses.dataclass(frozen=True)
+class Reading:
+    """One way to read what the paper leaves open."""
+
+    question: str
+    answer: str
+    model: Callable[[CageModel], CageModel] = lambda model: model
+    method: Callable[[], AbstractMethod | None] = lambda: None
+    first_start_only: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class ReadingResult:
+    """What a reading does."""
+
+    reading: Reading
+    sweep: Sweep
+    chaotic_share: float
+    """Share of the speeds from 4000 rpm up at which any start is chaotic."""
+    zones: int
+    """Chaotic zones between 4000 and 27500 rpm."""
+    edges: tuple[ComparedEdge, ...]
+    failed: int
+
+
+def _elastic(model: CageModel) -> CageModel:
+    stiffness = 100 * float(model.support.stiffness_x)
+    return replace(model, rib=ElasticRib(mass=2.0, stiffness=stiffness, damping=20.0, cubic_stiffness=0.0))
+
+
+def _roller_pass(model: CageModel) -> CageModel:
+    return replace(model, impact=RollerPassImpact(oscillator=PocketImpact(), harmonics=4))
+
+
+def _scaled(name: str, factor: float) -> Callable[[CageModel], CageModel]:
+    return lambda model: replace(model, **{name: factor * float(parameters(model)[name])})
+
+
+def _chosen(**values: str) -> Callable[[CageModel], CageModel]:
+    return lambda model: replace(model, **{name.replace("__", "."): v for name, v in values.items()})
+
+
+READINGS: tuple[Reading, ...] = (
+    Reading("as the cases have it", "-"),
+    Reading("clearance", "radial, c = C_r/2", _chosen(clearance_reading="radial")),
+    Reading("eccentricity", "a tenth of a micrometre", _scaled("eccentricity", 0.1)),
+    Reading("unbalance", "physical", _chosen(unbalance="physical")),
+    Reading("unbalance", "as printed in (20)", _chosen(unbalance="as_printed")),
+    Reading("unbalance", "none", _scaled("eccentricity", 0.0)),
+    Reading("film", "positive pressure", _chosen(film__model="positive_pressure")),
+    Reading("film", "full circle", _chosen(film__model="full")),
+    Reading("film", "none", _scaled("reference_viscosity", 1e-6)),
+    Reading("impact", "roller by roller", _roller_pass),
+    Reading("impact", "none", _scaled("amplitude", 0.0)),
+    Reading("rib", "elastic", _elastic),
+    Reading("integration", "Newmark, 256 steps", method=lambda: method("newmark", steps=256)),
+    Reading("integration", "Newmark, 1024 steps", method=lambda: method("newmark", steps=1024)),
+    Reading("start", "the paper's alone", first_start_only=True),
+)
+"""The speed axis read as shaft speed is a matter of the axis alone: cage speeds are then 0.40 of those printed."""
+
+
+def try_readings(
+    model: CageModel,
+    case: str,
+    *,
+    readings: Sequence[Reading] = READINGS,
+    speeds: int = 119,
+    discard: int = 300,
+    revolutions: int = 300,
+    report: Callable[[str, int, int], None] | None = None,
+) -> list[ReadingResult]:
+    """Sweep a case under each reading. A reading that a model cannot take, or on which every lane fails, says so."""
+    grid = rpm(4000, 27500, speeds)
+    results = []
+    for i, reading in enumerate(readings):
+        if report is not None:
+            report(f"{reading.question}: {reading.answer}", i, len(readings))
+        read = reading.model(model)
+        starts = [tuple(float(c) for c in read.starts(float(grid[0]))[0])] if reading.first_start_only else None
+        found = sweep(read, grid, starts=starts, discard=discard, revolutions=revolutions, method=reading.method())
+        chaotic = zones(found)
+        results.append(
+            ReadingResult(
+                reading,
+                found,
+                float(np.mean(np.any(found.label == "chaotic", axis=1))),
+                len(zones_in_range(chaotic.zones)),
+                tuple(compare_edges(PUBLISHED_CASES[case], chaotic.zones, "chaotic")),
+                int(np.sum(found.failed)),
+            )
+        )
+    return results

@@ -1,0 +1,84 @@
+"""The runs behind the reproduction: every case over speed, and the strobe sections of fig. 9."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ..analysis import Sweep, Zones, zones
+from ..bearing import PUBLISHED_SPEED_RANGE_RPM
+from ..integrate import AbstractMethod
+from ..models import CageModel
+from ..orbits import LossZones, loss_zones, synchronous_orbits
+from ..sweeps import rpm, sweep_designs
+
+
+SECTION_RPM = 8500.0
+SECTION_REVOLUTIONS = (4, 4000)
+"""Fig. 9: strobe points from the first to the second of these revolutions."""
+Report = Callable[[str, int, int], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Runs:
+    """What was computed, by case."""
+
+    models: Mapping[str, CageModel]
+    sweeps: Mapping[str, Sweep]
+    zones: Mapping[str, Zones]
+    loss: Mapping[str, LossZones]
+    """Empty where the orbits were left out."""
+    sections: Mapping[str, Sweep]
+    """At the speed of fig. 9, from the paper's start, with its transient."""
+
+
+def run_all(
+    models: Mapping[str, CageModel],
+    *,
+    speeds: int = 251,
+    discard: int = 300,
+    revolutions: int = 300,
+    section_revolutions: int = SECTION_REVOLUTIONS[1],
+    orbits: bool = True,
+    method: AbstractMethod | None = None,
+    report: Report | None = None,
+) -> Runs:
+    """Sweep every case over the published range from three starts, find its synchronous orbits, and run fig. 9."""
+    say = report or (lambda what, done, total: None)
+    grid = rpm(*PUBLISHED_SPEED_RANGE_RPM, speeds)
+    swept = dict(
+        zip(
+            models,
+            sweep_designs(
+                list(models.values()),
+                grid,
+                discard=discard,
+                revolutions=revolutions,
+                method=method,
+                progress=lambda done, total: say("sweeps", done, total),
+            ),
+            strict=True,
+        )
+    )
+    loss: dict[str, LossZones] = {}
+    for i, (name, model) in enumerate(models.items() if orbits else ()):
+        say(f"orbits of {name}", i, len(models))
+        found = synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name])
+        loss[name] = loss_zones(found)
+    say("strobe sections", 0, 1)
+    omega = np.array([rpm(SECTION_RPM)])
+    first = [tuple(float(c) for c in model.starts(float(omega[0]))[0]) for model in models.values()]
+    sections = {
+        name: sweep_designs(
+            [model],
+            omega,
+            starts=[start],
+            discard=SECTION_REVOLUTIONS[0],
+            revolutions=section_revolutions - SECTION_REVOLUTIONS[0],
+            blocks=1,
+            keep=section_revolutions,
+            method=method,
+        )[0]
+        for (name, model), start in zip(models.items(), first, strict=True)
+    }
+    return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections)
