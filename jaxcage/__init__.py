@@ -101,6 +101,7 @@ from .orbits import (
     Branch as Branch,
     Cascade as Cascade,
     Curve as Curve,
+    Located as Located,
     LossZones as LossZones,
     Orbit as Orbit,
     Sensitivity as Sensitivity,

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ..orbits import BifurcationPoint, SpecialPoint
+from ..orbits import Point
 from ._measured import MeasuredEdge
 from ._tracked import TrackedEdges, differentiable
 from ._unknowns import Unknown, check_unknowns, values_at, with_values
@@ -43,7 +43,7 @@ class Combination:
     @property
     def identified(self) -> bool:
         """Whether the data fix it to 10 % or better."""
-        return self.half_width <= IDENTIFIED_BELOW
+        return bool(self.half_width <= IDENTIFIED_BELOW)
 
     def __str__(self) -> str:
         terms = [f"{n}^{w:+.2f}" for n, w in sorted(self.weights.items(), key=lambda x: -abs(x[1])) if abs(w) > 0.05]
@@ -114,7 +114,7 @@ def fit_edges(
     systems: Mapping[str, AbstractForcedSystem],
     unknowns: Sequence[Unknown],
     measured: Sequence[MeasuredEdge],
-    points: Sequence[SpecialPoint | BifurcationPoint],
+    points: Sequence[Point],
     *,
     start: Mapping[str, float],
     method: AbstractMethod | None = None,
@@ -167,7 +167,7 @@ def _check(
     systems: Mapping[str, AbstractForcedSystem],
     unknowns: Sequence[Unknown],
     measured: Sequence[MeasuredEdge],
-    points: Sequence[SpecialPoint | BifurcationPoint],
+    points: Sequence[Point],
     start: Mapping[str, float],
 ) -> None:
     if len(points) != len(measured) or not measured:
@@ -212,7 +212,7 @@ def _report(
     lost = not np.all(np.isfinite(found.rpm))
     return Fit(
         values=values_at(unknowns, place),
-        interval={u.name: (float(u.value(a)), float(u.value(b))) for u, a, b in zip(unknowns, *ends, strict=True)},
+        interval={u.name: (u.value(a), u.value(b)) for u, a, b in zip(unknowns, *ends, strict=True)},
         edges=tuple(FittedEdge(e, float(w), s) for e, w, s in zip(measured, found.rpm, found.status, strict=True)),
         covariance=covariance,
         combinations=combinations,
@@ -243,7 +243,7 @@ def determined(
     free = np.any(np.abs(directions[~known]) > 1e-8, axis=0)
     covariance[np.ix_(free, free)] = np.where(np.eye(int(free.sum()), dtype=bool), np.inf, np.nan)
     combos = tuple(
-        Combination(dict(zip(names, (d * np.sign(d[np.argmax(np.abs(d))])).tolist(), strict=True)), NORMAL_95 * s)
+        Combination(dict(zip(names, (d * np.sign(d[np.argmax(np.abs(d))])).tolist(), strict=True)), float(NORMAL_95 * s))
         for d, s in zip(directions, deviation, strict=True)
     )
     return covariance, combos

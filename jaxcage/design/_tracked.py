@@ -14,22 +14,12 @@ from jaxtyping import Array, Float
 
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ..orbits import BifurcationPoint, Sensitivity, SpecialPoint, sensitivity
+from ..orbits import Located, Point, Sensitivity, sensitivity
 from ._unknowns import Unknown, values_at, with_values
 
 
 HALVINGS = 4
 """How often the way to new constants is halved before an edge counts as lost."""
-
-
-class Located(NamedTuple):
-    """A bifurcation to start Newton's method from."""
-
-    kind: str
-    speed: float
-    """[rad/s]."""
-    state: Float[np.ndarray, " dim"]
-    periods: int
 
 
 class Edges(NamedTuple):
@@ -49,7 +39,7 @@ class TrackedEdges:
         systems: Mapping[str, AbstractForcedSystem],
         unknowns: Sequence[Unknown],
         cases: Sequence[str],
-        points: Sequence[SpecialPoint | BifurcationPoint],
+        points: Sequence[Point],
         place: Float[np.ndarray, " unknowns"],
         method: AbstractMethod | None = None,
     ):

@@ -45,11 +45,11 @@ class Unknown:
         """Distance of the bounds: of their logarithms on a logarithmic scale."""
         return float(np.log(self.upper / self.lower)) if self.scale == "log" else self.upper - self.lower
 
-    def value(self, place: Float[np.ndarray, "..."] | float) -> Float[np.ndarray, "..."]:
+    def value(self, place: float | np.floating) -> float:
         """Value [SI] at a place between the bounds: 0 is the lower one, 1 the upper."""
         if self.scale == "log":
-            return self.lower * np.exp(np.asarray(place) * self.span)
-        return self.lower + np.asarray(place) * self.span
+            return float(self.lower * np.exp(place * self.span))
+        return float(self.lower + place * self.span)
 
     def place(self, value: float) -> float:
         """Where `value` [SI] lies between the bounds."""
@@ -79,7 +79,7 @@ def check_unknowns(systems: Mapping[str, AbstractForcedSystem], unknowns: Sequen
 
 def values_at(unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]) -> dict[str, float]:
     """Values [SI] by the unknowns' names."""
-    return {u.name: float(u.value(p)) for u, p in zip(unknowns, place, strict=True)}
+    return {u.name: u.value(p) for u, p in zip(unknowns, place, strict=True)}
 
 
 def with_values(

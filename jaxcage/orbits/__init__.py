@@ -37,6 +37,8 @@ from ._search import (
     synchronous_orbits as synchronous_orbits,
 )
 from ._sensitivity import (
+    Located as Located,
+    Point as Point,
     Sensitivity as Sensitivity,
     edge_speed as edge_speed,
     limit_sensitivity as limit_sensitivity,

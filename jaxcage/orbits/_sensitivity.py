@@ -8,7 +8,7 @@ These hold for every kind of edge and test a gradient without any reference.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
@@ -34,6 +34,20 @@ POLISHING = 6
 POLISHED, SETTLED, NEARBY = 1e-11, 1e-7, 0.5
 """Newton's steps end below the first, must be below the second, and may lead no further than the third, in units of the
 system's scale and of a tenth of the speed."""
+
+
+class Located(NamedTuple):
+    """A bifurcation over speed known from elsewhere, to start Newton's method from."""
+
+    kind: str
+    speed: float
+    """[rad/s]."""
+    state: Float[np.ndarray, " dim"]
+    """State of the orbit at phase 0 [SI]."""
+    periods: int = 1
+
+
+Point: TypeAlias = SpecialPoint | BifurcationPoint | Located
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,6 +123,7 @@ class _Unfolding(NamedTuple):
     """d|mu| / d parameter in the frame's unit (at a fold: the drift along the critical direction)."""
 
 
+@eqx.filter_jit
 def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
     n = z.size
     left, right = null_vectors(singular_matrix(kind, around.monodromy))
@@ -138,7 +153,7 @@ class _Edge(NamedTuple):
         return float(self.problem.values(self.u, self.frame)[0])
 
 
-def _located(system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoint, method: Any) -> _Edge:
+def _located(system: AbstractForcedSystem, point: Point, method: Any) -> _Edge:
     kind: Any = point.kind
     chosen = make_method() if method is None else method
     problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
@@ -159,9 +174,7 @@ def _located(system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoin
     return _Edge(problem, given, frame, u, here, bool(size < SETTLED))
 
 
-def edge_speed(
-    system: AbstractForcedSystem, point: SpecialPoint | BifurcationPoint, method: AbstractMethod | None = None
-) -> float:
+def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
     """Speed [rad/s] of the edge near `point`, located to rounding; NaN if Newton's method does not find it."""
     require_x64()
     if point.kind == "branch-point":
@@ -172,7 +185,7 @@ def edge_speed(
 
 def sensitivity(
     system: AbstractForcedSystem,
-    point: SpecialPoint | BifurcationPoint,
+    point: Point,
     name: str = "edge",
     method: AbstractMethod | None = None,
 ) -> Sensitivity:

@@ -194,7 +194,7 @@ def guidance(runs: Runs) -> Conclusion:
     moved = {k: displaced(k, 8900.0, 12000.0) - displaced(k, 4450.0, 0.0) for k in kinds}
     listed = ", ".join(f"{k.replace('_', ' ')} {1e6 * v:+.2f} um" for k, v in moved.items())
     return Conclusion(
-        "Guidance: by inner rib and rollers the displacement changes with load and speed, by the outer rib it does not.",
+        "Guidance: by inner rib or rollers the displacement changes with load and speed, by the outer rib it does not.",
         f"Change of the static displacement from 4450 N at rest to 8900 N at 12000 rpm of the shaft: {listed}.",
         _verdict(moved["outer_rib"] == 0.0, moved["inner_rib"] != 0.0 and moved["roller"] != 0.0),
         {"change_m": moved},

@@ -12,7 +12,7 @@ from ..analysis import Sweep
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ._engine import Progress, run_lanes
-from ._speed import assemble, checked_speeds, initial_states, make_plan
+from ._speed import assemble, checked_speeds, initial_states, make_plan, settings_of
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,10 +92,10 @@ def run_up_down_designs(
         state = np.asarray(seen[-1].last).T
         if progress is not None:
             progress(n + 1, speed.size)
-    found = []
+    found, how = [], settings_of(chosen)
     for i, one in enumerate(systems):
         up, down = (_stacked([tuple(x[..., 2 * i + j] for x in o) for o in seen]) for j in (0, 1))
-        make = lambda parts, one=one: assemble(one, speed, chosen, plan, parts, (speed.size, 1))
+        make = lambda parts, one=one: assemble(one, speed, how, plan, parts, (speed.size, 1))
         found.append(Hysteresis(make(up), make(tuple(x[..., ::-1] for x in down))))
     return found
 

@@ -1,5 +1,6 @@
 """Sweeps over speed from several starts."""
 
+import functools
 import math
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -120,13 +121,14 @@ def sweep_designs(
     lane_speed = np.tile(np.repeat(speed, shape[1]), len(systems))
     seen = run_lanes(systems, chosen, plan, lane_speed, y0.reshape(-1, dim), progress, which)
     parts = [tuple(x[..., i * each : (i + 1) * each] for x in seen) for i in range(len(systems))]
-    return [assemble(s, speed, chosen, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
+    how = settings_of(chosen)
+    return [assemble(s, speed, how, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
 
 
 def assemble(
     system: AbstractForcedSystem,
     speed: Float[np.ndarray, " speeds"],
-    method: AbstractMethod,
+    settings: dict[str, str],
     plan: Plan,
     seen: tuple[Any, ...],
     shape: tuple[int, ...],
@@ -140,10 +142,10 @@ def assemble(
         block_growth=growth.reshape(*shape, plan.blocks, plan.exponents),
         peak=peak.reshape(shape),
         outcome=outcome.reshape(shape),
-        scale=_scales(system, speed),
+        scale=np.asarray(_scales(system, jnp.asarray(speed))),
         discard=plan.discard,
         revolutions=plan.block * plan.blocks,
-        settings=_settings(method),
+        settings=settings,
     )
 
 
@@ -154,8 +156,7 @@ def initial_states(
 ) -> Float[np.ndarray, "speeds starts dim"]:
     """A state for each speed and start: the system's own, the same ones at every speed, or as given."""
     if starts is None:
-        table = jax.vmap(lambda s: jnp.stack([jnp.stack([jnp.asarray(c) for c in y]) for y in system.starts(s)]))
-        return np.asarray(table(jnp.asarray(speed)))
+        return np.asarray(_own_starts(system, jnp.asarray(speed)))
     wanted = f"states of {system.dimension} numbers"
     if isinstance(starts, np.ndarray):
         if starts.ndim != 3 or starts.shape[::2] != (speed.size, system.dimension):
@@ -169,11 +170,22 @@ def initial_states(
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), system.dimension)).copy()
 
 
-def _scales(system: AbstractForcedSystem, speed: np.ndarray) -> Float[np.ndarray, "speeds dim"]:
-    table = eqx.filter_vmap(lambda s: jnp.stack([jnp.asarray(c) for c in system.scale(s)]))
-    return np.asarray(table(jnp.asarray(speed)))
+@eqx.filter_jit
+def _scales(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds dim"]:
+    return jax.vmap(lambda s: jnp.stack([jnp.asarray(c) for c in system.scale(s)]))(speed)
 
 
-def _settings(method: AbstractMethod) -> dict[str, str]:
-    packages = ("jaxcage", "jax", "diffrax", "equinox", "numpy")
-    return {"method": str(method).replace("\n", " "), **{f"version_{p}": version(p) for p in packages}}
+@eqx.filter_jit
+def _own_starts(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds starts dim"]:
+    row = lambda y: jnp.stack([jnp.asarray(c) for c in y])
+    return jax.vmap(lambda s: jnp.stack([row(y) for y in system.starts(s)]))(speed)
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    return {f"version_{p}": version(p) for p in ("jaxcage", "jax", "diffrax", "equinox", "numpy")}
+
+
+def settings_of(method: AbstractMethod) -> dict[str, str]:
+    """How a sweep was computed: method and versions."""
+    return {"method": str(method).replace("\n", " "), **_versions()}
