@@ -16,6 +16,13 @@
 SI units inside, always; y points up and rotation is positive counter-clockwise.
 """
 
+import os as _os
+
+
+# XLA's loader reports every program kept on disk as an error on processors for which it has tuning flags of its own.
+# What really goes wrong is raised as an exception. Whoever wants XLA's log sets the variable, or imports jax first.
+_os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+
 from ._cache import keep_compiled_programs as keep_compiled_programs
 from ._parameters import (
     parameter_info as parameter_info,

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -228,6 +229,9 @@ def test_help_of_every_command(capsys: pytest.CaptureFixture[str]):
         assert main([command, "--help"]) == 0
         text = capsys.readouterr().out
         assert "CASE" in text and "--json" in text and "--out" in text
+    assert main(["reproduce", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "CASE" not in text and "--quick" in text and "--json" in text
 
 
 def test_as_a_module_from_a_shell(tmp_path: Path):
@@ -248,3 +252,16 @@ def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], 
     assert all(z["kind"] == "synchronous-loss" for z in found["synchronous"])
     closed = [z for z in found["zones"] if z["width_rpm"]]
     assert ("zoom" in found) == bool(closed)
+
+
+def test_programs_kept_on_disk_are_used_again_without_a_word(tmp_path: Path):
+    """XLA's loader calls its own tuning flags errors on some processors: nobody should see that."""
+    options = ["--speed", "8500", "--discard", "10", "--revolutions", "10", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "jaxcage", "poincare", "1a", *options]
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("TF_CPP")}
+    environment["JAXCAGE_CACHE"] = str(tmp_path / "programs")
+    first, again = (subprocess.run(command, capture_output=True, text=True, env=environment) for _ in range(2))
+    assert first.returncode == again.returncode == 0
+    assert list((tmp_path / "programs").rglob("*")), "nothing was kept"
+    assert first.stdout == again.stdout
+    assert again.stderr.count("\n") == first.stderr.count("\n") == 1  # the design rule

@@ -28,8 +28,8 @@ from ._options import ReproduceOptions
 from ._report import Report, Table, number
 
 
-QUICK = {"speeds": 126, "discard": 150, "revolutions": 100, "section_revolutions": 504, "orbits": False}
-QUICK_READINGS = {"speeds": 48, "discard": 150, "revolutions": 100}
+QUICK: dict[str, Any] = {"speeds": 126, "discard": 150, "revolutions": 100, "section_revolutions": 504, "orbits": False}
+QUICK_READINGS: dict[str, Any] = {"speeds": 48, "discard": 150, "revolutions": 100}
 
 
 def run(options: ReproduceOptions) -> Report:
@@ -64,7 +64,18 @@ def run(options: ReproduceOptions) -> Report:
         _conclusions_table(checked),
         _readings_table(read),
     ]
-    return Report(document, tables, [*_notes(document), f"Figures: {folder}", f"Time: {document['seconds']:.1f} s"])
+    evidence = [f"{c.claim.split('.')[0].split(':')[0]}: {c.evidence}" for c in checked]
+    return Report(
+        document,
+        tables,
+        [
+            "Evidence",
+            *(f"  {line}" for line in evidence),
+            *_notes(document),
+            f"Figures: {folder}",
+            f"Time: {document['seconds']:.1f} s",
+        ],
+    )
 
 
 def _edges(runs: Runs, name: str) -> list[ComparedEdge]:
@@ -142,10 +153,7 @@ def _ranges_table(ranges: list[dict[str, Any]]) -> Table:
 
 
 def _conclusions_table(checked: list[Conclusion]) -> Table:
-    rows = []
-    for c in checked:
-        rows += [(c.claim, c.verdict), (f"  {c.evidence}", "")]
-    return Table("The paper's conclusions", ("claim and evidence", "verdict"), rows)
+    return Table("The paper's conclusions", ("claim", "verdict"), [(c.claim, c.verdict) for c in checked])
 
 
 def _reading_document(r: ReadingResult) -> dict[str, Any]:

@@ -242,8 +242,9 @@ def determined(
         covariance = spread @ spread.T
     free = np.any(np.abs(directions[~known]) > 1e-8, axis=0)
     covariance[np.ix_(free, free)] = np.where(np.eye(int(free.sum()), dtype=bool), np.inf, np.nan)
+    turned = directions * np.sign(directions[np.arange(len(size)), np.argmax(np.abs(directions), axis=1)])[:, None]
     combos = tuple(
-        Combination(dict(zip(names, (d * np.sign(d[np.argmax(np.abs(d))])).tolist(), strict=True)), float(NORMAL_95 * s))
-        for d, s in zip(directions, deviation, strict=True)
+        Combination(dict(zip(names, d.tolist(), strict=True)), float(NORMAL_95 * s))
+        for d, s in zip(turned, deviation, strict=True)
     )
     return covariance, combos

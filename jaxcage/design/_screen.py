@@ -140,14 +140,14 @@ def screen(
                 report(len(tried), min(tried, key=lambda c: c.score))
         return np.array([c.score for c in new])
 
-    sample = qmc.Sobol(len(unknowns), seed=seed).random_base2(max(1, int(np.ceil(np.log2(designs)))))
+    sample = qmc.Sobol(len(unknowns), rng=seed).random_base2(max(1, int(np.ceil(np.log2(designs)))))
     first = scores(sample)
     if generations:
         population = sample[np.argsort(first)[: max(8, 4 * len(unknowns))]]
         differential_evolution(
             lambda x: scores(x.T),
             [(0.0, 1.0)] * len(unknowns),
-            init=population,
+            init=population,  # pyright: ignore[reportArgumentType]
             maxiter=generations,
             vectorized=True,
             updating="deferred",

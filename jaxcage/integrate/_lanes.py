@@ -138,7 +138,8 @@ def _by_kernels(
     rungs = method.rungs
     last = len(rungs) - 1
     if last == 0:
-        solver, count = rungs[0]
+        solver: Any = rungs[0].solver
+        count = rungs[0].steps
         after = run_steps(solver, numbers, start_lane(solver, y, tangents), REVOLUTION / count, count, divisor=count)
         return Moved(after.y, after.tangents, after.peak, jax.vmap(_code)(after.y, after.peak), level)
 
@@ -181,7 +182,7 @@ def _run_those(
     def run_block(i: Array, lane: Lane) -> Lane:
         first = jnp.minimum(i * BLOCK, lanes - BLOCK)  # the last block begins earlier where it must
         cut = lambda x: jax.lax.dynamic_slice_in_dim(x, first, BLOCK)
-        moved = run(*jax.tree.map(cut, (own, packed)), None)
+        moved = run(tuple(map(cut, own)), jax.tree.map(cut, packed), None)
         return jax.tree.map(lambda x, new: jax.lax.dynamic_update_slice_in_dim(x, new, first, 0), lane, moved)
 
     moved = jax.lax.fori_loop(0, (jnp.sum(mine) + BLOCK - 1) // BLOCK, run_block, packed)

@@ -47,11 +47,14 @@ def _box(ax: Axes, figure: str, what: str, vertical: bool) -> None:
     for axis in (a for a in FIGURE_AXES if a.figure == figure and a.quantity == what):
         for limit in (axis.lower, axis.upper):
             (ax.axhline if vertical else ax.axvline)(limit, color="#8A8A8A", linewidth=0.8, linestyle=":")
+        low, high = ax.get_ylim() if vertical else ax.get_xlim()
+        (ax.set_ylim if vertical else ax.set_xlim)(min(low, 1.05 * axis.lower), max(high, 1.05 * axis.upper))
 
 
 def _diagrams(runs: Runs, pair: tuple[str, str], zoom: tuple[float, float] | None) -> Figure:
     figure = new_figure(9.5, 6.4)
-    for case, ax in zip(pair, figure.subplots(2, 1, sharex=True), strict=True):
+    cells = figure.subplots(2, 1, sharex=True)
+    for case, ax in zip(pair, cells, strict=True):
         swept, published = runs.sweeps[case], PUBLISHED_CASES[case]
         if zoom is None:
             orbit_diagram(swept, 1, ax)
@@ -59,9 +62,10 @@ def _diagrams(runs: Runs, pair: tuple[str, str], zoom: tuple[float, float] | Non
             zoomed_diagram(swept, *zoom, 1, ax)
         mark_published(ax, published, text=False)
         oil, gap = f"VG{published.viscosity_grade:g}", f"gap {published.guidance_gap_mm} mm"
-        text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} um, {oil}; dashed, published edges"
+        text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} um, {oil}; dotted, published edges"
         ax.set_title(text, loc="left", fontsize=10)
-    ax.set_xlabel(quantity("speed_rpm").label)
+    cells[0].set_xlabel("")
+    cells[1].set_xlabel(quantity("speed_rpm").label)
     return figure
 
 

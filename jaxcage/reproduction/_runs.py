@@ -66,6 +66,8 @@ def run_all(
         found = synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name])
         loss[name] = loss_zones(found)
     say("strobe sections", 0, 1)
+    observed = section_revolutions - SECTION_REVOLUTIONS[0]
+    blocks = max(n for n in range(1, 21) if observed % n == 0)
     omega = np.array([rpm(SECTION_RPM)])
     first = [tuple(float(c) for c in model.starts(float(omega[0]))[0]) for model in models.values()]
     sections = {
@@ -74,9 +76,9 @@ def run_all(
             omega,
             starts=[start],
             discard=SECTION_REVOLUTIONS[0],
-            revolutions=section_revolutions - SECTION_REVOLUTIONS[0],
-            blocks=1,
-            keep=section_revolutions,
+            revolutions=observed,
+            blocks=blocks,
+            keep=observed,
             method=method,
         )[0]
         for (name, model), start in zip(models.items(), first, strict=True)

@@ -1,0 +1,118 @@
+"""The published edges beside ours: matching by hand-made zones, and the runs behind the report at a tiny size."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from jaxcage.analysis import Edge, Zone
+from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.reproduction import (
+    READINGS,
+    compare_edges,
+    conclusions,
+    paper_figures,
+    run_all,
+    try_readings,
+    zones_in_range,
+)
+
+
+def zone(onset, leaves):
+    edge = lambda rpm: None if rpm is None else Edge(float(rpm), 100.0, "chaotic", "crisis")
+    return Zone("chaotic", edge(onset), edge(leaves), 1.0)
+
+
+def ours(zones, case="1a"):
+    return [row.ours_rpm for row in compare_edges(PUBLISHED_CASES[case], zones, "chaotic")]
+
+
+def test_edges_of_the_zones_that_overlap_most():
+    """Published for 1a: 9100 to 12000 and from 25500."""
+    assert ours([zone(4500, 5000), zone(9000, 12500), zone(25000, None)]) == [9000, 12500, 25000]
+    assert ours([zone(9000, 9500), zone(10000, 13000), zone(26000, 27000)]) == [10000, 13000, 26000]
+
+
+def test_one_zone_over_both_has_no_second():
+    assert ours([zone(9000, None)]) == [9000, None, None]
+    assert ours([]) == [None, None, None]
+
+
+def test_a_zone_far_from_the_published_ones_is_none_of_them():
+    assert ours([zone(15000, 16000)]) == [None, None, None]
+
+
+def test_errors_are_relative_to_what_was_published():
+    rows = compare_edges(PUBLISHED_CASES["1a"], [zone(9100 * 1.1, 12000 * 0.95)], "chaotic")
+    assert rows[0].error_percent == pytest.approx(10.0)
+    assert rows[1].error_percent == pytest.approx(-5.0)
+    assert rows[2].error_percent is None
+    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("crisis", 100.0, "chaotic")
+
+
+def test_zones_below_the_range_do_not_count():
+    assert len(zones_in_range([zone(2500, 3900), zone(3900, 4100), zone(9000, 12000), zone(27400, None)])) == 3
+
+
+@pytest.fixture(scope="module")
+def runs():
+    models = {name: jc.case(name) for name in PUBLISHED_CASES}
+    return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False)
+
+
+def test_runs_cover_the_published_range(runs):
+    assert list(runs.sweeps) == list(PUBLISHED_CASES)
+    for found in runs.sweeps.values():
+        assert found.rpm[0] == pytest.approx(2500) and found.rpm[-1] == pytest.approx(27500)
+        assert not np.any(found.failed)
+    for name, section in runs.sections.items():
+        assert section.strobe.shape == (1, 1, 40, 4)
+        assert section.rpm[0] == pytest.approx(8500)
+        assert not np.array_equal(section.strobe, runs.sections["1b" if name == "1a" else "1a"].strobe)
+
+
+def test_every_conclusion_has_evidence_and_a_verdict(runs):
+    found = conclusions(runs)
+    assert len(found) == 7
+    for c in found:
+        assert c.verdict in ("holds", "holds in part", "does not hold")
+        assert any(ch.isdigit() for ch in c.evidence) and c.numbers
+    guidance = found[-1].numbers["change_m"]
+    assert guidance["outer_rib"] == 0.0 and guidance["roller"] == guidance["inner_rib"] > 1e-6  # (1), (5), (6)
+    assert found[1].numbers["force_ratio"] == pytest.approx(2 ** (20 / 19), rel=0.02)  # Hertz impact on a stiff bar
+
+
+def test_a_verdict_can_be_no(runs):
+    """Six cases with the same zones: the gap does nothing, and conclusion 1 cannot hold."""
+    same = dataclasses.replace(runs, zones=dict.fromkeys(runs.zones, runs.zones["1a"]))
+    first, *_, oil, _ = conclusions(same)
+    assert first.verdict != "holds"
+    assert oil.numbers["change"] == pytest.approx(dict.fromkeys(oil.numbers["change"], 0.0), nan_ok=True)
+
+
+def test_figures_of_the_paper(runs):
+    names = [name for name, figure in paper_figures(runs) if figure.axes]
+    assert names == ["fig5", "fig7a", "fig8a", "fig7b", "fig8b", "fig7c", "fig8c", "fig9"]
+
+
+def test_readings_change_the_model_and_say_what_came_of_it():
+    chosen = [r for r in READINGS if r.answer in ("-", "none")]
+    assert {r.question for r in chosen} == {"as the cases have it", "unbalance", "film", "impact"}
+    model = jc.case("1a")
+    found = {
+        r.reading.question: r for r in try_readings(model, "1a", readings=chosen, speeds=24, discard=60, revolutions=40)
+    }
+    base, film, impact = (found[q] for q in ("as the cases have it", "film", "impact"))
+    assert impact.chaotic_share < 0.5 * base.chaotic_share  # without the impact hardly any chaos
+    assert not np.allclose(film.sweep.last, base.sweep.last)
+    thin = film.reading.model(model)
+    assert float(thin.lubricant.dynamic_viscosity) < 1e-6 * float(model.lubricant.dynamic_viscosity)
+
+
+@pytest.mark.parametrize("reading", READINGS, ids=lambda r: f"{r.question}-{r.answer}")
+def test_every_reading_can_be_taken(reading):
+    model = reading.model(jc.case("1a"))
+    assert model.dimension == (8 if reading.answer == "elastic" else 4)
+    y = jc.strobe_map(model, jc.rpm(9000.0), reading.method() or jc.controlled())(model.starts(jc.rpm(9000.0))[0])
+    assert np.all(np.isfinite(np.asarray(y.y)))
