@@ -188,6 +188,8 @@ class ReproduceOptions(CommonOptions):
 
     implementation: ClassVar[str] = "_reproduce"
 
+    constants: str = "identified"
+    """Set of constants that the paper does not print: identified or preliminary."""
     quick: bool = False
     """A coarse grid, short runs and no exact edges: for trying."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..bearing import FIGURE_AXES, PUBLISHED_CASES
 from ..integrate import AbstractMethod
-from ..models import case
+from ..models import CONSTANTS, case
 from ..plotting import new_figure, zoomed_diagram
 from ..reproduction import (
     ComparedEdge,
@@ -23,6 +23,7 @@ from ..reproduction import (
     zones_in_range,
 )
 from ._console import progress_in_stages
+from ._errors import UsageError
 from ._inputs import output_folder, save_figure
 from ._options import ReproduceOptions
 from ._report import Report, Table, number
@@ -37,7 +38,10 @@ def run(options: ReproduceOptions) -> Report:
     folder = output_folder(options)
     began = time.perf_counter()
     method: AbstractMethod | None = None
-    models = {name: case(name) for name in PUBLISHED_CASES}
+    if options.constants not in CONSTANTS:
+        known = ", ".join(CONSTANTS)
+        raise UsageError(f"Option --constants must be one of {known}, but '{options.constants}' was given.")
+    models = {name: case(name, options.constants) for name in PUBLISHED_CASES}
     with progress_in_stages("reproduce") as bar:
         runs = run_all(models, method=method, report=bar, **(QUICK if options.quick else {}))
         drawn = [save_figure(figure, folder / f"{name}.png") for name, figure in paper_figures(runs)]
@@ -48,6 +52,7 @@ def run(options: ReproduceOptions) -> Report:
     ranges = _ranges(runs)
     document = {
         "quick": options.quick,
+        "constants": options.constants,
         "resolution_rpm": float(next(iter(runs.sweeps.values())).resolution_rpm),
         "edges": [_edge_document(row) for row in edges],
         "summary": {kind: _summary(edges, kind) for kind in ("chaotic", "synchronous-loss")},

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from .._checks import require_x64
@@ -77,6 +76,8 @@ def screen(
     *,
     designs: int = 256,
     generations: int = 0,
+    begin: Mapping[str, float] | None = None,
+    spread: float = 0.1,
     best: int = 8,
     seed: int = 0,
     starts: Sequence[tuple[float, ...]] | None = None,
@@ -92,7 +93,8 @@ def screen(
     - `systems`, `unknowns`, `measured`: cases by name, what is unknown, and the edges of the zones.
     - `speeds`: grid [rad/s].
     - `designs`: quasi-random designs (Sobol), rounded up to a power of 2.
-    - `generations`: of a differential evolution that starts from the best of them.
+    - `generations`: of an evolution strategy (CMA-ES) that starts from the best of them, or from `begin` [SI].
+    - `spread`: its first standard deviation, as a part of the distance between the bounds.
     - `best`: how many candidates to return.
     - `starts`: initial states, by default the first of each system's own.
     - `discard`, `revolutions`: revolutions left out and observed, at each speed.
@@ -142,17 +144,15 @@ def screen(
 
     sample = qmc.Sobol(len(unknowns), rng=seed).random_base2(max(1, int(np.ceil(np.log2(designs)))))
     first = scores(sample)
+    start = sample[np.argmin(first)]
+    if begin is not None:
+        start = np.clip([u.place(begin[u.name]) for u in unknowns], 0.0, 1.0)
     if generations:
-        population = sample[np.argsort(first)[: max(8, 4 * len(unknowns))]]
-        differential_evolution(
-            lambda x: scores(x.T),
-            [(0.0, 1.0)] * len(unknowns),
-            init=population,  # pyright: ignore[reportArgumentType]
-            maxiter=generations,
-            vectorized=True,
-            updating="deferred",
-            polish=False,
-            tol=0.0,
-            rng=seed,
-        )
+        import cma  # takes a second to load
+
+        options = {"bounds": [0.0, 1.0], "maxiter": generations, "seed": seed + 1, "verbose": -9}
+        search = cma.CMAEvolutionStrategy(start, spread, options)
+        while not search.stop():
+            places = search.ask()
+            search.tell(places, scores(np.array(places)).tolist())
     return sorted(tried, key=lambda c: c.score)[:best]

@@ -8,11 +8,13 @@
 | `_cage_at_speed`  | the cage in its rib: forces at one speed                                         |
 | `_groups`         | dimensionless groups                                                             |
 | `_cases`          | the paper's six cases as models                                                  |
+| `_constants`      | what the paper leaves out, in sets                                               |
 """
 
 from ._cage import CageModel as CageModel
 from ._cage_at_speed import CageAtSpeed as CageAtSpeed, CageForces as CageForces
 from ._cases import case as case
+from ._constants import CONSTANTS as CONSTANTS, Constants as Constants
 from ._field import (
     AbstractField as AbstractField,
     AbstractLinearisation as AbstractLinearisation,

@@ -1,0 +1,86 @@
+"""Constants that the paper does not print, in sets: one set for all its cases.
+
+`preliminary`: a blind search of an independent code, whose film was some twenty times too weak, on the sign of the
+largest exponent in the published zones. `identified`: found with this package, see `experiments/identify_nu2310.py`.
+Both read the clearance as printed (c = C_r), the speed axis as cage speed relative to the rib, eccentricities in
+micrometres; with the fixed half film, the synchronous impact, a rigid rib and circulatory cross-coupling.
+"""
+
+import dataclasses
+from typing import Literal, get_args
+
+from ..forces import UnbalanceReading
+
+
+ConstantsName = Literal["preliminary", "identified"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Constants:
+    """What the paper leaves out, in SI units."""
+
+    cage_mass: float
+    support_stiffness: float
+    support_cubic: float
+    support_damping: float
+    support_cross: float
+    land_width: float
+    """Of each of two lands."""
+    impact_amplitude: float
+    """At a cage speed of 1000 rad/s."""
+    impact_exponent: float
+    contact_stiffness: float | None
+    """[N/m^(10/9)]; None if it is given by a force at a penetration of one clearance."""
+    contact_force: float | None = None
+    contact_onset: float = 0.97
+    restitution: float = 1.0
+    gravity: float = 9.81
+    unbalance: UnbalanceReading = "physical"
+
+    def contact_stiffness_in(self, clearance: float) -> float:
+        """Contact stiffness of a case with this clearance [m]."""
+        if self.contact_stiffness is not None:
+            return self.contact_stiffness
+        assert self.contact_force is not None
+        return self.contact_force / clearance ** (10 / 9)
+
+
+CONSTANTS: dict[str, Constants] = {
+    "preliminary": Constants(
+        cage_mass=0.212227,
+        support_stiffness=37402.4,
+        support_cubic=1.0732e13,
+        support_damping=3.3136,
+        support_cross=-36.654,
+        land_width=4.2679e-3,
+        impact_amplitude=109.9051,
+        impact_exponent=1.5091,
+        contact_stiffness=None,
+        contact_force=68992.2,
+    ),
+    "identified": Constants(
+        cage_mass=0.252088,
+        support_stiffness=139446.0,
+        support_cubic=11262400000000.0,
+        support_damping=1.66072,
+        support_cross=1762.43,
+        land_width=0.00145461,
+        impact_amplitude=121.292,
+        impact_exponent=1.48297,
+        contact_stiffness=2407540000.0,
+        restitution=0.999142,
+        unbalance="as_printed",
+    ),
+}
+"""The sets by name."""
+
+
+def constants(name: str) -> Constants:
+    """The set `name`.
+
+    **Raises:** `ValueError` that names the sets there are.
+    """
+    if name not in CONSTANTS:
+        known = ", ".join(get_args(ConstantsName))
+        raise ValueError(f"Argument `constants` must be one of {known}, but '{name}' was given.")
+    return CONSTANTS[name]

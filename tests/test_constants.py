@@ -1,0 +1,51 @@
+"""Sets of the constants that the paper leaves out: physical, complete, and what they do to the zones."""
+
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.models import CONSTANTS
+
+
+@pytest.mark.parametrize("name", CONSTANTS)
+def test_constants_are_physical(name):
+    """Priors: cage mass from its shape, lands that fit beside the rollers, dampers that damp."""
+    c = CONSTANTS[name]
+    assert 0.20 <= c.cage_mass <= 0.36
+    assert 0 < c.land_width <= 6.5e-3
+    assert c.support_damping > 0 and c.support_stiffness > 0 and c.support_cubic > 0
+    assert 1 <= c.impact_exponent <= 2
+    assert 0 < c.restitution <= 1
+    assert 10 <= c.impact_amplitude <= 250  # fig. 5 peaks near 120 N
+
+
+@pytest.mark.parametrize("name", CONSTANTS)
+def test_one_set_for_all_cases(name):
+    models = [jc.case(c, name) for c in PUBLISHED_CASES]
+    for parameter in ("cage_mass", "stiffness_x", "cubic_stiffness", "damping", "land_width", "amplitude", "exponent"):
+        assert len({float(jc.parameters(m)[parameter]) for m in models}) == 1, parameter
+    assert len({float(m.guidance_gap) for m in models}) == 2 and len({float(m.eccentricity) for m in models}) == 4
+
+
+def test_an_unknown_set_gets_a_sentence():
+    with pytest.raises(ValueError, match="must be one of preliminary, identified"):
+        jc.case("1a", "best")
+
+
+def chaotic_share(model, grid):
+    return np.mean(jc.sweep(model, grid, discard=150, revolutions=100).chaotic_share > 0)
+
+
+def test_identified_constants_let_the_gap_act():
+    """Between 13000 and 20000 rpm 1b is chaotic and 1a is not, as published; with the preliminary set neither is."""
+    grid = jc.rpm(13000, 18000, 11)
+    narrow, wide = (chaotic_share(jc.case(name, "identified"), grid) for name in ("1a", "1b"))
+    assert wide > narrow + 0.5, (narrow, wide)
+    assert chaotic_share(jc.case("1b"), grid) < 0.2
+
+
+def test_identified_constants_let_the_unbalance_act():
+    """Without unbalance chaos fills the upper end of the steady zone of 1a."""
+    grid, model = jc.rpm(20700, 23700, 11), jc.case("1a", "identified")
+    assert chaotic_share(jc.replace(model, eccentricity=0.0), grid) > chaotic_share(model, grid) + 0.3
