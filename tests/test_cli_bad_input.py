@@ -65,7 +65,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         ("sweep", "CASE"),
         ("spin 1a", "Unrecognized options: spin"),
         ("sweep 1a --sped 3", "Unrecognized options: --sped"),
-        ("", "Expected one of {simulate, sweep, zones, bifurcations, gradient, map, poincare, statics, impact}"),
+        ("", "Expected one of {simulate, sweep, zones, bifurcations, gradient, map, poincare, statics, impact, reproduce}"),
     ],
 )
 def test_bad_arguments(capsys: pytest.CaptureFixture[str], arguments: str, said: str):
