@@ -23,6 +23,9 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return lines[0]
 
 
+COMMANDS = "simulate, sweep, zones, bifurcations, gradient, map, poincare, statics, impact, reproduce"
+
+
 @pytest.mark.parametrize(
     "arguments, said",
     [
@@ -65,7 +68,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         ("sweep", "CASE"),
         ("spin 1a", "Unrecognized options: spin"),
         ("sweep 1a --sped 3", "Unrecognized options: --sped"),
-        ("", "Expected one of {simulate, sweep, zones, bifurcations, gradient, map, poincare, statics, impact, reproduce}"),
+        ("", f"Expected one of {{{COMMANDS}}}"),
     ],
 )
 def test_bad_arguments(capsys: pytest.CaptureFixture[str], arguments: str, said: str):
