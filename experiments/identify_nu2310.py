@@ -2,8 +2,8 @@
 
 Every candidate is swept over 48 speeds in all six cases; its score is the share of speeds with the wrong kind of motion
 (`jaxcage.screen`). An evolution strategy runs again and again from the best of quasi-random designs and from the best
-found so far. The set `identified` in `jaxcage/models/_constants.py` comes from such a search of 75 minutes on two
-cores, run by hand with the same score, bounds and strategy; another run ends elsewhere, with a score like it.
+found so far. The set `identified` in `jaxcage/models/_constants.py` comes from a search of this kind, 75 minutes
+on two cores, with slightly other weights and bounds; another run ends elsewhere.
 """
 
 import argparse

@@ -96,7 +96,7 @@ def screen(
     - `generations`: of an evolution strategy (CMA-ES) that starts from the best of them, or from `begin` [SI].
     - `spread`: its first standard deviation, as a part of the distance between the bounds.
     - `best`: how many candidates to return.
-    - `starts`: initial states, by default the first of each system's own.
+    - `starts`: initial states, by default the first of the first system's own, for all cases.
     - `discard`, `revolutions`: revolutions left out and observed, at each speed.
     - `report`: called with the designs tried so far and the best candidate.
 

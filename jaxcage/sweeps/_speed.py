@@ -105,7 +105,7 @@ def sweep_designs(
 
     **Arguments:** systems that differ in their numbers only; the rest as for `sweep`.
 
-    **Returns:** a `Sweep` for each system, the same as one by one.
+    **Returns:** a `Sweep` for each system, the same as one by one to rounding (which chaos makes large).
     """
     require_x64()
     speed = checked_speeds(speeds)
