@@ -21,7 +21,7 @@ REVOLUTIONS = 10
 
 def main() -> None:
     """Print the table."""
-    model, speeds = jc.case("1a"), jc.rpm(4000, 27500, LANES)
+    model, speeds = jc.case("1a", "preliminary"), jc.rpm(4000, 27500, LANES)
     for size in (32, 64, 128, 256, 512):
         _engine.CHUNKS = (size,)
         run = lambda: jc.sweep(

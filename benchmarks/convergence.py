@@ -98,7 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="few methods, few speeds, nothing written")
     quick = parser.parse_args().quick
-    model = jc.case(CASE)
+    model = jc.case(CASE, "preliminary")
     speeds = jc.rpm(4000, 27500, 12 if quick else 95)
     states = attractor_states(model, speeds)
     first = table(

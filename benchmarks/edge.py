@@ -20,7 +20,7 @@ EDGE = "zone 1 exit"
 def search(lower_rpm: float, upper_rpm: float) -> tuple[jc.SpecialPoint, float]:
     """The edge among the synchronous orbits between two speeds, and the seconds it took to find, compiling included."""
     begin = time.perf_counter()
-    orbits = jc.synchronous_orbits(jc.case(CASE), jc.rpm(lower_rpm), jc.rpm(upper_rpm))
+    orbits = jc.synchronous_orbits(jc.case(CASE, "preliminary"), jc.rpm(lower_rpm), jc.rpm(upper_rpm))
     point = jc.loss_zones(orbits).edges[EDGE]
     return point, time.perf_counter() - begin
 
@@ -33,7 +33,7 @@ def twice(name: str, run: Callable[[], Any]) -> dict[str, float]:
 
 def solve_and_differentiate(point: jc.SpecialPoint) -> dict[str, float]:
     """The edge solved for again, and solved for together with its derivatives by every parameter."""
-    model = jc.case(CASE)
+    model = jc.case(CASE, "preliminary")
     parts = twice("solve", lambda: edge_speed(model, point))
     parts |= twice("gradient", lambda: jc.sensitivity(model, point, EDGE))
     return {**parts, "rpm": float(edge_speed(model, point)) * 30 / math.pi}
@@ -41,6 +41,6 @@ def solve_and_differentiate(point: jc.SpecialPoint) -> dict[str, float]:
 
 def differentiate_bifurcation(state: list[float], speed: float) -> dict[str, float]:
     """The same through the public function of one point and `jax.grad`."""
-    model = jc.case(CASE)
+    model = jc.case(CASE, "preliminary")
     value = lambda m: jc.bifurcation(m, "period-doubling", (tuple(state), speed)).value
     return {**twice("solve", lambda: value(model)), **twice("gradient", lambda: eqx.filter_grad(value)(model))}

@@ -55,7 +55,7 @@ def make_problem(lanes: int) -> Problem:
     Some attractors reach past the clearance circle, which the contact allows but `sweep` does not as a start: of a few
     more lanes than asked for those inside are kept.
     """
-    model = jc.case(CASE)
+    model = jc.case(CASE, "preliminary")
     speeds = jc.rpm(FIRST_RPM, LAST_RPM, lanes + lanes // 64 + 8)
     table = jax.vmap(lambda s: jnp.stack([jnp.stack(y) for y in model.starts(s)]))
     starts = np.asarray(table(jnp.asarray(speeds)))
@@ -76,7 +76,7 @@ def save(problem: Problem, file: str) -> None:
 def load(file: str) -> Problem:
     """The lanes that `save` kept."""
     with np.load(file) as kept:
-        return Problem(jc.case(CASE), kept["speeds"], kept["states"])
+        return Problem(jc.case(CASE, "preliminary"), kept["speeds"], kept["states"])
 
 
 def spread_out(problem: Problem, lanes: int) -> Problem:

@@ -5,8 +5,6 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 import jaxcage as jc
 
 from .plain import check, ladder, pick, seconds, time_all
@@ -105,9 +103,6 @@ def exponents(setup: Setup) -> dict[str, Any]:
 
 def monodromy(setup: Setup) -> dict[str, Any]:
     """A batch of monodromy matrices against plain revolutions of the same lanes."""
-    matrices = getattr(jc, "monodromy", None)
-    if matrices is None:
-        return {"missing": "no `jaxcage.monodromy`"}
     few = setup.problem.lanes(256) if setup.quick else setup.problem
     return {
         "lanes": few.speeds.size,
@@ -115,7 +110,7 @@ def monodromy(setup: Setup) -> dict[str, Any]:
         "runs": in_turns(
             {
                 "plain": lambda: our_map(few, None, 10),
-                "matrices": lambda: [np.asarray(x) for x in matrices(few.model, few.speeds, few.states)],
+                "matrices": lambda: jc.monodromy(few.model, few.speeds, few.states),
             }
         ),
     }

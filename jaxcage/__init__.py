@@ -9,8 +9,11 @@
 | `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
 | `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
 | `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
-| `design`    | constants identified from measured edges                                            |
+| `design`    | constants identified from edges; objectives, optimisation, tolerances               |
+| `validation` | numbers beside printed ones, closed forms and other programs                       |
 | `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
+| `studies`    | sweeps over any parameters, stored as they go; adaptive maps                        |
+| `report`     | tables of what was found; one HTML page about a design                              |
 | `cli`        | the `jaxcage` command                                                               |
 
 SI units inside, always; y points up and rotation is positive counter-clockwise.
@@ -24,6 +27,7 @@ import os as _os
 _os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
 from ._cache import keep_compiled_programs as keep_compiled_programs
+from ._checks import enable_x64 as enable_x64
 from ._parameters import (
     parameter_info as parameter_info,
     parameters as parameters,
@@ -61,12 +65,37 @@ from .bearing import (
     vg as vg,
 )
 from .design import (
+    AbstractObjective as AbstractObjective,
+    Candidate as Candidate,
+    ChaosMeasure as ChaosMeasure,
+    DesignSpace as DesignSpace,
+    EdgeClearance as EdgeClearance,
+    EdgeSum as EdgeSum,
     Fit as Fit,
+    FollowedEdges as FollowedEdges,
+    Measured as Measured,
     MeasuredEdge as MeasuredEdge,
+    Optimised as Optimised,
+    Optimum as Optimum,
+    Price as Price,
+    Robust as Robust,
+    Smooth as Smooth,
+    StabilityMargin as StabilityMargin,
     TrackedEdges as TrackedEdges,
     Unknown as Unknown,
+    chaotic_share as chaotic_share,
+    chaotic_width as chaotic_width,
+    cost as cost,
     fit_edges as fit_edges,
+    global_sensitivity as global_sensitivity,
+    optimise as optimise,
+    pareto_front as pareto_front,
+    rayleigh as rayleigh,
+    regular_motion as regular_motion,
     screen as screen,
+    tolerance_budget as tolerance_budget,
+    uniform as uniform,
+    zone_width as zone_width,
 )
 from .forces import (
     ElasticRib as ElasticRib,
@@ -123,11 +152,20 @@ from .orbits import (
     curve as curve,
     doubled_branch as doubled_branch,
     explain as explain,
+    leading_multiplier as leading_multiplier,
     loss_zones as loss_zones,
     periodic_orbit as periodic_orbit,
     sensitivities as sensitivities,
     sensitivity as sensitivity,
     synchronous_orbits as synchronous_orbits,
+)
+from .studies import (
+    Between as Between,
+    LabelMap as LabelMap,
+    Tolerance as Tolerance,
+    label_map as label_map,
+    open_study as open_study,
+    study as study,
 )
 from .sweeps import (
     Hysteresis as Hysteresis,

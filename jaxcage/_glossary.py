@@ -57,6 +57,7 @@ _QUANTITIES = (
     Quantity("largest_exponent", r"$\lambda_1$", "1", "largest exponent per revolution"),
     Quantity("standard_error", r"$s_\lambda$", "1", "standard error of the exponents"),
     Quantity("peak", r"$\epsilon$", "1", "largest excursion (cage: eccentricity ratio) observed"),
+    Quantity("period", "", "1", "revolutions after which the orbit closes, 0 if it does not"),
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
     Quantity("label", "", "1", "what each lane does"),
     Quantity("chaotic_share", "", "1", "share of the finished starts that are chaotic"),

@@ -100,7 +100,7 @@ def test_weak_restitution_is_delivered(restitution):
 
 def test_land_contact_of_the_cage_delivers_restitution():
     """Through `CageModel`: the regularised onset costs of the order of its share of the depth."""
-    model = case("1a")
+    model = case("1a", "preliminary")
     where = lambda m: (m.contact.restitution, m.contact.smoothing, m.contact.approach_speed)
     model = eqx.tree_at(where, model, tuple(jnp.asarray(v) for v in (0.5, 1e-9, 0.2)))
     cage = model.cage_at(1000.0)

@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 import jaxcage as jc
 
 
-METHOD = jc.method("rodas4", steps=256)
-FINE = jc.method("rodas4", steps=1024)
+METHOD = jc.method("rk4", steps=256)
+FINE = jc.method("rk4", steps=1024)
 
 
 def numbers(**values):

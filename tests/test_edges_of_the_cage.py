@@ -13,7 +13,7 @@ from jaxcage._parameters import parameter_info
 from jaxcage.orbits import SpecialPoint, edge_speed, sensitivity, width
 
 
-CASE = jc.case("1a")
+CASE = jc.case("1a", "preliminary")
 STATES = {
     "torus": (11023.07, (1.33877e-5, -5.11828e-5, 0.520974, 0.0221109)),
     "period-doubling": (12266.09, (1.43798e-5, -8.77557e-5, 0.437277, 0.0136768)),

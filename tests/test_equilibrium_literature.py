@@ -208,7 +208,7 @@ def test_default_chart_holds_together():
 
 def cage_in_film(**changes):
     names = ("stiffness_x", "stiffness_y", "damping", "cubic_stiffness", "cross_stiffness")
-    return replace(case("1a"), **(dict.fromkeys(names, 0.0) | changes))
+    return replace(case("1a", "preliminary"), **(dict.fromkeys(names, 0.0) | changes))
 
 
 @pytest.mark.parametrize("mass", [1e-3, 0.05, 0.15, 0.212])
@@ -279,7 +279,7 @@ def test_heavy_cage_on_a_weak_film_never_whirls():
 @pytest.mark.parametrize("rpm", [2500.0, 9000.0, 27500.0])
 @pytest.mark.parametrize("name", ["1a", "2b"])
 def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
-    model, speed = case(name), rpm * np.pi / 30
+    model, speed = case(name, "preliminary"), rpm * np.pi / 30
     at = equilibrium(model, speed)
     zero = jnp.zeros(())
     x, y = at.coordinates
@@ -293,7 +293,7 @@ def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
 
 def test_light_support_adds_its_stiffness_to_the_eigenvalues():
     """Without weight and film the cage is two oscillators: w^2 = K/M - (B/2M)^2."""
-    model = replace(case("1a"), gravity=0.0, land_width=1e-7, cross_stiffness=0.0, stiffness_y=9000.0)
+    model = replace(case("1a", "preliminary"), gravity=0.0, land_width=1e-7, cross_stiffness=0.0, stiffness_y=9000.0)
     at = equilibrium(model, 500.0, start=jnp.array([1e-6, 2e-6]))
     np.testing.assert_allclose(at.coordinates, 0.0, atol=1e-12)
     mass, rate = 0.212227, 3.3136 / (2 * 0.212227)
@@ -311,7 +311,7 @@ def test_gradient_of_the_growth_rate_is_that_of_differences():
 
 
 def test_elastic_rib_sinks_under_both_weights_and_the_cage_with_it():
-    model = case("1a")
+    model = case("1a", "preliminary")
     rib = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e7, 50.0)))
     elastic = eqx.tree_at(lambda m: m.rib, model, rib)
     rigid, soft = equilibrium(model, 800.0), equilibrium(elastic, 800.0)

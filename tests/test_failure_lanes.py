@@ -17,7 +17,7 @@ from jaxcage.sweeps import sweep
 from jaxcage.sweeps._engine import run_lanes
 
 
-MODEL = case("1a")
+MODEL = case("1a", "preliminary")
 RPM = np.pi / 30
 C = 0.45e-3
 HEALTHY = (0.4 * C, 0.3 * C, 0.0, 0.0)

@@ -306,7 +306,7 @@ def test_supply_pressure_pushes_with_its_projected_area(model, state):
 
 
 def test_supply_pressure_in_the_cage_is_2_R_L_p0_for_each_land():
-    model = case("1a")
+    model = case("1a", "preliminary")
     pressed = replace(model, supply_pressure=3e4)
     point = 1e-4, -0.5e-4, 0.01, 0.02
     (film, _), (plain, _) = (m.cage_at(900.0).land_forces(*point) for m in (pressed, model))
@@ -317,7 +317,7 @@ def test_supply_pressure_in_the_cage_is_2_R_L_p0_for_each_land():
 
 
 def with_film(name):
-    model = case("1a")
+    model = case("1a", "preliminary")
     film = RibFilm(land_width=model.film.land_width, model=name)
     return eqx.tree_at(lambda m: m.film, model, film)
 

@@ -12,11 +12,12 @@ import pytest
 
 import jaxcage as jc
 from jaxcage._parameters import parameter
+from jaxcage.analysis import Edge, Zone
 from jaxcage.design._fit import NORMAL_95, determined
-from jaxcage.design._measured import inside_zones
+from jaxcage.design._measured import inside_zones, matched
 
 
-METHOD = jc.method("rodas4", steps=64)
+METHOD = jc.method("rk4", steps=64)
 TRUTH = {"mass": 1.0, "damping": 0.3, "stiffness": 1.0, "cubic": 1.0, "gain": 1.0}
 FORCING = (0.24, 0.25, 0.262, 0.275, 0.29, 0.305)
 BOUNDS = [jc.Unknown(name, value / 4, value * 4) for name, value in TRUTH.items()]
@@ -205,3 +206,16 @@ def test_measured_zones_over_a_grid():
 def test_bad_input_gets_a_sentence(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+def test_a_sliver_at_the_end_of_the_range_is_not_zone_2():
+    """A zone without an exit counts up to the last speed looked at: 5000 rpm shared beat 100, whatever lies beyond."""
+    edge = lambda rpm: Edge(rpm, 100.0, "chaotic")
+    found = [Zone("chaotic", edge(a), b and edge(b), 1.0) for a, b in ((9.0e3, 12e3), (22e3, 27e3), (27.4e3, None))]
+    ends = (("zone 1 onset", 9100.0), ("zone 1 exit", 12000.0), ("zone 2 onset", 21000.0))
+    measured = [jc.MeasuredEdge("x", name, rpm, 100.0, "chaotic") for name, rpm in ends]
+    got = matched(measured, found, 27.5e3)
+    assert [e and e.speed_rpm for e in got] == [9000.0, 12000.0, 22000.0]
+    assert matched(measured, found[:1], 27.5e3)[2] is None
+    over = [Zone("chaotic", edge(9e3), None, 1.0)]  # one zone over both answers for the first only
+    assert [e and e.speed_rpm for e in matched(measured, over, 27.5e3)] == [9000.0, None, None]

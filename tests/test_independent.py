@@ -28,7 +28,7 @@ def random_states(speed, count, reach):
 
 def test_rates_agree_inside_and_beyond_the_onset_of_contact():
     """The package regularises the half film at the centre over 2e-6 of the clearance."""
-    model = case("1a")
+    model = case("1a", "preliminary")
     for speed in (400.0, 1500.0, 2800.0):
         field = eqx.filter_jit(model.at_speed(speed))
         for state in random_states(speed, 12, 1.1):
@@ -39,7 +39,7 @@ def test_rates_agree_inside_and_beyond_the_onset_of_contact():
 
 
 def test_one_revolution_agrees_from_every_start_of_the_model():
-    model, speed = case("1a"), float(rpm(9500.0))
+    model, speed = case("1a", "preliminary"), float(rpm(9500.0))
     one = eqx.filter_jit(lambda y: strobe_map(model, speed, method(tolerance=1e-10))(y))
     for start in model.starts(speed):
         end = one(start)
@@ -54,7 +54,7 @@ PERIODIC_RPM = 13500.0, 15000.0, 16500.0, 18000.0, 19500.0
 @functools.cache
 def orbits():
     """Strobe states of period-1 orbits by the package: settled, then Newton at 1024 steps."""
-    model, speeds = case("1a"), np.array(PERIODIC_RPM) * np.pi / 30
+    model, speeds = case("1a", "preliminary"), np.array(PERIODIC_RPM) * np.pi / 30
     settled = sweep(model, speeds, starts=[model.starts(1.0)[0]], discard=300, revolutions=40)
     assert np.all(settled.label == "periodic-1")
     fine = method("rodas4", steps=1024)
@@ -107,7 +107,7 @@ LANES = 250
 @functools.cache
 def chaos():
     """Exponents with standard errors by the package and by NumPy, for every chaotic speed."""
-    model, speeds = case("1a"), np.array(CHAOTIC_RPM) * np.pi / 30
+    model, speeds = case("1a", "preliminary"), np.array(CHAOTIC_RPM) * np.pi / 30
     rng = np.random.default_rng(0)
     reach = np.array([0.6, 0.6, 0.3, 0.3]) * independent.scale(1500.0)
     starts = [tuple(map(float, s)) for s in rng.uniform(-1, 1, (12, 4)) * reach]

@@ -177,7 +177,7 @@ def test_adaptive_steps_through_diffeqsolve(solver, kind):
 
 # --- the cage --------------------------------------------------------------------------------
 
-CAGE, SPEED = case("1a"), 15000 * np.pi / 30
+CAGE, SPEED = case("1a", "preliminary"), 15000 * np.pi / 30
 START = CAGE.starts(SPEED)[0]
 UNIT = independent.scale(SPEED)
 

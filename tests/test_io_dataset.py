@@ -52,7 +52,7 @@ def sweep_of(speeds: int = 5, starts: int = 3) -> jc.Sweep:
 
 def test_round_trip(tmp_path: Path):
     sweep = sweep_of()
-    again = load_sweep(save_sweep(tmp_path / "sweep.zarr", sweep, jc.case("1a")))
+    again = load_sweep(save_sweep(tmp_path / "sweep.zarr", sweep, jc.case("1a", "preliminary")))
     for field in dataclasses.fields(sweep):
         stored, expected = getattr(again, field.name), getattr(sweep, field.name)
         if isinstance(expected, np.ndarray):
@@ -64,7 +64,7 @@ def test_round_trip(tmp_path: Path):
 
 
 def test_labels_units_and_configuration_are_stored(tmp_path: Path):
-    model = jc.replace(jc.case("2b"), guidance_gap=0.5e-3)
+    model = jc.replace(jc.case("2b", "preliminary"), guidance_gap=0.5e-3)
     sweep = sweep_of()
     dataset = open_sweep(save_sweep(tmp_path / "sweep.zarr", sweep, model))
     assert dataset["strobe"].dims == ("speed", "start", "revolution", "component")

@@ -51,7 +51,7 @@ def trajectory(tau, state, speed: float | np.ndarray = SPEED, samples=64, peak=0
 @pytest.mark.parametrize("ratio", [1.0, 0.5, -0.25])
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (2e-5, -3e-5)])
 def test_circular_orbit(ratio, centre):
-    m = orbit_measures(case("1a"), orbit(ratio=ratio, centre=centre))
+    m = orbit_measures(case("1a", "preliminary"), orbit(ratio=ratio, centre=centre))
     assert m.whirl_ratio == pytest.approx(ratio, rel=1e-9)
     assert m.rms == pytest.approx(1e-4, rel=1e-9)
     assert m.peak_displacement == pytest.approx(1e-4, rel=1e-9)
@@ -59,8 +59,8 @@ def test_circular_orbit(ratio, centre):
 
 
 def test_whirl_about_the_rib_centre_needs_to_go_around_it():
-    inside = orbit_measures(case("1a"), orbit(radius=1e-4, centre=(0.0, -5e-5)))
-    outside = orbit_measures(case("1a"), orbit(radius=4e-5, centre=(0.0, -5e-5)))
+    inside = orbit_measures(case("1a", "preliminary"), orbit(radius=1e-4, centre=(0.0, -5e-5)))
+    outside = orbit_measures(case("1a", "preliminary"), orbit(radius=4e-5, centre=(0.0, -5e-5)))
     assert inside.rib_whirl_ratio == pytest.approx(1.0, abs=0.02)
     assert outside.rib_whirl_ratio == pytest.approx(0.0, abs=0.02)
     assert outside.whirl_ratio == pytest.approx(1.0, rel=1e-9)
@@ -68,7 +68,7 @@ def test_whirl_about_the_rib_centre_needs_to_go_around_it():
 
 def test_ellipse_and_its_velocity_scatter():
     """rms^2 = (a^2 + b^2)/2; |v| = a w sqrt(sin^2 + k^2 cos^2) with k = b/a."""
-    m = orbit_measures(case("1a"), orbit(flatten=0.5, samples=256))
+    m = orbit_measures(case("1a", "preliminary"), orbit(flatten=0.5, samples=256))
     assert m.rms == pytest.approx(1e-4 * np.sqrt(1.25 / 2), rel=1e-9)
     assert m.whirl_ratio == pytest.approx(1.0, abs=1e-3)
     a = np.linspace(0, 2 * np.pi, 100001)[:-1]
@@ -79,7 +79,7 @@ def test_ellipse_and_its_velocity_scatter():
 
 def test_centre_that_stands_still_has_no_whirl():
     still = orbit(radius=0.0, centre=(0.0, -1e-4))
-    m = orbit_measures(case("1a"), still)
+    m = orbit_measures(case("1a", "preliminary"), still)
     assert np.isnan(m.whirl_ratio) and np.isnan(m.velocity_scatter)
     assert m.rms < 1e-15 and m.largest_eps == pytest.approx(1e-4 / GAP)
     assert m.film_power == 0.0
@@ -88,14 +88,14 @@ def test_centre_that_stands_still_has_no_whirl():
 @pytest.mark.parametrize("peak, eps", [(0.0, 0.5), (0.8, 0.8), (1.1, 1.1)])
 def test_film_thickness_uses_the_largest_eps_of_any_step(peak, eps):
     run = dataclasses.replace(orbit(radius=0.5 * GAP), peak=peak)
-    m = orbit_measures(case("1a"), run)
+    m = orbit_measures(case("1a", "preliminary"), run)
     assert m.largest_eps == pytest.approx(eps)
     assert m.minimum_film_thickness == pytest.approx(max(GAP * (1 - eps), 0.0), abs=1e-18)
 
 
 def test_synchronous_impact_and_its_impulse():
     """A |sin tau|: peak A, impulse 4 A/omega in a revolution."""
-    m = orbit_measures(case("1a"), orbit(samples=256))
+    m = orbit_measures(case("1a", "preliminary"), orbit(samples=256))
     assert m.peak_impact_force == pytest.approx(109.9051, rel=1e-12)
     assert m.impact_impulse == pytest.approx(4 * 109.9051 / SPEED, rel=1e-4)
     assert m.peak_contact_force == 0.0 and m.contact_impulse == 0.0
@@ -103,7 +103,7 @@ def test_synchronous_impact_and_its_impulse():
 
 def test_steady_contact_force_and_its_impulse():
     """Whirl at a constant penetration of 0.01 c: K p^(10/9), no damping at restitution 1."""
-    model = case("1a")
+    model = case("1a", "preliminary")
     m = orbit_measures(model, orbit(radius=0.98 * GAP))
     expected = 68992.2 / GAP ** (10 / 9) * (0.01 * GAP) ** (10 / 9)
     assert m.peak_contact_force == pytest.approx(expected, rel=1e-3)
@@ -113,7 +113,7 @@ def test_steady_contact_force_and_its_impulse():
 
 @pytest.mark.parametrize("eps, kept", [(0.0, 0.0), (0.5, 0.5), (0.99, 0.97)])
 def test_drag_power_is_that_of_the_sheared_film(eps, kept):
-    model = case("1a")
+    model = case("1a", "preliminary")
     radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
     one = 2 * np.pi * viscosity * SPEED**2 * radius**3 * width / (GAP * np.sqrt(1 - kept**2))
     power = film_drag_power(model, np.full(3, SPEED), np.full(3, eps))
@@ -125,7 +125,7 @@ def test_drag_power_is_that_of_the_sheared_film(eps, kept):
 @pytest.mark.parametrize("ratio, sign", [(0.25, -1), (0.5, 0), (1.0, 1)])
 def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
     """-F . v = -2 S (omega - 2 phi') g(eps) c eps phi' on a circle: zero at half speed."""
-    model = case("1a")
+    model = case("1a", "preliminary")
     eps = 0.4
     m = orbit_measures(model, orbit(radius=eps * GAP, ratio=ratio))
     radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
@@ -138,7 +138,7 @@ def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
 
 def test_forces_of_a_simulation_are_its_acceleration():
     """M r'' from the recorded velocities, by a spectral derivative of a synchronous orbit."""
-    model, speed = case("1a"), 16000 * np.pi / 30
+    model, speed = case("1a", "preliminary"), 16000 * np.pi / 30
     run = ji.simulate(model, speed, revolutions=1, discard=400, samples=128)
     spectrum = np.fft.rfft(run.state[:, 2:], axis=0)
     order = np.arange(len(spectrum))[:, None]
@@ -150,7 +150,7 @@ def test_forces_of_a_simulation_are_its_acceleration():
 
 def test_energy_balance_of_a_synchronous_orbit():
     """On a closed orbit the impacts and the unbalance put in what film and support take out."""
-    model, speed = case("1a"), 16000 * np.pi / 30
+    model, speed = case("1a", "preliminary"), 16000 * np.pi / 30
     run = ji.simulate(model, speed, revolutions=4, discard=400, samples=128)
     forces, velocity = cage_forces(model, run), run.state[:, 2:]
     power = {name: float(np.mean(np.sum(f * velocity, axis=1))) for name, f in forces.items()}
@@ -163,7 +163,7 @@ def test_energy_balance_of_a_synchronous_orbit():
 
 
 def test_forces_vanish_in_sum_at_the_equilibrium():
-    model = replace(case("1a"), amplitude=0.0, eccentricity=0.0)
+    model = replace(case("1a", "preliminary"), amplitude=0.0, eccentricity=0.0)
     q = np.asarray(equilibrium(model, SPEED).coordinates)
     tau = np.linspace(0, 6, 5)
     forces = cage_forces(model, trajectory(tau, np.tile([*q, 0.0, 0.0], (5, 1))))
@@ -174,7 +174,7 @@ def test_forces_vanish_in_sum_at_the_equilibrium():
 
 @pytest.mark.parametrize("impact", ["synchronous", "roller_pass"])
 def test_speed_of_each_sample_counts(impact):
-    model = case("1a")
+    model = case("1a", "preliminary")
     if impact == "roller_pass":
         rollers = RollerPassImpact(oscillator=PocketImpact(), harmonics=4)
         model = eqx.tree_at(lambda m: m.impact, model, rollers)
@@ -195,7 +195,7 @@ def test_means_of_a_ramp_are_over_time():
     state = still.state.copy()
     state[n:, 0] = 0.0
     speeds = np.repeat([500.0, 1000.0], n)
-    m = orbit_measures(case("1a"), trajectory(still.tau, state, speeds))
+    m = orbit_measures(case("1a", "preliminary"), trajectory(still.tau, state, speeds))
     mean = 2 / 3 * 0.9 * GAP
     assert m.rms == pytest.approx(0.9 * GAP * np.sqrt(2 / 9), rel=1e-9)
     assert m.peak_displacement == pytest.approx(mean, rel=1e-9)
@@ -203,13 +203,13 @@ def test_means_of_a_ramp_are_over_time():
 
 def test_elastic_rib_motion_is_taken_out():
     rib_law = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e8, 100.0)))
-    elastic = eqx.tree_at(lambda m: m.rib, case("1a"), rib_law)
+    elastic = eqx.tree_at(lambda m: m.rib, case("1a", "preliminary"), rib_law)
     run = orbit(ratio=0.5)
     rib = orbit(radius=3e-5, ratio=1.7, centre=(1e-5, 1e-5)).state
     q, v = run.state[:, :2] + rib[:, :2], run.state[:, 2:] + rib[:, 2:]
     both = np.concatenate([q, rib[:, :2], v, rib[:, 2:]], axis=1)
     moved = orbit_measures(elastic, trajectory(run.tau, both))
-    fixed = orbit_measures(case("1a"), run)
+    fixed = orbit_measures(case("1a", "preliminary"), run)
     np.testing.assert_allclose(dataclasses.astuple(moved), dataclasses.astuple(fixed), rtol=1e-8, atol=1e-12)
     np.testing.assert_allclose(relative_state(elastic, both)[0], run.state[:, :2], atol=1e-18)
 
@@ -224,7 +224,7 @@ def test_winding_counts_turns(turns):
 
 
 def test_table_names_every_measure_with_its_unit():
-    m = orbit_measures(case("1a"), orbit(radius=0.5 * GAP, ratio=0.5))
+    m = orbit_measures(case("1a", "preliminary"), orbit(radius=0.5 * GAP, ratio=0.5))
     lines = str(m).splitlines()
     assert len(lines) == len(dataclasses.fields(m))
     assert lines[0].split()[-1] == "0.5"
@@ -232,7 +232,7 @@ def test_table_names_every_measure_with_its_unit():
 
 
 def test_runs_that_failed_and_states_of_other_models_are_refused():
-    model, run = case("1a"), orbit()
+    model, run = case("1a", "preliminary"), orbit()
     with pytest.raises(ValueError, match="Argument `trajectory` must .* outside"):
         orbit_measures(model, dataclasses.replace(run, outcome="outside"))
     with pytest.raises(ValueError, match="Argument `state` must have 4 components"):

@@ -13,7 +13,7 @@ import pytest
 import jaxcage as jc
 
 
-METHOD = jc.method("rodas4", steps=512)
+METHOD = jc.method("rk4", steps=512)
 NAMES = ("m", "d", "c", "k", "b", "g", "w")
 
 

@@ -303,7 +303,7 @@ def test_multipliers_of_a_cage_in_contact_are_trusted(name):
 
 def cage_in_contact(name):
     factor, rpm, expected_peak = CONTACT[name]
-    model = jc.case("1a")
+    model = jc.case("1a", "preliminary")
     model = jc.replace(model, eccentricity=factor * jc.parameters(model)["eccentricity"])
     speed = jnp.asarray(jc.rpm(rpm))
     return model, speed, jc.periodic_orbit(model, speed, revolutions=300), expected_peak

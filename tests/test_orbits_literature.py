@@ -18,8 +18,8 @@ from scipy.special import mathieu_a, mathieu_b
 import jaxcage as jc
 
 
-METHOD = jc.method("rodas4", steps=1024)
-FINE = jc.method("rodas4", steps=2048)
+METHOD = jc.method("rk4", steps=1024)
+FINE = jc.method("rk4", steps=2048)
 
 
 def numbers(**values):

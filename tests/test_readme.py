@@ -1,4 +1,4 @@
-"""The README's code runs, its numbers hold, and its commands are those of the check."""
+"""The code of README and guide runs, its numbers hold, and the commands are those of the check."""
 
 import contextlib
 import io
@@ -11,13 +11,14 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
+GUIDE = (ROOT / "docs" / "guide.md").read_text()
 
 
 def test_python_blocks_run_in_order():
     space: dict = {}
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
-        for block in re.findall(r"```python\n(.*?)```", README, flags=re.S):
+        for block in re.findall(r"```python\n(.*?)```", README + GUIDE, flags=re.S):
             exec(compile(block, "README.md", "exec"), space)
     text = out.getvalue()
     assert "Sweep of 9 speeds x 3 starts" in text and "Chaotic zones at a resolution of 500 rpm" in text
@@ -35,10 +36,10 @@ def test_set_up_commands_are_those_of_the_check():
         assert command.split(" sweep")[0] in check
 
 
-def test_toml_of_the_readme_is_accepted(tmp_path: pathlib.Path):
+def test_toml_of_the_guide_is_accepted(tmp_path: pathlib.Path):
     from jaxcage.io import load_model
 
-    (block,) = re.findall(r"```toml\n(.*?)```", README, flags=re.S)
+    (block,) = re.findall(r"```toml\n(.*?)```", GUIDE, flags=re.S)
     path = tmp_path / "bearing.toml"
     path.write_text(block)
     model = load_model(path)
@@ -46,6 +47,9 @@ def test_toml_of_the_readme_is_accepted(tmp_path: pathlib.Path):
     assert float(model.lubricant.temperature) == pytest.approx(343.15)
 
 
-def test_files_the_readme_points_to_exist():
-    for target in re.findall(r"\]\((?!http)([^)#]+)\)", README):
-        assert (ROOT / target).exists(), target
+@pytest.mark.parametrize(
+    "page", ["README.md", "CONTRIBUTING.md", "docs/guide.md", "docs/reproduction.md", "docs/transcript.md"]
+)
+def test_files_that_pages_point_to_exist(page: str):
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", (ROOT / page).read_text()):
+        assert ((ROOT / page).parent / target).exists(), target

@@ -8,11 +8,12 @@ import pytest
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone
 from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.forces import cubic_stiffness
+from jaxcage.plotting import paper_figures
 from jaxcage.reproduction import (
     READINGS,
     compare_edges,
     conclusions,
-    paper_figures,
     run_all,
     try_readings,
     zones_in_range,
@@ -57,7 +58,7 @@ def test_zones_below_the_range_do_not_count():
 
 @pytest.fixture(scope="module")
 def runs():
-    models = {name: jc.case(name) for name in PUBLISHED_CASES}
+    models = {name: jc.case(name, "preliminary") for name in PUBLISHED_CASES}
     return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False)
 
 
@@ -97,11 +98,13 @@ def test_figures_of_the_paper(runs):
 
 
 def test_readings_change_the_model_and_say_what_came_of_it():
-    chosen = [r for r in READINGS if r.answer in ("-", "none")]
-    assert {r.question for r in chosen} == {"as the cases have it", "unbalance", "film", "impact"}
-    model = jc.case("1a")
+    chosen = [r for r in READINGS if r.answer in ("-", "none", "shaft speed") and r.case == "1a"]
+    known = {"as the cases have it", "unbalance", "film", "impact", "cross-coupling", "speed axis"}
+    assert {r.question for r in chosen} == known
+    model = jc.case("1a", "preliminary")
     found = {
-        r.reading.question: r for r in try_readings(model, "1a", readings=chosen, speeds=24, discard=60, revolutions=40)
+        r.reading.question: r
+        for r in try_readings({"1a": model}, readings=chosen, speeds=24, discard=60, revolutions=40)
     }
     base, film, impact = (found[q] for q in ("as the cases have it", "film", "impact"))
     assert impact.chaotic_share < 0.5 * base.chaotic_share  # without the impact hardly any chaos
@@ -110,9 +113,29 @@ def test_readings_change_the_model_and_say_what_came_of_it():
     assert float(thin.lubricant.dynamic_viscosity) < 1e-6 * float(model.lubricant.dynamic_viscosity)
 
 
-@pytest.mark.parametrize("reading", READINGS, ids=lambda r: f"{r.question}-{r.answer}")
+def test_a_speed_axis_read_as_shaft_speed_stretches_the_picture():
+    """Cage speeds are 0.4012 of the shaft's: a zone that ends at 12250 rpm of the cage ends at 30530 on that axis."""
+    (reading,) = [r for r in READINGS if r.question == "speed axis"]
+    models = {"1a": jc.case("1a", "preliminary")}
+    (got,) = try_readings(models, readings=[reading], speeds=7, discard=20, revolutions=20)
+    ratio = float(models["1a"].bearing.cage_speed_ratio)
+    assert ratio == pytest.approx(0.4012, abs=5e-5)
+    own = jc.sweep(models["1a"], ratio * jc.rpm(4000, 27500, 7), discard=20, revolutions=20)
+    np.testing.assert_allclose(got.sweep.rpm, np.linspace(4000, 27500, 7))
+    np.testing.assert_array_equal(got.sweep.exponents, own.exponents)
+
+
+def test_a_cubic_term_that_falls_with_the_gap_is_that_of_the_narrow_gap():
+    (reading,) = [r for r in READINGS if r.question == "cubic stiffness"]
+    narrow, wide = (reading.model(jc.case(name, "preliminary")) for name in ("1a", "1b"))
+    at = lambda m: cubic_stiffness(m.support.cubic, 0.0, m.support.cubic_ratio, m.support.stiffness_x, m.clearance)
+    assert float(at(narrow)) == pytest.approx(float(jc.case("1a", "preliminary").support.cubic_stiffness), rel=1e-12)
+    assert float(at(wide) / at(narrow)) == pytest.approx((0.45 / 0.60) ** 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("reading", READINGS, ids=lambda r: f"{r.case}-{r.question}-{r.answer}")
 def test_every_reading_can_be_taken(reading):
-    model = reading.model(jc.case("1a"))
+    model = reading.model(jc.case(reading.case))
     assert model.dimension == (8 if reading.answer == "elastic" else 4)
     y = jc.strobe_map(model, jc.rpm(9000.0), reading.method() or jc.controlled())(model.starts(jc.rpm(9000.0))[0])
     assert np.all(np.isfinite(np.asarray(y.y)))

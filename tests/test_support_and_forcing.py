@@ -36,7 +36,7 @@ POINTS = np.random.default_rng(7).normal(scale=2e-4, size=(5, 2))
 
 
 def cage_with(speed=900.0, **parts):
-    model = case("1a")
+    model = case("1a", "preliminary")
     for name, part in parts.items():
         model = eqx.tree_at(lambda m, name=name: getattr(m, name), model, part)
     return model, model.cage_at(speed)

@@ -127,7 +127,7 @@ def test_unknown_methods_are_refused(options: dict, words: str):
 
 
 def test_replace_by_name():
-    model = jc.case("1a")
+    model = jc.case("1a", "preliminary")
     changed = jc.replace(model, guidance_gap=0.5e-3, **{"film.model": "full"})
     assert float(changed.guidance_gap) == 0.5e-3 and changed.film.model == "full"
     assert float(model.guidance_gap) == pytest.approx(0.45e-3)

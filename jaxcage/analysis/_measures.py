@@ -12,6 +12,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._notebook import notebook_html
 from ..integrate import Trajectory
 from ..models import CageForces, CageModel
 
@@ -153,6 +154,8 @@ class OrbitMeasures:
             value = getattr(self, field.name)
             lines.append(f"{field.metadata['text']:<48s} {value:12.5g} {unit}".rstrip())
         return "\n".join(lines)
+
+    _repr_html_ = notebook_html
 
 
 def _magnitude(force: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from jaxtyping import Complex, Float
 
+from .._notebook import notebook_html
 from .._types import State
 from ..integrate import AbstractMethod, Trajectory, simulate
 from ..models import AbstractForcedSystem
@@ -185,6 +186,8 @@ class Waterfall:
             text = "  ".join(f"{p.order:7.3f}x {p.amplitude:9.3e}" for p in peaks)
             lines.append(f"  {rpm:8.0f} rpm  {text or self.outcome[i]}")
         return "\n".join(lines)
+
+    _repr_html_ = notebook_html
 
 
 def waterfall(

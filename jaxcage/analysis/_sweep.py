@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from .._notebook import notebook_html
 from ..integrate import OUTCOMES
-from ._labels import closing_period, label_lanes
+from ._labels import closing_period, label_lanes, too_few_revolutions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +78,13 @@ class Sweep:
         return label_lanes(self.failed, period, self.exponents[..., 0], self.standard_error[..., 0])
 
     @property
+    def too_short(self) -> Shaped[np.ndarray, "speeds starts"]:
+        """Lanes whose label rests on too few revolutions for the error bar of its exponent."""
+        if self.exponents.shape[-1] == 0:
+            return np.zeros(self.outcome.shape, dtype=bool)
+        return too_few_revolutions(self.label, self.exponents[..., 0], self.standard_error[..., 0], self.revolutions)
+
+    @property
     def chaotic_share(self) -> Float[np.ndarray, " speeds"]:
         """Share of the finished starts that are chaotic; NaN where every start failed."""
         finished = np.sum(~self.failed, axis=1)
@@ -95,5 +103,10 @@ class Sweep:
         over = int(np.sum(self.peak > 1))
         if over:
             lines.append(f"  {over:6d} lanes went beyond eps = 1, at most to {np.nanmax(self.peak):.3f}")
+        short = int(np.sum(self.too_short))
+        if short:
+            lines.append(f"  {short:6d} labels rest on too few revolutions: their exponents are too uncertain")
         lines += [f"  {n:6d} lanes failed: {OUTCOMES[code]}" for code, n in sorted(codes.items())]
         return "\n".join(lines)
+
+    _repr_html_ = notebook_html

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool
 
+from .._notebook import notebook_html
 from ._sweep import Sweep
 
 
@@ -35,6 +36,8 @@ class Edge:
         if self.basis == "statistical":
             return f"{self.speed_rpm:.0f} +- {self.uncertainty_rpm:.0f} rpm"
         return f"{self.speed_rpm:.2f} rpm ({self.mechanism})"
+
+    _repr_html_ = notebook_html
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +76,8 @@ class Zones:
                 f"{zone.share:.0%} of starts chaotic"
             )
         return "\n".join(rows if self.zones else [*rows, "  none"])
+
+    _repr_html_ = notebook_html
 
 
 def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:

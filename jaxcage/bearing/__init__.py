@@ -28,6 +28,7 @@ from ._cases import (
     published_case as published_case,
 )
 from ._catalogue import (
+    BEARINGS as BEARINGS,
     NU2310_RATINGS as NU2310_RATINGS,
     CatalogueRatings as CatalogueRatings,
     nu2310 as nu2310,

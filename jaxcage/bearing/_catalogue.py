@@ -1,6 +1,7 @@
 """Ready-made bearings."""
 
 import dataclasses
+from collections.abc import Callable
 
 from ._geometry import Bearing
 
@@ -38,3 +39,7 @@ def nu2310() -> Bearing:
         radial_clearance=40e-6,
         pocket_clearance=0.3e-3,
     )
+
+
+BEARINGS: dict[str, Callable[[], Bearing]] = {"NU2310": nu2310}
+"""Bearings by their designation."""

@@ -12,11 +12,11 @@ from ..integrate import OUTCOMES, AbstractMethod
 from ..io import write_columns
 from ..orbits import LossZones, SynchronousOrbits, loss_zones, synchronous_orbits
 from ..plotting import multiplier_circle, new_figure, orbit_diagram_with_branches
+from ..report import coexisting_notes, edge_table, loss_table, orbits_document, stretch_table
 from ._console import progress_in_stages
-from ._errors import ComputationError, UsageError, require_at_least, require_speed
+from ._errors import ComputationError, require_at_least, require_range
 from ._inputs import Subject, angular_speed, asks_for_a_method, integration, output_folder, save_figure, subject
 from ._options import BifurcationsOptions, SearchOptions
-from ._orbit_report import coexisting_notes, edge_table, loss_table, orbits_document, stretch_table
 from ._report import Report
 
 
@@ -34,12 +34,7 @@ class Searched:
 
 def check_search(options: SearchOptions) -> None:
     """Refuse a search that cannot be made."""
-    require_speed("--first", options.first)
-    require_speed("--last", options.last)
-    if options.last <= options.first:
-        raise UsageError(
-            f"Option --last must be above --first, but the range is {options.first:g} to {options.last:g} rpm."
-        )
+    require_range(options.first, options.last)
     require_at_least("--count", options.count, 2)
     require_at_least("--discard", options.discard, 0)
 

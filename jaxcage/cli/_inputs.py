@@ -1,7 +1,11 @@
 """What commands start from: a case or TOML file, an integration method, a folder to write to."""
 
+import contextlib
+import contextvars
 import dataclasses
 import math
+import os
+from collections.abc import Iterator
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -10,8 +14,9 @@ from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import check_writable, load_model, replacing
 from ..models import CageModel, case
+from ..plotting import Style, restyle
 from ._console import say
-from ._errors import UsageError, refusing
+from ._errors import UsageError, refusing, require_at_least
 from ._options import CommonOptions, IntegrationOptions, Options
 
 
@@ -20,7 +25,7 @@ class Subject:
     """The model that a command is about."""
 
     name: str
-    """Name of the case, or of the TOML file without its ending."""
+    """Name of the case, or of the TOML file without its ending and with `_` for what no figure can show."""
     model: CageModel
     published: PublishedCase | None
 
@@ -32,9 +37,9 @@ def subject(options: Options) -> Subject:
     given = options.case
     if given in PUBLISHED_CASES:
         found = Subject(given, case(given), PUBLISHED_CASES[given])
-    elif Path(given).suffix.lower() == ".toml" or Path(given).exists():
+    elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
         with refusing():
-            found = Subject(Path(given).stem, load_model(given), None)
+            found = Subject(_title(Path(given).stem), load_model(given), None)
     else:
         known = ", ".join(PUBLISHED_CASES)
         raise UsageError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
@@ -44,6 +49,11 @@ def subject(options: Options) -> Subject:
     return found
 
 
+def _title(name: str) -> str:
+    """A name that matplotlib shows as it is: no bytes that are no text, no mathematics."""
+    return "".join(c if c.isprintable() and c != "$" else "_" for c in name)
+
+
 def angular_speed(rpm: float) -> float:
     """Speed [rad/s] from revolutions per minute, the unit of the command line."""
     return rpm * math.pi / 30
@@ -51,6 +61,8 @@ def angular_speed(rpm: float) -> float:
 
 def integration(options: IntegrationOptions) -> AbstractMethod:
     """The integration method that the options ask for."""
+    if options.steps is not None:
+        require_at_least("--steps", options.steps, 1)
     try:
         if options.solver is None:
             return method(steps=options.steps, tolerance=options.tolerance)
@@ -85,12 +97,27 @@ def samples_per_revolution(chosen: AbstractMethod, most: int = 64) -> int:
 
 def output_folder(options: CommonOptions) -> Path:
     """The folder to write to, tried out before anything is computed."""
+    if not options.out:
+        raise UsageError('Option --out must name a folder, but is "".')
     with refusing():
         return check_writable(options.out)
 
 
+_style: contextvars.ContextVar[Style] = contextvars.ContextVar("style", default="light")
+
+
+@contextlib.contextmanager
+def figures_in(style: Style) -> Iterator[None]:
+    """Around a command: figures are saved in this style."""
+    token = _style.set(style)
+    try:
+        yield
+    finally:
+        _style.reset(token)
+
+
 def save_figure(figure: Figure, path: Path) -> str:
-    """Write a figure, whole or not at all. **Returns:** its path as text."""
+    """Write a figure, whole or not at all, in the style of the command. **Returns:** its path as text."""
     with replacing(path) as temporary:
-        figure.savefig(temporary)
+        restyle(figure, _style.get()).savefig(temporary, dpi=figure.dpi)
     return str(path)

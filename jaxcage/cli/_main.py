@@ -3,15 +3,20 @@
 import contextlib
 import importlib
 import io
+import os
 import re
 import sys
 from collections.abc import Sequence
 
 from .._cache import keep_compiled_programs
-from ._console import leave_at_once_when_interrupted, say
+from ._console import FILES_ARE_WHOLE, leave_at_once_when_interrupted, say
 from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
-from ._options import Command, CommonOptions
-from ._report import show
+from ._options import Command, CommonOptions, InitOptions
+from ._report import Report, show
+
+
+COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
+"""Options that tyro takes by itself, and what it asserts of them."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,22 +38,46 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ComputationError, OSError) as error:
         say(str(error))
         return FAILED
+    except MemoryError:
+        say("There is not enough memory for this: ask for fewer speeds, lanes or revolutions.")
+        return FAILED
     except KeyboardInterrupt:
-        say("Interrupted.")
+        say(f"Interrupted{FILES_ARE_WHOLE}.")
         return INTERRUPTED
 
 
-def _carry_out(options: CommonOptions) -> None:
+def _carry_out(options: CommonOptions | InitOptions) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
     if not options.no_cache:
         keep_compiled_programs()
     implementation = importlib.import_module(f".{options.implementation}", __package__)
-    show(implementation.run(options), options.json)
+    from ._inputs import figures_in  # with the figures: after the options were understood
+
+    with figures_in(options.style):
+        report = implementation.run(options)
+    _print(report, options.json)
+    if report.failure:
+        raise ComputationError(report.failure)
 
 
-def _parse(arguments: list[str]) -> CommonOptions | None:
+def _print(report: Report, as_json: bool) -> None:
+    """Show a report; a standard output that takes nothing is said, as a file that cannot be written is."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not be text
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        show(report, as_json)
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or Python tries again at its end, and complains
+        raise OSError(
+            f"Standard output could not be written ({error.strerror or error}): the files of this run are whole, make "
+            "room and run it again for what it prints."
+        ) from error
+
+
+def _parse(arguments: list[str]) -> CommonOptions | InitOptions | None:
     """Options, or None if help was asked for and given.
 
     **Raises:** `UsageError`: the boxes in which tyro reports errors are boiled down to one
@@ -56,6 +85,10 @@ def _parse(arguments: list[str]) -> CommonOptions | None:
     """
     import tyro
 
+    if len(arguments) > 1 and arguments[0].replace("_", "-") in COMPLETION and arguments[1] not in SHELLS:
+        raise UsageError(
+            f"Option {arguments[0]} must be followed by {', '.join(SHELLS)}, but '{arguments[1]}' was given."
+        )
     box = io.StringIO()
     config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes)
     try:
@@ -83,4 +116,6 @@ def _sentence(box: str) -> str:
     parts = [" ".join(part.split()) for part in re.split(r"\s[─-]{3,}\s", " ".join(lines))]
     said = [part.rstrip(".") for part in parts if part][0 if framed else 1 :][:2]
     kept = [part for i, part in enumerate(said) if i == 0 or part.startswith("Available")]
-    return f"{'; '.join(kept) or 'The command line was not understood'} (see jaxcage --help)."
+    sentence = "; ".join(kept) or "The command line was not understood"
+    ours = re.sub(r"^Error parsing (--[\w-]+): (?=must )", r"Option \1 ", sentence)
+    return f"{ours} (see jaxcage --help)."

@@ -1,66 +1,45 @@
 """`jaxcage map`: the synchronous-loss edges followed in two parameters, over colours of the largest exponent."""
 
-import concurrent.futures
-import dataclasses
-import math
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .._parameters import parameter_info, parameters, replace
+from .._parameters import parameter_info, parameters
 from ..integrate import AbstractMethod
 from ..io import to_si, write_columns
 from ..models import CageModel
-from ..orbits import Curve, bifurcation, curve
+from ..orbits import Curve
 from ..plotting import new_figure, stability_map
-from ..sweeps import cores, rpm, sweep
+from ..report import RPM, SPEED, Axis, Exponents, Say, follow_edges, largest_exponents, shown_unit
+from ..sweeps import rpm
 from ._bifurcations import Searched, check_search, require_edges, search_case
 from ._console import progress_in_stages
 from ._errors import ComputationError, UsageError, require_at_least
 from ._inputs import angular_speed, save_figure, subject
+from ._label_map import run_label_map
 from ._options import MapOptions
 from ._report import Report, Table
 
 
-SPEED = "speed"
-RPM = 30 / math.pi
 BELOW, ABOVE = 0.8, 1.25
 """Range of a parameter over its value, unless told otherwise."""
-Exponents = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Speeds [rpm], values of y [SI], largest exponent at each."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Axis:
-    """One direction of the map."""
-
-    name: str
-    lower: float
-    upper: float
-    unit: str
-    """Unit in which it is shown."""
-    factor: float
-    """From SI to that unit."""
-
-    @property
-    def head(self) -> str:
-        """Head of a column."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
-
-    def cell(self, value: float) -> str:
-        """A value for a table."""
-        return f"{value * self.factor:.2f}" if self.name == SPEED else f"{value * self.factor:.6g}"
 
 
 def run(options: MapOptions) -> Report:
     """Carry out `jaxcage map`."""
+    if options.points is not None:
+        return run_label_map(options)
+    only = options.adaptive, options.no_curves, options.most is not None, options.speed is not None
+    if any(only) or options.refine != MapOptions.refine:
+        raise UsageError(
+            "Options --adaptive, --refine, --no-curves, --most and --speed go with --points, e.g. --points 300x300."
+        )
     check_search(options)
     _check_counts(options)
     about = subject(options)
     model = about.model
-    x, y = _axes(options, model)
+    x, y = axes_of(options, model)
     require_at_least("--starts", options.starts, 1)
     own = len(model.starts(1.0))
     if options.starts > own:
@@ -70,12 +49,12 @@ def run(options: MapOptions) -> Report:
     began = time.perf_counter()
     with progress_in_stages(f"map of {searched.subject.name}") as bar:
         say = bar or (lambda what, done, of: None)
-        curves, refused = follow_edges(searched, x, y, say)
+        curves, refused = follow_edges(model, searched.loss.edges, x, y, searched.method, say)
         if not curves:
             said = "; ".join(f"{name}: {why}" for name, why in refused.items())
             raise ComputationError(f"No edge could be followed ({said}).")
         over_speed = x.name == SPEED and options.rows > 0
-        exponents = largest_exponents(options, model, y, searched.method, say) if over_speed else None
+        exponents = _exponents(options, model, y, searched.method, say) if over_speed else None
     seconds = searched.seconds + time.perf_counter() - began
     files = _files(searched, curves, exponents, x, y)
     document = map_document(searched.subject.name, curves, exponents, x, y) | {
@@ -98,7 +77,7 @@ def _check_counts(options: MapOptions) -> None:
     require_at_least("--revolutions", options.revolutions, 1)
 
 
-def _axes(options: MapOptions, model: CageModel) -> tuple[Axis, Axis]:
+def axes_of(options: MapOptions, model: CageModel) -> tuple[Axis, Axis]:
     """Both directions.
 
     **Raises:** `UsageError` for names the model does not have, and for ranges that make no sense.
@@ -143,81 +122,18 @@ def _limit(option: str, text: str, unit: str) -> float:
         raise UsageError(f"Option {option} {error}.") from error
 
 
-def shown_unit(unit: str, value: float) -> tuple[str, float]:
-    """Unit in which a parameter is shown, and the factor from SI: lengths are easier to read in mm or µm."""
-    if unit == "m":
-        return ("µm", 1e6) if abs(value) < 1e-4 else ("mm", 1e3)
-    return ("" if unit == "1" else unit), 1.0
-
-
-def follow_edges(
-    searched: Searched, x: Axis, y: Axis, say: Callable[[str, int, int], None]
-) -> tuple[list[Curve], dict[str, str]]:
-    """A curve through each named edge, and why where there is none."""
-    model, method, edges = searched.subject.model, searched.method, searched.loss.edges
-    curves, refused = [], {}
-    for done, (name, point) in enumerate(edges.items()):
-        say("curves", done, len(edges))
-        kind: Any = point.kind
-        if kind == "branch-point":
-            refused[name] = "a branch point"
-            continue
-        start: Any = point
-        if x.name != SPEED:
-            start = bifurcation(model, kind, point, x.name, method=method)
-            if not bool(start.converged):
-                refused[name] = start.status
-                continue
-        try:
-            found = curve(
-                model,
-                start,
-                x.name,
-                y.name,
-                lower=y.lower,
-                upper=y.upper,
-                x_lower=x.lower,
-                x_upper=x.upper,
-                name=name,
-                method=method,
-            )
-            curves.append(found)
-        except ValueError:
-            refused[name] = "Newton's method did not find it again"
-    say("curves", len(edges), len(edges))
-    return curves, refused
-
-
-def largest_exponents(
-    options: MapOptions, model: CageModel, y: Axis, method: AbstractMethod, say: Callable[[str, int, int], None]
-) -> Exponents:
-    """Largest exponent per revolution over speed and y, NaN where every start failed."""
-    speeds = rpm(options.first, options.last, options.columns)
-    values = np.linspace(y.lower, y.upper, options.rows)
-
-    def row(value: float) -> np.ndarray:
-        changed = replace(model, **{y.name: float(value)})
-        states = [[[float(c) for c in start] for start in changed.starts(s)[: options.starts]] for s in speeds]
-        found = sweep(
-            changed,
-            speeds,
-            starts=np.array(states),
-            discard=options.discard,
-            revolutions=options.revolutions,
-            blocks=1,
-            keep=1,
-            method=method,
-        )
-        finished = np.where(found.failed, -np.inf, found.exponents[..., 0])
-        top = np.max(finished, axis=1)
-        return np.where(np.isfinite(top), top, np.nan)
-
-    rows = []
-    with concurrent.futures.ThreadPoolExecutor(cores()) as pool:  # a row alone does not fill two chunks of lanes
-        for largest in pool.map(row, values):
-            rows.append(largest)
-            say("exponents", len(rows), values.size)
-    return speeds * RPM, values, np.array(rows).T
+def _exponents(options: MapOptions, model: CageModel, y: Axis, method: AbstractMethod, say: Say) -> Exponents:
+    return largest_exponents(
+        model,
+        rpm(options.first, options.last, options.columns),
+        y,
+        options.rows,
+        starts=options.starts,
+        discard=options.discard,
+        revolutions=options.revolutions,
+        method=method,
+        say=say,
+    )
 
 
 def _files(searched: Searched, curves: list[Curve], exponents: Exponents | None, x: Axis, y: Axis) -> dict[str, Any]:

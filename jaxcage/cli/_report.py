@@ -9,14 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-
-@dataclasses.dataclass(frozen=True)
-class Table:
-    """A titled table of texts; numbers are aligned to the right."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
+from ..report import Table as Table, number as number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,6 +20,8 @@ class Report:
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
     """Lines below the tables."""
+    failure: str = ""
+    """What the command says, with exit status 1, after it has shown a report of something that failed."""
 
 
 def show(report: Report, as_json: bool) -> None:
@@ -78,8 +73,3 @@ def _show_plain(table: Table) -> None:
         first, *rest = (f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True))
         print("  ".join([f"{line[0]:<{len(first)}}", *rest]).rstrip())
     print()
-
-
-def number(value: float | None, digits: int = 0, nothing: str = "-") -> str:
-    """A number for a table."""
-    return nothing if value is None or not math.isfinite(value) else f"{value:.{digits}f}"

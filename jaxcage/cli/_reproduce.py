@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..bearing import FIGURE_AXES, PUBLISHED_CASES
-from ..integrate import AbstractMethod
-from ..models import CONSTANTS, case
-from ..plotting import new_figure, zoomed_diagram
+from ..models import case
+from ..plotting import new_figure, paper_figures, zoomed_diagram
 from ..reproduction import (
     ComparedEdge,
     Conclusion,
@@ -17,13 +16,11 @@ from ..reproduction import (
     Runs,
     compare_edges,
     conclusions,
-    paper_figures,
     run_all,
     try_readings,
     zones_in_range,
 )
 from ._console import progress_in_stages
-from ._errors import UsageError
 from ._inputs import output_folder, save_figure
 from ._options import ReproduceOptions
 from ._report import Report, Table, number
@@ -37,16 +34,12 @@ def run(options: ReproduceOptions) -> Report:
     """Carry out `jaxcage reproduce`."""
     folder = output_folder(options)
     began = time.perf_counter()
-    method: AbstractMethod | None = None
-    if options.constants not in CONSTANTS:
-        known = ", ".join(CONSTANTS)
-        raise UsageError(f"Option --constants must be one of {known}, but '{options.constants}' was given.")
     models = {name: case(name, options.constants) for name in PUBLISHED_CASES}
     with progress_in_stages("reproduce") as bar:
-        runs = run_all(models, method=method, report=bar, **(QUICK if options.quick else {}))
+        runs = run_all(models, report=bar, **(QUICK if options.quick else {}))
         drawn = [save_figure(figure, folder / f"{name}.png") for name, figure in paper_figures(runs)]
         checked = conclusions(runs)
-        read = try_readings(models["1a"], "1a", report=bar, **(QUICK_READINGS if options.quick else {}))
+        read = try_readings(models, report=bar, **(QUICK_READINGS if options.quick else {}))
     drawn.append(_readings_figure(read, folder))
     edges = [row for name in PUBLISHED_CASES for row in _edges(runs, name)]
     ranges = _ranges(runs)
@@ -163,6 +156,7 @@ def _conclusions_table(checked: list[Conclusion]) -> Table:
 
 def _reading_document(r: ReadingResult) -> dict[str, Any]:
     return {
+        "case": r.reading.case,
         "question": r.reading.question,
         "answer": r.reading.answer,
         "chaotic_share": r.chaotic_share,
@@ -175,6 +169,7 @@ def _reading_document(r: ReadingResult) -> dict[str, Any]:
 def _readings_table(read: list[ReadingResult]) -> Table:
     rows = [
         (
+            r.reading.case,
             f"{r.reading.question}: {r.reading.answer}",
             f"{100 * r.chaotic_share:.0f} %",
             str(r.zones),
@@ -183,8 +178,8 @@ def _readings_table(read: list[ReadingResult]) -> Table:
         )
         for r in read
     ]
-    columns = ("reading", "chaotic", "zones", "zone 1 onset", "zone 1 exit", "zone 2 onset", "failed")
-    return Table("Readings of the paper, case 1a [rpm]", columns, rows)
+    columns = ("case", "reading", "chaotic", "zones", "zone 1 onset", "zone 1 exit", "zone 2 onset", "failed")
+    return Table("Readings of the paper [rpm]", columns, rows)
 
 
 def _readings_figure(read: list[ReadingResult], folder: Path) -> str:
@@ -193,7 +188,7 @@ def _readings_figure(read: list[ReadingResult], folder: Path) -> str:
     cells = figure.subplots(-(-len(read) // columns), columns, sharex=True, squeeze=False).ravel()
     for ax, r in zip(cells, read, strict=False):
         zoomed_diagram(r.sweep, 4000.0, 27500.0, 1, ax)
-        ax.set_title(f"{r.reading.question}: {r.reading.answer}", loc="left", fontsize=9)
+        ax.set_title(f"{r.reading.case}, {r.reading.question}: {r.reading.answer}", loc="left", fontsize=9)
         ax.set_xlabel("")
     for ax in cells[len(read) :]:
         ax.set_visible(False)

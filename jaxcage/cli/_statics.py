@@ -3,21 +3,14 @@ kinematics.
 """
 
 import math
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
-from ..bearing import (
-    Bearing,
-    Guidance,
-    LoadDistribution,
-    load_distribution,
-    raceway_surface_speed,
-    static_cage_displacement,
-)
+from ..bearing import Bearing, load_distribution, raceway_surface_speed
 from ..io import write_columns
-from ..models import CageModel
 from ..plotting import load_bars, new_figure
+from ..report import displacements
 from ._errors import UsageError
 from ._inputs import angular_speed, output_folder, save_figure, subject
 from ._options import StaticsOptions
@@ -57,27 +50,11 @@ def run(options: StaticsOptions) -> Report:
         "shaft_shift": shared.shaft_shift,
         "elastic_approach": shared.elastic_approach,
         "half_angle": shared.half_angle,
-        "cage_displacement": _displacements(model, shared),
+        "cage_displacement": displacements(model, shared),
         "kinematics": _kinematics(bearing, shaft),
         **paths,
     }
     return Report(document, _tables(document), [f"Figure: {paths['figure']}", f"Data: {paths['data']}"])
-
-
-def _displacements(model: CageModel, shared: LoadDistribution) -> dict[str, float]:
-    """Static displacement of the cage [m] for the three types of guidance."""
-    return {
-        guidance: float(
-            static_cage_displacement(
-                guidance,
-                guidance_gap=model.guidance_gap,
-                pocket_clearance=model.bearing.pocket_clearance,
-                radial_clearance=model.bearing.radial_clearance,
-                elastic_approach=shared.elastic_approach,
-            )
-        )
-        for guidance in get_args(Guidance)
-    }
 
 
 def _kinematics(bearing: Bearing, shaft_speed: float) -> dict[str, float]:

@@ -12,9 +12,10 @@ from ..analysis import Sweep, Zones, waterfall, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
 from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
+from ..report import zones_document, zones_table
 from ..sweeps import rpm, sweep
 from ._console import progress, say
-from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
+from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_range, require_speed
 from ._inputs import (
     Subject,
     integration,
@@ -26,7 +27,6 @@ from ._inputs import (
 )
 from ._options import SweepOptions
 from ._report import Report, Table
-from ._zone_report import zones_document, zones_table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,10 +49,8 @@ def _check(options: SweepOptions) -> None:
     require_speed("--first", options.first)
     require_speed("--last", options.last)
     require_at_least("--count", options.count, 1)
-    if options.count > 1 and options.last <= options.first:
-        raise UsageError(
-            f"Option --last must be above --first, but the range is {options.first:g} to {options.last:g} rpm."
-        )
+    if options.count > 1:
+        require_range(options.first, options.last)
     require_at_least("--discard", options.discard, 0)
     require_at_least("--exponents", options.exponents, 1)
     require_at_least("--waterfall", options.waterfall, 0)
@@ -104,6 +102,7 @@ def run(options: SweepOptions) -> Report:
         "labels": dict(sorted(counts.items())),
         "failed": failed_lanes(found),
         "beyond_clearance": int(np.sum(found.peak > 1)),
+        "too_short": int(np.sum(found.too_short)),
         "seconds": round(swept.seconds, 2),
         **figures,
         "data": swept.data,
@@ -167,6 +166,8 @@ def _notes(document: dict[str, Any]) -> list[str]:
     beyond = document["beyond_clearance"]
     if beyond:
         say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
+    if document["too_short"]:
+        say(f"Warning: {document['too_short']} labels rest on too few revolutions: choose more --revolutions.")
     return [
         f"Failed lanes: {failed or 'none'}",
         f"Lanes beyond eps = 1: {beyond}",

@@ -4,26 +4,21 @@ import time
 from typing import Any
 
 from ..analysis import zones
-from ..integrate import AbstractMethod
 from ..orbits import (
     Cascade,
     Explained,
     LossZones,
     Sensitivity,
     explain,
-    limit_sensitivity,
     loss_zones,
-    sensitivities,
-    sensitivity,
     synchronous_orbits,
 )
+from ..report import edge_slopes, loss_table, zone_document, zones_document, zones_table
 from ._console import progress_in_stages
 from ._inputs import Subject, integration
 from ._options import ZonesOptions
-from ._orbit_report import loss_table
 from ._report import Report, Table, number
 from ._sweep import failed_lanes, sweep_case
-from ._zone_report import zone_document, zones_document, zones_table
 
 
 SHOWN = ("guidance_gap", "eccentricity")
@@ -41,7 +36,7 @@ def run(options: ZonesOptions) -> Report:
         )
         loss = loss_zones(found)
         explained = explain(zones(swept.sweep), found, about.model, chosen)
-        slopes = {} if options.quick else _slopes(about, loss, explained, chosen)
+        slopes = {} if options.quick else edge_slopes(about.model, loss, explained, chosen)
     document = zones_document(about.name, explained.zones, about.published)
     document["synchronous_loss"] = [_loss_document(i, loss, slopes) for i in range(len(loss.zones))]
     for i, zone in enumerate(document["zones"], start=1):
@@ -57,15 +52,6 @@ def run(options: ZonesOptions) -> Report:
         zones_table(about.name, explained.zones, about.published, swept.range_rpm),
     ]
     return Report(document, tables, [*_notes(explained), f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])
-
-
-def _slopes(about: Subject, loss: LossZones, explained: Explained, chosen: AbstractMethod) -> dict[str, Sensitivity]:
-    """Sensitivities of the synchronous-loss edges, and of chaotic edges that coincide with something exact."""
-    slopes = sensitivities(about.model, loss.edges, chosen)
-    for name, source in explained.sources.items():
-        of = limit_sensitivity if isinstance(source, Cascade) else sensitivity
-        slopes[f"chaotic {name}"] = of(about.model, source, f"chaotic {name}", chosen)  # pyright: ignore[reportArgumentType]
-    return slopes
 
 
 def _slopes_document(slopes: Sensitivity | None) -> dict[str, Any] | None:

@@ -7,10 +7,43 @@
 | `_screen`   | the global stage of identification: chaos where it was measured               |
 | `_tracked`  | exact edges as differentiable functions of the unknowns                       |
 | `_fit`      | the local stage: least squares on exact edges, what the data do and do not fix |
+| `_objective`| design space, objectives that add up, any differentiable function of a design |
+| `_smooth`   | manufacturing cost, measures of regular motion                                |
+| `_margin`   | how far the synchronous orbit is from losing its stability                    |
+| `_edges`    | widths of zones and distances from edges, exact                               |
+| `_chaos`    | chaotic widths and shares, statistical                                        |
+| `_robust`   | the mean or the worst over manufacturing scatter                              |
+| `_optimise` | designs made better by gradient                                               |
+| `_scatter`  | Sobol indices, tolerance budgets, Pareto fronts                               |
 """
 
+from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
+from ._edges import (
+    EdgeClearance as EdgeClearance,
+    EdgeSum as EdgeSum,
+    FollowedEdges as FollowedEdges,
+    zone_width as zone_width,
+)
 from ._fit import Combination as Combination, Fit as Fit, FittedEdge as FittedEdge, fit_edges as fit_edges
-from ._measured import MeasuredEdge as MeasuredEdge
+from ._margin import StabilityMargin as StabilityMargin
+from ._measured import MeasuredEdge as MeasuredEdge, matched as matched
+from ._objective import (
+    AbstractObjective as AbstractObjective,
+    DesignSpace as DesignSpace,
+    Measured as Measured,
+    Smooth as Smooth,
+)
+from ._optimise import Optimised as Optimised, Optimum as Optimum, optimise as optimise
+from ._robust import Robust as Robust, Scatter as Scatter, rayleigh as rayleigh, uniform as uniform
+from ._scatter import (
+    ParetoPoint as ParetoPoint,
+    SobolIndices as SobolIndices,
+    ToleranceBudget as ToleranceBudget,
+    global_sensitivity as global_sensitivity,
+    pareto_front as pareto_front,
+    tolerance_budget as tolerance_budget,
+)
 from ._screen import Candidate as Candidate, screen as screen
+from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motion as regular_motion
 from ._tracked import TrackedEdges as TrackedEdges
 from ._unknowns import Unknown as Unknown

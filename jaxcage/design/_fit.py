@@ -15,6 +15,7 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..orbits import Point
@@ -48,6 +49,8 @@ class Combination:
     def __str__(self) -> str:
         terms = [f"{n}^{w:+.2f}" for n, w in sorted(self.weights.items(), key=lambda x: -abs(x[1])) if abs(w) > 0.05]
         return f"{' '.join(terms)}: +-{100 * self.half_width:.2g} %{'' if self.identified else ', not identified'}"
+
+    _repr_html_ = notebook_html
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,6 +111,8 @@ class Fit:
             for e in self.edges
         ]
         return "\n".join(rows)
+
+    _repr_html_ = notebook_html
 
 
 def fit_edges(
@@ -197,7 +202,6 @@ def _report(
 ) -> Fit:
     found = tracked(place)
     sigma = np.array([e.uncertainty_rpm for e in measured])
-    span = np.array([u.span for u in unknowns])
     unit = np.array([u.span if u.scale == "log" else 1.0 for u in unknowns])
     rows = np.nan_to_num(found.slope) / sigma[:, None]
     off = (found.rpm - np.array([e.rpm for e in measured])) / sigma
@@ -216,9 +220,7 @@ def _report(
         edges=tuple(FittedEdge(e, float(w), s) for e, w, s in zip(measured, found.rpm, found.status, strict=True)),
         covariance=covariance,
         combinations=combinations,
-        at_bound=tuple(
-            u.name for u, p, s in zip(unknowns, place, span, strict=True) if min(p, 1 - p) < 2 * AT_BOUND and s > 0
-        ),
+        at_bound=tuple(u.name for u, p in zip(unknowns, place, strict=True) if min(p, 1 - p) < 2 * AT_BOUND),
         chi_square=float(np.sum(off**2)),
         solves=tracked.solves,
         status="an edge is lost" if lost else "converged" if converged else "not converged",

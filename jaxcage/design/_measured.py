@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ..analysis import Edge, Zone
+
 
 @dataclasses.dataclass(frozen=True)
 class MeasuredEdge:
@@ -53,3 +55,27 @@ def inside_zones(edges: Sequence[MeasuredEdge], rpm: Float[np.ndarray, " speeds"
         ends = {e.end: e.rpm for e in edges if e.zone == zone}
         inside |= (rpm >= ends.get("onset", 0.0)) & (rpm <= ends.get("exit", np.inf))
     return inside
+
+
+def matched(edges: Sequence[MeasuredEdge], found: Sequence[Zone], last_rpm: float) -> list[Edge | None]:
+    """For each edge of one case the one found: that of the zone which shares most speeds with its measured zone.
+
+    Zones without an exit, measured or found, end at `last_rpm`, the last speed that was looked at. A found zone answers
+    for one measured zone only, the lowest: one zone over two has the edges of the first.
+    """
+    taken: dict[int, Zone | None] = {}
+    for number in sorted({e.zone for e in edges}):
+        ends = {e.end: e.rpm for e in edges if e.zone == number}
+        low, high = ends.get("onset", 0.0), min(ends.get("exit", np.inf), last_rpm)
+        best = max(found, key=lambda z: _shared(z, low, high), default=None)
+        lost = best is None or _shared(best, low, high) <= 0 or any(best is z for z in taken.values())
+        taken[number] = None if lost else best
+    zones = [(e, taken[e.zone]) for e in edges]
+    return [None if z is None else z.onset if e.end == "onset" else z.exit for e, z in zones]
+
+
+def _shared(zone: Zone, low: float, high: float) -> float:
+    """How much of [low, high] a zone covers [rpm]."""
+    onset = zone.onset.speed_rpm if zone.onset else 0.0
+    leaves = zone.exit.speed_rpm if zone.exit else np.inf
+    return min(leaves, high) - max(onset, low)

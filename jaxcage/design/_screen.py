@@ -12,21 +12,23 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from .._checks import require_x64
+from .._notebook import notebook_html
+from ..analysis import CHAOS_THRESHOLD, Sweep, Zone, zones
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..sweeps import sweep_designs
-from ._measured import MeasuredEdge, inside_zones, of_case
+from ._measured import MeasuredEdge, inside_zones, matched, of_case
 from ._unknowns import Unknown, check_unknowns, values_at, with_values
 
 
-CHAOTIC = 0.02
-"""Exponent per revolution above which a motion is taken for chaotic."""
 SOFT = 0.04
 """Half width over which calm turns into chaos, so that the score tells better from worse."""
+MISSING = 0.3
+"""What a missing edge costs, as a relative error; one that is farther off costs no more."""
 TOGETHER = 64
 """Designs swept in one batch."""
-NEAR = 0.04
-"""Within this relative distance of an edge a speed counts half."""
+NEEDLESS = 0.01
+"""What a needless change between calm and chaos costs, as a relative error of the edges."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,36 +38,54 @@ class Candidate:
     values: dict[str, float]
     """[SI]."""
     score: float
-    """Mean over the cases of the share of speeds with the wrong kind of motion, plus half the worst case's."""
+    """Mean over the cases of how far their edges are off, about relative to the speed, plus half the worst case's."""
     by_case: dict[str, float]
 
     def __str__(self) -> str:
         numbers = ", ".join(f"{n} {v:.4g}" for n, v in self.values.items())
         return f"score {self.score:.4f}: {numbers}"
 
+    _repr_html_ = notebook_html
+
 
 @dataclasses.dataclass(frozen=True)
 class _Target:
     """What one case should do at the speeds of the grid."""
 
+    measured: tuple[MeasuredEdge, ...]
     chaotic: np.ndarray
-    weight: np.ndarray
+    width: np.ndarray
+    """Relative width of the speeds' cells, d log(speed)."""
+    edges: int
 
     @classmethod
     def of(cls, edges: Sequence[MeasuredEdge], rpm: np.ndarray) -> "_Target":
-        """Every stretch between two edges weighs half by its width and half as one of them."""
-        chaotic = inside_zones(edges, rpm)
-        near = np.min(np.abs(rpm[:, None] / np.array([e.rpm for e in edges]) - 1), axis=1) < NEAR
-        base = np.where(near, 0.5, 1.0)
-        stretch = np.cumsum(np.append(0, np.diff(chaotic.astype(int)) != 0))
-        total = np.bincount(stretch, base)
-        share = 0.5 * base / base.sum() + 0.5 * base / total[stretch] / total.size
-        return cls(chaotic, share)
+        return cls(tuple(edges), inside_zones(edges, rpm), np.gradient(np.log(rpm)), len(edges))
 
-    def wrong(self, exponent: Float[np.ndarray, " speeds"]) -> float:
-        """Share of speeds with the wrong kind of motion; a lane that failed is wrong whatever it should do."""
-        chaos = np.clip((exponent - CHAOTIC) / (2 * SOFT) + 0.5, 0, 1)
-        return float(np.sum(self.weight * np.where(np.isfinite(exponent), np.abs(self.chaotic - chaos), 1.0)))
+    def wrong(self, found: Sweep, by: str) -> float:
+        """How far a sweep is from what was measured."""
+        if by == "edges":
+            return self.wrong_edges(zones(found).zones, float(found.rpm[-1]))
+        return self.wrong_motion(found.exponents[..., 0])
+
+    def wrong_edges(self, found: Sequence[Zone], last_rpm: float) -> float:
+        """Mean relative error of the edges, a missing one counted as `MISSING`, and `NEEDLESS` for each end of each
+        zone too many.
+        """
+        edges = matched(self.measured, found, last_rpm)
+        pairs = zip(edges, self.measured, strict=True)
+        near = [MISSING if e is None else abs(e.speed_rpm / m.rpm - 1) for e, m in pairs]
+        extra = max(len(found) - len({m.zone for m in self.measured}), 0)
+        return float(np.mean(np.minimum(near, MISSING)) + 2 * NEEDLESS * extra)
+
+    def wrong_motion(self, exponent: Float[np.ndarray, "speeds starts"]) -> float:
+        """Mean relative error of the edges, were each wrong speed due to one that has moved; each needless change
+        between calm and chaos costs `NEEDLESS` besides. A lane that failed is wrong whatever it should do.
+        """
+        chaos = np.clip((exponent - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1).max(axis=1)
+        chaos = np.where(np.isfinite(chaos), chaos, 1.0 - self.chaotic)
+        changes = np.sum(np.abs(np.diff(chaos))) - np.sum(np.abs(np.diff(self.chaotic.astype(float))))
+        return float(self.width @ np.abs(self.chaotic - chaos) / self.edges + NEEDLESS * max(changes, 0.0))
 
 
 def screen(
@@ -79,6 +99,7 @@ def screen(
     begin: Mapping[str, float] | None = None,
     spread: float = 0.1,
     best: int = 8,
+    by: str = "motion",
     seed: int = 0,
     starts: Sequence[tuple[float, ...]] | None = None,
     discard: int = 160,
@@ -91,20 +112,25 @@ def screen(
     **Arguments:**
 
     - `systems`, `unknowns`, `measured`: cases by name, what is unknown, and the edges of the zones.
-    - `speeds`: grid [rad/s].
+    - `speeds`: grid [rad/s]; one in equal ratios weighs all edges alike.
     - `designs`: quasi-random designs (Sobol), rounded up to a power of 2.
     - `generations`: of an evolution strategy (CMA-ES) that starts from the best of them, or from `begin` [SI].
     - `spread`: its first standard deviation, as a part of the distance between the bounds.
     - `best`: how many candidates to return.
-    - `starts`: initial states, by default the first of the first system's own, for all cases.
+    - `by`: what is held against the measured edges: `motion`, chaotic or not at each speed, smoothly, which works far
+      from the answer; or the `edges` of the zones found, which is what counts near it.
+    - `starts`: initial states, by default the first of the first system's own, for all cases; a speed is chaotic if
+      any of them is.
     - `discard`, `revolutions`: revolutions left out and observed, at each speed.
     - `report`: called with the designs tried so far and the best candidate.
 
     **Returns:** the best candidates, best first.
 
-    **Raises:** `ValueError` for unknowns that no case has, or cases without an edge.
+    **Raises:** `ValueError` for unknowns that no case has, cases without an edge, or another `by`.
     """
     require_x64()
+    if by not in ("motion", "edges"):
+        raise ValueError(f"Argument `by` must be motion or edges, but '{by}' was given.")
     check_unknowns(systems, unknowns)
     rpm = np.asarray(speeds, dtype=float) * 30 / np.pi
     edges = {case: of_case(measured, case) for case in systems}
@@ -125,16 +151,13 @@ def screen(
                 discard=discard,
                 revolutions=revolutions,
                 exponents=1,
-                blocks=1,
-                keep=1,
+                blocks=5 if by == "edges" else 1,
+                keep=8 if by == "edges" else 1,
                 method=method,
             )
             for i, place in enumerate(part):
                 own = swept[i * len(systems) : (i + 1) * len(systems)]
-                wrong = [
-                    float(np.mean([t.wrong(s.exponents[:, j, 0]) for j in range(s.exponents.shape[1])]))
-                    for s, t in zip(own, targets.values(), strict=True)
-                ]
+                wrong = [t.wrong(s, by) for s, t in zip(own, targets.values(), strict=True)]
                 by_case = dict(zip(systems, wrong, strict=True))
                 new.append(Candidate(values_at(unknowns, place), float(np.mean(wrong) + 0.5 * np.max(wrong)), by_case))
             tried.extend(new[-len(part) :])

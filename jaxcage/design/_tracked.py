@@ -4,6 +4,8 @@ An edge is followed from where it was last found: Newton's method on its definin
 the new constants in as many parts as it needs. The derivatives come from the implicit function theorem.
 """
 
+import concurrent.futures
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +17,7 @@ from jaxtyping import Array, Float
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..orbits import Located, Point, Sensitivity, sensitivity
-from ._unknowns import Unknown, values_at, with_values
+from ._unknowns import Unknown, slope_in_place, with_values
 
 
 HALVINGS = 4
@@ -29,6 +31,14 @@ class Edges(NamedTuple):
     slope: Float[np.ndarray, "edges unknowns"]
     """d rpm / d place."""
     status: tuple[str, ...]
+
+
+class _Anchor(NamedTuple):
+    """A place at which all edges are known."""
+
+    place: np.ndarray
+    last: list[Located]
+    slope: np.ndarray
 
 
 class TrackedEdges:
@@ -46,66 +56,66 @@ class TrackedEdges:
         """**Arguments:** the cases; what is unknown; for each edge its case and the bifurcation that it is, as found
         with the unknowns at `place`."""
         self.systems, self.unknowns, self.cases, self.method = systems, tuple(unknowns), tuple(cases), method
-        self.place = np.asarray(place, dtype=float)
-        self.last = [Located(str(p.kind), float(p.speed), np.asarray(p.state), int(p.periods)) for p in points]
-        self.slope = np.zeros((len(points), len(self.unknowns)))
-        self.solves = 0
+        last = [Located(str(p.kind), float(p.speed), np.asarray(p.state), int(p.periods)) for p in points]
+        self._anchors = [_Anchor(np.asarray(place, dtype=float), last, np.zeros((len(points), len(self.unknowns))))]
+        self._solved: list[str] = []
         self._known: dict[bytes, Edges] = {}
 
+    @property
+    def solves(self) -> int:
+        """Edges that were solved for so far."""
+        return len(self._solved)
+
     def __call__(self, place: Float[np.ndarray, " unknowns"]) -> Edges:
-        """The edges at `place`, followed from the last place at which all were found."""
+        """The edges at `place`, followed from the nearest place at which all were found."""
         place = np.asarray(place, dtype=float)
         key = place.tobytes()
         if key not in self._known:
-            self._known[key] = self._go(self.last, self.slope, self.place, place)
+            self._known[key] = self._go(place)
         return self._known[key]
 
-    def _go(self, last: list[Located], slope: np.ndarray, start: np.ndarray, place: np.ndarray) -> Edges:
-        models = with_values(self.systems, self.unknowns, place)
-        found = [
-            self._follow(i, last[i], slope[i], start, place, models[c], HALVINGS) for i, c in enumerate(self.cases)
-        ]
+    def _go(self, place: np.ndarray) -> Edges:
+        near = min(self._anchors, key=lambda a: float(np.sum((a.place - place) ** 2)))
+        follow = lambda case, last, slope: self._follow(case, last, slope, near.place, place, HALVINGS)
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:  # an edge keeps one core busy
+            found = list(pool.map(follow, self.cases, near.last, near.slope))
         edges = Edges(
             np.array([s.value_rpm for s in found]),
-            np.array([self._slopes(s, place) for s in found]),
+            np.array([slope_in_place(self.unknowns, s.derivative, place) for s in found]),
             tuple(s.status for s in found),
         )
         if np.all(np.isfinite(edges.rpm)):
-            self.last = [
+            last = [
                 now._replace(speed=s.value_rpm * np.pi / 30, state=s.state)
-                for now, s in zip(self.last, found, strict=True)
+                for now, s in zip(near.last, found, strict=True)
             ]
-            self.place, self.slope = place, edges.slope
+            self._anchors.append(_Anchor(place, last, edges.slope))
         return edges
 
     def _follow(
         self,
-        i: int,
+        case: str,
         last: Located,
         slope: np.ndarray,
         start: np.ndarray,
         place: np.ndarray,
-        model: AbstractForcedSystem,
         halvings: int,
     ) -> Sensitivity:
-        self.solves += 1
+        """One edge at `place`, from where it was `last` found, with the unknowns at `start` and with that slope."""
+        self._solved.append(case)
         guess = last._replace(speed=last.speed + float(slope @ (place - start)) * np.pi / 30)
+        model = with_values({case: self.systems[case]}, self.unknowns, place)[case]
         found = sensitivity(model, guess, method=self.method)
         if np.isfinite(found.value_rpm) or halvings == 0:
             return found
         middle = (start + place) / 2
-        there = with_values({self.cases[i]: self.systems[self.cases[i]]}, self.unknowns, middle)[self.cases[i]]
-        half = self._follow(i, last, slope, start, middle, there, halvings - 1)
+        half = self._follow(case, last, slope, start, middle, halvings - 1)
         if not np.isfinite(half.value_rpm):
             return found
         nearer = last._replace(speed=half.value_rpm * np.pi / 30, state=half.state)
-        return self._follow(i, nearer, self._slopes(half, middle), middle, place, model, halvings - 1)
-
-    def _slopes(self, found: Sensitivity, place: np.ndarray) -> np.ndarray:
-        """d rpm / d place of one edge."""
-        values = values_at(self.unknowns, place)
-        total = lambda u: sum(found.derivative[target] for target in u.targets)
-        return np.array([total(u) * u.per_place(values[u.name]) for u in self.unknowns])
+        return self._follow(
+            case, nearer, slope_in_place(self.unknowns, half.derivative, middle), middle, place, halvings - 1
+        )
 
 
 def differentiable(edges: Callable[[np.ndarray], Edges], m: int, n: int, lost: float) -> Callable[[Array], Array]:

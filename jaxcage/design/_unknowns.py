@@ -89,3 +89,12 @@ def with_values(
     values = values_at(unknowns, place)
     chosen = {target: values[u.name] for u in unknowns for target in u.targets}
     return {case: replace(system, **chosen) for case, system in systems.items()}
+
+
+def slope_in_place(
+    unknowns: Sequence[Unknown], derivative: Mapping[str, float], place: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """d / d place of what has these derivatives with respect to the parameters [SI]."""
+    values = values_at(unknowns, place)
+    total = lambda u: sum(derivative[target] for target in u.targets)
+    return np.array([total(u) * u.per_place(values[u.name]) for u in unknowns])

@@ -3,6 +3,9 @@
 | module             | responsibility                                                              |
 |--------------------|-----------------------------------------------------------------------------|
 | `_film`            | short-bearing oil film of the rib lands, three film models, (25)-(28)       |
+| `_finite_film`     | the film of a land of finite width, and how far the short film is from it   |
+| `_reynolds`        | pressure by the Reynolds equation (25), three cavitation conditions         |
+| `_axial`, `_ring`  | its discretisation across the land, its linear solves around the rib        |
 | `_contact`         | line contact of the lands, with restitution                                 |
 | `_support`         | springs, cubic stiffness, damping and cross-coupling, (16), (20)            |
 | `_rib`             | rigid or elastic rib                                                        |
@@ -24,6 +27,7 @@ from ._contact import (
 from ._film import (
     FilmModel as FilmModel,
     RibFilm as RibFilm,
+    ShortFilm as ShortFilm,
     film_drive as film_drive,
     film_pressure as film_pressure,
     film_resistance as film_resistance,
@@ -35,6 +39,7 @@ from ._film import (
     short_film_force as short_film_force,
     supply_force as supply_force,
 )
+from ._finite_film import finite_film_force as finite_film_force, short_film_excess as short_film_excess
 from ._gravity import weight as weight
 from ._impact_forcing import (
     PulseTrain as PulseTrain,
@@ -52,6 +57,12 @@ from ._pocket_impact import (
     approach_speed as approach_speed,
     impact_history as impact_history,
     impact_time_scale as impact_time_scale,
+)
+from ._reynolds import (
+    Cavitation as Cavitation,
+    FilmPressure as FilmPressure,
+    film_pressure_field as film_pressure_field,
+    pressure_force as pressure_force,
 )
 from ._rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
 from ._smooth import (

@@ -24,7 +24,8 @@ from ._smooth import smooth_norm
 
 
 Vector = tuple[Scalar, Scalar]
-FilmModel = Literal["fixed_half", "positive_pressure", "full"]
+ShortFilm = Literal["fixed_half", "positive_pressure", "full"]
+FilmModel = Literal["fixed_half", "positive_pressure", "full", "finite_length"]
 
 
 class Resistance(NamedTuple):
@@ -77,7 +78,7 @@ class PolarResistance(NamedTuple):
     d_g: Scalar
 
 
-def polar_resistance(model: FilmModel, eps: Scalar) -> PolarResistance:
+def polar_resistance(model: ShortFilm, eps: Scalar) -> PolarResistance:
     """Coefficients of `fixed_half_resistance` or `full_resistance`, and how they change with eccentricity ratio."""
     inverse = 1 / (1 - eps * eps)
     a = (jnp.pi / 2 if model == "fixed_half" else jnp.pi) * inverse * jnp.sqrt(inverse)
@@ -129,7 +130,7 @@ def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> t
 
 
 def film_resistance(
-    model: FilmModel,
+    model: ShortFilm,
     x: Scalar,
     y: Scalar,
     direction: Vector,
@@ -152,7 +153,7 @@ def film_resistance(
 
 
 def supply_force(
-    model: FilmModel, direction: Vector, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
+    model: ShortFilm, direction: Vector, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
 ) -> tuple[Array, Array]:
     """Thrust -2 u of a uniform gauge pressure on the pressurised half circle centred on u, in units of R L p_0.
 
@@ -168,7 +169,7 @@ def supply_force(
 
 
 def short_film_force(
-    model: FilmModel, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar, smoothing: Scalar = 1e-9
+    model: ShortFilm, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar, smoothing: Scalar = 1e-9
 ) -> tuple[Array, Array]:
     """Force of the film in units of S = mu R L^3 / c^2, times 1/s: -(1/2) M P.
 
@@ -206,4 +207,16 @@ class RibFilm(eqx.Module):
     )
     supply_pressure: Scalar = parameter("Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", default=0.0)
     n_lands: int = count(1, 4, "number of guiding lands, each a film of its own", default=2)
-    model: FilmModel = choice("fixed_half", "positive_pressure", "full", text="film model", default="fixed_half")
+    model: FilmModel = choice(
+        "fixed_half",
+        "positive_pressure",
+        "full",
+        "finite_length",
+        text="film model: a short film, or the Reynolds equation with its axial term",
+        default="fixed_half",
+    )
+
+    @property
+    def arc(self) -> ShortFilm:
+        """The short film whose pressurised arc this film has: exactly, or as the land gets narrow."""
+        return "positive_pressure" if self.model == "finite_length" else self.model

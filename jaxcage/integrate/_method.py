@@ -21,6 +21,8 @@ from ._rosenbrock import Rodas3, Rodas4
 
 
 REVOLUTION = 2 * math.pi
+WATCHED = 1024
+"""Phases of a revolution of adaptive steps at which the largest excursion is looked for."""
 
 
 class Stretch(NamedTuple):
@@ -198,6 +200,7 @@ class AdaptiveSteps(AbstractMethod):
     def advance(
         self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
     ) -> Stretch:
+        watched = max(WATCHED // parts, 1)
         solution = dfx.diffeqsolve(
             _term(self.solver),
             self.solver,
@@ -206,6 +209,7 @@ class AdaptiveSteps(AbstractMethod):
             dt0=REVOLUTION / 512,
             y0=divide(y, scale),
             args=ScaledField(field, scale),
+            saveat=dfx.SaveAt(t1=True, ts=phase + jnp.linspace(0.0, REVOLUTION / parts, watched + 1)[1:-1]),
             stepsize_controller=dfx.PIDController(rtol=self.rtol, atol=self.atol, pcoeff=0.3, icoeff=0.4),
             adjoint=dfx.ForwardMode(),
             max_steps=self.max_steps,
@@ -213,7 +217,8 @@ class AdaptiveSteps(AbstractMethod):
         )
         assert solution.ys is not None
         y = multiply(tuple(c[-1] for c in solution.ys), scale)
-        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
+        excursions = jax.vmap(lambda z: jnp.asarray(system.excursion(multiply(z, scale))))(solution.ys)
+        excursion = jax.lax.stop_gradient(jnp.max(excursions))
         return Stretch(y, excursion, judge(solution.result, y, excursion, ESCAPE))
 
 

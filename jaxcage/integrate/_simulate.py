@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from .._types import Scalar, State
 from ..models import AbstractForcedSystem
 from ._method import REVOLUTION, AbstractMethod, method as make_method
@@ -46,6 +47,8 @@ class Trajectory:
             f"Trajectory of {revolutions:g} revolutions, {self.samples} samples each, "
             f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, largest excursion {self.peak:.3f}"
         )
+
+    _repr_html_ = notebook_html
 
 
 @eqx.filter_jit

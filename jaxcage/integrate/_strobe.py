@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
+from .._checks import require_x64
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
 from ._method import REVOLUTION, AbstractMethod, Stretch, judge, method as make_method
@@ -42,5 +43,6 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
 
     **Arguments:** system; speed; integration method, by default the library's own (`jaxcage.method()`).
     """
+    require_x64()
     chosen = make_method() if method is None else method
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

@@ -6,6 +6,7 @@
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
 | `_config`       | TOML to `CageModel`, with every value checked                             |
 | `_write_config` | `CageModel` to nested mapping or TOML                                     |
+| `_template`     | a commented TOML file to start from                                       |
 | `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
 | `_csv`          | time histories as CSV                                                     |
 | `_files`        | whole files or none; is a folder writable                                 |
@@ -28,6 +29,7 @@ from ._dataset import (
 )
 from ._files import check_writable as check_writable, replacing as replacing
 from ._schema import ConfigError as ConfigError
+from ._template import template as template, write_template as write_template
 from ._units import to_si as to_si
 from ._write_config import (
     configuration as configuration,

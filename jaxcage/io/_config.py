@@ -16,6 +16,7 @@ bar_mass = "4 g"
 """
 
 import dataclasses
+import math
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -24,10 +25,11 @@ from typing import Any
 import equinox as eqx
 
 from .._checks import require_x64
-from ..bearing import PUBLISHED_CASES, nu2310, vg
+from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
 from ._schema import KINDS, ConfigError, read_value, submodules, values
+from ._units import printable, shown
 
 
 _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
@@ -48,8 +50,8 @@ def load_model(path: str | Path) -> CageModel:
             table = tomllib.load(file)
     except OSError as error:
         raise ConfigError(f"File '{path}' must be a readable TOML file, but: {error.strerror}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        reason = str(error).rstrip(".")
+    except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits; nested too deep
+        reason = printable(str(error).rstrip("."))
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
     try:
         return model_from(table)
@@ -65,7 +67,7 @@ def model_from(table: Mapping[str, Any]) -> CageModel:
     if "base" in rest:
         name = rest.pop("base")
         if not isinstance(name, str) or name not in PUBLISHED_CASES:
-            raise ConfigError(f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {name!r}.")
+            raise ConfigError(f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {shown(name)}.")
         start = case(name)
     model = _build(CageModel, rest, start, ())
     assert isinstance(model, CageModel)
@@ -104,14 +106,14 @@ def _build_chosen(
 ) -> eqx.Module:
     """A sub-table, which chooses its law with `kind` where there are several."""
     if not isinstance(table, Mapping):
-        raise ConfigError(f"`{_dotted(path)}` must be a table of values, but is {table!r}.")
+        raise ConfigError(f"`{_dotted(path)}` must be a table of values, but is {shown(table)}.")
     table = dict(table)
     kind = options[0]
     if len(options) > 1:
         names = [name for name, law in KINDS.items() if law in options]
         given = table.pop("kind", None if start is None else kind_name(start))
         if given not in names:
-            given = "missing" if given is None else f"{given!r}"
+            given = "missing" if given is None else shown(given)
             raise ConfigError(f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}.")
         kind = KINDS[given]
     return _build(kind, table, start if isinstance(start, kind) else None, path)
@@ -150,7 +152,7 @@ def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple
     for key in table:
         if key not in keys and key not in tables:
             where = f" in [{_dotted(path)}]" if path else " at the top level"
-            raise ConfigError(f"Key `{key}`{where} must be one of {', '.join(allowed)}.")
+            raise ConfigError(f"Key `{printable(key)}`{where} must be one of {', '.join(allowed)}.")
 
 
 def _ready_made(table: dict, start: eqx.Module | None, path: tuple[str, ...]) -> eqx.Module | None:
@@ -161,14 +163,18 @@ def _ready_made(table: dict, start: eqx.Module | None, path: tuple[str, ...]) ->
 
 
 def _designated(given: Any) -> eqx.Module:
-    if given != "NU2310":
-        raise ConfigError(f"`bearing.designation` must be NU2310, the bearing in the catalogue, but is {given!r}.")
-    return nu2310()
+    if not isinstance(given, str) or given not in BEARINGS:
+        raise ConfigError(
+            f"`bearing.designation` must be {' or '.join(BEARINGS)}, from the catalogue, but is {shown(given)}."
+        )
+    return BEARINGS[given]()
 
 
 def _grade(given: Any) -> float:
     if isinstance(given, bool) or not isinstance(given, int | float) or not 2 <= given <= 10000:
-        raise ConfigError(f"`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), but is {given!r}.")
+        raise ConfigError(
+            f"`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), but is {shown(given)}."
+        )
     return float(given)
 
 
@@ -178,6 +184,14 @@ def _check_together(model: CageModel) -> None:
     if eccentricity >= gap:
         raise ConfigError(
             f"`eccentricity` must be smaller than `guidance_gap`, but is {eccentricity:g} mm in a gap of {gap:g} mm."
+        )
+    rib = 1e3 * float(model.bearing.rib_diameter)
+    if gap >= rib:
+        raise ConfigError(f"`guidance_gap` must leave room for the cage, but is {gap:g} mm in a rib of {rib:g} mm.")
+    if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
+        raise ConfigError(
+            "`lubricant` must have a viscosity at its temperature, but by ASTM D341 its two points, reference and "
+            "temperature give none."
         )
     width, limit = 1e3 * float(model.film.land_width), 1e3 * float(model.bearing.land_width_limit)
     if width > limit:

@@ -20,11 +20,14 @@ def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " r
 
 
 def read_columns(path: str | Path) -> dict[str, Float[np.ndarray, " rows"]]:
-    """The columns of a file that `write_columns` wrote, by their heads."""
+    """The columns of a file that `write_columns` wrote, by their heads.
+
+    **Raises:** `ValueError` for what is no table of numbers with a head over each column.
+    """
     with open(path, encoding="utf-8") as file:
         names = file.readline().strip().split(",")
     table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    return {name: table[:, i] for i, name in enumerate(names)}
+    return dict(zip(names, table.T, strict=True))
 
 
 def trajectory_columns(

@@ -128,7 +128,8 @@ def open_sweep(path: str | Path) -> xr.Dataset:
     """
     if not Path(path).is_dir():
         raise FileNotFoundError(f"There is no stored sweep at '{path}'.")
-    with xr.open_dataset(path, engine="zarr", consolidated=False, chunks=None) as dataset:
+    # Nothing but version 3, which we write: version 2 has a codec that unpickles, and so runs what a file says.
+    with xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, chunks=None) as dataset:
         return dataset.load()
 
 

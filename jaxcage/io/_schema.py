@@ -13,7 +13,7 @@ import equinox as eqx
 
 from .._parameters import ParameterInfo
 from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
-from ._units import to_si
+from ._units import printable, shown, to_si
 
 
 KINDS: dict[str, type[eqx.Module]] = {
@@ -68,13 +68,13 @@ def read_value(name: str, value: Any, field: dataclasses.Field) -> Any:
 
 def _read_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
     if value not in options:
-        raise ConfigError(f"`{name}` must be one of {', '.join(options)}, but is {value!r}.")
+        raise ConfigError(f"`{name}` must be one of {', '.join(options)}, but is {shown(value)}.")
     return value
 
 
 def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
-        raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {value!r}.")
+        raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {shown(value)}.")
     return value
 
 
@@ -82,12 +82,14 @@ def _read_number(name: str, value: Any, info: ParameterInfo) -> float:
     unit = "" if info.unit == "1" else f" {info.unit}"
     allowed = f"`{name}` must be a number from {info.lower:g} to {info.upper:g}{unit}"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ConfigError(f"{allowed}, but is {value!r}.")
+        raise ConfigError(f"{allowed}, but is {shown(value)}.")
     try:
         number = to_si(value, info.unit) if isinstance(value, str) else float(value)
     except ValueError as error:
         raise ConfigError(f"{allowed}, but {error}.") from error
+    except OverflowError as error:  # of a whole number
+        raise ConfigError(f"{allowed}, but is {shown(value)}.") from error
     if not math.isfinite(number) or not info.lower <= number <= info.upper:
-        given = f' (given as "{value}")' if isinstance(value, str) else ""
+        given = f' (given as "{printable(value)}")' if isinstance(value, str) else ""
         raise ConfigError(f"{allowed}, but is {number:g}{unit}{given}.")
     return number

@@ -4,7 +4,7 @@ is met.
 
 import functools
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 
 if TYPE_CHECKING:
@@ -12,6 +12,12 @@ if TYPE_CHECKING:
 
 
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+_UNIT = re.compile(r"[\w°µΩ%*/^().·⁻ +-]{1,60}")
+"""What a unit is written with; pint takes a comment, a colon or a line end for nothing."""
+_TOWER = re.compile(r"[\d)]\s*(?:\^|\*\*)|\d{3}")
+"""A power of a number, or a large number: pint would work out 9**9**9 to its last digit."""
+LONGEST = 100
+"""Characters of a value that a message shows."""
 
 
 @functools.cache
@@ -29,11 +35,12 @@ def to_si(text: str, unit: str) -> float:
     wanted: units alone cannot tell a revolution from a radian, so write rpm or rad/s.
 
     **Raises:** `ValueError` with half a sentence ("is ...") for a text that is not a number with a
-    unit, for a unit nobody knows, and for one of another dimension.
+    unit, for a unit nobody knows, and for one of another dimension, where a radian counts as one: 3000 1/min may be
+    revolutions.
     """
     match = _NUMBER_AND_UNIT.fullmatch(text)
     if match is None:
-        raise ValueError(f'is "{text}", which is not a number with a unit')
+        raise ValueError(f'is "{printable(text)}", which is not a number with a unit')
     number, given = float(match.group(1)), match.group(2)
     return number if not given else _convert(number, given, "" if unit == "1" else unit)
 
@@ -42,14 +49,42 @@ def _convert(number: float, given: str, unit: str) -> float:
     import pint
 
     registry = _registry()
+    unknown = f'has the unknown unit "{printable(given)}"'
+    if _UNIT.fullmatch(given) is None or _TOWER.search(given):
+        raise ValueError(unknown)
     try:
         source = registry.parse_units(given)
     except Exception as error:  # pint's parser leaks errors of many kinds
-        raise ValueError(f'has the unknown unit "{given}"') from error
+        raise ValueError(unknown) from error
+    target = registry.parse_units(unit)
     wanted = f'a unit like "{unit}"' if unit else "no unit"
-    if unit == "rad/s" and any(name.endswith("hertz") for name in source._units):
-        raise ValueError('is in Hz, where "rpm" or "rad/s" is wanted')
+    speeds = '"rpm" or "rad/s"'
+    if unit in ("rad/s", "rpm") and any(name.endswith("hertz") for name in source._units):
+        raise ValueError(f"is in Hz, where {speeds} is wanted")
     try:
-        return float(registry.Quantity(number, source).to(registry.parse_units(unit)).magnitude)
-    except pint.DimensionalityError as error:
+        found = float(registry.Quantity(number, source).to(target).magnitude)
+        same = _base_units(source) == _base_units(target)
+    except (pint.PintError, ArithmeticError, ValueError) as error:
         raise ValueError(f'has the unit "{given}", where {wanted} is wanted') from error
+    if not same:
+        raise ValueError(f'has the unit "{given}", where {speeds if unit in ("rad/s", "rpm") else wanted} is wanted')
+    return found
+
+
+def _base_units(unit: Any) -> set[str]:
+    """Names of the base units of a unit, those without a dimension, such as the radian, among them."""
+    return set(_registry().Quantity(1.0, unit).to_root_units().units._units)
+
+
+def printable(text: str) -> str:
+    """`text` as a message shows it: on one line, of a length that can be read, without control characters."""
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text[: LONGEST + 1])
+    return line if len(text) <= LONGEST else f"{line[:LONGEST]}..."
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it, whatever it is."""
+    try:
+        return printable(repr(value))
+    except (RecursionError, ValueError):  # nested a thousand times, or of thousands of digits
+        return f"a very large {type(value).__name__}"

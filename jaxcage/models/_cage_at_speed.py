@@ -3,6 +3,8 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._types import Scalar, State
@@ -21,6 +23,7 @@ from ..forces import (
     film_drive,
     film_resistance,
     film_scale,
+    finite_film_force,
     polar_resistance,
     pulse_train,
     pulse_train_force,
@@ -67,6 +70,7 @@ class CageAtSpeed(eqx.Module):
     eccentricity: Scalar
     film_scale: Scalar
     supply_scale: Scalar
+    slenderness: Scalar
     damping_number: Scalar
     stiffness_x: Scalar
     stiffness_y: Scalar
@@ -100,6 +104,7 @@ class CageAtSpeed(eqx.Module):
             ),
             film_scale=film.n_lands * film_scale(model.lubricant.dynamic_viscosity, radius, film.land_width, c),
             supply_scale=film.n_lands * radius * film.land_width * film.supply_pressure,
+            slenderness=film.land_width / (2 * radius),
             damping_number=restitution_damping(contact.restitution),
             stiffness_x=support.stiffness_x,
             stiffness_y=support.stiffness_y,
@@ -130,16 +135,24 @@ class CageAtSpeed(eqx.Module):
         excess = smooth_plus(eps - self.contact_onset, self.contact_smoothing)
         px, py = film_drive(x, y, vx, vy, self.omega)
         kept = 1 - excess * per_eps  # the film's coefficients stay at their value at the onset of contact
-        m = film_resistance(self.film_model, kept * x, kept * y, n, px, py, self.omega, self.film_smoothing)
-        half = -self.film_scale / 2
-        film = half * (m.xx * px + m.xy * py), half * (m.xy * px + m.yy * py)
-        thrust = supply_force(self.film_model, n, px, py, self.omega, self.film_smoothing)
+        film = self._film(kept * x, kept * y, n, px, py)
+        arc = "positive_pressure" if self.film_model == "finite_length" else self.film_model
+        thrust = supply_force(arc, n, px, py, self.omega, self.film_smoothing)
         film = film[0] + self.supply_scale * thrust[0], film[1] + self.supply_scale * thrust[1]
         rate = n[0] * vx + n[1] * vy
         normal = contact_force(
             c * excess, c * rate, self.contact_stiffness, self.damping_number, self.contact_approach_speed
         )
         return film, (-normal * n[0], -normal * n[1])
+
+    def _film(self, x: Scalar, y: Scalar, n: Vector, px: Scalar, py: Scalar) -> Vector:
+        """The film's force [N] at (x, y) over clearance, for the drive P."""
+        if self.film_model == "finite_length":
+            fx, fy = finite_film_force(x, y, px, py, self.omega, self.slenderness, self.film_smoothing)
+            return jnp.asarray(self.film_scale * fx), jnp.asarray(self.film_scale * fy)
+        m = film_resistance(self.film_model, x, y, n, px, py, self.omega, self.film_smoothing)
+        half = -self.film_scale / 2
+        return jnp.asarray(half * (m.xx * px + m.xy * py)), jnp.asarray(half * (m.xy * px + m.yy * py))
 
     def slopes(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Rows, Rows]:
         """Derivatives of land and support forces with respect to position [N/m] and velocity [N s/m], as rows.
@@ -156,6 +169,7 @@ class CageAtSpeed(eqx.Module):
         excess, touch = smooth_plus(gap, self.contact_smoothing), smooth_plus_slope(gap, self.contact_smoothing)
         px, py = film_drive(ex, ey, ux, uy, self.omega)
         p_n, p_t = nx * px + ny * py, nx * py - ny * px
+        assert self.film_model == "fixed_half" or self.film_model == "full"
         m = polar_resistance(self.film_model, eps - excess)
         open_ = 1 - touch  # how much of a change of eps the film's coefficients see
         half = -self.film_scale / 2 * per_c
@@ -198,6 +212,17 @@ class CageAtSpeed(eqx.Module):
             ((of_q[0][0] + held[0][0], of_q[0][1] + held[0][1]), (of_q[1][0] + held[1][0], of_q[1][1] + held[1][1])),
             ((of_v[0][0] - b, of_v[0][1]), (of_v[1][0], of_v[1][1] - b)),
         )
+
+    def solved_slopes(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Rows, Rows]:
+        """The same of a film whose pressure is solved for: one solve, differentiated along all four at once."""
+
+        def held(state: Array) -> Array:
+            film, contact = self.land_forces(*state)
+            support = self.support_force(*state)
+            return jnp.stack([film[i] + contact[i] + support[i] for i in (0, 1)])
+
+        (a, b), (c, d) = jax.jacfwd(held)(jnp.stack([jnp.asarray(s) for s in (x, y, vx, vy)])).reshape(2, 2, 2)
+        return ((a[0], a[1]), (c[0], c[1])), ((b[0], b[1]), (d[0], d[1]))
 
     def support_force(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> Vector:
         """Force of the elastic support for the same relative motion."""
@@ -265,11 +290,12 @@ class RigidRibLaw(eqx.Module):
         return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
 
     def slopes(self, q: State, v: State) -> tuple[Rows, Rows] | None:
-        """Derivatives with respect to q and v, as rows, where the film's arc is fixed."""
+        """Derivatives with respect to q and v, as rows, where the film's arc is fixed or its pressure is solved for."""
         if self.cage.film_model == "positive_pressure":
             return None
         per_mass = 1 / self.cage.mass
-        of_q, of_v = self.cage.slopes(*q, *v)
+        solved = self.cage.film_model == "finite_length"
+        of_q, of_v = (self.cage.solved_slopes if solved else self.cage.slopes)(*q, *v)
         return _times(per_mass, of_q), _times(per_mass, of_v)
 
 

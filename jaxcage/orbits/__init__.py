@@ -18,6 +18,7 @@
 | `_loss`        | synchronous-loss zones and their edges                                             |
 | `_mechanism`   | chaotic edges matched with bifurcations and cascade limits                         |
 | `_sensitivity` | derivatives and elasticities of an edge, homogeneity                               |
+| `_multiplier`  | derivatives of the largest multiplier of an orbit                                  |
 | `_curve`       | bifurcation points followed in two parameters                                      |
 | `_cascade`     | period-doubling cascades and their limit                                           |
 """
@@ -27,8 +28,10 @@ from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as b
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
 from ._coexisting import coexisting_orbits as coexisting_orbits
 from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve
+from ._lens import pick as pick
 from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._mechanism import Explained as Explained, explain as explain
+from ._multiplier import LeadingMultiplier as LeadingMultiplier, leading_multiplier as leading_multiplier
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from ._point import BifurcationPoint as BifurcationPoint, bifurcation as bifurcation
 from ._search import (

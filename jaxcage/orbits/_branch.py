@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, method as make_method
 from ..models import AbstractForcedSystem
@@ -96,6 +97,8 @@ class Branch:
         )
         rows = [f"  {p.kind:<16} {p.parameter} = {p.value:.8g}, multiplier {p.critical:.4f}" for p in self.special]
         return "\n".join([head, *rows])
+
+    _repr_html_ = notebook_html
 
 
 class Follower(eqx.Module):

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, correct, follow, stack
@@ -54,6 +55,8 @@ class Cascade:
         rows = [f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g}" for p in self.points]
         return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}"])
 
+    _repr_html_ = notebook_html
+
 
 def extrapolated(values: tuple[float, ...]) -> tuple[float, float]:
     """Limit of a cascade from its points, and the distance to the extrapolation with one point less."""
@@ -88,6 +91,7 @@ def doubled_branch(
 
     **Raises:** `ValueError` if the branch is not found.
     """
+    require_x64()
     if point.kind != "period-doubling":
         raise ValueError(f"Argument `point` must be a period doubling, but it is a {point.kind}.")
     at, periods = float(point.value), int(point.periods)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from ..integrate import AbstractMethod, method as make_method
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, correct, follow, stack, take
@@ -55,6 +56,8 @@ class Curve:
     def __str__(self) -> str:
         head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}, {self.x_value.size} points"
         return "\n".join([head, *(f"  {p.kind} at {p.x_value:.8g}, {p.y_value:.8g}" for p in self.special)])
+
+    _repr_html_ = notebook_html
 
 
 def curve(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .._notebook import notebook_html
 from ..analysis import CLOSE_BELOW_RPM, Edge, Zone
 from ._branch import SpecialPoint
 from ._search import Stretch, SynchronousOrbits
@@ -35,6 +36,15 @@ class LossZones:
     principal: Stretch | None
     """The stretch on which most simulations from the conventional start settled."""
     close_below_rpm: float
+
+    def __str__(self) -> str:
+        rows = [f"Synchronous-loss zones, closed below {self.close_below_rpm:.0f} rpm"]
+        for i, zone in enumerate(self.zones, start=1):
+            width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.2f} rpm wide"
+            rows.append(f"  zone {i}: {zone.onset or 'below the range'} to {zone.exit or 'above the range'}, {width}")
+        return "\n".join(rows if self.zones else [*rows, "  none"])
+
+    _repr_html_ = notebook_html
 
 
 @dataclasses.dataclass(frozen=True)

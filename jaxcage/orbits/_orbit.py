@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, method as make_method, strobe_map
 from ..models import AbstractForcedSystem
@@ -101,6 +102,8 @@ class Orbit(eqx.Module):
             f"  multipliers {mu}\n"
             f"  residual {float(self.residual):.1e}, Liouville {float(self.liouville):.1e}, {self.status}"
         )
+
+    _repr_html_ = notebook_html
 
 
 @jax.custom_jvp

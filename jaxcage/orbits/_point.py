@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, method as make_method
 from ..models import AbstractForcedSystem
@@ -143,6 +144,8 @@ class BifurcationPoint(eqx.Module):
             f"{self.kind} at {float(self.speed_rpm):.3f} rpm, {self.parameter} = {float(self.value):.9g}{angle}\n"
             f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
         )
+
+    _repr_html_ = notebook_html
 
 
 def bifurcation(

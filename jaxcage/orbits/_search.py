@@ -12,6 +12,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from .._notebook import notebook_html
 from ..analysis import Sweep
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -66,6 +67,8 @@ class Stretch:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
         return f"{end(self.lower, self.lower_rpm)} to {end(self.upper, self.upper_rpm)} rpm, {self.met} settled"
 
+    _repr_html_ = notebook_html
+
 
 @dataclasses.dataclass(frozen=True)
 class SynchronousOrbits:
@@ -103,6 +106,8 @@ class SynchronousOrbits:
     def __str__(self) -> str:
         head = f"{len(self.branches)} branches of synchronous orbits, {len(self.stretches)} stable stretches"
         return "\n".join([head, *(f"  {s}" for s in self.stretches)])
+
+    _repr_html_ = notebook_html
 
 
 def crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:

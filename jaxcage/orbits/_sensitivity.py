@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, method as make_method
 from ..models import AbstractForcedSystem
@@ -78,6 +79,8 @@ class Sensitivity:
         order = sorted(self.elasticity, key=lambda n: -abs(self.elasticity[n]))
         rows = [f"  {n:<28} {self.elasticity[n]:+.6f}" for n in order if self.elasticity[n] != 0.0]
         return "\n".join([f"{self.name}: {self.kind} at {self.value_rpm:.3f} rpm, elasticities", *rows])
+
+    _repr_html_ = notebook_html
 
 
 class _Expansion(NamedTuple):

@@ -2,7 +2,7 @@
 
 | module           | responsibility                                                          |
 |------------------|-------------------------------------------------------------------------|
-| `_style`         | colours, frames, figures without global state                           |
+| `_style`         | colours, frames, light, dark and print style, no global state           |
 | `_marks`         | zones shaded and published edges marked on a speed axis                 |
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
@@ -13,6 +13,9 @@
 | `_branches`      | branches of periodic orbits over speed, alone or over an orbit diagram  |
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
 | `_elasticities`  | elasticities of edges as bars                                           |
+| `_zone_strip`    | zones of both kinds and operating speeds as bars                        |
+| `_design`        | a search for a better design, and what came of it                       |
+| `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
 """
 
@@ -20,6 +23,7 @@ from ._branches import (
     branch_diagram as branch_diagram,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
 )
+from ._design import design_figure as design_figure, design_history as design_history
 from ._elasticities import elasticity_bars as elasticity_bars
 from ._history import (
     force_history as force_history,
@@ -29,6 +33,7 @@ from ._history import (
 )
 from ._impact import impact_forces as impact_forces
 from ._marks import (
+    mark_operating as mark_operating,
     mark_published as mark_published,
     published_edges as published_edges,
     shade_zones as shade_zones,
@@ -40,8 +45,16 @@ from ._orbit_diagram import (
     sweep_figure as sweep_figure,
     zoomed_diagram as zoomed_diagram,
 )
+from ._paper import paper_figures as paper_figures
 from ._section import strobe_section as strobe_section
 from ._stability_map import stability_map as stability_map
 from ._statics import load_bars as load_bars
-from ._style import enlarge_dots as enlarge_dots, new_figure as new_figure
+from ._style import (
+    STYLES as STYLES,
+    Style as Style,
+    enlarge_dots as enlarge_dots,
+    new_figure as new_figure,
+    restyle as restyle,
+)
 from ._waterfall import waterfall_map as waterfall_map
+from ._zone_strip import zone_strip as zone_strip

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.transforms import offset_copy
 from scipy.optimize import isotonic_regression
 
@@ -26,6 +25,7 @@ from ._style import (
     VERMILION,
     axes_or_new,
     enlarge_dots,
+    lighter,
     padded_limits,
 )
 
@@ -166,12 +166,6 @@ def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.nda
         x, y = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
         if x.size:
             ax.plot(x, y, **style, label=f"period-{periods}, {word}")
-
-
-def lighter(colour: str) -> tuple[float, float, float]:
-    """Half way to white."""
-    r, g, b = to_rgb(colour)
-    return 0.5 + 0.5 * r, 0.5 + 0.5 * g, 0.5 + 0.5 * b
 
 
 def runs(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

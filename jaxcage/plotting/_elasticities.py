@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..orbits import Sensitivity
-from ._style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new
+from ._style import BAND, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new
 
 
 FIRST = ("guidance_gap", "eccentricity")
@@ -42,7 +42,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
         ax.barh(place, value, height=0.9 * thick, **style, hatch=hatch, edgecolor="white", linewidth=0, label=label)
         _write_values(ax, place, value, size)
     for k in range(0, len(names), 2):
-        ax.axhspan(k - 0.5, k + 0.5, color="#F5F5F5", linewidth=0, zorder=0)
+        ax.axhspan(k - 0.5, k + 0.5, color=BAND, linewidth=0, zorder=0)
     ax.axvline(0, color=BLACK, linewidth=0.8)
     ax.set_yticks(np.arange(len(names)), [readable(name) for name in names])
     ax.tick_params(axis="y", length=0)

@@ -1,10 +1,12 @@
 """What is laid over diagrams with a speed axis: zones found, edges published."""
 
+from collections.abc import Sequence
+
 from matplotlib.axes import Axes
 
 from ..analysis import Zones
 from ..bearing import PublishedCase
-from ._style import BLACK, ZONE
+from ._style import BLACK, PURPLE, ZONE
 
 
 def shade_zones(ax: Axes, zones: Zones) -> Axes:
@@ -58,4 +60,21 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
                 va="bottom",
                 fontsize=8,
             )
+    return ax
+
+
+def mark_operating(ax: Axes, spans: Sequence[tuple[float, float]]) -> Axes:
+    """Mark operating speeds [rpm]: a line for a speed, a light band for a range, both with a bar at the foot."""
+    low, high = ax.get_xlim()
+    for i, (first, last) in enumerate(spans):
+        label = "operating speed" if i == 0 else "_operating speed"
+        for edge in {first, last}:
+            ax.axvline(edge, color=PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2, label=label)
+            label = "_operating speed"
+        if last > first:
+            ax.axvspan(first, last, color=PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
+        middle, half = (first + last) / 2, max(last - first, 0.004 * (high - low)) / 2
+        foot = ax.get_xaxis_transform()
+        ax.plot([middle - half, middle + half], [0, 0], color=PURPLE, linewidth=5, transform=foot, clip_on=False)
+    ax.set_xlim(low, high)
     return ax

@@ -7,19 +7,18 @@ import numpy as np
 from jaxtyping import Complex
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 
 from .._glossary import quantity
 from ..orbits import Branch, SpecialPoint
 from ._branches import mark_of, move_apart, words
-from ._style import BLACK, BLUE, GREY, axes_or_new
+from ._style import BLACK, BLUE, GREY, Halo, axes_or_new
 
 
 REACH = 1.6
 """The figure ends at this real and imaginary part: what matters happens on the unit circle."""
 _ROWS = 9
 _GLYPHS = {"s": "■□", "D": "◆◇", "o": "●○", "^": "▲△"}
-_HALO = [withStroke(linewidth=2.0, foreground="white")]
+_HALO = [Halo(2.0)]
 _LABEL_SIZE = 7.5
 
 

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 
 from .._glossary import quantity
@@ -13,7 +12,7 @@ from ..orbits import Curve
 from ._branches import mark_of, runs
 from ._elasticities import readable
 from ._orbit_diagram import label_speed
-from ._style import BLACK, axes_or_new, padded_limits
+from ._style import BLACK, Halo, axes_or_new, padded_limits
 
 
 Exponents = tuple[
@@ -24,7 +23,7 @@ Exponents = tuple[
 """Speeds [rpm], values of the parameter [SI], largest exponent per revolution at each (NaN: unknown)."""
 STEEPEST = 0.3
 """The colours end at this exponent: what lies beyond looks like it."""
-_HALO = [withStroke(linewidth=2.6, foreground="white")]
+_HALO = [Halo(2.6)]
 _LABEL_SIZE = 8.5
 _OFFSETS = [(9.0 * r * dx, 7.0 * r * dy) for r in (1, 2, 3.5) for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1))]
 """Where a name may begin beside its point [points], the best first."""
@@ -72,7 +71,7 @@ def _draw_curve(ax: Axes, curve: Curve, x: np.ndarray, y: np.ndarray) -> None:
     drawn = {line.get_label() for line in ax.get_lines()}
     genuine = np.asarray(curve.genuine[:-1] & curve.genuine[1:])
     colour = mark_of(curve.kind).colour
-    halo = [withStroke(linewidth=3.6, foreground="white")]
+    halo = [Halo(3.6)]
     for label, chosen, width, dash in (
         ("neutral saddles", ~genuine, 1.6, ":"),
         (curve.kind, genuine, 2.0, "-"),

@@ -1,14 +1,25 @@
 """House style: colours that colour-blind readers can tell apart, thin frames, light grids. No
 pyplot, no global state.
+
+The colours are Okabe and Ito's (https://jfly.uni-koeln.de/color), made for red-green blindness; the dark style lightens
+them and keeps their hues. Figures are drawn light; `restyle` gives them a dark or a print style afterwards.
 """
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import Collection
+from matplotlib.colors import to_hex, to_rgb, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Annotation, Text
 
 from .._glossary import quantity
 
@@ -18,7 +29,31 @@ BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 SKY, PURPLE, BLACK, GREY = "#56B4E9", "#CC79A7", "#222222", "#8A8A8A"
 ZONE = "#F8EBC8"
 """Light amber behind chaotic zones: the points on it keep their contrast."""
+GRID, BAND, PAPER = "#E6E6E6", "#F5F5F5", "#FFFFFF"
 RASTER_DPI = 200
+
+Style = Literal["light", "dark", "print"]
+STYLES: dict[Style, dict[str, str]] = {
+    "light": {},
+    "dark": {
+        BLUE: "#3E9BE0",
+        VERMILION: "#F2762B",
+        GREEN: "#12B886",
+        ORANGE: "#F4B942",
+        SKY: "#9AD6FF",
+        PURPLE: "#DE92BD",
+        BLACK: "#E8E8E8",
+        GREY: "#8C9199",
+        ZONE: "#3B3220",
+        GRID: "#2C3138",
+        BAND: "#1E2228",
+        PAPER: "#15181D",
+        "#000000": "#E8E8E8",
+    },
+    "print": {BLACK: "#000000", GREY: "#555555", ZONE: "#E4E4E4", GRID: "#D4D4D4", BAND: "#F0F0F0"},
+}
+"""What each style puts in the place of the light colours; print is white paper, black ink and no amber."""
+PRINT_DPI, PRINT_LINES = 300, 1.25
 
 KIND_COLOURS = {
     "periodic": BLUE,
@@ -34,8 +69,22 @@ FORCE_COLOURS = {
     "support": GREEN,
     "impact": ORANGE,
     "unbalance": PURPLE,
-    "weight": GREY,
+    "weight": BLACK,
 }
+
+
+class Halo(withStroke):
+    """A rim of paper around a line or a text, so that it can be read on whatever it crosses."""
+
+    def __init__(self, width: float, colour: str = PAPER):
+        super().__init__(linewidth=width, foreground=colour)
+        self.width = width
+
+
+def lighter(colour: str, paper: str = PAPER) -> tuple[float, float, float]:
+    """Half way to the paper."""
+    r, g, b = ((a + b) / 2 for a, b in zip(to_rgb(colour), to_rgb(paper), strict=True))
+    return r, g, b
 
 
 def new_figure(width: float = 8.0, height: float = 5.0) -> Figure:
@@ -55,7 +104,7 @@ def dress(ax: Axes) -> Axes:
     ax.spines[["top", "right"]].set_visible(False)
     ax.spines[["left", "bottom"]].set(color=GREY, linewidth=0.8)
     ax.tick_params(color=GREY, labelsize=9)
-    ax.grid(True, color="#E6E6E6", linewidth=0.6)
+    ax.grid(True, color=GRID, linewidth=0.6)
     ax.set_axisbelow(True)
     return ax
 
@@ -89,3 +138,68 @@ def padded_limits(values: np.ndarray, margin: float = 0.05) -> tuple[float, floa
     low, high = float(finite.min()), float(finite.max())
     pad = margin * (high - low) or 0.1 * abs(high) or 1.0
     return low - pad, high + pad
+
+
+def restyle(figure: Figure, style: Style) -> Figure:
+    """Give a figure that is drawn another style: every colour of the house style becomes the one of `style`, colour
+    maps stay.
+
+    **Arguments:** a figure as the functions here draw it; `light`, `dark` or `print`.
+
+    **Returns:** the same figure.
+    """
+    if style == "light":
+        return figure
+    figure.draw_without_rendering()  # texts and ticks that are made on drawing
+    colours = _Exchange(STYLES[style])
+    for artist in _everything(figure):
+        colours.change(artist)
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):  # ticks that are still to come
+        axis.set_tick_params(color=colours.of(GREY), labelcolor=colours.of("#000000"), grid_color=colours.of(GRID))
+    if style == "print":
+        figure.set_dpi(PRINT_DPI)
+        for line in figure.findobj(Line2D):
+            line.set_linewidth(PRINT_LINES * line.get_linewidth())
+    return figure
+
+
+def _everything(figure: Figure) -> Iterable[Artist]:
+    for artist in figure.findobj():
+        yield artist
+        if isinstance(artist, Annotation) and artist.arrow_patch is not None:  # no child of its text
+            yield artist.arrow_patch
+
+
+class _Exchange:
+    """Colours for colours; those not listed stay."""
+
+    def __init__(self, table: dict[str, str]):
+        paper = table.get(PAPER, PAPER)
+        known = {PAPER: paper} | table
+        half = {to_hex(lighter(old)): to_hex(lighter(new, paper)) for old, new in table.items()}
+        self.table = {old.lower(): new for old, new in (half | known).items()}
+
+    def of(self, colour: Any) -> Any:
+        """The colour in the place of `colour`, as transparent as that."""
+        if isinstance(colour, str) and colour in ("none", "auto"):
+            return colour
+        r, g, b, alpha = to_rgba(colour)
+        new = self.table.get(to_hex((r, g, b)))
+        return (r, g, b, alpha) if new is None else to_rgba(new, alpha)
+
+    def change(self, artist: Artist) -> None:
+        if isinstance(artist, Line2D):
+            artist.set(color=self.of(artist.get_color()))
+            artist.set(markerfacecolor=self.of(artist.get_markerfacecolor()))
+            artist.set(markeredgecolor=self.of(artist.get_markeredgecolor()))
+        elif isinstance(artist, Text):
+            artist.set_color(self.of(artist.get_color()))
+        elif isinstance(artist, Patch):
+            artist.set(facecolor=self.of(artist.get_facecolor()), edgecolor=self.of(artist.get_edgecolor()))
+        elif isinstance(artist, Collection) and artist.get_array() is None:
+            for name in ("facecolor", "edgecolor"):
+                colours = np.atleast_2d(getattr(artist, f"get_{name}")())
+                artist.set(**{name: [self.of(tuple(c)) for c in colours if len(c)]})
+        if any(isinstance(effect, Halo) for effect in artist.get_path_effects() or ()):
+            paper = to_hex(self.of(PAPER))
+            artist.set_path_effects([Halo(e.width, paper) for e in artist.get_path_effects() if isinstance(e, Halo)])

@@ -32,6 +32,11 @@ class Conclusion:
     numbers: dict[str, Any]
 
 
+def _percent(change: float) -> str:
+    """A relative change; an edge that is missing has none."""
+    return f"{100 * change:+.1f} %" if np.isfinite(change) else "no such edge"
+
+
 def _verdict(*checks: bool) -> str:
     return HOLDS if all(checks) else IN_PART if any(checks) else NOT
 
@@ -59,7 +64,7 @@ def two_zones(runs: Runs) -> Conclusion:
     }
     gap, unbalance, oil = (abs(v) for v in moved.values())
     listed = ", ".join(f"{case}: {n}" for case, n in counts.items())
-    changes = ", ".join(f"{name} {100 * v:+.0f} %" for name, v in moved.items())
+    changes = ", ".join(f"{name} {_percent(v)}" for name, v in moved.items())
     return Conclusion(
         "1. There are two zones in every case; gap and eccentricity, the gap above all, set the first; the oil hardly.",
         f"Chaotic zones between 4000 and 27500 rpm: {listed}. Change of zone 1's width: {changes}.",
@@ -80,18 +85,19 @@ def impacts(runs: Runs) -> Conclusion:
 
     clearance = float(model.bearing.pocket_clearance)
     ratio = peak(2 * clearance) / peak(clearance)
-    calm = lambda m: _swing(m, 16000.0)
+    calm = lambda m: _reach(m, 16000.0)
     with_, without = calm(model), calm(replace(model, amplitude=0.0))
     return Conclusion(
         "2. Impacts of the rollers cause small periodic oscillations, of an amplitude that the pocket clearance sets.",
         f"Twice the pocket clearance gives {ratio:.2f} times the peak impact force (with approach speed in proportion "
-        f"to it). At 16000 rpm the cage swings by {1e3 * with_:.4f} mm with impacts, {1e3 * without:.4f} mm without.",
+        f"to it). At 16000 rpm the cage goes {1e3 * with_:.4f} mm from the centre with impacts, "
+        f"{1e3 * without:.4f} mm without.",
         _verdict(ratio > 1.5, bool(without < 0.9 * with_)),
-        {"force_ratio": ratio, "swing_with_m": with_, "swing_without_m": without},
+        {"force_ratio": ratio, "reach_with_m": with_, "reach_without_m": without},
     )
 
 
-def _swing(model: CageModel, speed_rpm: float) -> float:
+def _reach(model: CageModel, speed_rpm: float) -> float:
     """Largest distance from the rib's centre at one speed, of the start that swings least [m]."""
     found = sweep(model, rpm(speed_rpm), discard=300, revolutions=100, blocks=1, exponents=0, keep=1)
     return float(np.nanmin(found.peak)) * float(model.clearance)
@@ -130,7 +136,10 @@ def eccentricity(runs: Runs) -> Conclusion:
 
 
 def chaos(runs: Runs) -> Conclusion:
-    """(4) Bifurcations differ with every parameter, from which the paper concludes chaos."""
+    """(4) Bifurcations differ with every parameter, from which the paper concludes chaos.
+
+    The motion may be chaotic, the inference is none: this conclusion can hold in part at most.
+    """
     share = {}
     for case, found in runs.sweeps.items():
         exit_ = _edge(runs, case, "zone 1 exit")
@@ -165,7 +174,7 @@ def viscosity(runs: Runs) -> Conclusion:
     names = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
     moved = {name: _change(runs, "3a", "3b", name) for name in names}
     small = [abs(v) < 0.02 for v in moved.values()]
-    listed = ", ".join(f"{name} {100 * v:+.1f} %" for name, v in moved.items())
+    listed = ", ".join(f"{name} {_percent(v)}" for name, v in moved.items())
     return Conclusion(
         "6. The viscosity does not affect the zones.",
         f"From VG78 to VG32 (a factor of 2.4): {listed}. Below 2 % counts as no effect.",

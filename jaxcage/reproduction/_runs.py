@@ -7,7 +7,6 @@ import numpy as np
 
 from ..analysis import Sweep, Zones, zones
 from ..bearing import PUBLISHED_SPEED_RANGE_RPM
-from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, synchronous_orbits
 from ..sweeps import rpm, sweep_designs
@@ -40,7 +39,6 @@ def run_all(
     revolutions: int = 300,
     section_revolutions: int = SECTION_REVOLUTIONS[1],
     orbits: bool = True,
-    method: AbstractMethod | None = None,
     report: Report | None = None,
 ) -> Runs:
     """Sweep every case over the published range from three starts, find its synchronous orbits, and run fig. 9."""
@@ -54,7 +52,6 @@ def run_all(
                 grid,
                 discard=discard,
                 revolutions=revolutions,
-                method=method,
                 progress=lambda done, total: say("sweeps", done, total),
             ),
             strict=True,
@@ -79,7 +76,6 @@ def run_all(
             revolutions=observed,
             blocks=blocks,
             keep=observed,
-            method=method,
         )[0]
         for (name, model), start in zip(models.items(), first, strict=True)
     }

@@ -13,6 +13,12 @@ from ._carried import (
     run_up_down as run_up_down,
     run_up_down_designs as run_up_down_designs,
 )
-from ._engine import cores as cores
+from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
-from ._speed import rpm as rpm, sweep as sweep, sweep_designs as sweep_designs
+from ._speed import (
+    make_plan as make_plan,
+    rpm as rpm,
+    settings_of as settings_of,
+    sweep as sweep,
+    sweep_designs as sweep_designs,
+)

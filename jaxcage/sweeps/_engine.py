@@ -131,8 +131,7 @@ def run_parts(
 ) -> tuple[np.ndarray, ...]:
     """`work` on all lanes, chunk by chunk on all cores."""
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    size = _chunk_size(speed.size)
-    return _in_chunks(begin, np.arange(speed.size), size, lambda _: None)
+    return _in_chunks(begin, np.arange(speed.size), _chunk_size(speed.size), lambda _: None)
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
@@ -148,7 +147,7 @@ def _chunk_size(lanes: int) -> int:
 
 
 def run_lanes(
-    systems: AbstractForcedSystem | Sequence[AbstractForcedSystem],
+    systems: AbstractForcedSystem | Sequence[AbstractForcedSystem] | Designs,
     method: AbstractMethod,
     plan: Plan,
     speed: Float[np.ndarray, " lanes"],
@@ -164,7 +163,9 @@ def run_lanes(
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
     lanes, dim = y0.shape
-    designs = Designs.of(list(systems) if isinstance(systems, Sequence) else [systems])
+    if not isinstance(systems, Designs):
+        systems = Designs.of(list(systems) if isinstance(systems, Sequence) else [systems])
+    designs = systems
     which = np.zeros(lanes, int) if which is None else which
     size = _chunk_size(lanes)
     static = Plan(*map(int, plan))

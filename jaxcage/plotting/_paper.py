@@ -10,9 +10,13 @@ from matplotlib.figure import Figure
 from .._glossary import quantity
 from ..bearing import FIGURE_AXES, PUBLISHED_CASES
 from ..forces import PocketImpact, approach_speed, impact_history
-from ..plotting import impact_forces, mark_published, new_figure, orbit_diagram, strobe_section, zoomed_diagram
+from ..reproduction import SECTION_RPM, Runs
 from ..sweeps import rpm
-from ._runs import SECTION_RPM, Runs
+from ._impact import impact_forces
+from ._marks import mark_published
+from ._orbit_diagram import orbit_diagram, zoomed_diagram
+from ._section import strobe_section
+from ._style import GREY, new_figure
 
 
 PAIRS = {"a": ("1a", "1b"), "b": ("2a", "2b"), "c": ("3a", "3b")}
@@ -46,7 +50,7 @@ def _box(ax: Axes, figure: str, what: str, vertical: bool) -> None:
     """The limits of the printed axis as dotted lines."""
     for axis in (a for a in FIGURE_AXES if a.figure == figure and a.quantity == what):
         for limit in (axis.lower, axis.upper):
-            (ax.axhline if vertical else ax.axvline)(limit, color="#8A8A8A", linewidth=0.8, linestyle=":")
+            (ax.axhline if vertical else ax.axvline)(limit, color=GREY, linewidth=0.8, linestyle=":")
         low, high = ax.get_ylim() if vertical else ax.get_xlim()
         (ax.set_ylim if vertical else ax.set_xlim)(min(low, 1.05 * axis.lower), max(high, 1.05 * axis.upper))
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from ..analysis import Edge, Zone, Zones
 from ..bearing import PublishedCase
-from ._report import Table, number
+from ._table import Table, number
 
 
 Span = tuple[float, float | None]

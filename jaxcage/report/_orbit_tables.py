@@ -9,8 +9,8 @@ import numpy as np
 from ..analysis import Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, SpecialPoint, Stretch, SynchronousOrbits
-from ._report import Table, number
-from ._zone_report import Span, published_zones, zone_document
+from ._table import Table, number
+from ._zone_tables import Span, published_zones, zone_document
 
 
 AT_LIMIT_RPM = 1e-6

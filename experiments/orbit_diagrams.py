@@ -1,0 +1,42 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: py:percent,ipynb
+# ---
+# %% [markdown]
+# # Orbit diagrams and zones
+# Two of the paper's cages differ only in their guidance gap: 0.45 mm (1a) and 0.60 mm (1b). Every speed is run from
+# three starts; the strobe points, taken once in a revolution, fill an area where the motion is chaotic.
+
+# %%
+from _size import save, small
+
+import jaxcage as jc
+from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.plotting import exponent_strip, mark_published, new_figure, orbit_diagram
+
+
+jc.enable_x64()
+jc.keep_compiled_programs()
+
+# %%
+speeds = jc.rpm(4000, 27500, small(236, 12))
+names = ("1a", "1b")
+length = dict(discard=small(300, 30), revolutions=small(300, 20))
+sweeps = dict(zip(names, jc.sweep_designs([jc.case(name) for name in names], speeds, **length), strict=True))
+for name, sweep in sweeps.items():
+    print(name, jc.zones(sweep), sep="\n")
+
+# %%
+figure = new_figure(12.0, 7.0)
+axes = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 2, 1))
+for i, (name, sweep) in enumerate(sweeps.items()):
+    orbit_diagram(sweep, 1, axes[2 * i])
+    mark_published(axes[2 * i], PUBLISHED_CASES[name])
+    axes[2 * i].set_title(
+        f"{name}: gap {PUBLISHED_CASES[name].guidance_gap_mm} mm, published edges dotted", loc="left", pad=20
+    )
+    exponent_strip(sweep, axes[2 * i + 1])
+for ax in axes[:-1]:
+    ax.set_xlabel("")
+save(figure, "orbit_diagrams")

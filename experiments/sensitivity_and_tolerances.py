@@ -1,0 +1,65 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: py:percent,ipynb
+# ---
+# %% [markdown]
+# # Sensitivity and tolerances
+# Which parameters decide how much of the speed range is chaotic (Sobol indices), and how much the tolerances of a
+# drawing scatter an exact edge (elasticities)?
+
+# %%
+import numpy as np
+from _size import save, small
+
+import jaxcage as jc
+from jaxcage.plotting import new_figure
+
+
+jc.enable_x64()
+jc.keep_compiled_programs()
+model = jc.case("2a")
+now = {name: float(value) for name, value in jc.parameters(model).items()}
+
+# %%
+varied = ("guidance_gap", "eccentricity", "cage_mass", "stiffness_x", "damping", "amplitude", "land_width")
+vary = {name: (0.8 * now[name], 1.2 * now[name]) for name in varied}
+width = jc.chaotic_width(4000, 27500, small(32, 4), discard=small(120, 5), revolutions=small(80, 5))
+shares = jc.global_sensitivity(model, vary, width, samples=small(64, 2))
+print(shares)
+
+# %% [markdown]
+# An exact edge, and what +-5 % in each parameter does to it. The same scatter by solving the edge in random designs.
+
+# %%
+orbits = jc.synchronous_orbits(model, jc.rpm(12700), jc.rpm(13700), count=21, discard=1500)
+edge = next(p for p in orbits.edges if p.kind == "period-doubling")
+exact = jc.sensitivity(model, edge, "lower edge of the calm stretch")
+tolerances = dict.fromkeys(varied, 0.05 / np.sqrt(3))
+budget = jc.tolerance_budget(exact, tolerances)
+print(budget)
+
+# %%
+rng = np.random.default_rng(0)
+solved = []
+for _ in range(small(60, 2)):
+    changed = {name: now[name] * (1 + 0.05 * rng.uniform(-1, 1)) for name in varied}
+    guess = exact.value_rpm * (1 + sum(exact.elasticity[n] * (v / now[n] - 1) for n, v in changed.items())) * np.pi / 30
+    found = jc.sensitivity(jc.replace(model, **changed), jc.Located(edge.kind, guess, exact.state))
+    solved.append(found.value_rpm)
+solved = np.array(solved)
+print(
+    f"{np.isfinite(solved).sum()} of {solved.size} edges found, deviation {np.nanstd(solved):.1f} rpm, "
+    f"to first order {budget.total_rpm:.1f} rpm"
+)
+
+# %%
+figure = new_figure(10.0, 3.5)
+left, right = figure.subplots(1, 2)
+order = sorted(varied, key=lambda n: shares.total[n])
+left.barh(order, [shares.total[n] for n in order], color="#0072B2")
+left.set_xlabel("Share of the chaotic width's variance, with interactions")
+order = sorted(varied, key=lambda n: budget.deviation_rpm[n])
+right.barh(order, [budget.deviation_rpm[n] for n in order], color="#D55E00")
+right.set_xlabel(f"Scatter of the edge at {exact.value_rpm:.0f} rpm [rpm]")
+save(figure, "sensitivity_and_tolerances")

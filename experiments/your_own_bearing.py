@@ -1,0 +1,53 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: py:percent,ipynb
+# ---
+# %% [markdown]
+# # Bring your own bearing
+# A bearing is a TOML file. `jaxcage init my_bearing.toml` writes one with every value explained; here is a shorter one,
+# an NU2310 with a smaller gap, better balance and thicker, colder oil.
+
+# %%
+from pathlib import Path
+
+from _size import FOLDER, save, small
+
+import jaxcage as jc
+from jaxcage.io import load_model
+from jaxcage.plotting import new_figure, orbit_diagram
+
+
+jc.enable_x64()
+jc.keep_compiled_programs()
+
+# %%
+TEXT = """
+base = "1a"
+guidance_gap = "0.35 mm"
+eccentricity = "12 um"
+
+[lubricant]
+grade = 100
+temperature = "30 degC"
+"""
+FOLDER.mkdir(exist_ok=True)
+path = Path("out") / "my_bearing.toml"
+path.parent.mkdir(exist_ok=True)
+path.write_text(TEXT)
+model = load_model(path)
+print({name: float(jc.parameters(model)[name]) for name in ("guidance_gap", "eccentricity", "cage_mass")})
+
+# %% [markdown]
+# How the load is carried, where the cage sits at rest, and how it runs.
+
+# %%
+load = jc.load_distribution(model.bearing, model.load)
+print(
+    f"largest roller load {float(load.max_load):.0f} N, the shaft goes down by {1e6 * float(load.shaft_shift):.1f} um"
+)
+sweep = jc.sweep(model, jc.rpm(4000, 27500, small(236, 12)), discard=small(300, 20), revolutions=small(200, 20))
+print(jc.zones(sweep))
+figure = new_figure(10.0, 3.5)
+orbit_diagram(sweep, 1, figure.subplots())
+save(figure, "your_own_bearing")

@@ -1,0 +1,278 @@
+"""Designs made better by gradient: bounded parameters, any optax optimiser, many starts at a time.
+
+A place between the bounds is a logistic function of an unbounded number, so that no step leaves the bounds. All starts
+take their steps together, and what their objective costs runs in one batch. A step that leads where the objective
+cannot be had is taken back by half. The search ends when the slope is small, or no larger than its own error.
+"""
+
+import dataclasses
+import json
+import os
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Float
+from scipy.stats import qmc
+
+from .._checks import require_x64
+from .._parameters import parameters
+from ..models import AbstractForcedSystem
+from ._objective import AbstractObjective, DesignSpace, Measured
+
+
+AT_BOUND = 0.01
+"""A parameter within this part of the bounds' distance of one is at it."""
+INSIDE = 0.02
+"""Starts are kept this far from the bounds, where a logistic function has no slope."""
+SAME = 0.05
+"""Two optima within this part of the bounds' distance in every parameter are one."""
+PATIENCE = 3
+"""Steps in a row for which the slope must be within its error before a search ends there."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """Where one search stood after a step."""
+
+    place: tuple[float, ...]
+    value: float
+    error: float
+    slope: tuple[float, ...]
+    slope_error: tuple[float, ...]
+    status: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Optimum:
+    """Where one search ended: its best design."""
+
+    values: dict[str, float]
+    """[SI]."""
+    objective: float
+    error: float
+    at_bound: tuple[str, ...]
+    """Parameters that ended at a bound: there the bound chose, not the objective."""
+    history: tuple[Step, ...]
+    status: str
+    """`slope is small`, `slope within its error`, `step limit`, or why the objective could not be had."""
+    model: AbstractForcedSystem
+
+    def __str__(self) -> str:
+        rows = [
+            f"Optimum after {len(self.history) - 1} steps ({self.status}): {self.objective:.6g} +- {self.error:.2g}"
+        ]
+        rows += [f"  {n:<24} {v:.6g}{' at bound' if n in self.at_bound else ''}" for n, v in self.values.items()]
+        return "\n".join(rows)
+
+
+@dataclasses.dataclass(frozen=True)
+class Optimised:
+    """What the searches from all starts found, the best first."""
+
+    optima: tuple[Optimum, ...]
+    space: DesignSpace
+
+    @property
+    def best(self) -> Optimum:
+        """The best of all."""
+        return self.optima[0]
+
+    @property
+    def distinct(self) -> tuple[tuple[Optimum, int], ...]:
+        """Optima that differ, with how many starts led to each."""
+        found: list[tuple[Optimum, int]] = []
+        place = lambda o: np.array([u.place(o.values[u.name]) for u in self.space.unknowns])
+        for optimum in self.optima:
+            for i, (other, count) in enumerate(found):
+                if np.max(np.abs(place(other) - place(optimum))) < SAME:
+                    found[i] = (other, count + 1)
+                    break
+            else:
+                found.append((optimum, 1))
+        return tuple(found)
+
+    def __str__(self) -> str:
+        head = f"{len(self.optima)} starts led to {len(self.distinct)} optima"
+        return "\n".join([head, *(f"{optimum}\n  reached by {count}" for optimum, count in self.distinct)])
+
+
+def optimise(
+    system: AbstractForcedSystem,
+    vary: Mapping[str, tuple[float, float]],
+    objective: AbstractObjective,
+    *,
+    optimiser: optax.GradientTransformation | None = None,
+    starts: int | Float[np.ndarray, "starts n"] = 1,
+    scouts: int = 0,
+    steps: int = 40,
+    tolerance: float = 1e-3,
+    seed: int = 0,
+    keep: str | Path | None = None,
+    report: Callable[[int, Sequence[Measured]], None] | None = None,
+) -> Optimised:
+    """Make `objective` small over some parameters of a design.
+
+    **Arguments:**
+
+    - `system`: the design; `vary`: bounds [SI] by parameter name.
+    - `objective`: a sum of objectives, such as `chaotic_width(4000, 27500) + 500 * cost()`.
+    - `optimiser`: of optax, for the unbounded numbers behind the places; by default Adam with a falling rate.
+    - `starts`: how many searches: the first from the design itself, others from quasi-random places; or places.
+    - `scouts`: so many quasi-random places are looked at beforehand, without slopes; searches start from the best.
+    - `steps`: at most so many; `tolerance`: a slope below this part of the objective's first size is small.
+    - `seed`: of the quasi-random places.
+    - `keep`: file to keep the state in after each step; if it is there, the search goes on from it.
+    - `report`: called with the step and what was measured in each search.
+
+    **Returns:** `Optimised`.
+
+    **Raises:** `ValueError` for unknown parameters, bounds that do not ascend, starts outside, or a kept file of
+    another search.
+    """
+    require_x64()
+    space = DesignSpace.of(system, vary)
+    chosen = optax.adam(optax.cosine_decay_schedule(0.5, max(steps, 1), 0.1)) if optimiser is None else optimiser
+    first = _first_places(space, objective, starts, scouts, seed)
+    z = _unbounded(first)
+    with jax.numpy_dtype_promotion("standard"):  # optax mixes steps and numbers
+        state = jax.vmap(chosen.init)(jnp.asarray(z))
+    history: list[list[Step]] = [[] for _ in first]
+    kept = None if keep is None else _Kept(Path(keep), space, steps, first)
+    if kept is not None:
+        z, state, history = kept.load(z, state, history)
+    before = z.copy()
+    while (step := max(map(len, history))) <= steps:
+        places = 1 / (1 + np.exp(-z))
+        live = [i for i in range(len(z)) if _ended(history[i], tolerance) is None]
+        if not live:
+            break
+        measured = dict(zip(live, objective.measure(space, places[live]), strict=True))
+        gradient = np.zeros_like(z)
+        for i, m in measured.items():
+            history[i].append(_step(places[i], m))
+            if m.status == "ok":
+                gradient[i] = m.slope * places[i] * (1 - places[i])
+        if report is not None:
+            report(step, list(measured.values()))
+        with jax.numpy_dtype_promotion("standard"):
+            update, moved = jax.vmap(chosen.update)(jnp.asarray(gradient), state, jnp.asarray(z))
+        fine = np.array([i in measured and measured[i].status == "ok" for i in range(len(z))])
+        state = jax.tree.map(
+            lambda new, old: jnp.where(fine.reshape(-1, *[1] * (new.ndim - 1)), new, old), moved, state
+        )
+        stepped = np.where(fine[:, None], z + np.asarray(update), (z + before) / 2)  # half way back
+        before = np.where(fine[:, None], z, before)
+        z = np.where(np.isin(np.arange(len(z)), live)[:, None], stepped, z)
+        if kept is not None:
+            kept.save(z, state, history)
+    optima = [_optimum(space, h, _ended(h, tolerance) or "step limit") for h in history]
+    return Optimised(tuple(sorted(optima, key=lambda o: np.nan_to_num(o.objective, nan=np.inf))), space)
+
+
+def _first_places(
+    space: DesignSpace, objective: AbstractObjective, starts: Any, scouts: int, seed: int
+) -> Float[np.ndarray, "starts n"]:
+    if isinstance(starts, np.ndarray):
+        if starts.ndim != 2 or starts.shape[1] != len(space.unknowns) or not np.all((starts >= 0) & (starts <= 1)):
+            raise ValueError("Argument `starts` must hold places between 0 and 1, one column for each parameter.")
+        return np.clip(starts, INSIDE, 1 - INSIDE)
+    if starts < 1:
+        raise ValueError(f"Argument `starts` must be at least 1, but {starts} was given.")
+    own = space.place
+    if not np.all((own >= 0) & (own <= 1)):
+        outside = ", ".join(n for n, p in zip(space.names, own, strict=True) if not 0 <= p <= 1)
+        raise ValueError(f"The design itself must lie within the bounds, but {outside} does not.")
+    if scouts and scouts < starts - 1:
+        raise ValueError(f"Argument `scouts` must be 0 or at least {starts - 1}, but {scouts} was given.")
+    count = max(scouts, starts - 1)
+    drawn = qmc.Sobol(len(own), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
+    if scouts and starts > 1:
+        drawn = drawn[np.argsort(objective.values(space, drawn), kind="stable")]  # NaN comes last
+    drawn = drawn[: starts - 1]
+    return np.clip(np.vstack([own, drawn]), INSIDE, 1 - INSIDE)
+
+
+def _unbounded(place: np.ndarray) -> np.ndarray:
+    return np.log(place / (1 - place))
+
+
+def _step(place: np.ndarray, measured: Measured) -> Step:
+    row = lambda x: tuple(float(c) for c in x)
+    m = measured
+    return Step(row(place), m.value, m.error, row(m.slope), row(m.slope_error), m.status)
+
+
+def _ended(history: Sequence[Step], tolerance: float) -> str | None:
+    """Why a search is over, if it is."""
+    if not history or history[-1].status != "ok":
+        return None
+    pull = lambda s: np.array(s.slope) * np.array(s.place) * (1 - np.array(s.place))
+    doubt = lambda s: np.array(s.slope_error) * np.array(s.place) * (1 - np.array(s.place))
+    size = max(abs(next((s.value for s in history if s.status == "ok"), 1.0)), 1e-300)
+    if np.max(np.abs(pull(history[-1]))) < tolerance * size:
+        return "slope is small"
+    last = history[-PATIENCE:]
+    fine = [s.status == "ok" and np.any(np.array(s.slope_error) > 0) for s in last]
+    if len(last) == PATIENCE and all(fine) and all(np.all(np.abs(pull(s)) <= doubt(s)) for s in last):
+        return "slope within its error"
+    return None
+
+
+def _optimum(space: DesignSpace, history: Sequence[Step], status: str) -> Optimum:
+    known = [s for s in history if s.status == "ok"] or [history[-1]]
+    best = min(known, key=lambda s: s.value)
+    place = np.array(best.place)
+    edge = [n for n, p in zip(space.names, place, strict=True) if min(p, 1 - p) < AT_BOUND]
+    why = status if best.status == "ok" else best.status
+    return Optimum(space.values(place), best.value, best.error, tuple(edge), tuple(history), why, space.model(place))
+
+
+class _Kept:
+    """The state of a search in a file: numbers only, put in place whole."""
+
+    def __init__(self, path: Path, space: DesignSpace, steps: int, first: np.ndarray):
+        design = {name: np.asarray(value).tolist() for name, value in parameters(space.system).items()}
+        bounds = {u.name: [u.lower, u.upper] for u in space.unknowns}
+        search = {"design": design, "bounds": bounds, "steps": steps, "first": first.tolist()}
+        self.path, self.what = path, json.dumps(search, sort_keys=True)
+
+    def save(self, z: np.ndarray, state: Any, history: Sequence[Sequence[Step]]) -> None:
+        leaves: dict[str, Any] = {f"leaf_{i}": np.asarray(x) for i, x in enumerate(jax.tree.leaves(state))}
+        rows = json.dumps([[dataclasses.asdict(s) for s in h] for h in history])
+        beside = self.path.with_name(self.path.name + ".part")
+        try:
+            with beside.open("wb") as file:
+                np.savez(file, z=z, what=self.what, history=rows, **leaves)
+            os.replace(beside, self.path)
+        except OSError as error:
+            beside.unlink(missing_ok=True)
+            raise OSError(
+                f"'{self.path}' could not be written ({error.strerror or error}): what was there before stays as it "
+                "was, and once there is room the same call goes on from there."
+            ) from error
+
+    def load(self, z: np.ndarray, state: Any, history: list[list[Step]]) -> tuple[np.ndarray, Any, list[list[Step]]]:
+        if not self.path.exists():
+            return z, state, history
+        try:
+            with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+                kept = dict(file)
+        except (ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise ValueError(f"Argument `keep` must be a file of this search, but {self.path} is none.") from error
+        if str(kept.get("what")) != self.what:
+            raise ValueError(f"Argument `keep` must be a file of this search, but {self.path} is of another one.")
+        leaves, tree = jax.tree.flatten(state)
+        state = jax.tree.unflatten(tree, [jnp.asarray(kept[f"leaf_{i}"]) for i in range(len(leaves))])
+        rows = [[_read(row) for row in h] for h in json.loads(str(kept["history"]))]
+        return kept["z"], state, rows
+
+
+def _read(row: dict[str, Any]) -> Step:
+    tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}
+    return Step(**tuples)

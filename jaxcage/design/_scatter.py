@@ -1,0 +1,152 @@
+"""What parameters do to an objective over their whole range, and what a drawing's tolerances do to an edge."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm, sobol_indices, uniform
+
+from ..models import AbstractForcedSystem
+from ..orbits import Sensitivity
+from ._objective import AbstractObjective, DesignSpace, Measured
+from ._optimise import Optimised, optimise
+
+
+@dataclasses.dataclass(frozen=True)
+class SobolIndices:
+    """Shares of an objective's variance, with 95 % intervals by the bootstrap."""
+
+    first: dict[str, float]
+    """Due to a parameter alone."""
+    total: dict[str, float]
+    """Due to it and all its interactions."""
+    first_interval: dict[str, tuple[float, float]]
+    total_interval: dict[str, tuple[float, float]]
+    evaluations: int
+
+    def __str__(self) -> str:
+        span = lambda pair: f"[{pair[0]:+.2f}, {pair[1]:+.2f}]"
+        head = f"Sobol indices from {self.evaluations} designs"
+        rows = [
+            f"  {n:<24} first {self.first[n]:+.3f} {span(self.first_interval[n])}  "
+            f"total {self.total[n]:+.3f} {span(self.total_interval[n])}"
+            for n in self.first
+        ]
+        return "\n".join([head, *rows])
+
+
+def global_sensitivity(
+    system: AbstractForcedSystem,
+    vary: Mapping[str, tuple[float, float]],
+    objective: AbstractObjective,
+    *,
+    samples: int = 64,
+    seed: int = 0,
+) -> SobolIndices:
+    """Sobol indices of an objective, parameters drawn evenly between their bounds (scipy's estimators).
+
+    **Arguments:** design; bounds [SI] by name; objective; base samples, a power of 2: samples (parameters + 2) designs
+    are evaluated in one batch.
+
+    **Raises:** `ValueError` for samples that are no power of 2, or an objective that could not be had somewhere.
+    """
+    space = DesignSpace.of(system, vary)
+    if samples < 2 or samples & (samples - 1):
+        raise ValueError(f"Argument `samples` must be a power of 2, but {samples} was given.")
+
+    def evaluate(x: np.ndarray) -> np.ndarray:
+        found = np.array(objective.values(space, x.T))
+        if not np.all(np.isfinite(found)):
+            raise ValueError(
+                f"The objective could not be had in {np.sum(~np.isfinite(found))} of {found.size} designs."
+            )
+        return found[None]
+
+    found = sobol_indices(func=evaluate, n=samples, dists=[uniform()] * len(space.names), rng=seed)
+    spread = found.bootstrap(confidence_level=0.95)
+    named = lambda row: dict(zip(space.names, np.ravel(row).tolist(), strict=True))
+    ends = lambda ci: zip(np.ravel(ci.low).tolist(), np.ravel(ci.high).tolist(), strict=True)
+    pairs = lambda ci: dict(zip(space.names, ends(ci), strict=True))
+    return SobolIndices(
+        named(found.first_order),
+        named(found.total_order),
+        pairs(spread.first_order.confidence_interval),
+        pairs(spread.total_order.confidence_interval),
+        samples * (len(space.names) + 2),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class ToleranceBudget:
+    """Scatter of an edge that the scatter of parameters causes, to first order."""
+
+    edge: str
+    speed_rpm: float
+    deviation_rpm: dict[str, float]
+    """Standard deviation due to each parameter alone."""
+
+    @property
+    def total_rpm(self) -> float:
+        """Standard deviation due to all of them, taken as independent."""
+        return float(np.sqrt(sum(d**2 for d in self.deviation_rpm.values())))
+
+    def __str__(self) -> str:
+        order = sorted(self.deviation_rpm.items(), key=lambda item: -item[1])
+        rows = [f"  {n:<24} +-{d:.3g} rpm, {100 * (d / self.total_rpm) ** 2:.0f} % of the variance" for n, d in order]
+        half = norm.ppf(0.975) * self.total_rpm
+        return "\n".join([f"{self.edge} at {self.speed_rpm:.1f} rpm: +-{half:.3g} rpm (95 %)", *rows])
+
+
+def tolerance_budget(edge: Sensitivity, deviation: Mapping[str, float]) -> ToleranceBudget:
+    """Scatter of an edge from its exact derivatives.
+
+    **Arguments:** edge; standard deviation of each parameter relative to its value (a tolerance of +-t, evenly used,
+    has t/sqrt(3)).
+
+    **Raises:** `ValueError` for a parameter that the edge has no derivative for, or a negative deviation.
+    """
+    for name, d in deviation.items():
+        if name not in edge.elasticity:
+            raise ValueError(f"Tolerance of `{name}` must be of one of {', '.join(edge.elasticity)}.")
+        if not d >= 0:
+            raise ValueError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
+    moved = {n: abs(edge.elasticity[n]) * d * edge.value_rpm for n, d in deviation.items()}
+    return ToleranceBudget(edge.name, edge.value_rpm, moved)
+
+
+@dataclasses.dataclass(frozen=True)
+class ParetoPoint:
+    """A design than which none that was found is better in one respect and no worse in the other."""
+
+    weight: float
+    values: dict[str, float]
+    first: Measured
+    second: Measured
+
+
+def pareto_front(
+    system: AbstractForcedSystem,
+    vary: Mapping[str, tuple[float, float]],
+    first: AbstractObjective,
+    second: AbstractObjective,
+    weights: Sequence[float],
+    *,
+    report: Callable[[int, Optimised], None] | None = None,
+    **options: Any,
+) -> tuple[ParetoPoint, ...]:
+    """Trade-off of two objectives: optima of first + weight * second without those that are dominated.
+
+    **Arguments:** as for `optimise`; weights of the second objective, one search from each optimum to the next.
+    """
+    points = []
+    for i, weight in enumerate(weights):
+        found = optimise(system, vary, first + weight * second, **options)
+        space, best = found.space, found.best
+        place = np.array([[u.place(best.values[u.name]) for u in space.unknowns]])
+        options["starts"] = place
+        points.append(ParetoPoint(weight, best.values, first.measure(space, place)[0], second.measure(space, place)[0]))
+        if report is not None:
+            report(i, found)
+    beats = lambda a, b: a.first.value < b.first.value and a.second.value <= b.second.value
+    return tuple(sorted((p for p in points if not any(beats(q, p) for q in points)), key=lambda p: p.second.value))

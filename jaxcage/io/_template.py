@@ -1,0 +1,63 @@
+"""A configuration to start from: every value with its unit, its meaning and where it comes from."""
+
+import contextlib
+from pathlib import Path
+from string import Template
+
+from ..forces import SynchronousImpact
+from ..models import case
+
+
+def template() -> str:
+    """The commented TOML text that `jaxcage init` writes; `load_model` accepts it as it is.
+
+    Dimensions stand in the text; what the paper does not print is filled in from the constants of its cases.
+    """
+    text = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
+    model = case("1a")
+    support, contact, impact = model.support, model.contact, model.impact
+    assert isinstance(impact, SynchronousImpact)
+    numbers = {
+        "cage_mass": model.cage_mass,
+        "land_width": 1e3 * model.film.land_width,
+        "contact": contact.stiffness,
+        "onset": contact.onset,
+        "restitution": contact.restitution,
+        "stiffness_x": support.stiffness_x,
+        "stiffness_y": support.stiffness_y,
+        "damping": support.damping,
+        "cubic": support.cubic_stiffness,
+        "cross": support.cross_stiffness,
+        "amplitude": impact.amplitude,
+        "exponent": impact.exponent,
+    }
+    words = {name: f"{float(value):.4g}" for name, value in numbers.items()}
+    filled = Template(text).substitute(words, unbalance=model.unbalance)
+    return "\n".join(map(_aligned, filled.splitlines())) + "\n"
+
+
+def _aligned(line: str) -> str:
+    """The comment behind a value in one column with the others."""
+    value, sign, comment = line[2:].partition(" # ")  # the first two may be the sign of an option
+    return f"{(line[:2] + value).rstrip():<34} # {comment}" if sign else line
+
+
+def write_template(path: str | Path) -> Path:
+    """Write the template to a new file.
+
+    **Raises:** `ValueError`, one sentence, if the name does not end in `.toml`, if the file is there already, or if it
+    cannot be written.
+    """
+    target, text = Path(path), template()
+    if target.suffix.lower() != ".toml":
+        raise ValueError(f"File '{path}' must end in .toml, so that the commands take it for a description.")
+    try:
+        with open(target, "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise ValueError(f"File '{path}' must be a new one, but is there already and is left as it is.") from None
+    except OSError as error:
+        with contextlib.suppress(OSError):  # half a file would stand in the way of the next try
+            target.unlink()
+        raise ValueError(f"File '{path}' must be in a folder that can be written to, but: {error.strerror}.") from error
+    return target

@@ -1,0 +1,99 @@
+"""The largest Floquet multiplier of an orbit and how its size moves with every parameter, exact for the equations as
+integrated.
+
+With P(z, k) = z the orbit and M(z, k) the monodromy matrix, dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple
+eigenvalue mu with left and right vectors l, r moves by l dM r / l r. One expansion of the return map to second order,
+the same as for edges, gives all of it.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import require_x64
+from .._parameters import get, parameter_paths
+from ..integrate import AbstractMethod, method as make_method
+from ..models import AbstractForcedSystem
+from ._lens import SPEED
+from ._problem import Given, OrbitProblem, make_frame
+from ._sensitivity import _expand, _Expansion, _pull_back
+
+
+NEWTON, CLOSED, NEARBY = 20, 1e-10, 3.0
+"""Most steps; size of a last step, and how far an orbit may lie from its guess, in units of the system's scale."""
+
+
+class LeadingMultiplier(NamedTuple):
+    """The largest multiplier of the orbit near a guess; NaN where there is none."""
+
+    size: float
+    """|mu|: below 1 the orbit is stable."""
+    derivative: dict[str, float]
+    """d|mu| / d parameter [SI]."""
+    state: Float[np.ndarray, " dim"]
+    """Of the orbit at phase 0 [SI]."""
+
+
+class _Moved(NamedTuple):
+    size: Array
+    weight: Float[Array, " k"]
+    """d|mu| / d number of the field."""
+
+
+@eqx.filter_jit
+def _moved(n: int, around: _Expansion) -> _Moved:
+    mu, left, right = jnp.linalg.eigvals(around.monodromy), *_vectors(around.monodromy)
+    i = jnp.argmax(jnp.abs(mu))
+    closing = around.image_slope[:, :n] - jnp.eye(n)
+    orbit = -jnp.linalg.solve(closing, around.image_slope[:, n:])
+    matrix = around.monodromy_slope[:, :, n:] + jnp.einsum("abz,zk->abk", around.monodromy_slope[:, :, :n], orbit)
+    change = jnp.einsum("a,abk,b->k", left[i], matrix.astype(mu.dtype), right[:, i])
+    size = jnp.abs(mu[i])
+    return _Moved(size, jnp.real(jnp.conj(mu[i]) * change) / size)
+
+
+def _vectors(m: Float[Array, "n n"]) -> tuple[Array, Array]:
+    """Left (rows) and right (columns) eigenvectors, l r = 1."""
+    right = jnp.linalg.eig(m)[1]
+    return jnp.linalg.inv(right), right
+
+
+def leading_multiplier(
+    system: AbstractForcedSystem,
+    speed: float,
+    guess: Any,
+    *,
+    periods: int = 1,
+    method: AbstractMethod | None = None,
+) -> LeadingMultiplier:
+    """Size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
+
+    **Arguments:** a system whose parameters are declared, such as `CageModel`; speed [rad/s]; guess; revolutions after
+    which the orbit closes; integration method.
+
+    **Returns:** `LeadingMultiplier`. Where two multipliers are equal in size, of one of them.
+    """
+    require_x64()
+    problem = OrbitProblem(make_method() if method is None else method, system.dimension, False, (SPEED,))
+    at, state = jnp.asarray(speed, dtype=float), jnp.asarray(guess, dtype=float)
+    given, n = Given(system, at), system.dimension
+    frame = make_frame(problem, given, state, at, 0.1 * at[None], periods)
+    u = first = jnp.append(state / frame.scale, 10.0)
+    paths = parameter_paths(system)
+    for _ in range(NEWTON):
+        around = _expand(problem, given, frame, u)
+        step = jnp.linalg.solve(around.image_slope[:, :n] - jnp.eye(n), around.image - u[:n])
+        size = float(jnp.max(jnp.abs(step)))
+        if not size < NEARBY or float(jnp.max(jnp.abs(u - first))) > NEARBY:
+            break
+        if size < CLOSED:
+            moved = _moved(n, around)
+            pulled = _pull_back(problem, given, frame, u, moved.weight)
+            slope = {name: float(get(pulled, path)) for name, path in paths.items()}
+            return LeadingMultiplier(float(moved.size), slope, np.asarray(problem.state(u, frame)))
+        u = u.at[:n].add(-step)
+    nan = float("nan")
+    return LeadingMultiplier(nan, dict.fromkeys(paths, nan), np.full(n, nan))

@@ -1,0 +1,44 @@
+"""How a search for a better design went, and what came of it."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..analysis import Sweep
+from ..design import Optimised
+from ._orbit_diagram import exponent_strip, orbit_diagram
+from ._style import BLUE, GREY, VERMILION, axes_or_new, new_figure
+
+
+def design_history(found: Optimised, ax: Axes | None = None) -> Axes:
+    """Objective over the steps of each search, the best one in colour with its error bars."""
+    ax = axes_or_new(ax, height=2.5)
+    for i, optimum in reversed(list(enumerate(found.optima))):
+        value = np.array([s.value if s.status == "ok" else np.nan for s in optimum.history])
+        error = np.array([s.error for s in optimum.history])
+        if i == 0:
+            ax.errorbar(
+                np.arange(value.size), value, 2 * error, color=BLUE, linewidth=1.4, elinewidth=0.8, label="best"
+            )
+            best = int(np.nanargmin(value))
+            ax.plot(best, value[best], "o", color=VERMILION, markersize=5, label="chosen")
+        else:
+            ax.plot(value, color=GREY, linewidth=0.9)
+    ax.set(xlabel="Step", ylabel="Objective [rpm]")
+    ax.legend(loc="upper right", frameon=False)
+    return ax
+
+
+def design_figure(found: Optimised, before: Sweep, after: Sweep) -> Figure:
+    """The search above; orbit diagrams and exponents of the first design and the chosen one below."""
+    figure = new_figure(12.0, 8.0)
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.6, 1.0))
+    design_history(found, figure.add_subplot(grid[0, :]))
+    shared = None
+    for column, (name, sweep) in enumerate((("before", before), ("after", after))):
+        above = figure.add_subplot(grid[1, column], sharey=shared)
+        shared = shared or above
+        orbit_diagram(sweep, 1, above)
+        above.set_title(name, loc="left", fontsize=10)
+        exponent_strip(sweep, figure.add_subplot(grid[2, column], sharex=above))
+    return figure

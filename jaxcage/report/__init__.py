@@ -1,0 +1,53 @@
+"""What was found of a design, as tables and as one page.
+
+| module           | responsibility                                                              |
+|------------------|-----------------------------------------------------------------------------|
+| `_table`         | tables of texts                                                             |
+| `_zone_tables`   | chaotic zones beside published ones                                         |
+| `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
+| `_slopes`        | sensitivities of every exact edge                                           |
+| `_map`           | edges in two parameters, exponents over both                                |
+| `_statics`       | statics as a table                                                          |
+| `_operating`     | operating speeds against zones                                              |
+| `_sources`       | every parameter with its unit and where its value comes from                |
+| `_findings`      | everything that a page shows, computed                                      |
+| `_figures`       | the page's figures as SVG, for light and dark screens                       |
+| `_page_tables`   | tables that no command prints                                               |
+| `_page`          | the page                                                                    |
+"""
+
+from ._findings import AllFailed as AllFailed, Findings as Findings, examine as examine
+from ._map import (
+    RPM as RPM,
+    SPEED as SPEED,
+    Axis as Axis,
+    Exponents as Exponents,
+    Say as Say,
+    follow_edges as follow_edges,
+    largest_exponents as largest_exponents,
+)
+from ._operating import (
+    Operating as Operating,
+    Verdict as Verdict,
+    chaotic_verdict as chaotic_verdict,
+    loss_verdict as loss_verdict,
+    read_operating as read_operating,
+)
+from ._orbit_tables import (
+    coexisting_notes as coexisting_notes,
+    edge_table as edge_table,
+    loss_table as loss_table,
+    multiplier_cell as multiplier_cell,
+    orbits_document as orbits_document,
+    stretch_table as stretch_table,
+)
+from ._page import Judged as Judged, judge as judge, page as page
+from ._slopes import edge_slopes as edge_slopes
+from ._sources import parameter_rows as parameter_rows
+from ._statics import displacements as displacements, statics_table as statics_table
+from ._table import Table as Table, number as number, shown_unit as shown_unit
+from ._zone_tables import (
+    zone_document as zone_document,
+    zones_document as zones_document,
+    zones_table as zones_table,
+)

@@ -1,0 +1,216 @@
+"""Findings as one page of HTML that needs nothing from outside."""
+
+import dataclasses
+import datetime
+import itertools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from .._parameters import parameter_info, parameters
+from ..analysis import Zone
+from ..bearing import design_rule_violations
+from ._figures import pictures
+from ._findings import Findings
+from ._operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict
+from ._orbit_tables import coexisting_notes, edge_table, loss_table
+from ._page_tables import at_speeds_table, checks_table, provenance_table, published_table, slope_tables
+from ._sources import parameter_rows, shown
+from ._statics import statics_table
+from ._table import Table, number
+from ._zone_tables import zones_table
+
+
+_HERE = Path(__file__).parent
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """An operating speed with what each kind of zone says of it."""
+
+    at: Operating
+    verdicts: dict[str, Verdict]
+
+
+def judge(findings: Findings, operating: Sequence[Operating]) -> list[Judged]:
+    """Both verdicts on each operating speed."""
+    found, loss = findings.found, findings.loss
+    return [
+        Judged(
+            at,
+            {
+                "synchronous-loss": loss_verdict(
+                    at, loss.zones, found.lower_rpm, found.upper_rpm, bool(found.stretches)
+                ),
+                "chaotic": chaotic_verdict(at, findings.zones, findings.sweep),
+            },
+        )
+        for at in operating
+    ]
+
+
+def page(
+    findings: Findings,
+    operating: Sequence[Operating] = (),
+    *,
+    table: Mapping[str, Any] | None = None,
+    command: str = "",
+) -> str:
+    """The report as HTML.
+
+    **Arguments:** findings; operating speeds; the nested mapping that the design was read from (None: a published
+    case); the command line that asked for it.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_HERE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    )
+    judged = judge(findings, operating)
+    return environment.get_template("page.html.j2").render(_context(findings, judged, table, command))
+
+
+def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] | None, command: str) -> dict[str, Any]:
+    name, model, swept, found = findings.name, findings.model, findings.sweep, findings.found
+    span = float(swept.rpm[0]), float(swept.rpm[-1])
+    what = f"Case {name}" if findings.published is not None else name
+    drawn = pictures(findings, [j.at for j in judged])
+    slopes = slope_tables(findings)
+    context: dict[str, Any] = {
+        "title": f"{what}: where the cage moves chaotically",
+        "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage"
+        + (", quick report: no gradients, a coarser sweep" if findings.quick else ""),
+        "summary": _summary(findings, judged),
+        "key_figures": _key_figures(findings),
+        "pictures": drawn,
+        "operating": [_operating_rows(findings, j) for j in judged],
+        "close_percent": f"{100 * CLOSE:g}",
+        "at_speeds": at_speeds_table(findings, [j.at for j in judged]) if judged else None,
+        "resolution": number(swept.resolution_rpm),
+        "loss_table": loss_table(name, found, findings.loss, findings.published),
+        "zones_table": zones_table(name, findings.zones, findings.published, span),
+        "zone_notes": coexisting_notes(findings.loss),
+        "edge_table": _named_edges(findings),
+        "further_edges": len(found.edges) - len({id(p) for p in findings.loss.edges.values()}),
+        "map_notes": [
+            f"Not followed: {n} ({why})." for n, why in (findings.map.refused if findings.map else {}).items()
+        ],
+        "slope_tables": slopes,
+        "statics": None if findings.statics is None else statics_table(model, findings.statics),
+        "warnings": design_rule_violations(model.bearing, model.guidance_gap),
+        "parameters": [
+            (group, list(rows))
+            for group, rows in itertools.groupby(parameter_rows(model, table), key=lambda row: row.group)
+        ],
+        "checks": checks_table(findings),
+        "published_table": published_table(findings),
+        "provenance": provenance_table(findings),
+        "version": swept.settings.get("version_jaxcage", ""),
+        "command": command,
+        "date": datetime.date.today().isoformat(),
+    }
+    there = {"operating": bool(judged), "map": "map" in drawn, "gradients": bool(slopes)}
+    there["statics"] = findings.statics is not None
+    return context | {"sections": [(k, text) for k, text in _SECTIONS.items() if there.get(k, True)]}
+
+
+_SECTIONS = {
+    "result": "In short",
+    "operating": "Operating speeds",
+    "zones": "Zones",
+    "stability": "Synchronous orbit",
+    "map": "Map",
+    "gradients": "What moves the edges",
+    "statics": "Statics",
+    "design": "Design",
+    "checks": "How sure",
+    "computed": "How computed",
+}
+
+
+def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
+    swept = findings.sweep
+    chaotic, loss = len(findings.zones.zones), len(findings.loss.zones)
+    share = float(np.mean(np.any(swept.label == "chaotic", axis=1)))
+    said = [
+        f"{_counted(chaotic, 'chaotic zone')} and {_counted(loss, 'zone').lower()} without a stable synchronous orbit. "
+        f"At {share:.0%} of the {swept.rpm.size} speeds that were swept some start "
+        f"of {swept.outcome.shape[1]} is chaotic."
+    ]
+    calm = calmest(findings)
+    if calm is not None:
+        said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
+    for j in judged:
+        states = [f"{v.state} of {'chaotic' if k == 'chaotic' else k} zones" for k, v in j.verdicts.items()]
+        words = {"inside of": "inside", "close of": "close to", "clear of": "clear of", "unknown of": "not known for"}
+        for old, new in words.items():
+            states = [s.replace(old, new) for s in states]
+        said.append(f"{_with_shaft(findings, j.at)}: {', '.join(states)}.")
+    if np.any(swept.failed):
+        said.append(f"{int(np.sum(swept.failed))} of {swept.failed.size} simulations failed: nothing is known of them.")
+    return said
+
+
+def _named_edges(findings: Findings) -> Table:
+    """The bifurcations that bound a zone; there may be dozens that bound nothing but a small stretch."""
+    whole = edge_table(findings.name, findings.found, findings.loss)
+    columns = (whole.columns[-1], *whole.columns[:-2])
+    rows = [(row[-1], *row[:-2]) for row in whole.rows if row[-1] != "-"]
+    nothing = ("none", *(len(columns) - 1) * ("-",))
+    return Table("Bifurcations of the synchronous orbit that bound a zone", columns, rows or [nothing])
+
+
+def _counted(n: int, what: str) -> str:
+    words = {0: "No", 1: "One", 2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
+    return f"{words.get(n, str(n))} {what}{'' if n == 1 else 's'}"
+
+
+def calmest(findings: Findings) -> tuple[float, float] | None:
+    """The widest range of the sweep [rpm] outside the zones of both kinds; None if there is none."""
+    first, last = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
+    taken = sorted(_ends(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones))
+    free, at = [], first
+    for low, high in taken:
+        free.append((at, low))
+        at = max(at, high)
+    low, high = max([*free, (at, last)], key=lambda pair: pair[1] - pair[0])
+    return (low, high) if high > low else None
+
+
+def _ends(zone: Zone, first: float, last: float) -> tuple[float, float]:
+    low = first if zone.onset is None else zone.onset.speed_rpm
+    return low, (last if zone.exit is None else zone.exit.speed_rpm)
+
+
+def _key_figures(findings: Findings) -> list[tuple[str, str]]:
+    model = findings.model
+    value, info = parameters(model), parameter_info(model)
+    named = []
+    for name in ("guidance_gap", "eccentricity", "cage_mass"):
+        unit, number_ = shown(float(value[name]), info[name].unit)
+        named.append((name.replace("_", " "), f"{number_:.4g} {unit}"))
+    oil = 1e3 * float(model.lubricant.dynamic_viscosity)
+    rollers = f"{model.bearing.n_rollers} of {1e3 * float(model.bearing.roller_diameter):.4g} mm"
+    return [*named, ("viscosity of the oil", f"{oil:.3g} mPa s"), ("rollers", rollers)]
+
+
+def _with_shaft(findings: Findings, at: Operating) -> str:
+    ratio = float(findings.model.bearing.cage_speed_ratio)
+    shaft = Operating(at.low_rpm / ratio, at.high_rpm / ratio)
+    return f"{at} (shaft {shaft})"
+
+
+def _operating_rows(findings: Findings, judged: Judged) -> dict[str, Any]:
+    rows = [
+        {
+            "kind": kind,
+            "state": v.state,
+            "where": v.where,
+            "edge": v.edge or "-",
+            "distance": number(v.distance_rpm),
+            "percent": number(v.percent, 1),
+        }
+        for kind, v in judged.verdicts.items()
+    ]
+    return {"text": _with_shaft(findings, judged.at), "verdicts": rows}

@@ -1,0 +1,106 @@
+"""Every parameter of a model with its unit, and where its value comes from."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from .._parameters import get, walk
+from ..models import CageModel
+
+
+_SHOWN = {
+    "m^2/s": ("mm²/s", 1e6, 0.0),
+    "K": ("°C", 1.0, -273.15),
+    "Pa": ("GPa", 1e-9, 0.0),
+    "1": ("", 1.0, 0.0),
+}
+"""Unit in which people read a quantity, the factor from SI, and what is added."""
+_READY_MADE = {("bearing", "designation"): "catalogue, {}", ("lubricant", "grade"): "grade {}"}
+_PUBLISHED = {
+    ("bearing", "inner_raceway_diameter"): "catalogue",
+    ("bearing", "palmgren_constant"): "default",
+    ("bearing", "roller_material"): "default",
+    ("bearing",): "paper, Table 1",
+    ("guidance_gap",): "paper, Table 2",
+    ("eccentricity",): "paper, Table 2",
+    ("lubricant", "temperature"): "default",
+    ("lubricant",): "paper, Table 2, read as a grade",
+}
+"""What the paper gives of a published case, the longest path first; all else it does not print."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One parameter, choice or count."""
+
+    path: tuple[str, ...]
+    text: str
+    value: str
+    unit: str
+    source: str
+
+    @property
+    def group(self) -> str:
+        """The part of the model that it belongs to."""
+        return self.path[0].replace("_", " ") if len(self.path) > 1 else "cage"
+
+    @property
+    def name(self) -> str:
+        """Its name in a configuration, without the table."""
+        return ".".join(self.path[1:] or self.path)
+
+
+def parameter_rows(model: CageModel, table: Mapping[str, Any] | None) -> list[Row]:
+    """All parameters of `model` in the units people read.
+
+    **Arguments:** the model; the nested mapping that it was read from, None for a published case.
+    """
+    rows = []
+    for path, field in walk(model):
+        value, text = get(model, path), field.metadata.get("text", "")
+        unit = ""
+        if "parameter" in field.metadata:
+            info = field.metadata["parameter"]
+            text, (unit, value) = info.text, shown(float(value), info.unit)
+            value = f"{value:.6g}"
+        rows.append(Row(path, text, str(value), unit, _source(model, path, field, table)))
+    return rows
+
+
+def shown(value: float, unit: str) -> tuple[str, float]:
+    """The unit in which a value [SI] is read, and the value in it."""
+    if unit == "m":
+        name, factor = ("µm", 1e6) if abs(value) < 1e-4 else ("mm", 1e3)
+        return name, value * factor
+    name, factor, shift = _SHOWN.get(unit, (unit, 1.0, 0.0))
+    if name == "GPa" and abs(value) < 1e7:
+        return unit, value
+    return name, value * factor + shift
+
+
+def _source(model: CageModel, path: tuple[str, ...], field: dataclasses.Field, table: Mapping[str, Any] | None) -> str:
+    if table is None:
+        for start in (path[:n] for n in range(len(path), 0, -1)):
+            if start in _PUBLISHED:
+                return _PUBLISHED[start]
+        return "default" if _is_default(model, path, field) else "identified, not printed"
+    here: Any = table
+    for name in path:
+        here = here.get(name) if isinstance(here, Mapping) else None
+    if here is not None:
+        return "this file"
+    for (part, key), words in _READY_MADE.items():
+        given = table.get(part)
+        if path[0] == part and isinstance(given, Mapping) and key in given:
+            return "default" if path[1:] == ("temperature",) else words.format(given[key])
+    return f"case {table['base']}" if "base" in table and path[0] not in _replaced(table) else "default"
+
+
+def _replaced(table: Mapping[str, Any]) -> set[str]:
+    """Parts of the base that another law takes the place of."""
+    return {part for part, given in table.items() if isinstance(given, Mapping) and "kind" in given}
+
+
+def _is_default(model: CageModel, path: tuple[str, ...], field: dataclasses.Field) -> bool:
+    default = field.default
+    return default is not dataclasses.MISSING and bool(get(model, path) == default)

@@ -1,0 +1,28 @@
+"""Studies: sweeps too large for one sitting, stored as they go.
+
+| module      | responsibility                                                                |
+|-------------|-------------------------------------------------------------------------------|
+| `_vary`     | how a parameter is sampled                                                    |
+| `_plan`     | what is varied, lanes and chunks                                              |
+| `_study`    | what is computed of a lane, the same bits anywhere                            |
+| `_store`    | the zarr folder, whole at any time                                            |
+| `_run`      | runs what a store lacks, in this process                                      |
+| `_dask`     | or on dask.distributed                                                        |
+| `_adaptive` | a grid of labels refined where the label changes                              |
+| `_label_map` | that grid over two parameters of a system                                    |
+"""
+
+from ._adaptive import AdaptiveGrid as AdaptiveGrid, found_share as found_share, refine as refine
+from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map
+from ._plan import Plan as Plan
+from ._run import run_study as run_study, study as study
+from ._store import OtherStudy as OtherStudy, label_names as label_names, open_study as open_study
+from ._study import (
+    LABELS as LABELS,
+    OIL as OIL,
+    PENDING as PENDING,
+    SPEED as SPEED,
+    Study as Study,
+    with_values as with_values,
+)
+from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance

@@ -1,0 +1,133 @@
+"""Runs a study: chunk after chunk of its lanes into a store, in this process or on a cluster, from where it stopped."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import require_x64
+from ..integrate import AbstractMethod, controlled
+from ..models import AbstractForcedSystem
+from ..sweeps import Progress
+from ._plan import LANES, Plan
+from ._store import Store, open_study
+from ._study import Results, Study
+from ._vary import Spread
+
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Spread]
+"""Parameter, or `"speed"` or `"oil"` -> values that make an axis of the grid [SI], or how to sample it."""
+Shard = tuple[int, int]
+"""(i, n): the i-th of n parts, counted from 1."""
+
+
+def study(
+    system: AbstractForcedSystem,
+    vary: Vary,
+    *,
+    store: str | Path,
+    samples: int = 0,
+    seed: int = 0,
+    starts: int | None = None,
+    discard: int = 300,
+    revolutions: int = 300,
+    blocks: int = 20,
+    exponents: int = 1,
+    strobe: int = 0,
+    method: AbstractMethod | None = None,
+    lanes: int = LANES,
+    shard: Shard = (1, 1),
+    executor: Literal["local", "dask"] = "local",
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> "xr.Dataset":
+    """Run a system over any grid or sample of its parameters, and keep what each lane does in a zarr folder.
+
+    What is stored already is not computed again: after a kill the same call goes on where it stopped, and the store
+    ends up with the same bits as that of an unbroken run, whichever processes computed it.
+
+    **Arguments:**
+
+    - `system`: any `AbstractForcedSystem`.
+    - `vary`: what is varied. Arrays are axes of a grid [SI]; `Between` and `Tolerance` are sampled together. The speed
+        [rad/s] must be among them; `oil`, for cages, is the ISO VG grade of a mineral oil.
+    - `store`: the folder.
+    - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
+    - `starts`: how many of the system's own starts are run at each point, by default all.
+    - `discard`, `revolutions`, `blocks`, `exponents`, `method`: as for `sweep`.
+    - `strobe`: strobe states stored of each lane, by default none.
+    - `lanes`: lanes of a chunk, at most.
+    - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
+    - `executor`: `"local"` runs on all cores of this process, `"dask"` on a dask.distributed cluster.
+    - `scheduler`, `workers`: address of the scheduler of a cluster, by default one of its own with so many processes.
+    - `progress`: called with lanes done and lanes in all, those that were stored before included.
+
+    **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `start`.
+
+    **Raises:** `ValueError` for what makes no sense, and for a store of another study; `ImportError` without dask.
+    """
+    require_x64()
+    plan = make_study_plan(system, vary, samples, seed, starts, lanes)
+    chosen = controlled() if method is None else method
+    about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)
+    run_study(about, store, shard, executor, scheduler, workers, progress)
+    return open_study(store)
+
+
+def make_study_plan(
+    system: AbstractForcedSystem, vary: Vary, samples: int, seed: int, starts: int | None, lanes: int
+) -> Plan:
+    """The plan that the arguments of `study` describe."""
+    sampled: dict[str, Spread] = {name: how for name, how in vary.items() if isinstance(how, Spread)}
+    grid = {name: np.asarray(x, dtype=float) for name, x in vary.items() if name not in sampled}
+    own = len(system.starts(1.0)) if starts is None else starts
+    return Plan(grid, sampled, samples, seed, own, lanes)
+
+
+def run_study(
+    about: Study,
+    path: str | Path,
+    shard: Shard = (1, 1),
+    executor: str = "local",
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Compute what the store at `path` lacks; arguments as for `study`."""
+    i, n = shard
+    if not 1 <= i <= n:
+        raise ValueError(f"Argument `shard` must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
+    if executor not in ("local", "dask"):
+        raise ValueError(f"Argument `executor` must be local or dask, but {executor!r} was given.")
+    if executor == "dask":
+        from ._dask import chunks_on_dask as computed  # needs an extra
+
+        compute = lambda chunks: computed(about, chunks, scheduler, workers)
+    else:
+        compute = lambda chunks: _chunks_here(about, chunks)
+    store = Store(path, about)
+    mine, pending = set(range(about.plan.chunks)[i - 1 :: n]), store.pending()
+    size = {chunk: about.plan.lanes_of(chunk).size for chunk in mine}
+    done, total = sum(size[c] for c in mine - set(pending)), sum(size.values())
+    report = progress or (lambda done, total: None)
+    report(done, total)
+    for chunk, results in compute([c for c in pending if c in mine]):
+        store.write(chunk, results)
+        done += size[chunk]
+        report(done, total)
+    left = set(store.pending())
+    if left & mine:
+        raise RuntimeError(f"{len(left & mine)} of {len(mine)} chunks did not come back.")
+    if not left:
+        store.tidy()
+
+
+def _chunks_here(about: Study, chunks: Iterable[int]) -> Iterator[tuple[int, Results]]:
+    for chunk in chunks:
+        yield chunk, about.chunk(chunk)

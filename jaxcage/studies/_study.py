@@ -1,0 +1,205 @@
+"""What a study computes: a system, a plan of lanes, how long to run them; and the numbers kept of each lane."""
+
+import dataclasses
+import functools
+import hashlib
+import inspect
+import json
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from ..analysis import Observation, closing_period, label_lanes
+from ..bearing import vg
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem, CageModel
+from ..orbits import pick
+from ..sweeps import Designs, Progress, make_plan, run_lanes, settings_of
+from ._plan import Plan, Values
+
+
+SPEED, OIL = "speed", "oil"
+"""Names beside those of the system's parameters: the speed [rad/s], and the ISO VG grade of a mineral oil."""
+CLOSING = 16
+"""Strobe states by which a lane's period is judged: twice the longest period that is looked for."""
+FEW, SOME = 256, 1024
+"""Lanes to which fewer ones are filled up: each number of lanes may take a program of its own."""
+
+LABELS = ("failed", *(f"periodic-{k}" for k in range(1, 9)), "chaotic", "quasi-periodic", "undecided")
+"""What a lane does, in the order of the integer codes that a study stores."""
+PENDING = -1
+"""Code of a lane that has not been run yet."""
+
+Results = dict[str, np.ndarray]
+"""Output by name; the lanes are the first axis."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Study:
+    """Lanes over any parameters, and what to compute in each of them."""
+
+    system: AbstractForcedSystem
+    plan: Plan
+    method: AbstractMethod
+    discard: int
+    revolutions: int
+    blocks: int
+    exponents: int
+    strobe: int
+    """Strobe states stored of each lane, the last ones; 0 for none."""
+
+    def __post_init__(self):
+        if SPEED not in self.plan.names:
+            raise ValueError("Argument `vary` must hold the speed: a single value is enough.")
+        for name in self.plan.names:
+            if name == OIL and isinstance(self.system, CageModel):
+                continue
+            if name != SPEED:
+                pick(self.system, name)
+        own = len(self.system.starts(1.0))
+        if self.plan.starts > own:
+            raise ValueError(f"Argument `starts` must be at most {own}, but {self.plan.starts} was given.")
+        if self.exponents < 1:
+            raise ValueError(f"Argument `exponents` must be at least 1, but {self.exponents} was given.")
+        if not 0 <= self.strobe <= self.revolutions:
+            raise ValueError(
+                f"Argument `strobe` must lie between 0 and the {self.revolutions} revolutions, but is {self.strobe}."
+            )
+        self._watch  # refuses impossible counts
+
+    @property
+    def _watch(self) -> Any:
+        keep = max(CLOSING, self.strobe)
+        return make_plan(self.discard, self.revolutions, self.blocks, keep, self.exponents, self.system.dimension)
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that the results follow from."""
+        return {
+            "system": _described(self.system),
+            "plan": self.plan.describe(),
+            "discard": self.discard,
+            "revolutions": self.revolutions,
+            "blocks": self.blocks,
+            "exponents": self.exponents,
+            "strobe": self.strobe,
+            **settings_of(self.method),
+            "version_jaxlib": version("jaxlib"),
+        }
+
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """A digest of `describe`: studies that share it have the same results."""
+        return hashlib.sha256(json.dumps(self.describe(), sort_keys=True).encode()).hexdigest()
+
+    def chunk(self, number: int) -> Results:
+        """The results of a chunk, laid out as its block of the grid."""
+        region = self.plan.region(number)
+        found = self.at(*self.plan.at(self.plan.lanes_of(number)))
+        shape = tuple(part.stop - part.start for part in region)
+        return {name: x.reshape(*shape, *x.shape[1:]) for name, x in found.items()}
+
+    def at(self, values: Values, start: Int[np.ndarray, " lanes"], progress: Progress | None = None) -> Results:
+        """The results of any lanes, given by the values of all that is varied and the numbers of their starts.
+
+        A lane has the same bits as in its chunk: the programs are those of a chunk, whatever its company.
+        """
+        most = self.plan.lanes
+        parts = [slice(i, min(i + most, start.size)) for i in range(0, start.size, most)]
+        found = []
+        for part in parts:
+            found.append(self._part({name: x[part] for name, x in values.items()}, start[part]))
+            if progress is not None:
+                progress(part.stop, start.size)
+        return {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+
+    def _part(self, values: Values, start: Int[np.ndarray, " lanes"]) -> Results:
+        count = start.size
+        full = {name: jnp.asarray(_filled(x, self.plan.lanes)) for name, x in values.items()}
+        speed = full.pop(SPEED)
+        designs = eqx.filter_vmap(lambda own: with_values(self.system, own), axis_size=self.plan.lanes)(full)
+        begin, scale = _start_and_scale(designs, speed, jnp.asarray(_filled(start, self.plan.lanes)))
+        run = min(max(FEW if count <= FEW else SOME, count), self.plan.lanes)
+        lanes = np.minimum(np.arange(run), count - 1)
+        seen = run_lanes(
+            Designs(designs, self.plan.lanes),
+            self.method,
+            self._watch,
+            np.asarray(speed)[lanes],
+            np.asarray(begin)[lanes],
+            which=lanes,
+        )
+        return self._judged(
+            Observation(*(np.moveaxis(np.asarray(x), -1, 0)[:count] for x in seen)), np.asarray(scale)[:count]
+        )
+
+    def _judged(self, seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Results:
+        """What is stored of lanes; here they are the first axis of an observation."""
+        strobe, growth, peak, outcome = (np.asarray(x) for x in (seen.strobe, seen.growth, seen.peak, seen.outcome))
+        failed = outcome != 0
+        period = np.where(failed, 0, closing_period(strobe[:, -CLOSING:], scale))
+        exponents = np.mean(growth, axis=1)
+        error = np.full(exponents.shape, np.inf)
+        if self.blocks > 1:
+            error = np.std(growth, axis=1, ddof=1) / np.sqrt(self.blocks)
+        label = label_lanes(failed, period, exponents[:, 0], error[:, 0])
+        several = {"exponents": exponents, "standard_errors": error} if self.exponents > 1 else {}
+        kept = {"strobe": strobe[:, -self.strobe :]} if self.strobe else {}
+        return {
+            "largest_exponent": exponents[:, 0],
+            "standard_error": error[:, 0],
+            **several,
+            **kept,
+            "peak": peak,
+            "period": period.astype(np.int8),
+            "label": np.array([LABELS.index(name) for name in label], dtype=np.int8),
+            "outcome": outcome.astype(np.int8),
+        }
+
+
+def with_values(system: AbstractForcedSystem, values: dict[str, Any]) -> AbstractForcedSystem:
+    """The system with parameters set by name; `oil` makes the lubricant a mineral oil of that grade."""
+    for name, value in values.items():
+        if name == OIL and isinstance(system, CageModel):
+            oil = vg(value, system.lubricant.temperature)
+            system = eqx.tree_at(lambda s: s.lubricant, system, oil)
+        else:
+            system = eqx.tree_at(pick(system, name), system, value)
+    return system
+
+
+def _filled(x: np.ndarray, size: int) -> np.ndarray:
+    """Repeat the last element up to `size` of them."""
+    return np.concatenate([x, np.repeat(x[-1:], size - x.shape[0], axis=0)])
+
+
+@eqx.filter_jit
+def _start_and_scale(
+    designs: AbstractForcedSystem, speed: Float[Array, " lanes"], start: Int[Array, " lanes"]
+) -> tuple[Float[Array, "lanes dim"], Float[Array, "lanes dim"]]:
+    row = lambda y: jnp.stack([jnp.asarray(c, dtype=float) for c in y])
+    of_lane = lambda s, w, n: (jnp.stack([row(y) for y in s.starts(w)])[n], row(s.scale(w)))
+    return eqx.filter_vmap(of_lane)(designs, speed, start)
+
+
+def _described(system: AbstractForcedSystem) -> Any:
+    """The configuration of a cage; of another system its numbers, and the text of its functions."""
+    if isinstance(system, CageModel):
+        from ..io import configuration  # the core does not load the tables of `io`
+
+        return configuration(system)
+    leaves = jax.tree.leaves(system)
+    numbers = [np.asarray(x).tolist() for x in leaves if eqx.is_array_like(x)]
+    return [str(jax.tree.structure(system)), numbers, [_text(x) for x in leaves if callable(x)]]
+
+
+def _text(f: Callable[..., Any]) -> str:
+    try:
+        return inspect.getsource(f)
+    except (OSError, TypeError):
+        return getattr(f, "__qualname__", type(f).__qualname__)

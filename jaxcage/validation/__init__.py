@@ -1,0 +1,35 @@
+"""Numbers of this package beside numbers that others printed, or that follow from a closed form or another program.
+
+| module          | responsibility                                                              |
+|-----------------|-----------------------------------------------------------------------------|
+| `_comparison`   | one number beside another, with the tolerance that its source supports      |
+| `_film`         | oil film: closed forms, printed tables of finite bearings                   |
+| `_statics`      | loads of the rollers, kinematics                                            |
+| `_contact`      | restitution and impact                                                      |
+| `_exponents`    | Lyapunov exponents of well-known systems                                    |
+| `_bifurcations` | periodic orbits and their bifurcations                                      |
+| `_cage`         | the cage: unbalance response, whirl, another integration                    |
+| `_page`         | all of it as one page of Markdown                                           |
+"""
+
+from collections.abc import Callable, Mapping
+
+from ._bifurcations import bifurcation_comparisons
+from ._cage import cage_comparisons
+from ._comparison import Comparison as Comparison
+from ._contact import contact_comparisons
+from ._exponents import exponent_comparisons
+from ._film import film_comparisons
+from ._page import page as page
+from ._statics import statics_comparisons
+
+
+TOPICS: Mapping[str, Callable[[], list[Comparison]]] = {
+    "film": film_comparisons,
+    "statics": statics_comparisons,
+    "contact": contact_comparisons,
+    "exponents": exponent_comparisons,
+    "bifurcations": bifurcation_comparisons,
+    "cage": cage_comparisons,
+}
+"""Topic -> what makes its comparisons; each takes seconds to a minute, most of it compiling."""

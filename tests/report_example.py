@@ -1,0 +1,125 @@
+"""Findings made by hand for the tests of the report: nothing is computed."""
+
+import numpy as np
+
+import jaxcage as jc
+from jaxcage.bearing import PUBLISHED_CASES, load_distribution
+from jaxcage.orbits import (
+    Branch,
+    Curve,
+    Explained,
+    Sensitivity,
+    SpecialPoint,
+    Stretch,
+    SynchronousOrbits,
+    loss_zones,
+)
+from jaxcage.report import Axis, Findings
+from jaxcage.report._findings import Map
+
+
+PER_RPM = np.pi / 30
+VERSIONS = {"method": "by hand", "version_jaxcage": "0.1.0", "version_jax": "0.10.1"}
+
+
+def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> SpecialPoint:
+    """A bifurcation of a 4-dimensional system."""
+    others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
+    mu = np.array([critical, *others, 0.1], dtype=complex)
+    state = np.array([1e-5, 2e-5, 0.1, 0.2])
+    return SpecialPoint(kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge)
+
+
+def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.Sweep:
+    """Three starts: chaotic from 9050 to 12050 and from 20050 rpm on, calm elsewhere."""
+    rpm = np.linspace(first, last, count)
+    chaotic = ((rpm > 9050) & (rpm < 12050)) | (rpm > 20050)
+    wild = np.random.default_rng(1).uniform(-2e-4, 2e-4, (count, 3, 8, 4))
+    calm = np.broadcast_to(1e-4 * np.sin(rpm / 5e3)[:, None, None, None], wild.shape)
+    growth = np.where(chaotic, 0.3, -0.4)[:, None, None, None] * np.ones((count, 3, 10, 1))
+    return jc.Sweep(
+        speed=rpm * PER_RPM,
+        strobe=np.where(chaotic[:, None, None, None], wild, calm),
+        last=np.zeros((count, 3, 4)),
+        block_growth=growth,
+        peak=np.full((count, 3), 0.5),
+        outcome=np.zeros((count, 3), dtype=int),
+        scale=np.full((count, 4), 1e-4),
+        discard=300,
+        revolutions=300,
+        settings=VERSIONS,
+    )
+
+
+def orbits(sweep: jc.Sweep) -> SynchronousOrbits:
+    """One orbit that is lost from 7000 to 12000 rpm and from 20000 rpm on."""
+    rpm = np.linspace(2500.0, 27500.0, 101)
+    special = (
+        point("fold", 7000.0, 1.0, 17),
+        point("period-doubling", 12000.0, -1.0, 37),
+        point("torus", 20000.0, np.exp(2.0j), 69),
+    )
+    stable = (rpm < 7000) | ((rpm > 12000) & (rpm < 20000))
+    state = np.column_stack([np.full(101, 1e-5), 1e-4 * np.sin(rpm / 5e3), np.full(101, 0.1), np.full(101, 0.2)])
+    turning = np.exp(1j * np.linspace(0.2, 2.0, 101))[:, None]
+    mu = np.where(stable, 0.8, 1.2)[:, None] * np.concatenate(
+        [turning, turning.conjugate(), 0.3 * np.ones((101, 2))], axis=1
+    )
+    speed = rpm * PER_RPM
+    branch = Branch("speed", speed, speed, state, mu, stable, special, 1, ("range", "range"))
+    stretches = (
+        Stretch(None, special[0], 2500.0, 7000.0, 0, 0, 40, 20),
+        Stretch(special[1], special[2], 12000.0, 20000.0, 0, 0, 90, 50),
+    )
+    return SynchronousOrbits((branch,), stretches, sweep, 0, 2500.0, 27500.0)
+
+
+def slopes(model: jc.CageModel, name: str, kind: str, rpm: float, turn: float) -> Sensitivity:
+    """Elasticities that differ from parameter to parameter and edge to edge."""
+    names = list(jc.parameters(model))
+    change = {n: turn * np.cos(i + turn) / (1 + i) for i, n in enumerate(names)}
+    slope = {n: change[n] * rpm / float(v) if float(v) else 0.0 for n, v in jc.parameters(model).items()}
+    balance = {"mass": 1e-13, "length": 2e-13, "time": 3e-13}
+    return Sensitivity(name, kind, rpm, slope, change, balance, 0.1, "converged")
+
+
+def findings(name: str = "1a", quick: bool = False) -> Findings:
+    """Everything that a page shows, of a design whose zones are known."""
+    model = jc.case("1a")
+    sweep = swept()
+    found = orbits(sweep)
+    loss = loss_zones(found)
+    gaps, across = np.linspace(0.36e-3, 0.56e-3, 9), np.linspace(2500, 27500, 20)
+    grid = 0.3 * np.sin(across[:, None] / 3e3) * np.ones((1, 9))
+    line = np.linspace(7000, 8000, 9) * PER_RPM
+    curve = Curve(
+        name="zone 1 onset",
+        kind="fold",
+        x="speed",
+        y="guidance_gap",
+        x_value=line,
+        y_value=gaps,
+        state=np.zeros((9, 4)),
+        genuine=np.ones(9, dtype=bool),
+        special=(),
+        ended=("range", "range"),
+        multipliers=np.zeros((9, 4), dtype=complex),
+    )
+    chart = Map(Axis("guidance_gap", gaps[0], gaps[-1], "mm", 1e3), (across, gaps, grid), [] if quick else [curve], {})
+    located = [] if quick else list(loss.edges.items())
+    edges = {n: slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(located)}
+    return Findings(
+        name=name,
+        model=model,
+        published=PUBLISHED_CASES.get(name),
+        sweep=sweep,
+        found=found,
+        loss=loss,
+        explained=Explained(jc.zones(sweep), {}),
+        slopes=edges,
+        map=chart,
+        statics=load_distribution(model.bearing, model.load),
+        quick=quick,
+        orbit_method="by hand",
+        seconds={"sweep": 12.0, "synchronous orbits": 34.0},
+    )

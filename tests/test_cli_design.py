@@ -1,0 +1,78 @@
+"""`jaxcage design` and `jaxcage sensitivity` in their smallest sizes: what they print, draw and refuse."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from jaxcage.cli import main
+
+
+RANGE = ["--first", "8000rpm", "--last", "14000rpm", "--speeds", "6", "--quick"]
+DESIGN = ["design", "1b", *RANGE, "--starts", "2", "--scouts", "4", "--steps", "2", "--cloud", "4"]
+SENSITIVITY = ["sensitivity", "1a", *RANGE, "--samples", "2"]
+
+
+def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    """The only thing that `arguments` with --json print on standard output."""
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    said = document(capsys, *DESIGN, "--out", str(tmp_path))
+    assert said["vary"] == {
+        "guidance_gap": pytest.approx([0.3e-3, 0.6e-3]),
+        "eccentricity": pytest.approx([5e-6, 60e-6]),
+    }
+    assert all(low <= said["optimum"][n] <= high for n, (low, high) in said["vary"].items())
+    assert sum(o["starts"] for o in said["optima"]) == 2
+    assert 4 + 2 * 4 <= said["designs_swept"] <= 4 + 2 * 3 * 4 and said["designs_swept"] % 4 == 0
+    assert set(said["chaotic_rpm"]) == {"before", "after"} == set(said["chaotic_zones"])
+    assert said["chaotic_rpm"]["before"] > 1000
+    assert said["synchronous_loss_zones"] == {}
+    assert Path(said["figure"]).parent == tmp_path and Path(said["figure"]).stat().st_size > 10_000
+
+
+def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    scatter = ["--scatter", "guidance_gap=10%", "--scatter", "eccentricity=rayleigh", "--worst", "0.5"]
+    small = ["--starts", "1", "--steps", "1", "--out", str(tmp_path)]
+    assert main([*DESIGN, *small, *scatter]) == 0
+    text = capsys.readouterr().out
+    assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
+    assert "128 designs swept" in text  # two steps x four of a cloud x sixteen made cages
+
+
+def test_sensitivity_shares_the_variance(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    said = document(capsys, *SENSITIVITY, "--out", str(tmp_path))
+    assert said["sobol"]["designs"] == 2 * 4
+    for order in ("first", "total"):
+        assert set(said["sobol"][order]) == {"guidance_gap", "eccentricity"}
+        assert all(low <= high for low, high in said["sobol"][f"{order}_interval"].values())
+    assert said["edges"] == [] and said["figure"] is None
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        ("design 1a --starts 0", "--starts must be at least 1, but 0 was given"),
+        ("design 1a --scouts 1", "--scouts must be at least 2, but 1 was given"),
+        ("design 1a --cloud 5", "`cloud` must be an even number from 4 up, but 5 was given"),
+        ("design 1a --cost nan", "--cost must be at least 0, but nan was given"),
+        ("design 1a --last 3000", "the range is 4000 to 3000 rpm"),
+        ("design 1a --vary gap=0.3mm:0.6mm", "gap"),
+        ("design 1a --vary guidance_gap=0.6mm:0.3mm", "must ascend"),
+        ("design 1a --vary guidance_gap=0.3kg:0.6kg", "guidance_gap"),
+        ("design 1a --scatter eccentricity=weibull", "weibull"),
+        ("design 1a --scatter damping=10%", "damping"),
+        ("sensitivity 1a --samples 3", "--samples must be a power of 2, but 3 was given"),
+        ("sensitivity 1a --tolerance 0", "--tolerance must lie between 0 and 100 percent, but 0 was given"),
+        ("sensitivity 1a --first nan", "--first must be a speed above 0 rpm, but nan was given"),
+    ],
+)
+def test_refused_in_one_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: str, said: str):
+    assert main([*arguments.split(), "--out", str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
+    assert out == "" and len(lines) == 1 and said in lines[0] and lines[0].endswith(".")

@@ -1,0 +1,238 @@
+"""Numerical guards: single precision and bad versions of JAX are refused, the wall holds at any step size, and a label
+that rests on too few revolutions says so.
+"""
+
+import inspect
+import runpy
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from report_example import point
+
+import jaxcage as jc
+from jaxcage import _checks
+from jaxcage.analysis._labels import label_lanes, too_few_revolutions
+from jaxcage.integrate import OUTCOMES
+from jaxcage.integrate._results import outcome_code
+
+
+def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
+    (x,), (u,) = q, v
+    return (-0.2 * u - x - x**3 + 0.3 * jnp.cos(tau),)
+
+
+OSCILLATOR = jc.ForcedOscillator(_duffing, coordinates=1)
+SPEEDS = np.array([1.0, 1.1])
+FOLD, DOUBLING = point("fold", 7000.0, 1.0, 17), point("period-doubling", 12000.0, -1.0, 37)
+WITHIN = {"guidance_gap": (3e-4, 6e-4)}
+STATE = np.zeros(2)
+
+ENTRIES: dict[str, Callable[[Any], Any]] = {
+    "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
+    "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
+    "branches": lambda m: jc.branches([OSCILLATOR], [STATE], lower=1.0, upper=2.0),
+    "cascade": lambda m: jc.cascade(OSCILLATOR, DOUBLING, lower=1.0, upper=2.0),
+    "case": lambda m: jc.case("1a"),
+    "coexisting_orbits": lambda m: jc.coexisting_orbits(OSCILLATOR, 1.0),
+    "curve": lambda m: jc.curve(m, FOLD, lower=4e-4, upper=5e-4, x_lower=600.0, x_upper=900.0),
+    "doubled_branch": lambda m: jc.doubled_branch(OSCILLATOR, DOUBLING, lower=1.0, upper=2.0),
+    "equilibrium": lambda m: jc.equilibrium(m, 900.0),
+    "fit_edges": lambda m: jc.fit_edges({"1a": m}, [], [], [], start={}),
+    "label_map": lambda m: jc.label_map(m, {"speed": SPEEDS}, {"guidance_gap": np.array([4e-4, 5e-4])}),
+    "leading_multiplier": lambda m: jc.leading_multiplier(OSCILLATOR, 1.0, STATE),
+    "monodromy": lambda m: jc.monodromy(OSCILLATOR, SPEEDS, np.zeros((2, 2))),
+    "optimise": lambda m: jc.optimise(m, WITHIN, jc.cost()),
+    "pareto_front": lambda m: jc.pareto_front(m, WITHIN, jc.cost(), jc.cost(), [1.0]),
+    "periodic_orbit": lambda m: jc.periodic_orbit(OSCILLATOR, 1.0),
+    "ramp": lambda m: jc.ramp(OSCILLATOR, 1.0, 1.1, revolutions=2),
+    "run_up_down": lambda m: jc.run_up_down(OSCILLATOR, SPEEDS),
+    "run_up_down_designs": lambda m: jc.run_up_down_designs([OSCILLATOR], SPEEDS),
+    "screen": lambda m: jc.screen({"1a": m}, [], [], SPEEDS),
+    "sensitivities": lambda m: jc.sensitivities(m, {"an edge": FOLD}, jc.method()),
+    "sensitivity": lambda m: jc.sensitivity(m, FOLD),
+    "simulate": lambda m: jc.simulate(OSCILLATOR, 1.0, revolutions=1),
+    "strobe_map": lambda m: jc.strobe_map(OSCILLATOR, 1.0),
+    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere"),
+    "sweep": lambda m: jc.sweep(OSCILLATOR, SPEEDS),
+    "sweep_designs": lambda m: jc.sweep_designs([OSCILLATOR], SPEEDS),
+    "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
+    "waterfall": lambda m: jc.waterfall(OSCILLATOR, SPEEDS),
+}
+"""Every public function that integrates a motion, or makes a model to integrate."""
+
+OTHERS = {
+    # settings, objectives and distributions: nothing is computed yet
+    *("keep_compiled_programs", "enable_x64", "rpm", "method", "controlled", "uniform", "rayleigh"),
+    *("chaotic_share", "chaotic_width", "cost", "regular_motion", "zone_width"),
+    # parameters by name, tables, closed formulas of a bearing
+    *("parameter_info", "parameters", "replace", "nu2310", "published_case", "vg", "cage_mass", "load_distribution"),
+    *("static_cage_displacement", "dimensionless_groups", "open_study"),
+    # of what was found before, with its numbers
+    *("zones", "loss_zones", "explain", "zero_one", "order_spectrum", "dominant_orders", "cage_forces"),
+    *("orbit_measures", "tolerance_budget", "global_sensitivity"),
+    # the cage at rest in its film
+    *("film_coefficients", "film_whirl_speed", "stability_chart"),
+}
+
+
+@pytest.fixture(scope="module")
+def model() -> jc.CageModel:
+    return jc.case("1a")
+
+
+def test_every_public_function_is_known():
+    functions = {n for n, o in vars(jc).items() if inspect.isfunction(inspect.unwrap(o)) and not n.startswith("_")}
+    assert functions == set(ENTRIES) | OTHERS
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_single_precision_is_refused(model: jc.CageModel, name: str):
+    with jax.enable_x64(False), pytest.raises(RuntimeError, match=r"double precision: call `jaxcage.enable_x64\(\)`"):
+        ENTRIES[name](model)
+
+
+@pytest.mark.parametrize("bad", _checks.BAD_JAX)
+@pytest.mark.parametrize("name", ["case", "sweep", "simulate", "periodic_orbit", "optimise"])
+def test_bad_versions_are_refused(monkeypatch: pytest.MonkeyPatch, model: jc.CageModel, name: str, bad: str):
+    monkeypatch.setattr(jax, "__version__", bad)
+    with pytest.raises(RuntimeError, match=f"JAX {bad} gives wrong results .*issues/39.*install jax==0.10.1"):
+        ENTRIES[name](model)
+
+
+def test_bad_versions_are_said_at_import(monkeypatch: pytest.MonkeyPatch):
+    assert {"0.10.2", "0.11.0"} <= set(_checks.BAD_JAX)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        runpy.run_path(_checks.__file__)
+    monkeypatch.setattr(jax, "__version__", "0.10.2")
+    with pytest.warns(RuntimeWarning, match="JAX 0.10.2 gives wrong results"):
+        runpy.run_path(_checks.__file__)
+
+
+THROWS = np.array([1.0, 3.0, 10.0, 100.0])
+"""Speeds [m/s] at which a cage leaves the middle: at the last one it has energy to cross the rib."""
+DIRECTIONS = np.arange(6) * np.pi / 3
+
+
+def _clearances_reached(model: jc.CageModel, speed: np.ndarray) -> np.ndarray:
+    """The eccentricity ratio at which the contact alone has taken all of a thrown cage's energy."""
+    energy = 0.5 * float(model.cage_mass) * speed**2
+    depth = (19 / 9 * energy / float(model.contact.stiffness)) ** (9 / 19)
+    return float(model.contact.onset) + depth / float(model.clearance)
+
+
+def _thrown() -> tuple[np.ndarray, Any]:
+    """Speed [m/s] and state of every throw."""
+    speed, angle = (x.ravel() for x in np.meshgrid(THROWS, DIRECTIONS, indexing="ij"))
+    rows = (np.zeros_like(speed), np.zeros_like(speed), speed * np.cos(angle), speed * np.sin(angle))
+    return speed, tuple(jnp.asarray(row) for row in rows)
+
+
+@pytest.mark.parametrize("solver, steps", [("rk4", 16), ("rk4", 128), ("newmark", 64), ("rodas3", 32)])
+def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageModel, solver: str, steps: int):
+    """With steps too large by far for the contact: a lane is refused, or tells how far out the farthest of its steps
+    was, which is compared with here for four of them at a time.
+    """
+    strobe = jc.strobe_map(model, jc.rpm(9000.0), jc.method(solver, steps=steps))
+
+    def one(y: Any, i: Any) -> Any:
+        y = strobe.part(y, i, steps).y
+        return y, jnp.hypot(y[0], y[1]) / model.clearance
+
+    def four(y: Any, i: Any) -> Any:
+        _, eps = jax.lax.scan(one, y, 4 * i + jnp.arange(4))
+        stretch = strobe.part(y, i, steps // 4)
+        return stretch.y, (jnp.max(eps), stretch.peak, outcome_code(stretch.result))
+
+    speed, y = _thrown()
+    revolution = jax.jit(jax.vmap(lambda y: jax.lax.scan(four, y, jnp.arange(steps // 4))[1]))
+    eps, told, code = (np.asarray(x) for x in revolution(y))
+    well = np.logical_and.accumulate(code == OUTCOMES.index("successful"), axis=1)
+    np.testing.assert_allclose(eps[well], told[well], rtol=1e-6)
+    assert np.all(told[well] <= 2) and not np.any(well[speed == 100.0, -1])
+    assert np.all(told[code == OUTCOMES.index("outside")] > 2)
+    crossed = np.any(~(eps <= 1), axis=1)
+    assert np.any(crossed & (speed == 10.0))  # with steps like these some do leave, and it is told
+    assert np.all(~crossed | ~well[:, -1] | (np.max(told, axis=1) > 1))
+
+
+def test_with_fine_steps_the_rib_turns_a_thrown_cage_back(model: jc.CageModel):
+    """Nothing goes deeper than where the contact has taken all its energy; what has more than that is refused."""
+    speed, y = _thrown()
+    strobe = jc.strobe_map(model, jc.rpm(9000.0), jc.method("rk4", steps=1024))
+
+    def revolution(y: Any) -> Any:
+        stretch = strobe(y)
+        return stretch.peak, outcome_code(stretch.result)
+
+    peak, code = (np.asarray(x) for x in jax.jit(jax.vmap(revolution))(y))
+    hard, limit = speed < 100, _clearances_reached(model, speed)
+    assert np.all(limit[~hard] > 2) and not np.any(code[~hard] == OUTCOMES.index("successful"))
+    assert np.all(code[hard] == OUTCOMES.index("successful")) and np.all(peak[hard] < limit[hard])
+    assert np.all(peak[hard] > float(model.contact.onset))  # every one of them met the wall
+    fast = speed == 10.0
+    assert np.all(peak[fast] > 1 + 0.6 * (limit[fast] - 1))
+
+
+@pytest.mark.parametrize(
+    "label, exponent, error, short",
+    [
+        ("quasi-periodic", 0.0, 0.009, False),
+        ("quasi-periodic", 0.0, 0.011, True),
+        ("quasi-periodic", 0.5, np.inf, True),  # a single block has no error bar
+        ("undecided", 0.05, 0.02, True),
+        ("undecided", -0.1, 0.03, False),
+        ("chaotic", 0.05, 0.01, False),
+        ("periodic-1", -0.1, 0.5, False),
+        ("failed", np.nan, np.nan, False),
+    ],
+)
+def test_labels_that_rest_on_too_few_revolutions(label: str, exponent: float, error: float, short: bool):
+    period, lost = np.array([int(label == "periodic-1")]), np.array([label == "failed"])
+    assert label_lanes(lost, period, np.array([exponent]), np.array([error]))[0] == label
+    lane = np.array([label]), np.array([exponent]), np.array([error])
+    assert too_few_revolutions(*lane, 300)[0] == short
+    judged_by_exponent = label in ("quasi-periodic", "undecided", "chaotic")
+    assert too_few_revolutions(*lane, 19)[0] == judged_by_exponent
+
+
+def test_a_short_sweep_says_so_and_a_long_one_does_not():
+    """The chaotic oscillator of Ueda: 0.1034 per unit time, 0.65 a revolution."""
+
+    def ueda(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
+        (x,), (u,) = q, v
+        return (-0.05 * u - x**3 + 7.5 * jnp.sin(tau),)
+
+    system = jc.ForcedOscillator(ueda, coordinates=1)
+    lengths = {"discard": 20, "method": jc.method("rk4", steps=64), "keep": 8}
+    single, long = (
+        jc.sweep(system, np.array([1.0]), revolutions=n, blocks=blocks, **lengths)
+        for n, blocks in ((100, 1), (400, 20))
+    )
+    assert np.all(long.label == "chaotic") and not np.any(long.too_short)
+    assert "too few revolutions" not in str(long)
+    assert np.all(single.label == "quasi-periodic") and np.all(single.too_short)  # wrong, and known to be
+    assert "3 labels rest on too few revolutions" in str(single)
+
+
+def test_adaptive_steps_tell_how_far_the_cage_went():
+    """Not only where it ended: it bounces off the rib within the revolution."""
+    run = lambda method: jc.sweep(
+        jc.case("1a"),
+        float(jc.rpm(9000.0)),
+        starts=[(0.0, 0.0, 3.0, 0.0)],
+        discard=0,
+        revolutions=1,
+        blocks=1,
+        exponents=0,
+        keep=1,
+        method=method,
+    )
+    adaptive, fine = run(jc.method("rk4", tolerance=1e-6)), run(jc.method("rk4", steps=1024))
+    assert fine.peak[0, 0] > 1.0
+    assert adaptive.peak[0, 0] == pytest.approx(fine.peak[0, 0], abs=2e-3)

@@ -1,0 +1,55 @@
+"""J. C. Sprott, Chaos and Time-Series Analysis (2003), appendix A: spectra of Lorenz's and Roessler's systems.
+
+They have no period: a unit of time, or a phase of 2 pi, takes its place; exponents are those per unit of time.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import jaxcage as jc
+
+
+def lorenz(rho):
+    def rates(tau, y, speed):
+        return (10 * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2])
+
+    return rates
+
+
+def roessler(tau, y, speed):
+    return (-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7))
+
+
+def spectrum(rates, speed, centre, steps, revolutions, discard=50, starts=64):
+    cloud = np.asarray(centre) + np.random.default_rng(1).uniform(-1, 1, (starts, 3))
+    found = jc.sweep(
+        jc.ForcedSystem(rates, dimension=3),
+        np.array([speed]),
+        starts=[tuple(map(float, s)) for s in cloud],
+        discard=discard,
+        revolutions=revolutions,
+        exponents=3,
+        blocks=10,
+        keep=1,
+        method=jc.method("rodas4", steps=steps),
+    )
+    assert not np.any(found.failed)
+    return found.exponents[0].mean(axis=0) * speed / (2 * math.pi)
+
+
+def test_lorenz():
+    """0.9056, 0, -14.5723; the sum is the divergence -41/3, exactly."""
+    found = spectrum(lorenz(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 256, 400)
+    np.testing.assert_allclose(found, [0.9056, 0.0, -14.5723], atol=0.006)
+    assert found.sum() == pytest.approx(-41 / 3, abs=1e-5)
+    dimension = 2 + found[0] / abs(found[2])
+    assert dimension == pytest.approx(2.062, abs=1e-3)  # Kaplan and Yorke's, as printed
+
+
+def test_roessler():
+    """0.0714, 0, -5.3943."""
+    found = spectrum(roessler, 1.0, (0.0, -5.0, 0.0), 512, 300, discard=20)
+    np.testing.assert_allclose(found[:2], [0.0714, 0.0], atol=0.002)
+    assert found[2] == pytest.approx(-5.3943, abs=0.02)

@@ -1,0 +1,181 @@
+"""Optimisation: known optima from many starts, within bounds, resumable; sensitivities against closed forms."""
+
+import jax.numpy as jnp
+import numpy as np
+import optax
+import pytest
+
+import jaxcage as jc
+from tests.test_identification import TRUTH, DoubleWell
+
+
+VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
+
+
+def double_well():
+    return jc.ForcedOscillator(DoubleWell(**TRUTH, forcing=0.262), coordinates=1)
+
+
+def bowl(damping=0.4, cubic=1.5):
+    """Smallest, with the value 1, where damping and cubic are these."""
+
+    def height(system):
+        p = jc.parameters(system)
+        return 1.0 + 40 * (p["damping"] - damping) ** 2 + (p["cubic"] - cubic) ** 2
+
+    return jc.Smooth(height)
+
+
+@pytest.mark.parametrize("optimiser", [None, optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)])
+def test_any_optimiser_finds_a_known_optimum(optimiser):
+    found = jc.optimise(double_well(), VARY, bowl(), starts=4, steps=150, optimiser=optimiser).best
+    assert found.objective == pytest.approx(1.0, abs=2e-2)
+    assert found.values == pytest.approx({"damping": 0.4, "cubic": 1.5}, rel=0.1)
+    assert found.at_bound == ()
+    assert found.model.acceleration.cubic == pytest.approx(found.values["cubic"], rel=1e-12)
+
+
+def test_starts_that_lead_to_one_optimum_are_one():
+    found = jc.optimise(double_well(), VARY, bowl(), starts=6, steps=200)
+    assert [n for _, n in found.distinct] == [6]
+    assert "6 starts led to 1 optima" in str(found)
+
+
+def test_several_optima_are_listed():
+    """Two valleys, in the damping."""
+    two = jc.Smooth(lambda s: 50 * (jc.parameters(s)["damping"] - 0.3) ** 2 * (jc.parameters(s)["damping"] - 0.8) ** 2)
+    places = np.array([[0.1], [0.3], [0.7], [0.9]])
+    found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, 100.0 * two, starts=places, steps=300)
+    where = sorted(o.values["damping"] for o, _ in found.distinct)
+    assert where == pytest.approx([0.3, 0.8], abs=0.03)
+    assert [n for _, n in found.distinct] == [2, 2]
+
+
+def test_scouts_find_the_deeper_valley():
+    """One valley holds an eighth of the range and is the deeper; the slope from elsewhere leads away from it."""
+
+    def height(system):
+        d = jc.parameters(system)["damping"]
+        return (d - 0.7) ** 2 - 0.5 * jnp.exp(-(((d - 0.2) / 0.05) ** 2))
+
+    search = lambda **options: jc.optimise(double_well(), {"damping": (0.1, 1.0)}, jc.Smooth(height), **options)
+    assert search(steps=200).best.values["damping"] == pytest.approx(0.7, abs=0.02)  # from the design itself, 0.3
+    looked = search(starts=4, scouts=32, steps=200)
+    assert looked.best.values["damping"] == pytest.approx(0.2, abs=0.02)
+    assert looked.distinct[0][1] >= 2
+    assert len(search(starts=1, scouts=8, steps=1).optima) == 1
+    with pytest.raises(ValueError, match="`scouts` must be 0 or at least 3, but 2 was given"):
+        search(starts=4, scouts=2)
+
+
+def test_a_bound_that_stops_the_search_is_named():
+    found = jc.optimise(double_well(), VARY, bowl(damping=2.0), steps=400, optimiser=optax.adam(0.3)).best
+    assert found.at_bound == ("damping",)
+    assert found.values["damping"] <= 1.0
+    assert "at bound" in str(found)
+
+
+def test_a_step_to_where_nothing_is_known_is_taken_back():
+    """Beyond damping 0.5 the objective is NaN, just past its smallest value."""
+
+    def height(system):
+        d = jc.parameters(system)["damping"]
+        return jax.numpy.where(d < 0.5, (d - 0.49) ** 2 * 100 + 1, jax.numpy.nan)
+
+    import jax
+
+    found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, jc.Smooth(height), steps=60).best
+    assert any(s.status != "ok" for s in found.history)
+    assert found.values["damping"] == pytest.approx(0.49, abs=0.03)
+
+
+def test_an_interrupted_search_goes_on_as_if_it_had_not_been(tmp_path):
+    path = tmp_path / "search.npz"
+    unbroken = jc.optimise(double_well(), VARY, bowl(), starts=2, steps=30)
+
+    class Stop(Exception):
+        pass
+
+    def stop(step, measured):
+        if step == 11:
+            raise Stop
+
+    with pytest.raises(Stop):
+        jc.optimise(double_well(), VARY, bowl(), starts=2, steps=30, keep=path, report=stop)
+    seen = []
+    again = jc.optimise(
+        double_well(), VARY, bowl(), starts=2, steps=30, keep=path, report=lambda step, _: seen.append(step)
+    )
+    assert seen[0] == 11
+    assert [o.history for o in again.optima] == [o.history for o in unbroken.optima]
+    with pytest.raises(ValueError, match="file of this search"):
+        jc.optimise(double_well(), VARY, bowl(), starts=3, steps=30, keep=path)
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(ValueError, match="is none"):
+        jc.optimise(double_well(), VARY, bowl(), starts=2, steps=30, keep=path)
+
+
+def test_a_noisy_search_ends_within_its_error():
+    class Noisy(jc.AbstractObjective):
+        def measure(self, space, places):
+            return [jc.Measured(1.0, 0.1, np.array([1e-2]), np.array([0.1])) for _ in places]
+
+        def values(self, space, places):
+            return np.ones(len(places))
+
+    found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, Noisy(), steps=40, tolerance=1e-4).best
+    assert found.status == "slope within its error" and len(found.history) == 3
+
+
+def test_sobol_indices_of_ishigami():
+    """Ishigami and Homma's function, a = 7, b = 0.1: first 0.3139, 0.4424, 0, total 0.5576, 0.4424, 0.2437."""
+    import jax.numpy as jnp
+
+    names = ("damping", "cubic", "stiffness")
+    vary = {n: (0.5, 1.5) for n in names}
+
+    def ishigami(system):
+        x = [2 * jnp.pi * (jc.parameters(system)[n] - 1.0) for n in names]
+        return jnp.sin(x[0]) + 7 * jnp.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * jnp.sin(x[0])
+
+    got = jc.global_sensitivity(double_well(), vary, jc.Smooth(ishigami), samples=4096)
+    assert list(got.first.values()) == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
+    assert list(got.total.values()) == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
+    for name in names:
+        assert got.first_interval[name][0] <= got.first[name] <= got.first_interval[name][1]
+
+
+def test_tolerance_budget_is_the_root_of_squares():
+    elasticity = {"gap": 0.5, "mass": -2.0}
+    edge = jc.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")
+    got = jc.tolerance_budget(edge, {"gap": 0.02, "mass": 0.01})
+    assert got.deviation_rpm == pytest.approx({"gap": 100.0, "mass": 200.0})
+    assert got.total_rpm == pytest.approx(np.hypot(100, 200))
+    assert "80 % of the variance" in str(got)
+    with pytest.raises(ValueError, match="must be of one of"):
+        jc.tolerance_budget(edge, {"heat": 0.1})
+
+
+def test_pareto_front_of_two_parabolas():
+    """(x - 0.3)^2 and (x - 0.8)^2 trade off along sqrt(f) + sqrt(g) = 0.5."""
+    f, g = (jc.Smooth(lambda s, c=c: (jc.parameters(s)["damping"] - c) ** 2) for c in (0.3, 0.8))
+    front = jc.pareto_front(double_well(), {"damping": (0.1, 1.0)}, f, g, [0.2, 1.0, 5.0], steps=200, tolerance=1e-5)
+    assert len(front) == 3
+    for p in front:
+        assert np.sqrt(p.first.value) + np.sqrt(p.second.value) == pytest.approx(0.5, abs=0.01)
+        assert p.values["damping"] == pytest.approx((0.3 + 0.8 * p.weight) / (1 + p.weight), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (dict(starts=0), "at least 1"),
+        (dict(starts=np.array([[0.5]])), "one column for each"),
+        (dict(starts=np.array([[0.5, 1.5]])), "between 0 and 1"),
+    ],
+)
+def test_bad_input_gets_a_sentence(options, words):
+    with pytest.raises(ValueError, match=words):
+        jc.optimise(double_well(), VARY, bowl(), **options)
+    with pytest.raises(ValueError, match="power of 2"):
+        jc.global_sensitivity(double_well(), VARY, bowl(), samples=3)

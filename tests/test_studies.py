@@ -1,0 +1,337 @@
+"""Studies: the same bits after kills, from shards and from other processes; what is stored is what sweeps find."""
+
+import json
+import math
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import stats
+
+import jaxcage as jc
+from jaxcage.studies import LABELS, OtherStudy, Plan, Study, label_names, with_values
+from jaxcage.studies._store import Store
+
+
+class Duffing(eqx.Module):
+    """x'' + damping x' + x + cubic x^3 = force cos(speed t); with cubic below 0 it runs away."""
+
+    damping: jax.Array
+    cubic: jax.Array
+    force: jax.Array = eqx.field(default_factory=lambda: jnp.array(0.3))
+
+    def __call__(self, tau, q, v, speed):
+        del speed
+        (x,), (u,) = q, v
+        return (-self.damping * u - x - self.cubic * x**3 + self.force * jnp.cos(tau),)
+
+
+OSCILLATOR = jc.ForcedOscillator(Duffing(jnp.array(0.1), jnp.array(1.0)), coordinates=1)
+SPEEDS, CUBICS = np.linspace(1.1, 1.9, 9), np.array([0.5, 1.0, 1.5, -4.0])
+LENGTH: dict[str, Any] = {"discard": 40, "revolutions": 40, "blocks": 4, "method": jc.method("rodas4", steps=32)}
+OPTIONS: dict[str, Any] = {**LENGTH, "starts": 2, "lanes": 12}
+VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": jc.Tolerance(0.1, 0.02)}
+
+
+def duffing_study(store: Path, **more: Any) -> xr.Dataset:
+    return jc.study(OSCILLATOR, VARY, store=store, samples=2, seed=3, **(OPTIONS | more))
+
+
+def contents(store: Path) -> dict[str, bytes]:
+    """Every file of a store."""
+    return {str(p.relative_to(store)): p.read_bytes() for p in sorted(store.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The store of an unbroken run: 2 samples x 4 cubics x 9 speeds x 2 starts in 16 chunks."""
+    jc.keep_compiled_programs(tmp_path_factory.mktemp("programs"))
+    store = tmp_path_factory.mktemp("whole") / "study.zarr"
+    duffing_study(store)
+    return store
+
+
+def test_lanes_are_those_of_a_sweep(whole: Path):
+    """Labels and exponents of lanes, against sweeps of one system at a time, whose programs hold it as constants."""
+    found = jc.open_study(whole)
+    assert found["label"].dims == ("sample", "cubic", "speed", "start")
+    damping = found["damping"].values
+    for i, j in ((0, 0), (1, 1), (0, 2)):
+        system = eqx.tree_at(
+            lambda s: (s.acceleration.damping, s.acceleration.cubic),
+            OSCILLATOR,
+            (jnp.array(damping[i]), jnp.array(CUBICS[j])),
+        )
+        starts = [tuple(float(c) for c in start) for start in system.starts(1.0)[:2]]
+        swept = jc.sweep(system, SPEEDS, starts=starts, keep=16, **LENGTH)
+        mine = found.isel(sample=i, cubic=j)
+        assert np.array_equal(label_names(mine).values, swept.label)
+        np.testing.assert_allclose(mine["largest_exponent"], swept.exponents[..., 0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(mine["standard_error"], swept.standard_error[..., 0], rtol=0, atol=1e-9)
+        assert {f"periodic-{k}" for k in np.unique(mine["period"]) if k} == set(np.unique(swept.label)) - {"undecided"}
+
+
+def test_a_lane_that_runs_away_is_failed_and_nothing_else(whole: Path):
+    found = jc.open_study(whole).load()
+    away = found.sel(cubic=-4.0).isel(start=1)  # starts at 0.9, beyond the edge of the well at 0.5
+    assert np.all(away["label"] == LABELS.index("failed")) and np.all(away["outcome"] > 0)
+    assert np.all(np.isnan(away["largest_exponent"])) and np.all(away["period"] == 0)
+    assert np.all(found.sel(cubic=CUBICS[:3])["outcome"] == 0)
+
+
+def test_plain_xarray_opens_it_with_names_and_units(whole: Path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plain = xr.open_zarr(whole, chunks=None)
+    np.testing.assert_array_equal(plain["speed"], SPEEDS)
+    np.testing.assert_allclose(plain["speed_rpm"], SPEEDS * 30 / math.pi, rtol=1e-15)
+    assert plain["speed"].attrs["units"] == "rad/s"
+    assert plain["label"].attrs["flag_meanings"].split()[1:] == list(LABELS)
+    study = json.loads(plain.attrs["study"])
+    assert (study["plan"]["seed"], study["revolutions"], study["version_jax"]) == (3, 40, jax.__version__)
+
+
+def test_any_lane_alone_has_the_bits_that_its_chunk_has(whole: Path):
+    """Lanes drawn from all chunks, backwards: which neighbours a lane has does not matter."""
+    found = jc.open_study(whole)
+    plan = Plan({"cubic": CUBICS, "speed": SPEEDS}, {"damping": VARY["damping"]}, 2, 3, 2, 12)
+    study = Study(OSCILLATOR, plan, LENGTH["method"], 40, 40, 4, 1, 0)
+    lanes = np.random.default_rng(0).permutation(plan.size)[:31]
+    again = study.at(*plan.at(lanes))
+    for name, values in again.items():
+        np.testing.assert_array_equal(values, found[name].values.ravel()[lanes])
+
+
+def test_shards_fill_one_store(whole: Path, tmp_path: Path):
+    store = tmp_path / "study.zarr"
+    seen: list[tuple[int, int]] = []
+    half = duffing_study(store, shard=(2, 2), progress=lambda done, total: seen.append((done, total)))
+    assert seen[0] == (0, 64) and seen[-1] == (64, 64)  # chunks of 10 and 8 lanes in turn
+    pending = half["outcome"].values == -1
+    assert np.sum(pending) == 80 and np.all(np.isnan(half["peak"].values[pending]))
+    assert set(label_names(half).values[pending].tolist()) == {"pending"}
+    duffing_study(store, shard=(1, 2))
+    assert contents(store) == contents(whole)
+
+
+@pytest.mark.parametrize("written", [0, 1, 3, 5])
+def test_a_chunk_half_written_is_written_again(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
+):
+    """The process dies when so many of a chunk's six variables are in place."""
+    store, put, left = tmp_path / "study.zarr", Store.write, [2 * 6 + written]
+
+    def write(self: Store, chunk: int, results: dict) -> None:
+        for name in sorted(results, key=lambda name: name == "outcome"):
+            if left[0] == 0:
+                raise KeyboardInterrupt
+            left[0] -= 1
+            self._arrays[name][self.study.plan.region(chunk)] = results[name]
+
+    monkeypatch.setattr(Store, "write", write)
+    with pytest.raises(KeyboardInterrupt):
+        duffing_study(store)
+    monkeypatch.setattr(Store, "write", put)
+    done: list[int] = []
+    duffing_study(store, progress=lambda lanes, _: done.append(lanes))
+    assert done[0] == 2 * 9 and done[-1] == 144
+    assert contents(store) == contents(whole)
+
+
+def test_killed_at_random_and_resumed(whole: Path, tmp_path: Path):
+    """SIGKILL at random moments, four times; whoever starts again ends with the very files of an unbroken run."""
+    store, dice = tmp_path / "study.zarr", random.Random(1)
+    programs = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
+    code = (
+        "import sys, pathlib, jaxcage as jc, jax; jax.config.update('jax_enable_x64', True); "
+        f"sys.path.insert(0, {str(Path(__file__).parent)!r}); "
+        f"jax.config.update('jax_compilation_cache_dir', {programs!r}); "
+        "import test_studies as t; t.duffing_study(pathlib.Path(sys.argv[1]), "
+        "progress=lambda done, total: print(done, flush=True))"
+    )
+    stored = [0]
+    for _ in range(4):
+        with subprocess.Popen([sys.executable, "-c", code, str(store)], stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            lines = [process.stdout.readline() for _ in range(dice.randint(1, 4))]
+            try:
+                process.wait(dice.uniform(0.0, 0.05))
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGKILL)
+        assert process.returncode == -signal.SIGKILL
+        stored.append(int(lines[-1]))
+    assert stored == sorted(stored) and 0 < stored[-1] < 144
+    duffing_study(store)
+    assert contents(store) == contents(whole)
+
+
+def test_dask_survives_a_worker_and_finds_the_same(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Two worker processes; one is killed as soon as the first chunk is done."""
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    store, killed = tmp_path / "study.zarr", []
+    monkeypatch.setenv("JAXCAGE_CACHE", str(tmp_path / "programs"))
+
+    def kill_one(done: int, total: int) -> None:
+        del total
+        if done and not killed:
+            victim = multiprocessing.active_children()[0]
+            os.kill(victim.pid or 0, signal.SIGKILL)
+            killed.append(victim.pid)
+
+    duffing_study(store, executor="dask", workers=2, progress=kill_one)
+    assert killed
+    assert contents(store) == contents(whole)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"revolutions": 20}, "differs in revolutions: choose"),
+        ({"seed": 4}, "differs in cloud.damping, seed: choose"),
+        ({"starts": 1}, "differs in starts: choose"),
+        ({"method": jc.method("rodas4", steps=48)}, "differs in method: choose"),
+    ],
+)
+def test_another_study_is_not_mixed_in(whole: Path, change: dict, words: str):
+    before = contents(whole)
+    options = {"samples": 2, "seed": 3, **OPTIONS} | change
+    with pytest.raises(OtherStudy, match=words):
+        jc.study(OSCILLATOR, VARY, store=whole, **options)
+    assert contents(whole) == before
+
+
+def test_another_system_or_another_folder_is_refused(whole: Path, tmp_path: Path):
+    other = eqx.tree_at(lambda s: s.acceleration.damping, OSCILLATOR, jnp.array(0.2))
+    with pytest.raises(OtherStudy, match="differs in system"):
+        jc.study(other, VARY, store=whole, samples=2, seed=3, **OPTIONS)
+    (tmp_path / "letters").mkdir()
+    with pytest.raises(OtherStudy, match="must be a new folder or the store of this study"):
+        duffing_study(tmp_path / "letters")
+    assert list((tmp_path / "letters").iterdir()) == []
+    with pytest.raises(FileNotFoundError, match="no study at"):
+        jc.open_study(tmp_path / "letters")
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"vary": {"cubic": CUBICS}}, "must hold the speed"),
+        ({"vary": {"speed": SPEEDS, "cubik": CUBICS}}, "must be one of speed, .*cubic, force, but 'cubik'"),
+        ({"vary": {"speed": np.array([1.0, 1.0])}}, "distinct numbers for speed"),
+        ({"vary": {"speed": np.array([])}}, "distinct numbers for speed"),
+        ({"vary": VARY, "samples": 0}, "samples` must be above 0"),
+        ({"vary": {"speed": SPEEDS}, "samples": 8}, "samples` must be above 0"),
+        ({"starts": 4}, "starts` must be at most 3"),
+        ({"lanes": 0}, "at least 0, 1 and 1"),
+        ({"exponents": 0}, "exponents` must be at least 1"),
+        ({"strobe": 41}, "strobe` must lie between 0 and the 40"),
+        ({"blocks": 7}, "blocks` must divide"),
+        ({"shard": (0, 2)}, "shard` must be"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(tmp_path: Path, change: dict, words: str):
+    options: dict = {"vary": {"speed": SPEEDS}, "store": tmp_path / "study.zarr", **OPTIONS} | change
+    with pytest.raises(ValueError, match=words):
+        jc.study(OSCILLATOR, options.pop("vary"), **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_orbit_data_when_asked_for(tmp_path: Path):
+    options = OPTIONS | {"lanes": 18, "exponents": 2, "strobe": 5, "blocks": 1}
+    found = jc.study(OSCILLATOR, {"speed": SPEEDS}, store=tmp_path / "study.zarr", **options)
+    assert found["strobe"].dims == ("speed", "start", "revolution", "component")
+    assert found["revolution"].values.tolist() == [76, 77, 78, 79, 80]
+    # the sum of the exponents is the mean divergence, -damping times the period
+    np.testing.assert_allclose(found["exponents"].sum("exponent"), (-0.2 * np.pi / SPEEDS)[:, None] * [1, 1], atol=1e-5)
+    np.testing.assert_array_equal(found["exponents"].isel(exponent=0), found["largest_exponent"])
+    still = found["period"].values == 1
+    assert np.max(np.ptp(found["strobe"].values, axis=2)[still]) < 1e-4
+    assert np.all(np.isinf(found["standard_error"]))
+
+
+@pytest.mark.parametrize(
+    "shape, lanes", [((3, 7, 5), 12), ((3, 7, 5), 1), ((3, 7, 5), 1000), ((1000,), 96), ((6, 2), 4)]
+)
+def test_chunks_cover_every_lane_once(shape: tuple[int, ...], lanes: int):
+    grid = {f"p{i}": np.arange(1.0, n + 1.0) for i, n in enumerate(shape)}
+    plan = Plan(grid, {}, 0, 0, 2, lanes)
+    parts = [plan.lanes_of(i) for i in range(plan.chunks)]
+    assert np.array_equal(np.sort(np.concatenate(parts)), np.arange(plan.size))
+    assert max(map(len, parts)) <= max(lanes, 1)
+    for number in (0, plan.chunks - 1):  # the numbers of a lane are those of its place in the block
+        values, start = plan.at(parts[number])
+        block = np.zeros(plan.shape)[plan.region(number)]
+        coordinates = np.meshgrid(*grid.values(), np.arange(2), indexing="ij")
+        for name, grid_values in zip(grid, coordinates, strict=False):
+            assert np.array_equal(values[name], grid_values[plan.region(number)].ravel())
+        assert np.array_equal(start.reshape(block.shape), coordinates[-1][plan.region(number)])
+
+
+def test_samples_fill_their_distributions():
+    """A Sobol sequence has one point in each of n equal parts, of every parameter; a tolerance is a normal distribution
+    cut off at three standard deviations."""
+    sampled = {"a": jc.Between(2.0, 6.0), "b": jc.Tolerance(10.0, 0.3)}
+    first, again, other = (Plan({}, sampled, 256, seed, 1).cloud for seed in (0, 0, 1))
+    assert all(np.array_equal(first[name], again[name]) for name in sampled)
+    assert not np.array_equal(first["a"], other["a"])
+    assert np.array_equal(np.sort(np.floor((first["a"] - 2.0) / 4.0 * 256)), np.arange(256))
+    normal = stats.norm(10.0, 0.1)
+    inside = (normal.cdf(first["b"]) - normal.cdf(9.7)) / (normal.cdf(10.3) - normal.cdf(9.7))
+    assert np.array_equal(np.sort(np.floor(inside * 256)), np.arange(256))
+    assert np.array_equal(Plan({}, sampled, 100, 0, 1).cloud["b"], first["b"][:100])
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: jc.Between(2.0, 2.0), "must ascend"),
+        (lambda: jc.Between(2.0, math.inf), "must ascend"),
+        (lambda: jc.Tolerance(1.0, 0.0), "above 0"),
+        (lambda: jc.Tolerance(math.nan, 1.0), "above 0"),
+    ],
+)
+def test_impossible_distributions_are_refused(make: Any, words: str):
+    with pytest.raises(ValueError, match=words):
+        make()
+
+
+def test_designs_of_a_cage_by_name():
+    """Gap, land width and oil of many lanes at once are those of one design after the other."""
+    model = jc.case("1a")
+    values = {
+        "guidance_gap": np.array([4e-4, 5e-4]),
+        "land_width": np.array([3e-3, 4e-3]),
+        "oil": np.array([32.0, 78.0]),
+    }
+    many = eqx.filter_vmap(lambda own: with_values(model, own))({k: jnp.asarray(v) for k, v in values.items()})
+    for i in range(2):
+        one = jc.replace(
+            model,
+            guidance_gap=values["guidance_gap"][i],
+            land_width=values["land_width"][i],
+            lubricant=jc.vg(values["oil"][i], model.lubricant.temperature),
+        )
+        mine = jax.tree.map(lambda x, i=i: x[i] if eqx.is_array(x) else x, many)
+        for name, value in jc.parameters(one).items():
+            assert float(jc.parameters(mine)[name]) == pytest.approx(float(value), rel=1e-14), name
+
+
+def test_a_store_is_made_once_by_whoever_comes_first(tmp_path: Path):
+    """Two shards that begin together: the second finds the store in place, and nothing is left beside it."""
+    plan = Plan({"speed": SPEEDS}, {}, 0, 0, 2, 12)
+    study = Study(OSCILLATOR, plan, LENGTH["method"], 40, 40, 4, 1, 0)
+    first, second = (Store(tmp_path / "study.zarr", study) for _ in range(2))
+    assert first.pending() == second.pending() == list(range(plan.chunks))
+    assert [p.name for p in tmp_path.iterdir()] == ["study.zarr"]
