@@ -23,8 +23,10 @@ import os as _os
 
 
 # XLA's loader reports every program kept on disk as an error on processors for which it has tuning flags of its own.
-# What really goes wrong is raised as an exception. Whoever wants XLA's log sets the variable, or imports jax first.
-_os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+# What really goes wrong is raised as an exception. JAX itself sets the variable to 1, also for the processes that a
+# script starts; whoever wants XLA's log sets it to 0.
+if _os.environ.get("TF_CPP_MIN_LOG_LEVEL", "1") == "1":
+    _os.environ["TF_CPP_MIN_LOG_LEVEL"] = "3"
 
 from ._cache import keep_compiled_programs as keep_compiled_programs
 from ._checks import enable_x64 as enable_x64

@@ -386,16 +386,21 @@ def test_work_is_the_change_of_energy(design, speed, start):
     assert np.all(fine < coarse / 10 + 1e-9) and np.all(fine < 1e-5)
 
 
+def liouville_defect(model, speed, start, steps):
+    """log|det| of the derivative of a revolution less the integral of the divergence along it; that integral."""
+    tau, _, _, divergence = first_revolution(model, speed, start, steps)
+    method, at = jc.method("rodas4", steps=steps), in_si(model, speed, start)
+    _, matrix = jc.monodromy(model, np.array([speed]), at[None], method=method)
+    size = np.array([1.0, 1.0, speed, speed])
+    expected = simpson(divergence, x=tau)
+    return abs(np.linalg.slogdet(matrix[0] * size / size[:, None])[1] - expected), abs(expected)
+
+
 @random(20)
 @given(designs, speeds, states(0.02, 0.7, 0.5))
 def test_phase_volume_shrinks_with_the_divergence(design, speed, start):
-    """Liouville: log|det| of the derivative of a revolution is the integral of the divergence along it."""
+    """Liouville, by two rules of fourth order: with twice the steps the defect falls to a sixteenth."""
     model = jc.replace(CASE, **design)
-    tau, y, _, divergence = first_revolution(model, speed, start, STEPS)
-    assume(within(y, model))
-    expected = simpson(divergence, x=tau)
-    method, at = jc.method("rodas4", steps=STEPS), in_si(model, speed, start)
-    _, matrix = jc.monodromy(model, np.array([speed]), at[None], method=method)
-    size = np.array([1.0, 1.0, speed, speed])
-    found = np.linalg.slogdet(matrix[0] * size / size[:, None])[1]
-    assert abs(found - expected) < 5e-5
+    assume(within(first_revolution(model, speed, start, STEPS)[1], model))
+    (coarse, _), (fine, expected) = (liouville_defect(model, speed, start, steps) for steps in (STEPS, 2 * STEPS))
+    assert fine < coarse / 10 + 1e-8 and fine < 1e-6 * (1 + expected)
