@@ -6,6 +6,7 @@ import inspect
 import runpy
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -16,7 +17,8 @@ from report_example import point
 
 import jaxcage as jc
 from jaxcage import _checks
-from jaxcage.analysis._labels import label_lanes, too_few_revolutions
+from jaxcage.analysis import label_lanes, too_few_revolutions
+from jaxcage.cli import main
 from jaxcage.integrate import OUTCOMES
 from jaxcage.integrate._results import outcome_code
 
@@ -31,22 +33,31 @@ SPEEDS = np.array([1.0, 1.1])
 FOLD, DOUBLING = point("fold", 7000.0, 1.0, 17), point("period-doubling", 12000.0, -1.0, 37)
 WITHIN = {"guidance_gap": (3e-4, 6e-4)}
 STATE = np.zeros(2)
+ROW = np.zeros(3)
+TRAJECTORY = jc.Trajectory(ROW, ROW, np.zeros((3, 4)), ROW, 2, 0.0, "finished")
 
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
     "branches": lambda m: jc.branches([OSCILLATOR], [STATE], lower=1.0, upper=2.0),
+    "cage_forces": lambda m: jc.cage_forces(m, TRAJECTORY),
+    "cage_mass": lambda m: jc.cage_mass(m.bearing, 5e-4),
     "cascade": lambda m: jc.cascade(OSCILLATOR, DOUBLING, lower=1.0, upper=2.0),
     "case": lambda m: jc.case("1a"),
     "coexisting_orbits": lambda m: jc.coexisting_orbits(OSCILLATOR, 1.0),
     "curve": lambda m: jc.curve(m, FOLD, lower=4e-4, upper=5e-4, x_lower=600.0, x_upper=900.0),
+    "dimensionless_groups": lambda m: jc.dimensionless_groups(m, 900.0),
     "doubled_branch": lambda m: jc.doubled_branch(OSCILLATOR, DOUBLING, lower=1.0, upper=2.0),
     "equilibrium": lambda m: jc.equilibrium(m, 900.0),
+    "film_coefficients": lambda m: jc.film_coefficients(0.5),
+    "film_whirl_speed": lambda m: jc.film_whirl_speed(m),
     "fit_edges": lambda m: jc.fit_edges({"1a": m}, [], [], [], start={}),
     "label_map": lambda m: jc.label_map(m, {"speed": SPEEDS}, {"guidance_gap": np.array([4e-4, 5e-4])}),
     "leading_multiplier": lambda m: jc.leading_multiplier(OSCILLATOR, 1.0, STATE),
+    "load_distribution": lambda m: jc.load_distribution(m.bearing, 1000.0, 900.0),
     "monodromy": lambda m: jc.monodromy(OSCILLATOR, SPEEDS, np.zeros((2, 2))),
     "optimise": lambda m: jc.optimise(m, WITHIN, jc.cost()),
+    "orbit_measures": lambda m: jc.orbit_measures(m, TRAJECTORY),
     "pareto_front": lambda m: jc.pareto_front(m, WITHIN, jc.cost(), jc.cost(), [1.0]),
     "periodic_orbit": lambda m: jc.periodic_orbit(OSCILLATOR, 1.0),
     "ramp": lambda m: jc.ramp(OSCILLATOR, 1.0, 1.1, revolutions=2),
@@ -56,6 +67,10 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "sensitivities": lambda m: jc.sensitivities(m, {"an edge": FOLD}, jc.method()),
     "sensitivity": lambda m: jc.sensitivity(m, FOLD),
     "simulate": lambda m: jc.simulate(OSCILLATOR, 1.0, revolutions=1),
+    "stability_chart": lambda m: jc.stability_chart(),
+    "static_cage_displacement": lambda m: jc.static_cage_displacement(
+        "outer_rib", guidance_gap=1.0, pocket_clearance=1.0, radial_clearance=1.0, elastic_approach=1.0
+    ),
     "strobe_map": lambda m: jc.strobe_map(OSCILLATOR, 1.0),
     "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere"),
     "sweep": lambda m: jc.sweep(OSCILLATOR, SPEEDS),
@@ -63,20 +78,17 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
     "waterfall": lambda m: jc.waterfall(OSCILLATOR, SPEEDS),
 }
-"""Every public function that integrates a motion, or makes a model to integrate."""
+"""Every public function that computes in JAX, or makes a model to compute with."""
 
 OTHERS = {
     # settings, objectives and distributions: nothing is computed yet
     *("keep_compiled_programs", "enable_x64", "rpm", "method", "controlled", "uniform", "rayleigh"),
     *("chaotic_share", "chaotic_width", "cost", "regular_motion", "zone_width"),
-    # parameters by name, tables, closed formulas of a bearing
-    *("parameter_info", "parameters", "replace", "nu2310", "published_case", "vg", "cage_mass", "load_distribution"),
-    *("static_cage_displacement", "dimensionless_groups", "open_study"),
+    # parameters by name, tables
+    *("parameter_info", "parameters", "replace", "nu2310", "published_case", "vg", "open_study"),
     # of what was found before, with its numbers
-    *("zones", "loss_zones", "explain", "zero_one", "order_spectrum", "dominant_orders", "cage_forces"),
-    *("orbit_measures", "tolerance_budget", "global_sensitivity"),
-    # the cage at rest in its film
-    *("film_coefficients", "film_whirl_speed", "stability_chart"),
+    *("zones", "loss_zones", "explain", "zero_one", "order_spectrum", "dominant_orders"),
+    *("tolerance_budget", "global_sensitivity"),
 }
 
 
@@ -218,6 +230,13 @@ def test_a_short_sweep_says_so_and_a_long_one_does_not():
     assert "too few revolutions" not in str(long)
     assert np.all(single.label == "quasi-periodic") and np.all(single.too_short)  # wrong, and known to be
     assert "3 labels rest on too few revolutions" in str(single)
+
+
+def test_short_studies_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    counts = ["--starts", "1", "--discard", "2", "--revolutions", "10", "--solver", "rk4", "--steps", "64"]
+    counts += ["--out", str(tmp_path)]
+    assert main(["study", "1a", "--vary", "speed=5000rpm:6000rpm:2", *counts]) == 0
+    assert "Warning: 2 labels rest on too few revolutions: choose more --revolutions." in capsys.readouterr().err
 
 
 def test_adaptive_steps_tell_how_far_the_cage_went():

@@ -8,6 +8,7 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import warnings
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ import xarray as xr
 from scipy import stats
 
 import jaxcage as jc
-from jaxcage.studies import LABELS, OtherStudy, Plan, Study, label_names, with_values
+from jaxcage.studies import LABELS, OtherStudy, Plan, Study, _dask, label_names, with_values
 from jaxcage.studies._store import Store
 
 
@@ -193,6 +194,20 @@ def test_dask_survives_a_worker_and_finds_the_same(whole: Path, tmp_path: Path, 
     duffing_study(store, executor="dask", workers=2, progress=kill_one)
     assert killed
     assert contents(store) == contents(whole)
+
+
+def test_a_cluster_without_workers_is_not_waited_for(monkeypatch: pytest.MonkeyPatch):
+    """A cluster of which all workers died for good is an error; one whose worker comes back is not."""
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    monkeypatch.setattr(_dask, "WAIT_S", 0.02)
+    with distributed.Client(n_workers=0, processes=False, dashboard_address=":0") as client:
+        future = client.submit(abs, -3)
+        with pytest.raises(OSError, match="has had no workers for"):
+            _dask._finished(client, [future])
+        monkeypatch.setattr(client, "scheduler_info", lambda: {"workers": {"one": {}}})
+        threading.Timer(0.2, client.cluster.scale, [1]).start()
+        (found,) = _dask._finished(client, [future])
+        assert found.result() == 3
 
 
 @pytest.mark.parametrize(

@@ -145,8 +145,11 @@ def test_map_of_a_system_agrees_with_a_sweep():
         mine = np.array(LABELS)[found.label[known, j]]
         periodic = np.char.startswith(swept.label[known], "periodic")
         assert np.array_equal(mine[periodic], swept.label[known][periodic])
+        agree = mine == swept.label[known]
+        assert np.mean(found.too_short[known, j][agree] == swept.too_short[known][agree]) > 0.9
         same, near = same + np.sum(mine == swept.label[known]), near + mine.size
     assert same >= 0.9 * near  # long chaotic lanes differ by rounding, and a few of their labels with them
+    assert np.any(found.too_short) and "labels rest on too few revolutions" in str(found)
     assert 0 < np.sum(kinds(found.label) == 1) < found.grid.known.size
     assert np.array_equal(found.grid.label[found.grid.known], kinds(found.label)[found.grid.known])
     assert np.array_equal(found.kind[found.grid.known], found.grid.label[found.grid.known])

@@ -27,7 +27,12 @@ from ._equilibrium import (
     stability_chart as stability_chart,
     whirl_threshold as whirl_threshold,
 )
-from ._labels import CHAOS_THRESHOLD as CHAOS_THRESHOLD, closing_period as closing_period, label_lanes as label_lanes
+from ._labels import (
+    CHAOS_THRESHOLD as CHAOS_THRESHOLD,
+    closing_period as closing_period,
+    label_lanes as label_lanes,
+    too_few_revolutions as too_few_revolutions,
+)
 from ._measures import (
     OrbitMeasures as OrbitMeasures,
     cage_forces as cage_forces,

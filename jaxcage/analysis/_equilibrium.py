@@ -93,6 +93,7 @@ def film_coefficients(eccentricity_ratio: Scalar, film: ShortFilm = "fixed_half"
 
     **Arguments:** eccentricity ratio in (0, 1); film model.
     """
+    require_x64()
     eps = jnp.asarray(eccentricity_ratio, dtype=float)
 
     def force(r: Array, v: Array) -> Array:
@@ -171,6 +172,7 @@ def stability_chart(
 
     **Arguments:** eccentricity ratios, by default 0.005 to 0.95 in 190 steps; film model.
     """
+    require_x64()
     eps = np.linspace(0.005, 0.95, 190) if eccentricity_ratios is None else eccentricity_ratios
     coefficients, threshold = _chart(jnp.asarray(eps, dtype=float), film)
     columns = (coefficients.load_number, coefficients.attitude_angle, *threshold)
@@ -190,6 +192,7 @@ def film_whirl_speed(model: CageModel) -> Array:
 
     **Raises:** `ValueError` for the full film, in which the cage whirls at every speed.
     """
+    require_x64()
     film, c = model.film, model.clearance
     if film.model == "full":
         raise ValueError("Argument `model` must have a half film, but its film model is 'full'.")

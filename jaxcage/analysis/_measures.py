@@ -12,6 +12,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._checks import require_x64
 from .._notebook import notebook_html
 from ..integrate import Trajectory
 from ..models import CageForces, CageModel
@@ -68,6 +69,7 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
     **Returns:** `film`, `contact`, `support`, `impact`, `unbalance` and `weight`, each
     (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
+    require_x64()
     position, velocity = relative_state(model, trajectory.state)
     motion = jax.numpy.asarray(np.concatenate([position, velocity], axis=1))
     tau, speed = jax.numpy.asarray(trajectory.tau), jax.numpy.asarray(trajectory.speed)
@@ -167,6 +169,7 @@ def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
 
     **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples.
     """
+    require_x64()
     if trajectory.outcome != "successful" or len(trajectory.tau) < 3:
         raise ValueError(
             "Argument `trajectory` must be a run that succeeded, of at least 3 samples, "

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._checks import require_x64
 from .._parameters import parameter
 from .._types import Scalar
 from ._geometry import Bearing
@@ -62,6 +63,7 @@ def cage_mass(bearing: Bearing, guidance_gap: Scalar, cage: CageGeometry | None 
 
     **Returns:** mass [kg].
     """
+    require_x64()
     cage = CageGeometry() if cage is None else cage
     inner, outer = cage.inner_diameter / 2, guiding_radius(bearing.rib_diameter, guidance_gap)
     pocket = (bearing.roller_diameter + bearing.pocket_clearance) / 2

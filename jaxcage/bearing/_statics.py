@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from .._checks import require_x64
 from .._types import Scalar
 from ._geometry import Bearing
 from ._line_contact import line_contact_approach, raceway_loads_of_all
@@ -75,6 +76,7 @@ def static_cage_displacement(
 
     **Raises:** `ValueError` for another kind of guidance.
     """
+    require_x64()
     shift = elastic_approach + radial_clearance / 2
     if guidance == "outer_rib":
         return jnp.asarray(guidance_gap / 2)
@@ -180,6 +182,7 @@ def load_distribution(
     **Raises:** `ValueError` for a load that is not positive, or a negative centrifugal force; when
     traced, an error as the computation runs.
     """
+    require_x64()
     return _distribution(
         bearing,
         require_positive("load", load),

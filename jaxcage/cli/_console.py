@@ -24,6 +24,12 @@ def say(text: str) -> None:
     print("".join(c if c.isprintable() else repr(c)[1:-1] for c in line), file=sys.stderr)
 
 
+def warn_of_short(labels: int) -> None:
+    """Say how many labels rest on too few revolutions, if any."""
+    if labels:
+        say(f"Warning: {labels} labels rest on too few revolutions: choose more --revolutions.")
+
+
 def leave_at_once_when_interrupted() -> None:
     """Ctrl-C during a computation ends the process then and there.
 

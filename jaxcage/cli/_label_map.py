@@ -16,7 +16,7 @@ from ..plotting import new_figure, stability_map
 from ..report import RPM, SPEED, Axis, follow_edges
 from ..studies import KINDS, LABELS, PENDING, LabelMap, kinds, label_map
 from ._bifurcations import check_search, search_case
-from ._console import progress_in_stages, progress_with_rate
+from ._console import progress_in_stages, progress_with_rate, warn_of_short
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
 from ._inputs import Subject, angular_speed, output_folder, save_figure, subject, sweep_integration
 from ._options import MapOptions
@@ -79,12 +79,14 @@ def run_label_map(options: MapOptions) -> Report:
         "computed": found.grid.points,
         "complete": found.grid.complete,
         "kinds": dict(zip(KINDS, counts.tolist(), strict=True)),
+        "too_short": int(np.sum(found.too_short)),
         "curves": [c.name for c in curves],
         "refused": refused,
         "seconds": round(seconds, 2),
         "figure": str(files.figure),
         "data": str(files.data),
     }
+    warn_of_short(document["too_short"])
     share = found.grid.points / found.grid.known.size
     rows = [(kind, str(n), f"{n / found.grid.points:.1%}") for kind, n in zip(KINDS, counts, strict=True)]
     total = f"{found.grid.points} computed of {found.grid.known.size}"

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..integrate import OUTCOMES
 from ..models import CageModel
-from ..studies import LABELS, OtherStudy, Plan, Spread, Study, open_study, run_study
-from ._console import progress_with_rate, say
+from ..studies import LABELS, OtherStudy, Plan, Spread, Study, open_study, run_study, too_short
+from ._console import progress_with_rate, say, warn_of_short
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks
 from ._inputs import output_folder, subject, sweep_integration
 from ._options import StudyOptions
@@ -114,6 +114,7 @@ def _of_options(sentence: str) -> str:
 def _report(name: str, path: Path, work: Study, before: int, seconds: float) -> Report:
     with open_study(path) as dataset:
         label, outcome = dataset["label"].values, dataset["outcome"].values
+        judged = {name: dataset[name].values for name in ("label", "largest_exponent", "standard_error")}
     done = outcome >= 0
     stored, new = int(np.sum(done)), int(np.sum(done)) - before
     counts = {LABELS[code]: int(n) for code, n in zip(*np.unique(label[done], return_counts=True), strict=True)}
@@ -130,10 +131,12 @@ def _report(name: str, path: Path, work: Study, before: int, seconds: float) -> 
         "chunks": work.plan.chunks,
         "labels": counts,
         "failed": failed,
+        "too_short": int(np.sum(too_short(judged, work.revolutions))),
         "seconds": round(seconds, 2),
         "lanes_per_second": round(new / seconds, 1) if new else None,
         "store": str(path),
     }
+    warn_of_short(document["too_short"])
     if stored < work.plan.size:
         say(f"Warning: {work.plan.size - stored} lanes are left for the other shards.")
     shape = " x ".join(f"{n} {axis}" for axis, n in axes.items())

@@ -14,7 +14,7 @@ from ..io import save_sweep
 from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
 from ..report import zones_document, zones_table
 from ..sweeps import rpm, sweep
-from ._console import progress, say
+from ._console import progress, say, warn_of_short
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_range, require_speed
 from ._inputs import (
     Subject,
@@ -166,8 +166,7 @@ def _notes(document: dict[str, Any]) -> list[str]:
     beyond = document["beyond_clearance"]
     if beyond:
         say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
-    if document["too_short"]:
-        say(f"Warning: {document['too_short']} labels rest on too few revolutions: choose more --revolutions.")
+    warn_of_short(document["too_short"])
     return [
         f"Failed lanes: {failed or 'none'}",
         f"Lanes beyond eps = 1: {beyond}",

@@ -5,6 +5,7 @@ Those the paper prints in (23) are not dimensionless under any reading; these ar
 
 from jaxtyping import Array
 
+from .._checks import require_x64
 from .._types import Scalar
 from ._cage import CageModel
 from ._cage_at_speed import CageAtSpeed
@@ -16,6 +17,7 @@ def dimensionless_groups(model: CageModel, speed: Scalar) -> dict[str, Array]:
     **Returns:** by name: e/c, omega sqrt(c/g), load number W c^2/(mu omega R L^3) of all lands together,
     K_s/(M omega^2), B_s/(M omega), K_3 c^2/(M omega^2), and for a synchronous impact A/(M c omega^2).
     """
+    require_x64()
     cage: CageAtSpeed = model.cage_at(speed)
     c, inertia = cage.clearance, cage.mass * speed**2
     groups = {

@@ -23,6 +23,7 @@ from ._study import (
     PENDING as PENDING,
     SPEED as SPEED,
     Study as Study,
+    too_short as too_short,
     with_values as with_values,
 )
 from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance

@@ -22,7 +22,7 @@ from ._study import Results, Study
 AHEAD = 2
 """Chunks under way for each worker: one that is computed, one that waits."""
 WAIT_S = 30
-"""Seconds to wait for a scheduler and its first worker."""
+"""Seconds to wait for a scheduler and its first worker, or for workers after all have died."""
 DEATHS = 10
 """Workers of a cluster of our own that may die of one chunk before it is given up."""
 _one_at_a_time = threading.Lock()  # a chunk uses all cores, however many threads the worker has
@@ -33,9 +33,10 @@ def chunks_on_dask(
 ) -> Iterator[tuple[int, Results]]:
     """The results of `chunks` as they arrive.
 
-    **Raises:** `ImportError` without dask.distributed; `OSError` if the scheduler does not answer or has no worker.
+    **Raises:** `ImportError` without dask.distributed; `OSError` if the scheduler does not answer or has no workers, or
+    none any more.
     """
-    distributed = import_distributed()
+    import_distributed()
     import cloudpickle  # comes with it
 
     waiting, packed = iter(chunks), cloudpickle.dumps(dataclasses.replace(about))  # without what it has worked out
@@ -43,12 +44,28 @@ def chunks_on_dask(
         submit = lambda n: client.submit(_compute, packed, n, about.fingerprint, pure=False, key=f"chunk-{n}")
         room = AHEAD * len(client.scheduler_info()["workers"])
         under_way = {submit(n): n for n in itertools.islice(waiting, room)}
-        arriving = distributed.as_completed(list(under_way))
-        for future in arriving:
-            yield under_way.pop(future), future.result()
-            for n in itertools.islice(waiting, 1):
-                under_way[after := submit(n)] = n
-                arriving.add(after)
+        while under_way:
+            for future in _finished(client, list(under_way)):
+                yield under_way.pop(future), future.result()
+                under_way |= {submit(n): n for n in itertools.islice(waiting, 1)}
+
+
+def _finished(client: Any, futures: list[Any]) -> set[Any]:
+    """Those that are done, one at least.
+
+    **Raises:** `OSError` if there are no workers any more: dask would wait for ever.
+    """
+    distributed, deserted = import_distributed(), False
+    while True:
+        try:
+            return distributed.wait(futures, timeout=WAIT_S, return_when="FIRST_COMPLETED").done
+        except distributed.TimeoutError:
+            if client.scheduler_info()["workers"]:
+                deserted = False
+            elif deserted:
+                raise OSError(f"The dask cluster has had no workers for {WAIT_S} s.") from None
+            else:
+                deserted = True
 
 
 def import_distributed() -> Any:

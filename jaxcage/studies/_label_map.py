@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from .._checks import require_x64
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ._adaptive import AdaptiveGrid, Points, refine
 from ._plan import LANES, Plan
-from ._study import LABELS, PENDING, SPEED, Study
+from ._study import LABELS, PENDING, SPEED, Study, too_short
 
 
 KINDS = ("calm", "chaotic", "failed")
@@ -38,6 +38,8 @@ class LabelMap:
     """Places in `jaxcage.studies.LABELS`."""
     largest_exponent: Float[np.ndarray, "x y starts"]
     """Per revolution."""
+    too_short: Bool[np.ndarray, "x y starts"]
+    """Labels that rest on too few revolutions for the error bars of their exponents."""
     grid: AdaptiveGrid
     """By what was refined; with `refine = "chaos"` places in `KINDS`."""
 
@@ -57,11 +59,13 @@ class LabelMap:
         known = self.grid.known
         counts = np.bincount(kinds(self.label)[known], minlength=len(KINDS))
         across, upward = known.shape
+        short = int(np.sum(self.too_short))
         return "\n".join(
             [
                 f"{across} x {upward} points over {self.x} and {self.y}: {self.grid.points} computed "
                 f"({self.grid.points / known.size:.1%}), {'complete' if self.grid.complete else 'not complete'}",
                 *(f"  {n:6d} {kind}" for kind, n in zip(KINDS, counts, strict=True)),
+                *([f"  {short:6d} labels rest on too few revolutions"] if short else []),
             ]
         )
 
@@ -117,6 +121,7 @@ def label_map(
     shape = (len(x_value), len(y_value))
     label = np.full((*shape, starts), PENDING, dtype=np.int8)
     exponent = np.full((*shape, starts), np.nan)
+    short = np.zeros((*shape, starts), dtype=bool)
 
     def evaluate(points: Points) -> np.ndarray:
         first_lane = np.asarray(np.ravel_multi_index(tuple(points.T), shape)) * starts
@@ -126,10 +131,11 @@ def label_map(
         place = points[:, 0], points[:, 1]
         new = found["label"].reshape(-1, starts)
         label[place], exponent[place] = new, found["largest_exponent"].reshape(-1, starts)
+        short[place] = too_short(found, revolutions).reshape(-1, starts)
         return kinds(new) if refine_by == "chaos" else new @ len(LABELS) ** np.arange(starts)  # labels as one number
 
     def make(grid: AdaptiveGrid) -> LabelMap:
-        return LabelMap(x_name, x_value, y_name, y_value, label.copy(), exponent.copy(), grid)
+        return LabelMap(x_name, x_value, y_name, y_value, label.copy(), exponent.copy(), short.copy(), grid)
 
     def say(grid: AdaptiveGrid) -> None:
         if report is not None:

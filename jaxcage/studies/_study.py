@@ -5,7 +5,7 @@ import functools
 import hashlib
 import inspect
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -13,9 +13,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
-from ..analysis import Observation, closing_period, label_lanes
+from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, CageModel
@@ -160,6 +160,12 @@ class Study:
             "label": np.array([LABELS.index(name) for name in label], dtype=np.int8),
             "outcome": outcome.astype(np.int8),
         }
+
+
+def too_short(found: Mapping[str, np.ndarray], revolutions: int) -> Bool[np.ndarray, "*lanes"]:
+    """Lanes whose label rests on too few revolutions for the error bar of its exponent; not those still to be run."""
+    label = np.array([*LABELS, "pending"])[found["label"].astype(int)]
+    return too_few_revolutions(label, found["largest_exponent"], found["standard_error"], revolutions)
 
 
 def with_values(system: AbstractForcedSystem, values: dict[str, Any]) -> AbstractForcedSystem:
