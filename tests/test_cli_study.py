@@ -23,21 +23,13 @@ SMALL = [*CASE, "--discard", "10", "--revolutions", "20", "--steps", "64", "--ch
 MAP = ["map", "1a", "--points", "9x7", "--discard", "10", "--revolutions", "20", "--steps", "64"]
 
 
-@pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory):
-    """A folder for compiled programs, of this process and those it starts."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("JAXCAGE_CACHE", str(tmp_path_factory.mktemp("programs")))
-        yield
-
-
 def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
     """The only thing that `arguments` with --json print on standard output."""
     assert main([*arguments, "--json"]) == 0
     return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
-def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path, programs: None):
+def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     out = ["--out", str(tmp_path)]
     half = document(capsys, *SMALL, *out, "--shard", "2/2")
     assert half["axes"] == {"speed": 6, "guidance_gap": 2, "start": 2}
@@ -63,7 +55,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     assert whole["labels"] == counts and sum(counts.values()) == 24
 
 
-def test_interrupted_and_gone_on(tmp_path: Path, programs: None):
+def test_interrupted_and_gone_on(tmp_path: Path):
     """Ctrl-C says in one sentence how to go on; killed and started again, the command finishes the study."""
     long = [*SMALL, "--out", str(tmp_path), "--chunk", "2"]
     start = [sys.executable, "-m", "jaxcage", *long]
@@ -149,7 +141,7 @@ def test_misuse_gets_one_sentence(
 
 
 def test_stores_of_others_and_missing_dask_get_one_sentence(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, programs: None
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
     out = ["--out", str(tmp_path)]
     assert main([*SMALL, *out, "--shard", "1/6"]) == 0
@@ -190,9 +182,7 @@ def test_a_line_a_minute_where_there_is_no_terminal(
     assert capsys.readouterr().err.splitlines() == ["study x: 170 of 200 lanes, 2 a second, 0.2 min left"]
 
 
-def test_adaptive_map(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, programs: None
-):
+def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """The figure is there from the coarse picture on, curves come on top; the data hold what was computed."""
     line = np.full(5, jc.rpm(7000))
     height, rest = np.linspace(4e-4, 5e-4, 5), (np.zeros((5, 4)), np.zeros((5, 4), complex), np.ones(5, bool), ())
