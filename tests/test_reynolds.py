@@ -144,6 +144,8 @@ def test_mass_is_conserved():
     assert errors[0] < 0.05 and errors[1] < 2e-4
 
 
+ROUNDING = 1e-10
+"""Of the largest pressure: 2048 unknowns in a row have a condition of some 1e6."""
 PRESSURE = jax.jit(film_pressure_field, static_argnames=("cavitation", "stations", "profiles"))
 
 
@@ -155,8 +157,9 @@ def test_film_breaks_off_without_a_slope(slenderness: float):
 
     def slope_at_the_edge(cavitation: str, stations: int) -> float:
         p = np.asarray(PRESSURE(*r, *drive, slenderness, cavitation=cavitation, stations=stations).pressure)[:, 0]
-        assert p.min() > -1e-12 * p.max() and 0.2 < np.mean(p > 0) < 0.8
-        ends = [i for i in range(stations) if p[i] > 0 and p[(i + 1) % stations] <= 0]
+        wet = p > ROUNDING * p.max()
+        assert p.min() > -ROUNDING * p.max() and 0.2 < np.mean(wet) < 0.8
+        ends = [i for i in range(stations) if wet[i] and not wet[(i + 1) % stations]]
         assert len(ends) == 1
         return float(p[ends[0]] / p.max() * stations)
 
