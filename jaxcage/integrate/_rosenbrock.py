@@ -82,13 +82,21 @@ def computed_once(x: PyTree, t0: Scalar) -> PyTree:
 
 
 def rosenbrock_step(
-    tableau: RosenbrockTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State
+    tableau: RosenbrockTableau,
+    field: AbstractField,
+    t0: Scalar,
+    h: Scalar,
+    y0: State,
+    settle: Callable[[Any, Scalar], Any] = lambda x, t0: x,
 ) -> tuple[State, State, State]:
-    """One step of size h from y0 at phase t0, written out stage by stage: what a kernel is made of.
+    """One step of size h from y0 at phase t0.
+
+    `settle` is told what had better be worked out in full before it is used: `computed_once` where the step is left to
+    XLA's fusions, nothing where it is one kernel.
 
     **Returns:** the new state, the error estimate of the embedded method, and dy/dtau at the beginning of the step.
     """
-    near = field.linearise(t0, y0)
+    near = settle(field.linearise(t0, y0), t0)
     solve = near.solver(1 / (tableau.gamma * h))
     zero = tuple(jnp.zeros_like(c) for c in near.value)
     stages: list[State] = []
@@ -99,39 +107,8 @@ def rosenbrock_step(
         r = combine(rates, tableau.c[i], stages, 1 / h)
         if tableau.gamma_sum[i] != 0.0:
             r = tuple(c + tableau.gamma_sum[i] * h * s for c, s in zip(r, near.phase_derivative, strict=True))
-        stages.append(solve(r))
+        stages.append(settle(solve(r), t0))
     return combine(y0, tableau.m, stages), combine(zero, tableau.e, stages), near.value
-
-
-def rosenbrock_step_in_a_loop(
-    tableau: RosenbrockTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State
-) -> tuple[State, State, State]:
-    """The same step with its stages as a loop: the forces are in the program once, and it compiles in a third of the
-    time.
-    """
-    count, rows = len(tableau.a), range(len(y0))
-    square = lambda a: jnp.asarray([[*row, *(count - len(row)) * [0.0]] for row in a])
-    near = computed_once(field.linearise(t0, y0), t0)
-    solve = near.solver(1 / (tableau.gamma * h))
-    at = lambda table, stages: [jnp.tensordot(table, stages[k], 1) for k in rows]
-
-    def stage(stages: Any, row: Any) -> tuple[Any, None]:
-        i, alpha, gamma_sum, a, c = row
-        rates = field(t0 + alpha * h, tuple(y + step for y, step in zip(y0, at(a, stages), strict=True)))
-        r = zip(rates, at(c, stages), near.phase_derivative, strict=True)
-        solved = computed_once(solve(tuple(f + pull / h + gamma_sum * h * late for f, pull, late in r)), t0)
-        return tuple(u.at[i].set(new) for u, new in zip(stages, solved, strict=True)), None
-
-    table = (
-        jnp.arange(count),
-        jnp.asarray(tableau.alpha),
-        jnp.asarray(tableau.gamma_sum),
-        square(tableau.a),
-        square(tableau.c),
-    )
-    stages, _ = jax.lax.scan(stage, tuple(jnp.zeros((count, *jnp.shape(y))) for y in y0), table)
-    m, e = jnp.asarray(tableau.m), jnp.asarray(tableau.e)
-    return tuple(y + step for y, step in zip(y0, at(m, stages), strict=True)), tuple(at(e, stages)), near.value
 
 
 def rosenbrock_step_with_tangent(
@@ -187,7 +164,7 @@ class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     ) -> tuple[Any, Any, dict[str, Any], _SolverState, dfx.RESULTS]:
         del terms, solver_state, made_jump
         h = t1 - t0
-        y1, error, rate0 = rosenbrock_step_in_a_loop(self.tableau, args, t0, h, y0)
+        y1, error, rate0 = rosenbrock_step(self.tableau, args, t0, h, y0, computed_once)
         rate1 = args(t1, y1)
         k0, k1 = (tuple(h * c for c in rate) for rate in (rate0, rate1))
         return y1, error, dict(y0=y0, y1=y1, k0=k0, k1=k1), None, dfx.RESULTS.successful

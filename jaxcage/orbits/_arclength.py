@@ -70,8 +70,8 @@ _correct_own = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0
 
 
 def take(tree: Any, lanes: np.ndarray) -> Any:
-    """Chosen lanes of a tree whose arrays have the lanes first."""
-    return jax.tree.map(lambda x: x[lanes] if eqx.is_array(x) else x, tree)
+    """Chosen lanes of a tree whose arrays have the lanes first, by NumPy: JAX takes a millisecond for each array."""
+    return jax.tree.map(lambda x: np.asarray(x)[lanes] if eqx.is_array(x) else x, tree)
 
 
 def stack(tree: Any, lanes: int) -> Any:
