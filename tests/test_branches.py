@@ -256,7 +256,7 @@ class Ring(eqx.Module):
         return ((self.p - 2) ** 2 + x * x - self.r**2, -0.5 * u + jnp.cos(tau))
 
 
-@pytest.mark.parametrize("degrees", [-90, -3, -0.3, 60, 176])
+@pytest.mark.parametrize("degrees", [-90, 60, *(pytest.param(d, marks=pytest.mark.slow) for d in (-3, -0.3, 176))])
 def test_closed_branch_is_covered_once(degrees):
     """Folds at p = 2 +- r, wherever on the circle it begins; multipliers exp(2 x T) and exp(-T/2): exact."""
     radius, speed = 0.3, 1.5
@@ -449,6 +449,7 @@ def test_lengths_of_steps_must_be_in_order(steps):
     assert dataclasses.replace(jc.Steps(), first=0.1).first == 0.1
 
 
+@pytest.mark.slow
 def test_shorter_steps_change_no_bifurcation(over_speed):
     orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
     steps = jc.Steps(first=0.01, longest=0.04, most=2000)

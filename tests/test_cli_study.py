@@ -55,6 +55,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     assert whole["labels"] == counts and sum(counts.values()) == 24
 
 
+@pytest.mark.slow
 def test_interrupted_and_gone_on(tmp_path: Path):
     """Ctrl-C says in one sentence how to go on; killed and started again, the command finishes the study."""
     long = [*SMALL, "--out", str(tmp_path), "--chunk", "2"]

@@ -255,6 +255,7 @@ def test_whirl_speed_of_a_light_cage_in_rpm(gap_mm, highest):
     assert float(film_whirl_speed(model)) * 30 / np.pi == pytest.approx(highest, abs=0.6)
 
 
+@pytest.mark.slow
 def test_whirl_speed_depends_on_mass_over_cube_of_land_width():
     model = cage_in_film()
     slope = lambda name: jax.grad(lambda v: film_whirl_speed(replace(model, **{name: v})))
@@ -302,6 +303,7 @@ def test_light_support_adds_its_stiffness_to_the_eigenvalues():
     np.testing.assert_allclose(np.sort(np.abs(at.eigenvalues.imag))[::2], expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_gradient_of_the_growth_rate_is_that_of_differences():
     model, speed = cage_in_film(cage_mass=0.1), 450.0
     rate = lambda v: equilibrium(replace(model, guidance_gap=v), speed).growth_rate

@@ -201,6 +201,7 @@ def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
     np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rodas3", "rodas4", "tsit5", "kvaerno3", "kvaerno5", "kencarp4"])
 def test_named_solvers_agree_with_adaptive_steps(name):
     tolerance = 1e-7

@@ -1,7 +1,7 @@
 """Steps as one compiled loop over the lanes: values, tangents, error control, other devices."""
 
 import dataclasses
-import itertools
+import functools
 
 import equinox as eqx
 import jax
@@ -35,6 +35,9 @@ CLEARANCE = float(MODEL.clearance)
 # Inside the film, at the onset of contact, and pressed into the rib.
 STATES = np.array([[0.3, -0.5, 0.1, 0.2], [0.0, -0.97, 0.0, 0.0], [0.6, 0.77, -0.2, 0.3]] * 2)
 STATES = STATES * np.stack([CLEARANCE * np.array([1, 1, w, w]) for w in SPEEDS])
+
+
+slow = functools.partial(pytest.param, marks=pytest.mark.slow)
 
 
 def lane_state(states):
@@ -211,6 +214,7 @@ def test_controlled_steps_reach_1e_4_of_the_clearance(attractor):
     assert np.nanmax(np.abs(coarse.last - truth.last)[..., :2]) / CLEARANCE > 1e-3  # the control has work to do
 
 
+@pytest.mark.slow
 def test_a_lane_takes_the_rung_that_it_needs():
     """The same end as fixed steps of the rung it took, to the rounding of hundreds of steps."""
     chosen = controlled()
@@ -279,7 +283,7 @@ def test_results_do_not_depend_on_chunks_cores_or_lane_order(monkeypatch):
     run = lambda: jc.sweep(MODEL, speeds, discard=20, revolutions=10, blocks=1, keep=4)
     fields = ("strobe", "last", "block_growth", "peak", "outcome")
     expected = run()
-    for chunk, cores in itertools.product((16, 128), (1, 2)):
+    for chunk, cores in ((16, 1), (16, 2), (128, 1)):
         monkeypatch.setattr(_engine, "CHUNKS", (chunk,))
         monkeypatch.setattr(_engine, "cores", lambda cores=cores: cores)
         got = run()
@@ -306,6 +310,7 @@ def test_several_designs_in_one_batch_give_what_each_gives_alone():
         jc.sweep_designs([MODEL, other], speeds)
 
 
+@pytest.mark.slow
 def test_run_up_and_down_of_several_designs():
     models = [MODEL, jc.case("1b", "preliminary")]
     speeds = jc.rpm(8000, 9000, 3)
@@ -328,7 +333,9 @@ def pieces(solver, tangents):
     return maps._pieces(), start_lane(solver, y, (direction,) * tangents)
 
 
-@pytest.mark.parametrize("solver, tangents", [(ClassicalRK4(), 0), (ClassicalRK4(), 2), (Rodas3(), 0), (Rodas4(), 0)])
+@pytest.mark.parametrize(
+    "solver, tangents", [(ClassicalRK4(), 0), slow(ClassicalRK4(), 2), (Rodas3(), 0), slow(Rodas4(), 0)]
+)
 def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
     """Blocks with a lane that asks for it go through all steps; the others stay where they are."""
     numbers, lane = pieces(solver, tangents)

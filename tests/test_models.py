@@ -52,7 +52,9 @@ def test_strobe_map_does_not_depend_on_units(name: str, base: str):
     assert np.max(np.abs(there / units - here) / scale) < 1e-8
 
 
-@pytest.mark.parametrize("name", ["rigid", "elastic", "restitution"])
+@pytest.mark.parametrize(
+    "name", ["rigid", *(pytest.param(n, marks=pytest.mark.slow) for n in ("elastic", "restitution"))]
+)
 def test_strobe_map_derivatives_match_finite_differences(name: str):
     """jacfwd with respect to every parameter against central differences, in elasticities; none is NaN."""
     model, speed = MODELS[name](), jnp.asarray(900.0)
@@ -119,6 +121,7 @@ def test_clearance_readings():
     assert start == pytest.approx([-0.30e-3, -0.97 * 0.30e-3])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
 @pytest.mark.parametrize("share, grows", [(0.99, False), (1.01, True)])
 def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool):

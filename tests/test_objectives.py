@@ -123,6 +123,7 @@ def chaos_width(**options):
     return jc.chaotic_width(9.0, 14.0, 20, **(CHAOS | options))
 
 
+@pytest.mark.slow
 def test_statistical_slopes_are_within_their_errors():
     """A hundred seeds, each within 3 of its own standard errors of the mean slope of a far larger ensemble."""
     place = np.array([[0.4, 0.5]])

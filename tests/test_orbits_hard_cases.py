@@ -69,6 +69,7 @@ def test_no_orbit_and_so_no_point():
     assert str(point).startswith("No fold found: no such point")
 
 
+@pytest.mark.slow
 def test_a_failing_lane_leaves_its_neighbours_alone():
     """Bit for bit, orbits and points."""
 
@@ -273,7 +274,7 @@ def test_bad_arguments():
 CONTACT = {"pressed": (10.0, 20000.0, 0.998), "grazed": (3.0, 20000.0, 0.971)}
 
 
-@pytest.mark.parametrize("name", CONTACT)
+@pytest.mark.parametrize("name", [pytest.param("pressed", marks=pytest.mark.slow), "grazed"])
 def test_cage_in_contact_with_its_land(name):
     model, speed, orbit, expected_peak = cage_in_contact(name)
     assert bool(orbit.stable) and orbit.residual < 1e-10

@@ -62,6 +62,7 @@ def runs():
     return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False)
 
 
+@pytest.mark.slow
 def test_runs_cover_the_published_range(runs):
     assert list(runs.sweeps) == list(PUBLISHED_CASES)
     for found in runs.sweeps.values():
@@ -73,6 +74,7 @@ def test_runs_cover_the_published_range(runs):
         assert not np.array_equal(section.strobe, runs.sections["1b" if name == "1a" else "1a"].strobe)
 
 
+@pytest.mark.slow
 def test_every_conclusion_has_evidence_and_a_verdict(runs):
     found = conclusions(runs)
     assert len(found) == 7
@@ -84,6 +86,7 @@ def test_every_conclusion_has_evidence_and_a_verdict(runs):
     assert found[1].numbers["force_ratio"] == pytest.approx(2 ** (20 / 19), rel=0.02)  # Hertz impact on a stiff bar
 
 
+@pytest.mark.slow
 def test_a_verdict_can_be_no(runs):
     """Six cases with the same zones: the gap does nothing, and conclusion 1 cannot hold."""
     same = dataclasses.replace(runs, zones=dict.fromkeys(runs.zones, runs.zones["1a"]))
@@ -92,11 +95,13 @@ def test_a_verdict_can_be_no(runs):
     assert oil.numbers["change"] == pytest.approx(dict.fromkeys(oil.numbers["change"], 0.0), nan_ok=True)
 
 
+@pytest.mark.slow
 def test_figures_of_the_paper(runs):
     names = [name for name, figure in paper_figures(runs) if figure.axes]
     assert names == ["fig5", "fig7a", "fig8a", "fig7b", "fig8b", "fig7c", "fig8c", "fig9"]
 
 
+@pytest.mark.slow
 def test_readings_change_the_model_and_say_what_came_of_it():
     chosen = [r for r in READINGS if r.answer in ("-", "none", "shaft speed") and r.case == "1a"]
     known = {"as the cases have it", "unbalance", "film", "impact", "cross-coupling", "speed axis"}
@@ -113,6 +118,7 @@ def test_readings_change_the_model_and_say_what_came_of_it():
     assert float(thin.lubricant.dynamic_viscosity) < 1e-6 * float(model.lubricant.dynamic_viscosity)
 
 
+@pytest.mark.slow
 def test_a_speed_axis_read_as_shaft_speed_stretches_the_picture():
     """Cage speeds are 0.4012 of the shaft's: a zone that ends at 12250 rpm of the cage ends at 30530 on that axis."""
     (reading,) = [r for r in READINGS if r.question == "speed axis"]
