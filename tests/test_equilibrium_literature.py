@@ -303,7 +303,6 @@ def test_light_support_adds_its_stiffness_to_the_eigenvalues():
     np.testing.assert_allclose(np.sort(np.abs(at.eigenvalues.imag))[::2], expected, rtol=1e-6)
 
 
-@pytest.mark.slow
 def test_gradient_of_the_growth_rate_is_that_of_differences():
     model, speed = cage_in_film(cage_mass=0.1), 450.0
     rate = lambda v: equilibrium(replace(model, guidance_gap=v), speed).growth_rate
