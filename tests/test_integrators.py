@@ -252,7 +252,7 @@ def test_derivatives_of_the_strobe_map_against_central_differences():
     assert np.all(np.abs(exact).max(axis=0) > 1e-3)  # each of the eight matters
 
 
-@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
+@pytest.mark.parametrize("film", ["fixed_half", pytest.param("positive_pressure", marks=pytest.mark.slow)])
 def test_liouville_for_the_cage(film):
     """log |det M| of the strobe map is the integral of the trace of the linearised equations."""
     model = eqx.tree_at(lambda m: m.film, CAGE, type(CAGE.film)(land_width=CAGE.film.land_width, model=film))

@@ -160,6 +160,7 @@ def test_the_positive_pressure_film_is_left_to_autodiff():
 # --- monodromy matrices -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_monodromy_matrices_against_the_strobe_map():
     chosen = method("rodas4", steps=256)
     image, matrix = jc.monodromy(MODEL, SPEEDS, STATES, method=chosen)

@@ -180,7 +180,9 @@ ELSEWHERE = {
 }
 
 
-@pytest.mark.parametrize("name", ELSEWHERE)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if "branch" in name else name for name in ELSEWHERE]
+)
 def test_another_kind_than_asked(name):
     kind, settings = ELSEWHERE[name]
     point = point_of(kind, **settings)

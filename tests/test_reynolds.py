@@ -235,7 +235,7 @@ def test_mirror_and_turn_of_the_state_turn_the_force():
     np.testing.assert_allclose(FORCE(turn @ r, turn @ v, 0.1, profiles=1, stations=64), turn @ f, rtol=1e-10)
 
 
-@pytest.mark.parametrize("profiles, stations", [(1, 64), (2, 12)])
+@pytest.mark.parametrize("profiles, stations", [pytest.param(1, 64, marks=pytest.mark.slow), (2, 12)])
 def test_derivatives_through_the_solve_match_differences(profiles: int, stations: int):
     """By position, velocity and slenderness: forward mode, and reverse mode on the grid of the force law."""
 
