@@ -487,7 +487,7 @@ def written() -> Iterator[list[Path]]:
     """Paths that this process writes to."""
     if not getattr(sys, "_jaxcage_audit", False):
         sys.addaudithook(_audit)  # for good: there is no taking it away
-        sys._jaxcage_audit = True  # type: ignore
+        sys._jaxcage_audit = True
     _written.clear()
     bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     _watching[0] = True

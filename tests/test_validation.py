@@ -57,7 +57,7 @@ def test_command(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 def test_a_failure_is_shown_and_told(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
-    monkeypatch.setitem(TOPICS, "contact", lambda: [made(), made(ours=3.0)])  # type: ignore[arg-type]
+    monkeypatch.setitem(TOPICS, "contact", lambda: [made(), made(ours=3.0)])
     assert main(["validate", "--topics", "contact", "--out", str(tmp_path)]) == 1
     out, err = capsys.readouterr()
     assert "1 of 2 comparisons pass" in out and "FAILS" in out

@@ -92,9 +92,9 @@ class StrobeLanes(eqx.Module):
         """
         level = jnp.zeros(y[0].shape, jnp.int32) if level is None else level
         method, pieces = self.shared.method, self._pieces()
-        if isinstance(method, EqualSteps):
+        if isinstance(method, EqualSteps) and all(can_be_kernel(rung.solver) for rung in method.rungs):
             solvers: dict[Any, None] = dict.fromkeys(rung.solver for rung in method.rungs)
-            if all(can_be_kernel(solver) and runs_lanewise(solver, pieces, y) for solver in solvers):
+            if all(runs_lanewise(solver, pieces, y) for solver in solvers):
                 return _by_kernels(method, pieces, y, tangents, level)
         return self._by_maps(y, tangents, level)
 
