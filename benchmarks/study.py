@@ -1,14 +1,16 @@
-"""Big studies shown at full size, or a part of it: `python -m benchmarks.study [--size 0.02] [--only store,dask,map]`.
+"""Big studies shown at full size, or in part: `python -m benchmarks.study [--size 0.02] [--only store,killed]`.
 
 store: 200 000 lanes x 300 revolutions of case 1a over speed, guidance gap and eccentricity. Rate from start to end,
-peak memory, and the same study killed twenty times at random and resumed: every file of the store must be the same.
+by the clock and by processor time, and peak memory.
+killed: the same study killed twenty times at random and resumed: every file of the store must be the same.
 dask: the same study on a local cluster of two workers, one of them killed half way: every file must be the same.
 map: labels on a grid of 300 x 300, adaptively and in full: share of the label changes found, share of points computed.
 
-At full size the first two take an hour or more each on two cores, the last some ten minutes.
+At full size the first three take half an hour or more each on two cores, the last some ten minutes.
 """
 
 import argparse
+import contextlib
 import json
 import math
 import multiprocessing
@@ -71,23 +73,30 @@ def contents(store: pathlib.Path) -> dict[str, bytes]:
 
 def unbroken(store: pathlib.Path, size: float) -> dict[str, Any]:
     """An unbroken run in this process: rate in each tenth, peak memory."""
-    seen: list[tuple[float, int]] = []
-    run(store, size, progress=lambda done, total: seen.append((time.perf_counter(), done)))
-    clock, done = (np.array(x, dtype=float) for x in zip(*seen[1:], strict=True))  # the first chunk compiles
-    at = np.interp(np.linspace(done[0], done[-1], 11), done, clock)
-    tenths = (done[-1] - done[0]) / 10 / np.diff(at)
-    rate = (done[-1] - done[0]) / (clock[-1] - clock[0])
-    spread = float(np.max(np.abs(tenths / np.mean(tenths) - 1)))
+    seen: list[tuple[float, float, int]] = []
+    run(store, size, progress=lambda done, total: seen.append((time.perf_counter(), time.process_time(), done)))
+    clock, work, done = (np.array(x, dtype=float) for x in zip(*seen[1:], strict=True))  # the first chunk compiles
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     return {
         "lanes": int(done[-1]),
         "seconds": seen[-1][0] - seen[0][0],
-        "lanes_per_second": rate,
-        "last_tenth_over_first": tenths[-1] / tenths[0],
-        "largest_change_of_a_tenth": spread,
-        "steady": bool(abs(tenths[-1] / tenths[0] - 1) <= STEADY),
+        "by_the_clock": rates(clock, done),
+        "by_processor_time": rates(work, done),
         "peak_memory_gib": memory,
         "memory_bounded": memory < MEMORY_GIB,
+    }
+
+
+def rates(time_: np.ndarray, done: np.ndarray) -> dict[str, Any]:
+    """How steady the rate is over the tenths of a run."""
+    at = np.interp(np.linspace(done[0], done[-1], 11), done, time_)
+    tenths = (done[-1] - done[0]) / 10 / np.diff(at)
+    return {
+        "lanes_per_second": (done[-1] - done[0]) / (time_[-1] - time_[0]),
+        "tenths": [round(float(t), 2) for t in tenths],
+        "last_tenth_over_first": tenths[-1] / tenths[0],
+        "largest_change_of_a_tenth": float(np.max(np.abs(tenths / np.mean(tenths) - 1))),
+        "steady": bool(abs(tenths[-1] / tenths[0] - 1) <= STEADY),
     }
 
 
@@ -152,7 +161,8 @@ def main() -> None:
     """Run what is asked for and print one JSON document."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.study", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--size", type=float, default=1.0, help="part of the full size, e.g. 0.02")
-    parser.add_argument("--only", default="store,dask,map", help="store, dask, map")
+    parser.add_argument("--only", default="store,killed,dask,map", help="store, killed, dask, map")
+    parser.add_argument("--folder", type=pathlib.Path, help="keep the stores here, and take the whole one from here")
     parser.add_argument("--run", type=pathlib.Path, help="only run the study into this store")
     given = parser.parse_args()
     if given.run is not None:
@@ -164,20 +174,25 @@ def main() -> None:
     jax.config.update("jax_enable_x64", True)
     jc.keep_compiled_programs()
     found: dict[str, Any] = {"size": given.size}
-    with tempfile.TemporaryDirectory() as folder:
+    with contextlib.ExitStack() as stack:
+        folder = given.folder or stack.enter_context(tempfile.TemporaryDirectory())
         whole, broken, spread = (pathlib.Path(folder, f"{name}.zarr") for name in ("whole", "broken", "spread"))
-        if {"store", "dask"} & set(given.only.split(",")):
+        kept, only = pathlib.Path(folder, "whole.json"), set(given.only.split(","))
+        if kept.exists():
+            found["store"] = json.loads(kept.read_text())
+        elif {"store", "killed", "dask"} & only:
             found["store"] = unbroken(whole, given.size)
+            kept.write_text(json.dumps(found["store"]))
             print(json.dumps(found), flush=True)
-        if "store" in given.only.split(","):
+        if "killed" in only:
             found["killed"] = killed(broken, given.size, found["store"]["seconds"])
             found["killed"]["same_files"] = contents(whole) == contents(broken)
             print(json.dumps(found), flush=True)
-        if "dask" in given.only.split(","):
+        if "dask" in only:
             found["dask"] = on_dask(spread, given.size)
             found["dask"]["same_files"] = contents(whole) == contents(spread)
             print(json.dumps(found), flush=True)
-        if "map" in given.only.split(","):
+        if "map" in only:
             found["map"] = adaptive_map(given.size)
     print(json.dumps(found, indent=2))
 
