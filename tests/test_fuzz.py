@@ -231,6 +231,8 @@ def test_monsters(tmp_path: Path, given: str, said: str):
         (f"study 1a --vary speed=8500 --shard=1/{'9' * 5000}", "--shard must be I/N"),
         (f"map 1a --points {'9' * 5000}x4", "--points must be ACROSSxUPWARDS"),
         ("map 1a --points 4x4 --rows 3", "--rows and --columns do not go with --points"),
+        ("map 1a --points 4x4 --persist 300", "--persist must be 0 or above the 300 of --discard, but 300 was given"),
+        ("map 1a --persist 3000", "go with --points"),
         ("map 1a --refine label", "--refine, --no-curves, --most and --speed go with --points"),
         ("map 1a --points 4x4 --refine label", "--refine goes with --adaptive"),
         ("design 1a --seed -5", "--seed must be at least 0"),

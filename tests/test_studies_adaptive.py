@@ -71,12 +71,13 @@ def test_what_is_missed_is_what_the_coarse_picture_cannot_see():
     assert np.array_equal(grid.filled[130:], field[130:])
 
 
-def test_speckle_is_not_found_cheaply_and_that_is_seen():
-    """Where labels change at every other point there are no edges to follow: all of it is computed, and the few points
-    allowed are said not to have been enough."""
+def test_speckle_is_seen_but_not_followed():
+    """Where labels change at every other point there are no edges to follow: every other point shows that. If there are
+    fewer points than that takes, they are said not to have been enough."""
     field = np.random.default_rng(0).integers(0, 2, (64, 64))
-    everything = refine(lambda p: field[tuple(p.T)], field.shape)
-    assert everything.points > 0.95 * field.size
+    seen = refine(lambda p: field[tuple(p.T)], field.shape)
+    assert seen.complete and seen.points <= 0.35 * field.size  # in its corners fewer than half of the cells around are
+    assert found_share(seen, field) >= 0.99
     few = refine(lambda p: field[tuple(p.T)], field.shape, most=600)
     assert few.points <= 600 and not few.complete and few.stride > 1
 
@@ -153,6 +154,30 @@ def test_map_of_a_system_agrees_with_a_sweep():
     assert 0 < np.sum(kinds(found.label) == 1) < found.grid.known.size
     assert np.array_equal(found.grid.label[found.grid.known], kinds(found.label)[found.grid.known])
     assert np.array_equal(found.kind[found.grid.known], found.grid.label[found.grid.known])
+
+
+def test_speckle_beside_an_edge_leaves_the_edge_sharp():
+    field = (X > 0.6).astype(int)
+    field[:100] = np.random.default_rng(0).integers(0, 2, (100, SIDE))
+    grid = refine(lambda p: field[tuple(p.T)], field.shape)
+    assert np.array_equal(grid.filled[110:], field[110:])
+    assert np.sum(grid.known[:100]) <= 0.3 * 100 * SIDE
+
+
+def test_chaos_must_persist_if_asked():
+    """Starts found chaotic are judged again after more revolutions, all others stay as they were."""
+    system = jc.ForcedOscillator(Ueda(jnp.array(7.5)), coordinates=1)
+    x, y = {"speed": np.linspace(0.95, 1.15, 9)}, {"force": np.linspace(6.0, 8.0, 6)}
+    length = dict(revolutions=60, blocks=6, method=jc.method("rodas4", steps=32), starts=2, refine_by="everything")
+    soon, late = (jc.label_map(system, x, y, discard=n, **length) for n in (20, 400))
+    found = jc.label_map(system, x, y, discard=20, persist=400, **length)
+    chaotic = soon.label == LABELS.index("chaotic")
+    assert np.array_equal(found.label, np.where(chaotic, late.label, soon.label))
+    assert np.array_equal(found.largest_exponent, np.where(chaotic, late.largest_exponent, soon.largest_exponent))
+    died = chaotic & (found.label != LABELS.index("chaotic"))
+    assert 0 < np.sum(died) < np.sum(chaotic)  # transients and attractors both
+    with pytest.raises(ValueError, match="`persist` must be 0 or above the 20 revolutions discarded, but is 20"):
+        jc.label_map(system, x, y, discard=20, persist=20, **length)
 
 
 def test_what_a_point_counts_as():

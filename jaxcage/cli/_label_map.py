@@ -41,6 +41,10 @@ def run_label_map(options: MapOptions) -> Report:
     blocks = require_blocks("--revolutions", options.revolutions)
     if options.most is not None:
         require_at_least("--most", options.most, 4)
+    if options.persist and options.persist <= options.discard:
+        raise UsageError(
+            f"Option --persist must be 0 or above the {options.discard} of --discard, but {options.persist} was given."
+        )
     method, about = sweep_integration(options), subject(options)
     x, y = axes_of(options, about.model)
     speed = _fixed_speed(options, x)
@@ -60,6 +64,7 @@ def run_label_map(options: MapOptions) -> Report:
             starts=options.starts,
             discard=options.discard,
             revolutions=options.revolutions,
+            persist=options.persist,
             blocks=blocks,
             method=method,
             report=files.write,

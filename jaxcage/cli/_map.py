@@ -30,10 +30,17 @@ def run(options: MapOptions) -> Report:
     """Carry out `jaxcage map`."""
     if options.points is not None:
         return run_label_map(options)
-    only = options.adaptive, options.no_curves, options.most is not None, options.speed is not None
+    only = (
+        options.adaptive,
+        options.no_curves,
+        options.persist != 0,
+        options.most is not None,
+        options.speed is not None,
+    )
     if any(only) or options.refine != MapOptions.refine:
         raise UsageError(
-            "Options --adaptive, --refine, --no-curves, --most and --speed go with --points, e.g. --points 300x300."
+            "Options --adaptive, --refine, --no-curves, --persist, --most and --speed go with --points, "
+            "e.g. --points 300x300."
         )
     check_search(options)
     _check_counts(options)

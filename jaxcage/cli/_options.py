@@ -136,6 +136,8 @@ class MapOptions(SearchOptions):
     """Revolutions over which the exponent is computed."""
     starts: int = 1
     """Starts of which the largest exponent is taken."""
+    persist: int = 0
+    """With --points: revolutions that chaos must outlast to count; what has died out by then was a transient."""
     points: OptionalText = None
     """Instead of rows and columns: a grid of labels, e.g. 300x300, from a coarse picture to the full grid."""
     adaptive: bool = False

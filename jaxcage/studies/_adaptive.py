@@ -2,8 +2,10 @@
 
 A coarse lattice of points comes first. Then, stride by stride, every cell in which known labels differ is cut into
 four, and at coarse strides its neighbours are too. Labels on the rim of a cell that has been cut count for the cells
-next to it, so that an edge is followed to wherever it leads. What no lattice point of the coarse picture, nor a cell
-beside an edge, comes across stays unseen: islands narrower than the first stride may be missed.
+next to it, so that an edge is followed to wherever it leads. Where more than half of the cells around one change there
+is speckle, as where chaotic transients end sooner or later, and no edge to follow: every other point has to do there.
+What no lattice point of the coarse picture, nor a cell beside an edge, comes across stays unseen: islands narrower than
+the first stride may be missed.
 """
 
 import dataclasses
@@ -19,6 +21,8 @@ Evaluate = Callable[[Points], Int[np.ndarray, " points"]]
 UNKNOWN = np.iinfo(np.int32).min
 NEIGHBOURS_ABOVE = 4
 """Cells beside a change are cut too at strides above this one, which meets narrow things there."""
+CROWD, CROWDED = 7, 0.5
+"""Of CROWD x CROWD cells with two points a side, the share with a change from which on they are speckle."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +34,7 @@ class AdaptiveGrid:
     stride: int
     """Distance of the points between which changes have been looked for: 1 once it is done."""
     complete: bool
-    """False if there were not points enough to follow every change down to neighbouring points."""
+    """False if there were not points enough to follow every edge down to neighbouring points."""
 
     @property
     def known(self) -> Bool[np.ndarray, "x y"]:
@@ -120,6 +124,8 @@ def _cut_cells(label: Int[np.ndarray, "x y"], stride: int, compute: Callable[[np
         wanted = changes(label, lines)
         if stride > NEIGHBOURS_ABOVE:
             wanted = _with_neighbours(wanted)
+        if stride == 2:
+            wanted &= ~_speckled(wanted)
         if not np.any(wanted & ~cut):
             return True
         cut |= wanted
@@ -155,6 +161,12 @@ def _with_neighbours(cells: Bool[np.ndarray, "i j"]) -> Bool[np.ndarray, "i j"]:
     from scipy.ndimage import binary_dilation
 
     return binary_dilation(cells, np.ones((3, 3), dtype=bool))
+
+
+def _speckled(cells: Bool[np.ndarray, "i j"]) -> Bool[np.ndarray, "i j"]:
+    from scipy.ndimage import uniform_filter
+
+    return uniform_filter(cells.astype(float), CROWD, mode="constant") > CROWDED
 
 
 def _points_of(

@@ -89,6 +89,7 @@ def label_map(
     starts: int = 1,
     discard: int = 300,
     revolutions: int = 300,
+    persist: int = 0,
     blocks: int = 20,
     method: AbstractMethod | None = None,
     report: Callable[[LabelMap], None] | None = None,
@@ -105,6 +106,8 @@ def label_map(
     - `most`, `first`: as for `refine`: points at most, stride of the coarse picture.
     - `starts`: of the system's own, how many are run at each point.
     - `discard`, `revolutions`, `blocks`, `method`: as for `sweep`.
+    - `persist`: revolutions that chaos must outlast to count: starts found chaotic are run again with so many
+        discarded, and what has died out by then was a transient. With 0 it is not asked.
     - `report`: called with the coarse picture and after each refinement.
     - `stage`: called as lanes are done.
 
@@ -118,6 +121,11 @@ def label_map(
     plan = Plan({**fixed, x_name: x_value, y_name: y_value}, {}, 0, 0, starts, LANES)
     chosen = controlled() if method is None else method
     about = Study(system, plan, chosen, discard, revolutions, blocks, 1, 0)
+    if persist and persist <= discard:
+        raise ValueError(
+            f"Argument `persist` must be 0 or above the {discard} revolutions discarded, but is {persist}."
+        )
+    longer = dataclasses.replace(about, discard=persist or discard)
     shape = (len(x_value), len(y_value))
     label = np.full((*shape, starts), PENDING, dtype=np.int8)
     exponent = np.full((*shape, starts), np.nan)
@@ -128,6 +136,11 @@ def label_map(
         lane = (first_lane[:, None] + np.arange(starts)).ravel()
         say = None if stage is None else functools.partial(stage, f"{len(points)} points")
         found = about.at(*plan.at(lane), progress=say)
+        again = np.flatnonzero(found["label"] == LABELS.index("chaotic")) if persist else np.array([], dtype=int)
+        if again.size:
+            say = None if stage is None else functools.partial(stage, f"{again.size} chaotic lanes again")
+            for name, x in longer.at(*plan.at(lane[again]), progress=say).items():
+                found[name][again] = x
         place = points[:, 0], points[:, 1]
         new = found["label"].reshape(-1, starts)
         label[place], exponent[place] = new, found["largest_exponent"].reshape(-1, starts)
