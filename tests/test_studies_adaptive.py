@@ -77,7 +77,7 @@ def test_speckle_is_seen_but_not_followed():
     field = np.random.default_rng(0).integers(0, 2, (64, 64))
     seen = refine(lambda p: field[tuple(p.T)], field.shape)
     assert seen.complete and seen.points <= 0.35 * field.size  # in its corners fewer than half of the cells around are
-    assert found_share(seen, field) >= 0.99
+    assert found_share(seen, field) >= 0.95
     few = refine(lambda p: field[tuple(p.T)], field.shape, most=600)
     assert few.points <= 600 and not few.complete and few.stride > 1
 

@@ -39,6 +39,25 @@ def test_kept_states_are_the_last_ones_in_order():
     assert np.allclose(one.last, long.last, rtol=0, atol=1e-13)
 
 
+def test_chaos_must_persist_if_asked():
+    """Lanes found chaotic are judged again after more revolutions, all others stay as they were."""
+    ueda = lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),)
+    system = jc.ForcedOscillator(ueda, coordinates=1)
+    speeds, length = np.linspace(0.9, 1.2, 60), {"revolutions": 60, "blocks": 6, "keep": 16, "method": FAST}
+    soon, late = (jc.sweep(system, speeds, discard=n, **length) for n in (20, 400))
+    found = jc.sweep(system, speeds, discard=20, persist=400, **length)
+    chaotic = soon.label == "chaotic"
+    assert np.array_equal(found.label, np.where(chaotic, late.label, soon.label))
+    for name in ("last", "peak", "block_growth", "strobe"):
+        a, b, c = (getattr(x, name) for x in (found, soon, late))
+        there = chaotic.reshape(chaotic.shape + (1,) * (a.ndim - 2))
+        assert np.array_equal(a, np.where(there, c, b)), name
+    assert 0 < np.sum(chaotic & (found.label != "chaotic")) < np.sum(chaotic)  # transients and attractors both
+    assert "20 + 60 revolutions, chaos that outlasts 400" in str(found)
+    with pytest.raises(ValueError, match="`persist` must be 0 or above the 20 revolutions discarded, but is 5"):
+        jc.sweep(system, speeds, discard=20, persist=5, **length)
+
+
 def test_number_of_exponents_does_not_change_the_first():
     a, b = (
         jc.sweep(

@@ -37,6 +37,8 @@ class Sweep:
     """Revolutions run before anything was recorded."""
     revolutions: int
     """Revolutions observed."""
+    persist: int = 0
+    """Revolutions that chaos had to outlast, discarded of the lanes that looked chaotic; 0 if that was not asked."""
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
     """How it was computed: method, versions, configuration."""
 
@@ -96,7 +98,8 @@ class Sweep:
         counts = collections.Counter(self.label.ravel().tolist())
         lines = [
             f"Sweep of {speeds} speeds x {starts} starts, {self.rpm.min():.0f} to {self.rpm.max():.0f} rpm, "
-            f"{self.discard} + {self.revolutions} revolutions",
+            f"{self.discard} + {self.revolutions} revolutions"
+            + (f", chaos that outlasts {self.persist}" if self.persist else ""),
             *(f"  {count:6d} {label}" for label, count in sorted(counts.items())),
         ]
         codes = collections.Counter(self.outcome[self.failed].tolist())

@@ -58,3 +58,10 @@ def require_blocks(option: str, revolutions: int) -> int:
         raise UsageError(f"Option {option} must be a multiple of 10 above 0, but {revolutions} was given.")
     require_at_least(option, revolutions, 10)
     return 10 if revolutions % 20 else 20
+
+
+def require_persist(persist: int, discard: int) -> None:
+    """Revolutions that chaos must outlast: none, or more than are discarded anyway."""
+    if persist and persist <= discard:
+        raise UsageError(f"Option --persist must be 0 or above the {discard} of --discard, but {persist} was given.")
+    require_at_least("--persist", persist, 0)

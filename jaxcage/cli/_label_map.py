@@ -17,7 +17,7 @@ from ..report import RPM, SPEED, Axis, follow_edges
 from ..studies import KINDS, LABELS, PENDING, LabelMap, kinds, label_map
 from ._bifurcations import check_search, search_case
 from ._console import progress_in_stages, progress_with_rate, warn_of_short
-from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_speed
+from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_persist, require_speed
 from ._inputs import Subject, angular_speed, output_folder, save_figure, subject, sweep_integration
 from ._options import MapOptions
 from ._report import Report, Table
@@ -41,10 +41,7 @@ def run_label_map(options: MapOptions) -> Report:
     blocks = require_blocks("--revolutions", options.revolutions)
     if options.most is not None:
         require_at_least("--most", options.most, 4)
-    if options.persist and options.persist <= options.discard:
-        raise UsageError(
-            f"Option --persist must be 0 or above the {options.discard} of --discard, but {options.persist} was given."
-        )
+    require_persist(options.persist, options.discard)
     method, about = sweep_integration(options), subject(options)
     x, y = axes_of(options, about.model)
     speed = _fixed_speed(options, x)

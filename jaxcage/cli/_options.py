@@ -70,6 +70,8 @@ class SweepOptions(IntegrationOptions):
     """Revolutions left out at the beginning."""
     revolutions: int = 300
     """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
+    persist: int = 0
+    """Revolutions that chaos must outlast to count, e.g. 3000; what has died out by then was a transient."""
     exponents: int = 1
     """Number of Lyapunov exponents."""
     waterfall: int = 0

@@ -15,7 +15,15 @@ from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
 from ..report import zones_document, zones_table
 from ..sweeps import rpm, sweep
 from ._console import progress, say, warn_of_short
-from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_range, require_speed
+from ._errors import (
+    ComputationError,
+    UsageError,
+    require_at_least,
+    require_blocks,
+    require_persist,
+    require_range,
+    require_speed,
+)
 from ._inputs import (
     Subject,
     integration,
@@ -52,6 +60,7 @@ def _check(options: SweepOptions) -> None:
     if options.count > 1:
         require_range(options.first, options.last)
     require_at_least("--discard", options.discard, 0)
+    require_persist(options.persist, options.discard)
     require_at_least("--exponents", options.exponents, 1)
     require_at_least("--waterfall", options.waterfall, 0)
 
@@ -75,6 +84,7 @@ def sweep_case(options: SweepOptions) -> Swept:
             speeds,
             discard=options.discard,
             revolutions=options.revolutions,
+            persist=options.persist,
             exponents=options.exponents,
             blocks=blocks,
             method=chosen,
@@ -156,6 +166,7 @@ def _title(swept: Swept) -> str:
 def _label_table(found: Sweep, counts: collections.Counter) -> Table:
     speeds, starts = found.outcome.shape
     length = f"{found.discard} + {found.revolutions} revolutions"
+    length += f", chaos that outlasts {found.persist}" if found.persist else ""
     title = f"Lanes: {speeds} speeds x {starts} starts, {length}"
     rows = [(label, str(n), f"{n / found.outcome.size:.1%}") for label, n in sorted(counts.items())]
     return Table(title, ("label", "lanes", "share"), rows)

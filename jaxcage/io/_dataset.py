@@ -75,6 +75,7 @@ def _attributes(sweep: Sweep, model: CageModel | None) -> dict[str, Any]:
         "title": "jaxcage sweep over speed",
         "discard": sweep.discard,
         "revolutions": sweep.revolutions,
+        "persist": sweep.persist,
         "resolution_rpm": sweep.resolution_rpm if np.isfinite(sweep.resolution_rpm) else "none",
         "settings": json.dumps(sweep.settings),
         **configured,
@@ -98,6 +99,7 @@ def from_dataset(dataset: xr.Dataset) -> Sweep:
         speed=np.asarray(dataset["speed"].values),
         discard=int(dataset.attrs["discard"]),
         revolutions=int(dataset.attrs["revolutions"]),
+        persist=int(dataset.attrs.get("persist", 0)),
         settings=json.loads(dataset.attrs["settings"]),
         **stored,
     )

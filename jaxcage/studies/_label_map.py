@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from .._checks import require_x64
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
+from ..sweeps import require_persist
 from ._adaptive import AdaptiveGrid, Points, refine
 from ._plan import LANES, Plan
 from ._study import LABELS, PENDING, SPEED, Study, too_short
@@ -121,10 +122,7 @@ def label_map(
     plan = Plan({**fixed, x_name: x_value, y_name: y_value}, {}, 0, 0, starts, LANES)
     chosen = controlled() if method is None else method
     about = Study(system, plan, chosen, discard, revolutions, blocks, 1, 0)
-    if persist and persist <= discard:
-        raise ValueError(
-            f"Argument `persist` must be 0 or above the {discard} revolutions discarded, but is {persist}."
-        )
+    require_persist(persist, discard)
     longer = dataclasses.replace(about, discard=persist or discard)
     shape = (len(x_value), len(y_value))
     label = np.full((*shape, starts), PENDING, dtype=np.int8)

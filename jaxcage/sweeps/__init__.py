@@ -17,6 +17,7 @@ from ._engine import Designs as Designs, Progress as Progress, cores as cores, r
 from ._monodromy import monodromy as monodromy
 from ._speed import (
     make_plan as make_plan,
+    require_persist as require_persist,
     rpm as rpm,
     settings_of as settings_of,
     sweep as sweep,

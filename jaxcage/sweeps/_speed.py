@@ -1,5 +1,6 @@
 """Sweeps over speed from several starts."""
 
+import dataclasses
 import functools
 import math
 from collections.abc import Sequence
@@ -51,6 +52,14 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
+def require_persist(persist: int, discard: int) -> None:
+    """**Raises:** `ValueError`."""
+    if persist and persist <= discard:
+        raise ValueError(
+            f"Argument `persist` must be 0 or above the {discard} revolutions discarded, but is {persist}."
+        )
+
+
 def sweep(
     system: AbstractForcedSystem,
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
@@ -58,6 +67,7 @@ def sweep(
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
+    persist: int = 0,
     exponents: int = 1,
     blocks: int = 20,
     keep: int = 64,
@@ -73,6 +83,8 @@ def sweep(
     - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; by default the
         system's own.
     - `discard`, `revolutions`: revolutions left out at the beginning, and observed after that.
+    - `persist`: revolutions that chaos must outlast to count: lanes found chaotic are run again with so many discarded,
+        and what has died out by then was a transient. With 0 it is not asked.
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
     - `keep`: number of strobe states kept, the last ones.
@@ -84,7 +96,9 @@ def sweep(
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
     `RuntimeError` without double precision.
     """
-    options = dict(discard=discard, revolutions=revolutions, exponents=exponents, blocks=blocks, keep=keep)
+    options = dict(
+        discard=discard, revolutions=revolutions, persist=persist, exponents=exponents, blocks=blocks, keep=keep
+    )
     return sweep_designs([system], speeds, starts=starts, method=method, progress=progress, **options)[0]
 
 
@@ -95,6 +109,7 @@ def sweep_designs(
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
+    persist: int = 0,
     exponents: int = 1,
     blocks: int = 20,
     keep: int = 64,
@@ -114,15 +129,32 @@ def sweep_designs(
         raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
+    require_persist(persist, discard)
     y0 = np.stack([initial_states(s, speed, starts) for s in systems])  # systems, speeds, starts, dim
     shape = y0.shape[1:3]
     each = shape[0] * shape[1]
     which = np.repeat(np.arange(len(systems)), each)
     lane_speed = np.tile(np.repeat(speed, shape[1]), len(systems))
-    seen = run_lanes(systems, chosen, plan, lane_speed, y0.reshape(-1, dim), progress, which)
-    parts = [tuple(x[..., i * each : (i + 1) * each] for x in seen) for i in range(len(systems))]
+    lane_start = y0.reshape(-1, dim)
     how = settings_of(chosen)
-    return [assemble(s, speed, how, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
+
+    def run(plan: Plan, lane: np.ndarray) -> list[np.ndarray]:
+        seen = run_lanes(systems, chosen, plan, lane_speed[lane], lane_start[lane], progress, which[lane])
+        return [np.asarray(x) for x in seen]
+
+    def each_system(seen: Sequence[np.ndarray]) -> list[Sweep]:
+        parts = [tuple(x[..., i * each : (i + 1) * each] for x in seen) for i in range(len(systems))]
+        return [assemble(s, speed, how, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
+
+    seen = run(plan, np.arange(which.size))
+    found = each_system(seen)
+    if not persist:
+        return found
+    chaotic = np.flatnonzero(np.concatenate([s.label.ravel() for s in found]) == "chaotic")
+    if chaotic.size:
+        for x, late in zip(seen, run(plan._replace(discard=persist), chaotic), strict=True):
+            x[..., chaotic] = late
+    return [dataclasses.replace(s, persist=persist) for s in each_system(seen)]
 
 
 def assemble(
