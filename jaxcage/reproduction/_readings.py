@@ -24,6 +24,8 @@ class Reading:
     model: Callable[[CageModel], CageModel] = lambda model: model
     method: Callable[[], AbstractMethod | None] = lambda: None
     first_start_only: bool = False
+    persist: int = 0
+    """Revolutions that chaos must outlast to count."""
     case: str = "1a"
     cage_per_printed: Callable[[CageModel], float] = lambda model: 1.0
     """Cage speed over the speed on the printed axis."""
@@ -90,8 +92,10 @@ READINGS: tuple[Reading, ...] = (
     Reading("integration", "Newmark, 64 steps", method=lambda: method("newmark", steps=64)),
     Reading("integration", "Newmark, 256 steps", method=lambda: method("newmark", steps=256)),
     Reading("start", "the paper's alone", first_start_only=True),
+    Reading("chaos", "outlasts 3000 revolutions", persist=3000),
     Reading("speed axis", "shaft speed", cage_per_printed=lambda model: float(model.bearing.cage_speed_ratio)),
     Reading("as the cases have it", "-", case="1b"),
+    Reading("chaos", "outlasts 3000 revolutions", case="1b", persist=3000),
     Reading("cubic stiffness", "falls with the gap", _relative_cubic, case="1b"),
 )
 """The cubic term as alpha K_s/c^2 acts on the case with the other gap only."""
@@ -115,7 +119,15 @@ def try_readings(
         ratio = reading.cage_per_printed(read)
         grid = ratio * rpm(*ZONE_RANGE_RPM, speeds)
         starts = [tuple(float(c) for c in read.starts(float(grid[0]))[0])] if reading.first_start_only else None
-        found = sweep(read, grid, starts=starts, discard=discard, revolutions=revolutions, method=reading.method())
+        found = sweep(
+            read,
+            grid,
+            starts=starts,
+            discard=discard,
+            revolutions=revolutions,
+            persist=reading.persist,
+            method=reading.method(),
+        )
         found = dataclasses.replace(found, speed=found.speed / ratio)
         chaotic = zones(found)
         results.append(
