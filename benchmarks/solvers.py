@@ -126,10 +126,10 @@ def main() -> None:
                 continue
             found[tasks[task]] = task.result()
             print(f"{solver} {steps}: {found[tasks[task]].pop('seconds'):.0f} s", flush=True)
-    text = page({m: found[m] for m in methods if m in found})
-    print(text)
-    if not options.quick:
-        pathlib.Path(__file__).with_suffix(".md").write_text(text)
+            if FINEST in found and not options.quick:  # after each solver: the last ones take long
+                so_far = page({m: found[m] for m in methods if m in found})
+                pathlib.Path(__file__).with_suffix(".md").write_text(so_far)
+    print(page({m: found[m] for m in methods if m in found}))
 
 
 def page(found: dict[tuple[str, int], dict[str, Any]]) -> str:
