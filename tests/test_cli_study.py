@@ -220,7 +220,7 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
         ("--points 9x7 --x eccentricity", "--speed must be given for a map over eccentricity"),
         ("--points 9x7 --x eccentricity --speed -1", "--speed must be a speed above 0 rpm, but -1"),
         ("--points 9x7 --starts 4", "--starts must lie between 1 and 3, but 4"),
-        ("--adaptive", "--adaptive, --refine, --no-curves, --most and --speed go with --points"),
+        ("--adaptive", "--adaptive, --refine, --no-curves, --persist, --most and --speed go with --points"),
     ],
 )
 def test_impossible_maps_get_one_sentence(

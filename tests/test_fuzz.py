@@ -231,7 +231,7 @@ def test_monsters(tmp_path: Path, given: str, said: str):
         (f"study 1a --vary speed=8500 --shard=1/{'9' * 5000}", "--shard must be I/N"),
         (f"map 1a --points {'9' * 5000}x4", "--points must be ACROSSxUPWARDS"),
         ("map 1a --points 4x4 --rows 3", "--rows and --columns do not go with --points"),
-        ("map 1a --points 4x4 --persist 300", "--persist must be 0 or above the 300 of --discard, but 300 was given"),
+        ("map 1a --points 4x4 --persist 300", "--persist must be 0 or above the 1000 of --discard, but 300 was given"),
         ("map 1a --persist 3000", "go with --points"),
         ("sweep 1a --persist 200", "--persist must be 0 or above the 300 of --discard, but 200 was given"),
         ("map 1a --refine label", "--most and --speed go with --points"),
