@@ -56,6 +56,9 @@ def test_chaos_must_persist_if_asked():
     assert "20 + 60 revolutions, chaos that outlasts 400" in str(found)
     with pytest.raises(ValueError, match="`persist` must be 0 or above the 20 revolutions discarded, but is 5"):
         jc.sweep(system, speeds, discard=20, persist=5, **length)
+    for few in ({"exponents": 0}, {"blocks": 1}):  # no lane could be called chaotic
+        with pytest.raises(ValueError, match="`persist` needs an exponent and its error"):
+            jc.sweep(system, speeds, discard=20, persist=400, **(length | few))
 
 
 def test_number_of_exponents_does_not_change_the_first():

@@ -43,6 +43,12 @@ class Sweep:
     """How it was computed: method, versions, configuration."""
 
     @property
+    def length(self) -> str:
+        """How long lanes were run, in words."""
+        lasting = f", chaos that outlasts {self.persist}" if self.persist else ""
+        return f"{self.discard} + {self.revolutions} revolutions{lasting}"
+
+    @property
     def rpm(self) -> Float[np.ndarray, " speeds"]:
         """Speed in revolutions per minute."""
         return self.speed * 30 / np.pi
@@ -98,8 +104,7 @@ class Sweep:
         counts = collections.Counter(self.label.ravel().tolist())
         lines = [
             f"Sweep of {speeds} speeds x {starts} starts, {self.rpm.min():.0f} to {self.rpm.max():.0f} rpm, "
-            f"{self.discard} + {self.revolutions} revolutions"
-            + (f", chaos that outlasts {self.persist}" if self.persist else ""),
+            + self.length,
             *(f"  {count:6d} {label}" for label, count in sorted(counts.items())),
         ]
         codes = collections.Counter(self.outcome[self.failed].tolist())

@@ -48,7 +48,8 @@ def run_label_map(options: MapOptions) -> Report:
     own = len(about.model.starts(1.0))
     if not 1 <= options.starts <= own:
         raise UsageError(f"Option --starts must lie between 1 and {own}, but {options.starts} was given.")
-    files = _Files(about, output_folder(options), x, y)
+    length = {"discard": options.discard, "revolutions": options.revolutions, "persist": options.persist}
+    files = _Files(about, output_folder(options), x, y, length)
     began = time.perf_counter()
     with progress_with_rate(f"map of {about.name}", "lanes", ADVICE) as bar:
         found = label_map(
@@ -59,9 +60,7 @@ def run_label_map(options: MapOptions) -> Report:
             refine_by=options.refine if options.adaptive else "everything",
             most=options.most,
             starts=options.starts,
-            discard=options.discard,
-            revolutions=options.revolutions,
-            persist=options.persist,
+            **length,
             blocks=blocks,
             method=method,
             report=files.write,
@@ -78,6 +77,7 @@ def run_label_map(options: MapOptions) -> Report:
         "x_range": [x.lower * (RPM if x.name == SPEED else 1.0), x.upper * (RPM if x.name == SPEED else 1.0)],
         "y_range": [y.lower, y.upper],
         "points": list(points),
+        **length,
         "computed": found.grid.points,
         "complete": found.grid.complete,
         "kinds": dict(zip(KINDS, counts.tolist(), strict=True)),
@@ -133,8 +133,8 @@ def _curves(options: MapOptions, about: Subject, x: Axis, y: Axis) -> tuple[list
 class _Files:
     """Figure and data of a map, written anew at every stage."""
 
-    def __init__(self, about: Subject, folder: Path, x: Axis, y: Axis):
-        self.about, self.x, self.y = about, x, y
+    def __init__(self, about: Subject, folder: Path, x: Axis, y: Axis, length: dict[str, int]):
+        self.about, self.x, self.y, self.length = about, x, y, length
         stem = f"map_{about.name}_{x.name}_{y.name}_labels"
         self.figure, self.data = folder / f"{stem}.png", folder / f"{stem}.zarr"
 
@@ -168,7 +168,7 @@ class _Files:
                 "largest_exponent": (dims, found.largest_exponent, {"units": "1"}),
             },
             coords={found.x: (found.x, found.x_value, unit(self.x)), found.y: (found.y, found.y_value, unit(self.y))},
-            attrs={"title": "jaxcage map", "configuration": json.dumps(configuration(self.about.model))},
+            attrs={"title": "jaxcage map", **self.length, "configuration": json.dumps(configuration(self.about.model))},
         )
 
 

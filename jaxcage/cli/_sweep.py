@@ -160,14 +160,13 @@ def _title(swept: Swept) -> str:
     published, model = swept.subject.published, swept.subject.model
     what = f"Case {swept.subject.name}" if published is not None else swept.subject.name
     gap, e = 1e3 * float(model.guidance_gap), 1e6 * float(model.eccentricity)
-    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm"
+    lasting = f", chaos that outlasts {swept.sweep.persist} revolutions" if swept.sweep.persist else ""
+    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm{lasting}"
 
 
 def _label_table(found: Sweep, counts: collections.Counter) -> Table:
     speeds, starts = found.outcome.shape
-    length = f"{found.discard} + {found.revolutions} revolutions"
-    length += f", chaos that outlasts {found.persist}" if found.persist else ""
-    title = f"Lanes: {speeds} speeds x {starts} starts, {length}"
+    title = f"Lanes: {speeds} speeds x {starts} starts, {found.length}"
     rows = [(label, str(n), f"{n / found.outcome.size:.1%}") for label, n in sorted(counts.items())]
     return Table(title, ("label", "lanes", "share"), rows)
 

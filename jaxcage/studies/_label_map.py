@@ -122,7 +122,7 @@ def label_map(
     plan = Plan({**fixed, x_name: x_value, y_name: y_value}, {}, 0, 0, starts, LANES)
     chosen = controlled() if method is None else method
     about = Study(system, plan, chosen, discard, revolutions, blocks, 1, 0)
-    require_persist(persist, discard)
+    require_persist(persist, discard, 1, blocks)
     longer = dataclasses.replace(about, discard=persist or discard)
     shape = (len(x_value), len(y_value))
     label = np.full((*shape, starts), PENDING, dtype=np.int8)

@@ -52,11 +52,16 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
-def require_persist(persist: int, discard: int) -> None:
-    """**Raises:** `ValueError`."""
+def require_persist(persist: int, discard: int, exponents: int, blocks: int) -> None:
+    """**Raises:** `ValueError`, also where no lane could be called chaotic for want of an exponent or its error."""
     if persist and persist <= discard:
         raise ValueError(
             f"Argument `persist` must be 0 or above the {discard} revolutions discarded, but is {persist}."
+        )
+    if persist and (exponents < 1 or blocks < 2):
+        raise ValueError(
+            "Argument `persist` needs an exponent and its error, from at least 1 of `exponents` and 2 `blocks`, "
+            f"but they are {exponents} and {blocks}."
         )
 
 
@@ -129,7 +134,7 @@ def sweep_designs(
         raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
-    require_persist(persist, discard)
+    require_persist(persist, discard, exponents, blocks)
     y0 = np.stack([initial_states(s, speed, starts) for s in systems])  # systems, speeds, starts, dim
     shape = y0.shape[1:3]
     each = shape[0] * shape[1]
