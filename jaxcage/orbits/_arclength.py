@@ -94,17 +94,15 @@ def correct(
     """
     lanes = at.shape[0]
     run = _correct_own if own_given else _correct_shared
-
-    def part(first: int) -> Corrected:
-        chosen = np.minimum(np.arange(first, first + CHUNK), lanes - 1)
-        mine = take(given, chosen) if own_given else given
-        got = run(
-            take(curves, chosen), mine, jnp.asarray(at[chosen]), jnp.asarray(normal[chosen]), jnp.asarray(tolerance)
-        )
-        return jax.tree.map(lambda x: np.asarray(x)[: lanes - first], got)
-
+    padded = lambda first: np.minimum(np.arange(first, first + CHUNK), lanes - 1)
+    mine = lambda chosen: take(given, chosen) if own_given else given
+    got = lambda k: run(take(curves, k), mine(k), jnp.asarray(at[k]), jnp.asarray(normal[k]), jnp.asarray(tolerance))
+    part = lambda first: jax.tree.map(lambda x: np.asarray(x)[: lanes - first], got(padded(first)))
+    firsts = range(0, lanes, CHUNK)
+    if len(firsts) == 1:
+        return part(0)
     with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
-        parts = list(pool.map(part, range(0, lanes, CHUNK)))
+        parts = list(pool.map(part, firsts))
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
 
 

@@ -55,38 +55,44 @@ def solve(
     guess: Float[Array, " n"],
     max_steps: int = 40,
     tolerance: Scalar = TOLERANCE,
+    at_root: bool = False,
 ) -> tuple[Float[Array, " n"], Found]:
-    """Newton's method from `guess`. **Returns:** the root and `Found`."""
+    """Newton's method from `guess`.
+
+    **Returns:** the root and `Found`: its Newton state is that of the last point before the root or, if `at_root`, of
+    the root, for one evaluation more.
+    """
 
     def fn(u: Array, given: Any) -> tuple[Array, Any]:
         return equations.residual(u, equations.prepare(u, given))
 
-    solver = DampedNewton(tolerance, tolerance)
+    solver = DampedNewton(tolerance, tolerance, at_root=at_root)
     got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
     return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux)
 
 
 def implicit_root(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
     """u with residual(u, prepare(u, given)) = 0, differentiable with respect to `given` only.
 
-    **Returns:** u, NaN where Newton's method did not get there, and `Found`.
+    **Returns:** u, NaN where Newton's method did not get there, and `Found` (see `solve`).
     """
-    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), max_steps=max_steps)
+    settings = (max_steps, TOLERANCE, at_root)
+    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), settings=settings)
     return jnp.where(found.converged, u, jnp.nan), found
 
 
 @eqx.filter_custom_jvp
-def _root(given: Any, *, equations: AbstractEquations, guess: Array, max_steps: int) -> Any:
-    return solve(equations, given, guess, max_steps)
+def _root(given: Any, *, equations: AbstractEquations, guess: Array, settings: tuple) -> Any:
+    return solve(equations, given, guess, *settings)
 
 
 @_root.def_jvp
-def _root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, max_steps: int) -> Any:
+def _root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, settings: tuple) -> Any:
     (given,), (given_dot,) = primals, tangents
-    u, found = _root(given, equations=equations, guess=guess, max_steps=max_steps)
+    u, found = _root(given, equations=equations, guess=guess, settings=settings)
     row = lambda v, g: numbers_of(equations.prepare(v, g))[0]
     _, remake = numbers_of(equations.prepare(u, given))
     k, k_dot = eqx.filter_jvp(lambda g: row(u, g), (given,), (given_dot,))
@@ -106,16 +112,16 @@ def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any
 
 
 @eqx.filter_custom_jvp
-def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any]) -> Any:
-    """f(x), differentiated by its Jacobian matrix in forward mode even where reverse mode is asked for.
+def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any], known: Any) -> Any:
+    """`known`, which is f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode.
 
-    `f` is a module; what it holds has no derivative.
+    `f` is a module; what it holds has no derivative. Without derivatives f is not evaluated, nor compiled.
     """
-    return f(x)
+    return known
 
 
 @by_columns.def_jvp
-def _by_columns_jvp(primals: Any, tangents: Any, *, f: Callable[[Array], Any]) -> Any:
+def _by_columns_jvp(primals: Any, tangents: Any, *, f: Callable[[Array], Any], known: Any) -> Any:
     (x,), (x_dot,) = primals, tangents
     jacobian, value = jax.jacfwd(lambda x: (f(x),) * 2, has_aux=True)(x)
     return value, jax.tree.map(lambda j: j @ x_dot, jacobian)

@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 
 class NewtonState(eqx.Module):
@@ -25,13 +25,15 @@ class NewtonState(eqx.Module):
     residual: Float[Array, " n"]
     factor: Float[Array, ""]
     """Share of `step` that is being tried."""
+    done: Bool[Array, ""]
 
 
 class DampedNewton(optx.AbstractRootFinder):
     """Newton's method with step halving; the Jacobian by forward differentiation, as strobe maps allow no other.
 
     Ends when the full step is below `atol` + `rtol` |y| in every component; that step is still taken, so that the error
-    of the result is of the order of its square.
+    of the result is of the order of its square. With `at_root`, residual and Jacobian are then evaluated once more, so
+    that the state has those of the result itself.
     """
 
     rtol: Any = 1e-9
@@ -40,12 +42,13 @@ class DampedNewton(optx.AbstractRootFinder):
     longest: float = 1.0
     """Longest step in any component."""
     smallest_factor: float = 2.0**-10
+    at_root: bool = False
 
     def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> NewtonState:
         del fn, args, options, aux_struct, tags
         n = y.size
         full = lambda *shape: jnp.full(shape, jnp.inf)
-        return NewtonState(y, full(n, n), full(n), jnp.full(f_struct.shape, jnp.inf), jnp.ones(()))
+        return NewtonState(y, full(n, n), full(n), jnp.full(f_struct.shape, jnp.inf), jnp.ones(()), jnp.array(False))
 
     def step(self, fn: Any, y: Any, args: Any, options: Any, state: NewtonState, tags: Any) -> Any:
         del options, tags
@@ -60,21 +63,23 @@ class DampedNewton(optx.AbstractRootFinder):
         ahead = jnp.linalg.solve(known, f)
         usable = jnp.all(jnp.isfinite(f)) & jnp.all(jnp.isfinite(jacobian))
         nearer = jnp.max(jnp.abs(ahead)) < jnp.max(jnp.abs(state.step))
-        tiny = jnp.max(jnp.abs(state.step) / self._tolerance(y)) <= 1.0
-        accept = usable & (first | nearer | tiny)
-        taken = NewtonState(y, jacobian, -jnp.linalg.solve(jacobian, f), f, jnp.minimum(1.0, 2 * state.factor))
+        there = self._tiny(state.step, y)
+        accept = usable & (first | nearer | there)
+        step = -jnp.linalg.solve(jacobian, f)
+        done = there if self.at_root else self._tiny(step, y)
+        taken = NewtonState(y, jacobian, step, f, jnp.minimum(1.0, 2 * state.factor), done)
         kept = eqx.tree_at(lambda s: s.factor, state, state.factor / 2)
         new = jax.tree.map(lambda a, b: jnp.where(accept, a, b), taken, kept)
         length = jnp.max(jnp.abs(new.step))
         share = jnp.minimum(new.factor, self.longest / jnp.where(length > 0, length, 1.0))
-        return new.point + share * new.step, new, aux
+        onward = new.point + share * new.step
+        return jnp.where(new.done, y, onward) if self.at_root else onward, new, aux
 
     def terminate(self, fn: Any, y: Any, args: Any, options: Any, state: NewtonState, tags: Any) -> Any:
-        del fn, args, options, tags
-        done = jnp.max(jnp.abs(state.step) / self._tolerance(y)) <= 1.0
+        del fn, y, args, options, tags
         stuck = state.factor < self.smallest_factor
         result = optx.RESULTS.where(stuck, optx.RESULTS.nonlinear_divergence, optx.RESULTS.successful)
-        return done | stuck, result
+        return state.done | stuck, result
 
     def postprocess(
         self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
@@ -82,5 +87,6 @@ class DampedNewton(optx.AbstractRootFinder):
         del fn, args, options, state, tags, result
         return y, aux, {}
 
-    def _tolerance(self, y: Array) -> Array:
-        return self.atol + self.rtol * jnp.abs(y)
+    def _tiny(self, step: Array, y: Array) -> Bool[Array, ""]:
+        """Whether a step is below the tolerances."""
+        return jnp.max(jnp.abs(step) / (self.atol + self.rtol * jnp.abs(y))) <= 1.0

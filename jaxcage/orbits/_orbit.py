@@ -39,15 +39,15 @@ class OrbitEquations(AbstractEquations):
 
 
 class _Monodromy(eqx.Module):
-    """Image and derivative of the return map from state and field numbers in a row."""
+    """Derivative of the return map from state and field numbers in a row."""
 
     like: StrobeMap
     frame: Frame
 
-    def __call__(self, x: Array) -> tuple[Array, Array]:
+    def __call__(self, x: Array) -> Array:
         n = self.frame.scale.size
         _, remake = numbers_of(self.like)
-        return ReturnMap(remake(x[n:]), self.frame).with_monodromy(x[:n])
+        return ReturnMap(remake(x[n:]), self.frame).with_monodromy(x[:n])[1]
 
 
 class Orbit(eqx.Module):
@@ -145,10 +145,13 @@ def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, peri
     u0 = guess / frame.scale
     if problem.free_speed:
         u0 = jnp.append(u0, 1.0)
-    u, found = implicit_root(OrbitEquations(problem, frame), given, u0)
-    strobe, z = problem.prepare(u, given, frame), u[: problem.dimension]
+    u, found = implicit_root(OrbitEquations(problem, frame), given, u0, at_root=True)
+    n = problem.dimension
+    strobe, z = problem.prepare(u, given, frame), u[:n]
+    at_root = frozen(found.newton)  # image and derivative of the map are those of Newton's last evaluation
+    known = jnp.where(found.converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
     row = jnp.concatenate([z, numbers_of(strobe)[0]])
-    image, monodromy = by_columns(row, f=_Monodromy(frozen(strobe), frame))
+    monodromy = by_columns(row, f=_Monodromy(frozen(strobe), frame), known=known)
     expected = divergence_integral(frozen(strobe), frozen(problem.state(u, frame)), frame.periods)
     finite = jnp.where(jnp.isfinite(monodromy), monodromy, 0.0)
     floor = _resolved(frozen(finite))
@@ -157,9 +160,7 @@ def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, peri
         speed=jnp.asarray(problem.speed(u, given, frame), dtype=float),
         multipliers=jnp.where(found.converged, sorted_multipliers(finite), jnp.nan),
         monodromy=monodromy,
-        residual=frozen(
-            jnp.where(found.converged, jnp.max(jnp.abs(image - z)), jnp.max(jnp.abs(found.newton.residual)))
-        ),
+        residual=jnp.max(jnp.abs(at_root.residual[:n])),
         liouville=jnp.maximum(jnp.linalg.slogdet(frozen(monodromy))[1], floor) - jnp.maximum(expected, floor),
         converged=found.converged,
         iterations=found.iterations,
