@@ -92,8 +92,24 @@ LAYOUTS = {
         [(6000, 9000), (9501, 15000)],
     ),
     "windows closed one after another": (
-        [BELOW, stretch(6400, 6500, family=1), stretch(6900, 7000, family=2), ABOVE],
-        [(7000, 15000)],
+        [BELOW, stretch(6400, 6900, family=1), stretch(7300, 7800, family=2), ABOVE],
+        [(7800, 15000)],
+    ),
+    "a window wider than the stretch beyond it is not closed": (
+        [BELOW, stretch(6400, 6799, family=0), ABOVE],
+        [(6000, 15000)],
+    ),
+    "slivers do not carry an edge away": (
+        [BELOW, *(stretch(x, x + 50, family=f) for x, f in ((6400, 0), (6900, 1), (7400, 0), (7900, 2))), ABOVE],
+        [(6000, 15000)],
+    ),
+    "slivers with narrow windows between them are one stretch": (
+        [BELOW, *(stretch(x, x + 90, family=1) for x in range(9000, 9600, 100)), ABOVE],
+        [(6000, 9000), (9590, 15000)],
+    ),
+    "narrow windows are closed before wide ones": (
+        [BELOW, *(stretch(x, x + 90, family=0) for x in range(6300, 6700, 100)), ABOVE],
+        [(6690, 15000)],
     ),
     "another branch that overlaps only coexists": ([BELOW, stretch(5000, 9000, family=1), ABOVE], [(6000, 15000)]),
     "the same branch that overlaps belongs to it": ([BELOW, stretch(5000, 9000, family=0), ABOVE], [(9000, 15000)]),

@@ -3,8 +3,11 @@
 Several synchronous orbits coexist at many speeds, so what a zone is needs a rule. The **principal** stretch is the one
 on which most simulations from the conventional start (a cage: at rest on the rib) settled; stretches of its own branch
 that overlap it or follow within a window that is closed belong to it. Other stretches count where they do not overlap
-it; those that do are coexisting orbits, which a cage meets only from other starts. Zones are what is left between,
-windows and stretches narrower than a stated width closed as for chaotic zones.
+it; those that do are coexisting orbits, which a cage meets only from other starts. Zones are what is left between.
+
+As for chaotic zones, stretches narrower than a stated width do not count and windows narrower than it are closed, but
+only between stretches wider than the window. Else a row of slivers, some a tenth of a revolution per minute wide, would
+carry an edge far from the stretch it belongs to, to a bifurcation that every solver has elsewhere.
 """
 
 import dataclasses
@@ -73,13 +76,16 @@ class _Group:
         return self.high.upper_rpm - self.low.lower_rpm
 
 
-def _grown(seed: _Group, others: Sequence[Stretch], close: float) -> _Group:
-    """The group with all stretches that overlap it or lie within a closed window, again and again."""
-    group, left = seed, [s for s in others if s not in seed.stretches]
-    while near := [s for s in left if group.apart(_Group((s,))) < close]:
-        group = _Group((*group.stretches, *near))
-        left = [s for s in left if s not in near]
-    return group
+def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
+    """Groups joined where they overlap or where the window between them is closed, narrowest window first."""
+    groups = list(groups)
+    while True:
+        pairs = [(a.apart(b), a, b) for i, a in enumerate(groups) for b in groups[:i]]
+        closed = [pair for pair in pairs if pair[0] < max(0.0, min(close, pair[1].width, pair[2].width))]
+        if not closed:
+            return groups
+        _, a, b = min(closed, key=lambda pair: pair[0])
+        groups = [g for g in groups if g is not a and g is not b] + [_Group((*a.stretches, *b.stretches))]
 
 
 def loss_zones(found: SynchronousOrbits, close_below_rpm: float = CLOSE_BELOW_RPM) -> LossZones:
@@ -92,17 +98,11 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float = CLOSE_BELOW_RP
     if not found.stretches:
         return LossZones((), {}, {}, None, close_below_rpm)
     principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))
-    own = [s for s in found.stretches if s.family == principal.family]
-    groups = [_grown(_Group((principal,)), own, close_below_rpm)]
-    left = [s for s in found.stretches if groups[0].apart(_Group((s,))) >= 0]
-    while left:
-        group = _grown(_Group((left[0],)), left, close_below_rpm)
-        left = [s for s in left if s not in group.stretches]
-        gap = groups[0].apart(group)
-        if gap < close_below_rpm:
-            groups[0] = _Group((*groups[0].stretches, *group.stretches))
-        elif group.width >= close_below_rpm:
-            groups.append(group)
+    own = _joined([_Group((s,)) for s in found.stretches if s.family == principal.family], close_below_rpm)
+    first = next(g for g in own if principal in g.stretches)
+    others = [_Group((s,)) for s in found.stretches if first.apart(_Group((s,))) >= 0]
+    groups = _joined([first, *others], close_below_rpm)
+    groups = [g for g in groups if principal in g.stretches or g.width >= close_below_rpm]
     groups.sort(key=lambda g: g.low.lower_rpm)
     return _between(found, groups, principal, close_below_rpm)
 
