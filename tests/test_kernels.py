@@ -23,7 +23,7 @@ from jaxcage.integrate import (
     strobe_map,
 )
 from jaxcage.integrate._device import steps_on_device
-from jaxcage.integrate._kernel import run_steps, start_lane, step_function
+from jaxcage.integrate._kernel import Step, run_steps, start_lane
 from jaxcage.models._field import _columns
 from jaxcage.sweeps import _engine
 from jaxcage.sweeps._engine import compiled
@@ -342,7 +342,7 @@ def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
     numbers, lane = pieces(solver, tangents)
     mine = jnp.arange(200) < 100
     expected = compiled(lambda lane: run_steps(solver, numbers, lane, 0.02, 12, True))(lane).row()
-    step = step_function(solver, numbers, lane, True)
+    step = Step.of(solver, numbers, lane, True)
     got = steps_on_device(step, numbers.shared, lane.row(), numbers.own, 0.02, 12, mine, interpret=True)
     for new, old, ran in zip(got, lane.row(), expected, strict=True):
         scale = np.nanmax(np.abs(ran)) + 1e-300
@@ -354,6 +354,6 @@ def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
 def test_the_gpu_kernel_translates_for_cuda(solver, tangents):
     """Every operation of the step has its counterpart in Triton; no GPU is needed to see that."""
     numbers, lane = pieces(solver, tangents)
-    step = step_function(solver, numbers, lane, True)
+    step = Step.of(solver, numbers, lane, True)
     run = jax.jit(lambda row: steps_on_device(step, numbers.shared, row, numbers.own, 0.02, 12, jnp.ones(200, bool)))
     assert "triton" in run.trace(lane.row()).lower(lowering_platforms=("cuda",)).as_text()

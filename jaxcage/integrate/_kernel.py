@@ -3,8 +3,9 @@
 The numbers of field, system and scale are its inputs; the rest (structure, tableau) is fixed.
 """
 
+import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -17,8 +18,23 @@ from .._types import LaneState, Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
 from ._device import steps_on_device
 from ._explicit import explicit_step
-from ._lanewise import ScalarFunction, is_lanewise, lanewise
+from ._lanewise import evaluate, is_lanewise, lanewise
 from ._rosenbrock import AbstractRosenbrock, rosenbrock_step, rosenbrock_step_with_tangent
+
+
+@dataclasses.dataclass(frozen=True)
+class Structure:
+    """A module without the numbers of the two rows it is put together from."""
+
+    shared: Any
+    own: Any
+    rest: Any
+    leaves: tuple[tuple[type, Any], ...]
+
+    def remake(self, shared: Sequence[Any], own: Sequence[Any]) -> Any:
+        """The module with these numbers."""
+        rest = jax.tree.unflatten(self.rest, [x for _, x in self.leaves])
+        return eqx.combine(jax.tree.unflatten(self.own, list(own)), jax.tree.unflatten(self.shared, list(shared)), rest)
 
 
 class Split(NamedTuple):
@@ -26,7 +42,7 @@ class Split(NamedTuple):
 
     shared: tuple[Array, ...]
     own: tuple[Array, ...]
-    remake: Callable[[Sequence[Any], Sequence[Any]], Any]
+    structure: Structure
     complete: bool  # no array is left that is not in one of the rows
 
 
@@ -39,12 +55,10 @@ def split(shared: Any, own: Any = None) -> Split:
     alike, static = eqx.partition(shared, eqx.is_inexact_array)
     first, first_tree = jax.tree.flatten(alike)
     second, second_tree = jax.tree.flatten(own)
-
-    def remake(a: Sequence[Any], b: Sequence[Any]) -> Any:
-        return eqx.combine(jax.tree.unflatten(second_tree, list(b)), jax.tree.unflatten(first_tree, list(a)), static)
-
-    complete = all(map(eqx.is_inexact_array, second)) and not any(map(eqx.is_array, jax.tree.leaves(static)))
-    return Split(tuple(first), tuple(second), remake, complete)
+    leaves, rest = jax.tree.flatten(static)
+    complete = all(map(eqx.is_inexact_array, second)) and not any(map(eqx.is_array, leaves))
+    structure = Structure(first_tree, second_tree, rest, tuple((type(x), x) for x in leaves))
+    return Split(tuple(first), tuple(second), structure, complete)
 
 
 class Lane(NamedTuple):
@@ -85,13 +99,25 @@ def start_lane(solver: KernelSolver, y: LaneState, tangents: tuple[LaneState, ..
     return Lane(y, zero, zero, unknown, tangents)
 
 
-def step_function(solver: KernelSolver, numbers: Split, form: Lane, estimate: bool) -> ScalarFunction:
+@dataclasses.dataclass(frozen=True)
+class Step:
     """One step for `lanewise`: shared (phase, step, shared numbers), lane (`Lane.row`, own numbers) -> `Lane.row`."""
 
-    def step(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> tuple[Any, ...]:
+    solver: KernelSolver
+    structure: Structure
+    form: Any
+    """That of the lane."""
+    estimate: bool
+
+    @classmethod
+    def of(cls, solver: KernelSolver, numbers: Split, lane: Lane, estimate: bool) -> "Step":
+        return cls(solver, numbers.structure, jax.tree.structure(lane), estimate)
+
+    def __call__(self, shared: tuple[Any, ...], lane: tuple[Any, ...]) -> tuple[Any, ...]:
+        solver, moved = self.solver, self.form.num_leaves
         t0, h, *alike = shared
-        before = form.filled(lane)
-        field, system, scale = numbers.remake(alike, lane[len(form.row()) :])
+        before: Lane = jax.tree.unflatten(self.form, lane[:moved])
+        field, system, scale = self.structure.remake(alike, lane[moved:])
         pending = before.pending
         if isinstance(solver, dfx.AbstractERK):
             tableau = solver.tableau
@@ -108,10 +134,23 @@ def step_function(solver: KernelSolver, numbers: Split, form: Lane, estimate: bo
             (y, error, _), tangents = rosenbrock_step(solver.tableau, field, t0, h, before.y), ()
         excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y)))
         peak = jnp.maximum(before.peak, excursion)  # the maximum keeps a NaN
-        grown = sum(jnp.abs(e / s) for e, s in zip(error, scale, strict=True)) if estimate else 0.0
-        return Lane(y, peak, before.error + grown, pending if estimate else before.pending, tangents).row()
+        grown = sum(jnp.abs(e / s) for e, s in zip(error, scale, strict=True)) if self.estimate else 0.0
+        return Lane(y, peak, before.error + grown, pending if self.estimate else before.pending, tangents).row()
 
-    return step
+
+@dataclasses.dataclass(frozen=True)
+class Several:
+    """`count` steps one after the other."""
+
+    step: Step
+    count: int
+
+    def __call__(self, shared: tuple[Any, ...], lane: tuple[Any, ...]) -> tuple[Any, ...]:
+        (t0, h, *alike), moved = shared, self.step.form.num_leaves
+        row, own = lane[:moved], lane[moved:]
+        for i in range(self.count):
+            row = evaluate(self.step, (t0 + i * h, h, *alike), (*row, *own))
+        return row
 
 
 def runs_lanewise(solver: KernelSolver, numbers: Split, y: LaneState) -> bool:
@@ -119,9 +158,9 @@ def runs_lanewise(solver: KernelSolver, numbers: Split, y: LaneState) -> bool:
     scalars = all(x.ndim == 0 for x in numbers.shared) and all(x.ndim == 1 for x in numbers.own)
     if not (numbers.complete and scalars):
         return False
-    form = start_lane(solver, y)
-    step = step_function(solver, numbers, form, True)
-    return is_lanewise(step, 2 + len(numbers.shared), len(form.row()) + len(numbers.own))
+    lane = start_lane(solver, y)
+    step = Step.of(solver, numbers, lane, True)
+    return is_lanewise(step, 2 + len(numbers.shared), len(lane.row()) + len(numbers.own))
 
 
 TOGETHER = 4
@@ -148,19 +187,13 @@ def run_steps(
         each = jax.lax.map(along, jax.tree.map(lambda *t: jnp.stack(t), *lane.tangents))
         pick = lambda i: jax.tree.map(lambda x: x[i], each)
         return pick(0)._replace(tangents=tuple(pick(i).tangents[0] for i in range(len(lane.tangents))))
-    step = step_function(solver, numbers, lane, estimate)
+    step = Step.of(solver, numbers, lane, estimate)
     mine = jnp.ones(lane.y[0].shape, bool) if mine is None else mine
     if jax.default_backend() != "cpu":
         return lane.filled(steps_on_device(step, numbers.shared, lane.row(), numbers.own, h, count, mine))
     few = TOGETHER // 2 if lane.tangents else TOGETHER
     together = math.gcd(divisor, few) if isinstance(solver, dfx.AbstractERK) else 1
-
-    def several(shared: tuple[Any, ...], given: tuple[Any, ...]) -> tuple[Any, ...]:
-        t0, h, *alike = shared
-        row, own = given[: len(given) - len(numbers.own)], given[len(given) - len(numbers.own) :]
-        for i in range(together):
-            row = step((t0 + i * h, h, *alike), (*row, *own))
-        return row
+    several = Several(step, together) if together > 1 else step
 
     def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
         return lanewise(several, (i.astype(float) * (together * h), h, *numbers.shared), (*row, *numbers.own))

@@ -7,9 +7,10 @@ body is the whole of `f`, computes each term once, takes what depends on shared 
 along the lanes. Rodas4 on the cage is compiled in a third of the time and runs four times as fast as by fusions.
 """
 
+import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.extend as jex
@@ -21,7 +22,8 @@ from .._types import Scalar
 
 
 ScalarFunction = Callable[[tuple[Any, ...], tuple[Any, ...]], tuple[Any, ...]]
-"""(shared numbers, numbers of one lane) -> numbers of that lane."""
+"""(shared numbers, numbers of one lane) -> numbers of that lane. A dataclass is known by its fields, which are no
+arrays: one that equals an earlier one is not traced again."""
 
 _CONTROL_FLOW = {"while", "scan", "cond"}
 
@@ -34,32 +36,27 @@ def lanewise(f: ScalarFunction, shared: Sequence[Scalar], lanes: Sequence[Array]
 
     **Returns:** an array of that shape for each of f's results.
     """
-    traced, used = _trace(f, len(shared), len(lanes))
-    constant = [i for i in range(len(shared)) if used[i]]
-    varying = [i for i in range(len(lanes)) if used[len(shared) + i]] or [0]
-
-    def body(first: tuple[Array, ...], second: tuple[Array, ...]) -> tuple[Array, ...]:
-        given = [jnp.zeros(())] * (len(shared) + len(lanes))
-        for place, x in zip(constant, first, strict=False):
-            given[place] = x
-        for place, x in zip(varying, second, strict=False):
-            given[len(shared) + place] = x
-        results = eval_jaxpr(traced.jaxpr, traced.consts, *given)
-        return (*results, *second[len(results) :])
-
-    results = len(traced.jaxpr.outvars)
-    width = max(len(constant), len(varying), results)  # a reduction has as many results as operands
-    operands = [lanes[i] for i in varying]
+    program = _program(f, len(shared), len(lanes))
+    results = len(program.traced.jaxpr.outvars)
+    width = max(len(program.constant), len(program.varying), results)  # as many results as operands
+    operands = [lanes[i] for i in program.varying]
     operands += [operands[0]] * (width - len(operands))
-    inits = [jnp.asarray(shared[i], dtype=float) for i in constant] + [jnp.zeros(())] * (width - len(constant))
+    inits = [jnp.asarray(shared[i], dtype=float) for i in program.constant]
+    inits += [jnp.zeros(())] * (width - len(inits))
     ones = (1,) * operands[0].ndim
-    reduced = jax.lax.reduce_window(tuple(operands), tuple(inits), body, ones, ones, "VALID")
+    reduced = jax.lax.reduce_window(tuple(operands), tuple(inits), program.body, ones, ones, "VALID")
     return tuple(reduced[:results])
+
+
+def evaluate(f: ScalarFunction, shared: tuple[Any, ...], lane: tuple[Any, ...]) -> tuple[Any, ...]:
+    """f(shared, lane), from its program where that is known: a tenth of the time of tracing f."""
+    traced = _program(f, len(shared), len(lane)).traced
+    return tuple(eval_jaxpr(traced.jaxpr, traced.consts, *shared, *lane))
 
 
 def is_lanewise(f: ScalarFunction, shared: int, lanes: int) -> bool:
     """Whether `f` of that many numbers is made of elementary operations on scalars alone."""
-    traced, _ = _trace(f, shared, lanes)
+    traced = _program(f, shared, lanes).traced
     caught = any(isinstance(c, Tracer) for c in traced.consts)
     return not caught and _elementary(traced.jaxpr) and _in_order()
 
@@ -83,12 +80,43 @@ def _in_order() -> bool:
         return bool(jnp.all(got[0] == 2 - 3 * first) & jnp.all(got[1] == 2 * second))
 
 
-def _trace(f: ScalarFunction, shared: int, lanes: int) -> tuple[Any, list[bool]]:
-    """The program of f, and which of its inputs it uses."""
+class _Program(NamedTuple):
+    """A scalar function traced."""
+
+    traced: Any
+    constant: list[int]
+    """Which of the shared numbers it uses."""
+    varying: list[int]
+    """Which of the lane's numbers it uses, the first if none."""
+    body: Callable[..., Any]
+    """The function as a reduction's: of the numbers used, both rows filled up to as many as there are results."""
+
+
+def _program(f: ScalarFunction, shared: int, lanes: int) -> _Program:
+    return (_kept if dataclasses.is_dataclass(f) else _trace)(f, shared, lanes)
+
+
+def _trace(f: ScalarFunction, shared: int, lanes: int) -> _Program:
     number = jax.ShapeDtypeStruct((), float)
     traced = jax.make_jaxpr(lambda *x: tuple(f(x[:shared], x[shared:])))(*[number] * (shared + lanes))
     needed = {v for v in traced.jaxpr.outvars if not isinstance(v, jex.core.Literal)}
     for equation in reversed(traced.jaxpr.eqns):
         if needed.intersection(equation.outvars):
             needed.update(v for v in equation.invars if not isinstance(v, jex.core.Literal))
-    return traced, [v in needed for v in traced.jaxpr.invars]
+    used = [v in needed for v in traced.jaxpr.invars]
+    constant = [i for i in range(shared) if used[i]]
+    varying = [i for i in range(lanes) if used[shared + i]] or [0]
+
+    def body(first: tuple[Array, ...], second: tuple[Array, ...]) -> tuple[Array, ...]:
+        given = [jnp.zeros(())] * (shared + lanes)
+        for place, x in zip(constant, first, strict=False):
+            given[place] = x
+        for place, x in zip(varying, second, strict=False):
+            given[shared + place] = x
+        results = eval_jaxpr(traced.jaxpr, traced.consts, *given)
+        return (*results, *second[len(results) :])
+
+    return _Program(traced, constant, varying, body)
+
+
+_kept = functools.lru_cache(maxsize=64)(_trace)
