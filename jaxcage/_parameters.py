@@ -5,6 +5,7 @@ What is declared here once is used by the configuration reader (units, ranges, u
 """
 
 import dataclasses
+import functools
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, TypeVar
@@ -49,14 +50,28 @@ def count(lower: int, upper: int, text: str, **kwargs: Any) -> Any:
     return eqx.field(static=True, metadata={"count": (lower, upper), "text": text}, **kwargs)
 
 
-def walk(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], dataclasses.Field]]:
-    """Every declared field below `module` with its path of attribute names, depth first."""
-    for field in dataclasses.fields(module):
-        value = getattr(module, field.name)
-        if isinstance(value, eqx.Module):
-            yield from walk(value, (*path, field.name))
-        elif {"parameter", "choice", "count"} & set(field.metadata):
-            yield (*path, field.name), field
+Declared = tuple[tuple[str, ...], dataclasses.Field]
+"""A declared field with its path of attribute names."""
+
+
+def walk(module: eqx.Module) -> tuple[Declared, ...]:
+    """Every declared field below `module`, depth first."""
+    return _declared(jax.tree.structure(module))
+
+
+@functools.lru_cache(maxsize=256)
+def _declared(structure: Any) -> tuple[Declared, ...]:
+    """The declared fields of modules of one structure: they are many, and asked for with every change of a design."""
+
+    def below(module: eqx.Module, path: tuple[str, ...]) -> Iterator[Declared]:
+        for field in dataclasses.fields(module):
+            value = getattr(module, field.name)
+            if isinstance(value, eqx.Module):
+                yield from below(value, (*path, field.name))
+            elif {"parameter", "choice", "count"} & set(field.metadata):
+                yield (*path, field.name), field
+
+    return tuple(below(jax.tree.unflatten(structure, [0.0] * structure.num_leaves), ()))
 
 
 def get(module: Any, path: tuple[str, ...]) -> Any:
@@ -141,19 +156,21 @@ def replace(module: M, **values: PyTree) -> M:
     **Raises:** `ValueError` for a name the module does not have, or an option a choice does not offer.
     """
     leaves, choices = parameter_paths(module), choice_paths(module)
-    parts = {f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)}
-    fields = {path: field for path, field in walk(module)}
+    parts = [f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)]
+    fields = dict(walk(module))
     for name, value in values.items():
-        if name in parts:
-            module = dataclasses.replace(module, **{name: value})
-        elif name in leaves:
-            module = eqx.tree_at(lambda m: get(m, leaves[name]), module, jax.tree.map(_as_leaf, value))
-        elif name in choices:
-            offered = fields[choices[name]].metadata.get("choice")
-            if offered and value not in offered:
-                raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
-            module = _with_static(module, choices[name], value)
-        else:
+        if not any(name in known for known in (parts, leaves, choices)):
             known = ", ".join([*leaves, *choices, *sorted(parts)])
             raise ValueError(f"Argument `{name}` must name a part of the model, one of: {known}.")
+        offered = fields[choices[name]].metadata.get("choice") if name in choices else None
+        if offered and value not in offered:
+            raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
+    module = dataclasses.replace(module, **{name: values[name] for name in parts if name in values})
+    changed = [name for name in leaves if name in values and name not in parts]
+    if changed:
+        at = lambda m: [get(m, leaves[name]) for name in changed]
+        module = eqx.tree_at(at, module, [jax.tree.map(_as_leaf, values[name]) for name in changed])
+    for name in choices:
+        if name in values:
+            module = _with_static(module, choices[name], values[name])
     return module
