@@ -165,7 +165,8 @@ def replace(module: M, **values: PyTree) -> M:
         offered = fields[choices[name]].metadata.get("choice") if name in choices else None
         if offered and value not in offered:
             raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
-    module = dataclasses.replace(module, **{name: values[name] for name in parts if name in values})
+    if exchanged := {name: values[name] for name in parts if name in values}:
+        module = dataclasses.replace(module, **exchanged)
     changed = [name for name in leaves if name in values and name not in parts]
     if changed:
         at = lambda m: [get(m, leaves[name]) for name in changed]

@@ -114,8 +114,9 @@ def test_intervals_cover_the_truth(located):
     rng = np.random.default_rng(0)
     known = [BOUNDS[i] for i in (1, 3, 4)]  # damping, cubic and gain: mass and stiffness weighed, as on a test rig
     covered = np.zeros(3)
+    half = [*located[:2], *located[4:6], *located[-2:]]
     for _ in range(20):
-        fit = fitted(located, rng.normal(size=12), unknowns=known)
+        fit = fitted(half, rng.normal(size=6), unknowns=known)
         assert fit.status == "converged"
         for i, c in enumerate(fit.combinations):
             off = logarithm(c, fit.values) - logarithm(c, TRUTH)

@@ -15,19 +15,22 @@ from .._types import LaneState
 from ..integrate import StrobeLanes, outcome_code
 
 
-class Plan(NamedTuple):
-    """How long to run and what to watch; all static."""
+Count = Int[Array, ""] | int
 
-    discard: int  # revolutions before anything is recorded
-    block: int  # revolutions per block of the exponents' error estimate
+
+class Plan(NamedTuple):
+    """How long to run and what to watch. The two lengths may be arrays: programs then serve every length."""
+
+    discard: Count  # revolutions before anything is recorded
+    block: Count  # revolutions per block of the exponents' error estimate
     blocks: int  # number of blocks; block * blocks revolutions are observed
     keep: int  # strobe states kept, the last ones
     exponents: int  # number of Lyapunov exponents, from the largest down
 
     @property
-    def align(self) -> int:
+    def align(self) -> Count:
         """The last of the discarded revolutions, in which the tangent vectors turn to their directions."""
-        return min(self.block, self.discard) if self.exponents else 0
+        return jnp.minimum(self.block, self.discard) if self.exponents else 0
 
 
 class Observation(NamedTuple):
@@ -104,7 +107,7 @@ def _start_tangents(dimension: int, exponents: int, lanes: int) -> Tangents:
     return orthonormalise(tuple(tuple(wave(i, d) for d in range(dimension)) for i in range(exponents)))[0]
 
 
-def settle(maps: StrobeLanes, y0: LaneState, revolutions: int) -> Lanes:
+def settle(maps: StrobeLanes, y0: LaneState, revolutions: Count) -> Lanes:
     """Run lanes from `y0` without recording anything; a lane that may not start there has failed."""
     count = y0[0].shape[0]
     admitted = maps.map(lambda m, y: outcome_code(m.admit(y)), y0)
@@ -154,6 +157,6 @@ def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan) -> Observation:
 
         carry = (lanes, ring, _start_tangents(dim, plan.exponents, count), zero, sums)
         lanes, ring, _, _, sums = jax.lax.fori_loop(-align, observed, follow, carry)
-        growth = sums[:-1] / plan.block
+        growth = sums[:-1] / jnp.asarray(plan.block, dtype=float)
     strobe = jnp.roll(ring, -(observed % plan.keep), axis=0)
     return Observation(strobe, growth, jnp.stack(lanes.y), lanes.peak, lanes.outcome)

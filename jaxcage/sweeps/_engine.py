@@ -42,7 +42,7 @@ def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @compiled
-def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: int, part: "Part") -> Lanes:
+def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array, part: "Part") -> Lanes:
     return settle(designs.lanes(method, part), part.y, revolutions)
 
 
@@ -168,11 +168,11 @@ def run_lanes(
     designs = systems
     which = np.zeros(lanes, int) if which is None else which
     size = _chunk_size(lanes)
-    static = Plan(*map(int, plan))
-    first = static.discard - static.align
-    share = np.array([first, static.block * static.blocks + static.align]) / (
-        static.discard + static.block * static.blocks
-    )
+    plan = Plan(*map(int, plan))
+    first, watched = int(plan.discard - plan.align), int(plan.align + plan.block * plan.blocks)
+    share = np.array([first, watched]) / (first + watched)
+    alone = jnp.asarray(first)
+    plan = plan._replace(discard=jnp.asarray(plan.discard), block=jnp.asarray(plan.block))
     done = [0, 0]
 
     def report(stage: int) -> Callable[[int], None]:
@@ -184,7 +184,7 @@ def run_lanes(
         return add
 
     def begin(lane: np.ndarray) -> tuple[Any, ...]:
-        got = _settle_chunk(designs, method, first, _part(speed, which, y0, lane))
+        got = _settle_chunk(designs, method, alone, _part(speed, which, y0, lane))
         return *got.y, got.outcome, got.level
 
     *y, outcome, level = _in_chunks(begin, np.arange(lanes), size, report(0))
@@ -192,6 +192,6 @@ def run_lanes(
 
     def follow(lane: np.ndarray) -> Observation:
         rest = jnp.asarray(outcome[lane]), jnp.asarray(level[lane])
-        return _observe_chunk(designs, method, static, _part(speed, which, settled, lane), *rest)
+        return _observe_chunk(designs, method, plan, _part(speed, which, settled, lane), *rest)
 
     return Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))
