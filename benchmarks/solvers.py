@@ -1,8 +1,8 @@
 """What the solver and its step do to the results: edges, exponents and chaotic width of all six cases.
 
-    python -m benchmarks.solvers [--cases 1a,1b] [--quick]
+    python -m benchmarks.solvers [--cases 1a,1b] [--only edge,width] [--quick]
 
-Every solver is used with two step sizes. Three tables are printed and written to `benchmarks/solvers.md`:
+Every solver is used with two step sizes. Tables are printed and written to `benchmarks/solvers.md`, each for itself:
 
 1. Speeds of the exact edges of the synchronous orbit, and how far each solver's are from the finest one's [ppm].
 2. Largest exponents of a calm and a chaotic speed of each case, with standard errors over the starts.
@@ -44,6 +44,7 @@ CALM = 5000.0
 CHAOTIC = {"1a": 10000.0, "1b": 11000.0, "2a": 9500.0, "2b": 9500.0, "3a": 10000.0, "3b": 10000.0}
 """Speeds of the exponents [rpm]."""
 STARTS = 8
+PARTS = ("edge", "exponent", "width", "optimum")
 BOUNDS = {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 60e-6)}
 """Of the search, which is that of `jaxcage design`."""
 
@@ -84,8 +85,10 @@ def optimum(model: jc.CageModel, method: jc.AbstractMethod, quick: bool) -> tupl
     return (*(best.values[name] for name in BOUNDS), best.objective, best.error)
 
 
-def results(solver: str, steps: int, cases: list[str], edges: dict[str, Any], quick: bool) -> dict[str, Any]:
-    """Everything by one solver, in a process of its own: compiled programs are let go of with it."""
+def results(
+    solver: str, steps: int, cases: list[str], edges: dict[str, Any], only: list[str], quick: bool
+) -> dict[str, Any]:
+    """What is asked for by one solver, in a process of its own: compiled programs are let go of with it."""
     jc.enable_x64()
     jc.keep_compiled_programs()
     method, began = jc.method(solver, steps=steps), time.perf_counter()
@@ -93,14 +96,15 @@ def results(solver: str, steps: int, cases: list[str], edges: dict[str, Any], qu
     for name, model in models(cases).items():
         for edge, point in edges.get(name, {}).items():
             found[f"edge|{name}|{edge}"] = float(edge_speed(model, point, method)) * 30 / np.pi
-        if name in CHAOTIC:
+        if name in CHAOTIC and "exponent" in only:
             for kind, rpm in (("calm", CALM), ("chaotic", CHAOTIC[name])):
                 found[f"exponent|{name}|{kind}"] = exponent(model, float(jc.rpm(rpm)), method)
-        if name.startswith("1b"):
+        if name.startswith("1b") and "width" in only:
             grid = jc.rpm(4000, 27500, 8 if quick else 48)
             swept = jc.sweep(model, grid, starts=model.starts(grid[0])[:1], method=method, discard=100, revolutions=60)
             found[f"width|{name}|"] = float(np.mean(swept.label == "chaotic") * 23500)
-        if name == "1b" and isinstance(method, EqualSteps) and can_be_kernel(method.rungs[0].solver):
+        kernel = isinstance(method, EqualSteps) and can_be_kernel(method.rungs[0].solver)
+        if name == "1b" and kernel and "optimum" in only:
             found["optimum|1b|"] = optimum(model, method, quick)
     return found | {"seconds": time.perf_counter() - began}
 
@@ -109,16 +113,20 @@ def main() -> None:
     """Run every solver and write the tables."""
     parser = argparse.ArgumentParser(description="Spread of the results over solvers and step sizes.")
     parser.add_argument("--cases", default="1a,1b,2a,2b,3a,3b")
+    parser.add_argument("--only", default=",".join(PARTS), help="which tables to make, the others are left as they are")
     parser.add_argument("--quick", action="store_true", help="the first two cases' worth of everything, three solvers")
     options = parser.parse_args()
     jc.enable_x64()
     cases = options.cases.split(",")
     methods = METHODS[:3] + METHODS[5:7] if options.quick else METHODS
-    edges = {name: located(model) for name, model in models(cases).items() if name in cases}
+    only = options.only.split(",")
+    if unknown := set(only) - set(PARTS):
+        parser.error(f"--only takes some of {', '.join(PARTS)}, but was given {', '.join(sorted(unknown))}")
+    edges = {name: located(model) for name, model in models(cases).items() if name in cases and "edge" in only}
     print({n: len(e) for n, e in edges.items()}, "edges", flush=True)
     context, found = multiprocessing.get_context("spawn"), {}
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context, max_tasks_per_child=1) as pool:
-        tasks = {pool.submit(results, m[0], m[1], cases, edges, options.quick): m for m in methods}
+        tasks = {pool.submit(results, m[0], m[1], cases, edges, only, options.quick): m for m in methods}
         for task in concurrent.futures.as_completed(tasks):
             solver, steps = tasks[task]
             if task.exception():
@@ -127,43 +135,54 @@ def main() -> None:
             found[tasks[task]] = task.result()
             print(f"{solver} {steps}: {found[tasks[task]].pop('seconds'):.0f} s", flush=True)
             if FINEST in found and not options.quick:  # after each solver: the last ones take long
-                so_far = page({m: found[m] for m in methods if m in found})
-                pathlib.Path(__file__).with_suffix(".md").write_text(so_far)
-    print(page({m: found[m] for m in methods if m in found}))
+                write({m: found[m] for m in methods if m in found}, only)
+    made = tables({m: found[m] for m in methods if m in found})
+    print("\n".join(made[part] for part in PARTS if part in only))
 
 
-def page(found: dict[tuple[str, int], dict[str, Any]]) -> str:
-    """The tables as Markdown."""
+PAGE = pathlib.Path(__file__).with_suffix(".md")
+HEAD = """# Spread over solvers
+
+Made by `python -m benchmarks.solvers`; steps per revolution behind each name.
+"""
+
+
+def write(found: dict[tuple[str, int], dict[str, Any]], only: list[str]) -> None:
+    """The page with the tables in `only` made anew."""
+    old = PAGE.read_text().split("\n## ")[1:] if PAGE.exists() else []
+    kept = dict(zip(PARTS, (f"## {section.rstrip()}\n" for section in old), strict=False))
+    made = tables(found)
+    PAGE.write_text("\n".join([HEAD, *(made[p] if p in only else kept[p] for p in PARTS if p in only or p in kept)]))
+
+
+def tables(found: dict[tuple[str, int], dict[str, Any]]) -> dict[str, str]:
+    """The tables as Markdown, by their part."""
     best = found[FINEST]
     names = [f"{solver} {n}" for solver, n in found]
     keys = lambda kind: [k for k in best if k.startswith(kind + "|")]
     title = lambda key: ", ".join(part for part in key.split("|")[1:] if part)
-    lines: list[str] = [
-        "# Spread over solvers",
-        "",
-        "Made by `python -m benchmarks.solvers`; steps per revolution behind each name.",
-    ]
-    lines += ["", f"## Edges: off from {names[0]} [ppm]", "", f"| edge | rpm | {' | '.join(names[1:])} |"]
+    made: dict[str, list[str]] = {}
+    made["edge"] = lines = [f"## Edges: off from {names[0]} [ppm]", "", f"| edge | rpm | {' | '.join(names[1:])} |"]
     lines += ["|---|" + "---:|" * len(names)]
     for key in keys("edge"):
         off = [1e6 * (row[key] / best[key] - 1) for m, row in found.items() if m != FINEST]
         lines.append(f"| {title(key)} | {best[key]:.3f} | " + " | ".join(f"{o:+.2g}" for o in off) + " |")
-    lines += ["", f"## Largest exponent per revolution, mean and standard error of {STARTS} starts", ""]
+    made["exponent"] = lines = [f"## Largest exponent per revolution, mean and standard error of {STARTS} starts", ""]
     lines += [f"| motion | {' | '.join(names)} |", "|---|" + "---:|" * len(names)]
     for key in keys("exponent"):
         cells = (f"{row[key][0]:.4f} ± {row[key][1]:.4f}" for row in found.values())
         lines.append(f"| {title(key)} | " + " | ".join(cells) + " |")
-    lines += ["", "## Chaotic speeds between 4000 and 27500 rpm [rpm]", ""]
+    made["width"] = lines = ["## Chaotic speeds between 4000 and 27500 rpm [rpm]", ""]
     lines += [f"| design | {' | '.join(names)} |", "|---|" + "---:|" * len(names)]
     for key in keys("width"):
         lines.append(f"| {title(key)} | " + " | ".join(f"{row[key]:.0f}" for row in found.values()) + " |")
-    lines += ["", "## Optimum of 1b", "", "| solver | gap [mm] | eccentricity [um] | objective [rpm] |"]
+    made["optimum"] = lines = ["## Optimum of 1b", "", "| solver | gap [mm] | eccentricity [um] | objective [rpm] |"]
     lines += ["|---|---:|---:|---:|"]
     for (solver, n), row in found.items():
         if "optimum|1b|" in row:
             gap, eccentricity, value, error = row["optimum|1b|"]
             lines.append(f"| {solver} {n} | {gap * 1e3:.4f} | {eccentricity * 1e6:.2f} | {value:.0f} ± {error:.0f} |")
-    return "\n".join(lines) + "\n"
+    return {part: "\n".join(lines) + "\n" for part, lines in made.items()}
 
 
 if __name__ == "__main__":

@@ -19,11 +19,11 @@ Count = Int[Array, ""] | int
 
 
 class Plan(NamedTuple):
-    """How long to run and what to watch. The two lengths may be arrays: programs then serve every length."""
+    """How long to run and what to watch. The first three may be arrays: a program then serves every length."""
 
     discard: Count  # revolutions before anything is recorded
     block: Count  # revolutions per block of the exponents' error estimate
-    blocks: int  # number of blocks; block * blocks revolutions are observed
+    blocks: Count  # number of blocks; block * blocks revolutions are observed
     keep: int  # strobe states kept, the last ones
     exponents: int  # number of Lyapunov exponents, from the largest down
 
@@ -115,10 +115,10 @@ def settle(maps: StrobeLanes, y0: LaneState, revolutions: Count) -> Lanes:
     return jax.lax.fori_loop(0, revolutions, lambda n, c: _advance(maps, c, n)[0], lanes)
 
 
-def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan) -> Observation:
+def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan, rows: int) -> Observation:
     """Follow lanes that `settle` has left and record strobe states and Lyapunov exponents.
 
-    **Arguments:** strobe maps of the lanes; where they are; plan.
+    **Arguments:** strobe maps of the lanes; where they are; plan; rows for its blocks, zero beyond them.
 
     **Returns:** `Observation`. A failed lane is NaN from the revolution it failed in and carries its outcome code.
     """
@@ -138,10 +138,10 @@ def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan) -> Observation:
             return lanes, record(ring, n, lanes)
 
         lanes, ring = jax.lax.fori_loop(0, observed, watch, (lanes, ring))
-        growth = jnp.zeros((plan.blocks, 0, count))
+        growth = jnp.zeros((rows, 0, count))
     else:
         zero = jnp.zeros((plan.exponents, count))
-        sums = jnp.zeros((plan.blocks + 1, plan.exponents, count))
+        sums = jnp.zeros((rows + 1, plan.exponents, count))
 
         def follow(n: Array, carry: tuple) -> tuple:
             # Revolutions n < 0 only align the tangent vectors; their growth goes to the extra row of `sums`.
@@ -150,7 +150,7 @@ def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan) -> Observation:
             runs = lanes.outcome == 0
             tangents, logs = orthonormalise(jax.tree.map(lambda t: jnp.where(runs, t, 1.0), moved))
             total = total + jnp.where(runs, logs, jnp.nan)
-            row = jnp.where(n < 0, plan.blocks, n // plan.block)
+            row = jnp.where(n < 0, rows, n // plan.block)
             sums = jax.lax.dynamic_update_index_in_dim(sums, total, row, 0)
             total = jnp.where((n + 1) % plan.block == 0, zero, total)
             return lanes, record(ring, jnp.maximum(n, 0), lanes), tangents, total, sums

@@ -48,9 +48,10 @@ def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array
 
 @compiled
 def _observe_chunk(
-    designs: "Designs", method: AbstractMethod, plan: Plan, part: "Part", outcome: Array, level: Array
+    designs: "Designs", method: AbstractMethod, plan: Plan, rows: int, part: "Part", outcome: Array, level: Array
 ) -> Observation:
-    return observe(designs.lanes(method, part), Lanes(part.y, jnp.zeros_like(part.speed), outcome, level), plan)
+    lanes = Lanes(part.y, jnp.zeros_like(part.speed), outcome, level)
+    return observe(designs.lanes(method, part), lanes, plan, rows)
 
 
 class Part(NamedTuple):
@@ -146,6 +147,11 @@ def _chunk_size(lanes: int) -> int:
     return min(CHUNKS, key=lambda size: (rounds(size) * (size + CALL), size))
 
 
+def _room(count: int) -> int:
+    """The next of a few sizes, so that few programs serve all counts."""
+    return 1 << max(3, (count - 1).bit_length())
+
+
 def run_lanes(
     systems: AbstractForcedSystem | Sequence[AbstractForcedSystem] | Designs,
     method: AbstractMethod,
@@ -171,8 +177,9 @@ def run_lanes(
     plan = Plan(*map(int, plan))
     first, watched = int(plan.discard - plan.align), int(plan.align + plan.block * plan.blocks)
     share = np.array([first, watched]) / (first + watched)
-    alone = jnp.asarray(first)
-    plan = plan._replace(discard=jnp.asarray(plan.discard), block=jnp.asarray(plan.block))
+    alone, rows = jnp.asarray(first), _room(plan.blocks)
+    lengths = {name: jnp.asarray(getattr(plan, name)) for name in ("discard", "block", "blocks")}
+    roomy = plan._replace(keep=_room(plan.keep), **lengths)
     done = [0, 0]
 
     def report(stage: int) -> Callable[[int], None]:
@@ -192,6 +199,7 @@ def run_lanes(
 
     def follow(lane: np.ndarray) -> Observation:
         rest = jnp.asarray(outcome[lane]), jnp.asarray(level[lane])
-        return _observe_chunk(designs, method, plan, _part(speed, which, settled, lane), *rest)
+        return _observe_chunk(designs, method, roomy, rows, _part(speed, which, settled, lane), *rest)
 
-    return Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))
+    seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))
+    return seen._replace(strobe=seen.strobe[roomy.keep - plan.keep :], growth=seen.growth[: plan.blocks])
