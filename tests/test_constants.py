@@ -56,7 +56,6 @@ def test_identified_constants_let_the_unbalance_act():
     assert chaotic_share(jc.replace(model, eccentricity=0.0), grid) > chaotic_share(model, grid) + 0.3
 
 
-@pytest.mark.slow  # an experiment, run by `.ci/run` after the suite
 def test_the_search_for_constants_runs(tmp_path: pathlib.Path):
     """The smallest size of the experiment: it gets better, and its best values are within the bounds."""
     script = pathlib.Path(__file__).parent.parent / "experiments" / "identify_nu2310.py"

@@ -11,12 +11,7 @@ FOLDER = pathlib.Path(__file__).parent.parent / "experiments"
 SCRIPTS = sorted(p for p in FOLDER.glob("*.py") if p.name not in ("_size.py", "identify_nu2310.py"))
 
 
-LONG = ("gradient_tour", "optimise_gap_and_balance", "sensitivity_and_tolerances")
-"""A minute of compilation each, of what other tests have: run by `.ci/run` after the suite."""
-MARKED = [pytest.param(p, marks=pytest.mark.slow if p.stem in LONG else (), id=p.stem) for p in SCRIPTS]
-
-
-@pytest.mark.parametrize("script", MARKED)
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.stem)
 def test_experiment(script: pathlib.Path, tmp_path: pathlib.Path):
     done = subprocess.run(
         [sys.executable, str(script), "--smoke"], cwd=tmp_path, capture_output=True, text=True, timeout=900

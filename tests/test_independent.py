@@ -100,7 +100,7 @@ def test_default_steps_reach_the_same_periodic_motion(index):
     np.testing.assert_allclose(settled[index] / unit, exact[index] / unit, rtol=0, atol=1e-4)
 
 
-CHAOTIC_RPM = 10250.0, 10500.0, 24500.0
+CHAOTIC_RPM = 10250.0, 24500.0
 LANES = 250
 
 
