@@ -41,8 +41,10 @@ from ._measures import (
 )
 from ._observe import (
     Lanes as Lanes,
+    Lengths as Lengths,
     Observation as Observation,
     Plan as Plan,
+    Room as Room,
     observe as observe,
     settle as settle,
 )

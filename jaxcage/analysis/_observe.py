@@ -15,22 +15,35 @@ from .._types import LaneState
 from ..integrate import StrobeLanes, outcome_code
 
 
-Count = Int[Array, ""] | int
-
-
 class Plan(NamedTuple):
-    """How long to run and what to watch. The first three may be arrays: a program then serves every length."""
+    """How long to run and what to watch."""
 
-    discard: Count  # revolutions before anything is recorded
-    block: Count  # revolutions per block of the exponents' error estimate
-    blocks: Count  # number of blocks; block * blocks revolutions are observed
+    discard: int  # revolutions before anything is recorded
+    block: int  # revolutions per block of the exponents' error estimate
+    blocks: int  # number of blocks; block * blocks revolutions are observed
     keep: int  # strobe states kept, the last ones
     exponents: int  # number of Lyapunov exponents, from the largest down
 
     @property
-    def align(self) -> Count:
+    def align(self) -> int:
         """The last of the discarded revolutions, in which the tangent vectors turn to their directions."""
-        return jnp.minimum(self.block, self.discard) if self.exponents else 0
+        return min(self.block, self.discard) if self.exponents else 0
+
+
+class Lengths(NamedTuple):
+    """A plan's lengths as arrays: one program serves them all."""
+
+    align: Int[Array, ""]
+    block: Int[Array, ""]
+    blocks: Int[Array, ""]
+
+
+class Room(NamedTuple):
+    """Sizes of what is recorded, which are a program's own; a plan may need less of the first two."""
+
+    keep: int
+    blocks: int
+    exponents: int
 
 
 class Observation(NamedTuple):
@@ -107,7 +120,7 @@ def _start_tangents(dimension: int, exponents: int, lanes: int) -> Tangents:
     return orthonormalise(tuple(tuple(wave(i, d) for d in range(dimension)) for i in range(exponents)))[0]
 
 
-def settle(maps: StrobeLanes, y0: LaneState, revolutions: Count) -> Lanes:
+def settle(maps: StrobeLanes, y0: LaneState, revolutions: Int[Array, ""]) -> Lanes:
     """Run lanes from `y0` without recording anything; a lane that may not start there has failed."""
     count = y0[0].shape[0]
     admitted = maps.map(lambda m, y: outcome_code(m.admit(y)), y0)
@@ -115,22 +128,23 @@ def settle(maps: StrobeLanes, y0: LaneState, revolutions: Count) -> Lanes:
     return jax.lax.fori_loop(0, revolutions, lambda n, c: _advance(maps, c, n)[0], lanes)
 
 
-def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan, rows: int) -> Observation:
+def observe(maps: StrobeLanes, lanes: Lanes, lengths: Lengths, room: Room) -> Observation:
     """Follow lanes that `settle` has left and record strobe states and Lyapunov exponents.
 
-    **Arguments:** strobe maps of the lanes; where they are; plan; rows for its blocks, zero beyond them.
+    **Arguments:** strobe maps of the lanes; where they are; how long; what there is room for.
 
-    **Returns:** `Observation`. A failed lane is NaN from the revolution it failed in and carries its outcome code.
+    **Returns:** `Observation`: the last strobe states come last; growth is zero beyond the blocks that were run. A
+    failed lane is NaN from the revolution it failed in and carries its outcome code.
     """
     dim, count = len(lanes.y), lanes.y[0].shape[0]
-    observed, align = plan.block * plan.blocks, plan.align
+    observed = lengths.block * lengths.blocks
     lanes = lanes._replace(peak=jnp.zeros(count))
-    ring = jnp.zeros((plan.keep, dim, count))
+    ring = jnp.zeros((room.keep, dim, count))
 
     def record(ring: Array, n: Array, lanes: Lanes) -> Array:
-        return jax.lax.dynamic_update_index_in_dim(ring, jnp.stack(lanes.y), n % plan.keep, 0)
+        return jax.lax.dynamic_update_index_in_dim(ring, jnp.stack(lanes.y), n % room.keep, 0)
 
-    if plan.exponents == 0:
+    if room.exponents == 0:
 
         def watch(n: Array, carry: tuple) -> tuple:
             lanes, ring = carry
@@ -138,10 +152,10 @@ def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan, rows: int) -> Observati
             return lanes, record(ring, n, lanes)
 
         lanes, ring = jax.lax.fori_loop(0, observed, watch, (lanes, ring))
-        growth = jnp.zeros((rows, 0, count))
+        growth = jnp.zeros((room.blocks, 0, count))
     else:
-        zero = jnp.zeros((plan.exponents, count))
-        sums = jnp.zeros((rows + 1, plan.exponents, count))
+        zero = jnp.zeros((room.exponents, count))
+        sums = jnp.zeros((room.blocks + 1, room.exponents, count))
 
         def follow(n: Array, carry: tuple) -> tuple:
             # Revolutions n < 0 only align the tangent vectors; their growth goes to the extra row of `sums`.
@@ -150,13 +164,13 @@ def observe(maps: StrobeLanes, lanes: Lanes, plan: Plan, rows: int) -> Observati
             runs = lanes.outcome == 0
             tangents, logs = orthonormalise(jax.tree.map(lambda t: jnp.where(runs, t, 1.0), moved))
             total = total + jnp.where(runs, logs, jnp.nan)
-            row = jnp.where(n < 0, rows, n // plan.block)
+            row = jnp.where(n < 0, room.blocks, n // lengths.block)
             sums = jax.lax.dynamic_update_index_in_dim(sums, total, row, 0)
-            total = jnp.where((n + 1) % plan.block == 0, zero, total)
+            total = jnp.where((n + 1) % lengths.block == 0, zero, total)
             return lanes, record(ring, jnp.maximum(n, 0), lanes), tangents, total, sums
 
-        carry = (lanes, ring, _start_tangents(dim, plan.exponents, count), zero, sums)
-        lanes, ring, _, _, sums = jax.lax.fori_loop(-align, observed, follow, carry)
-        growth = sums[:-1] / jnp.asarray(plan.block, dtype=float)
-    strobe = jnp.roll(ring, -(observed % plan.keep), axis=0)
+        carry = (lanes, ring, _start_tangents(dim, room.exponents, count), zero, sums)
+        lanes, ring, _, _, sums = jax.lax.fori_loop(-lengths.align, observed, follow, carry)
+        growth = sums[:-1] / lengths.block.astype(float)
+    strobe = jnp.roll(ring, -(observed % room.keep), axis=0)
     return Observation(strobe, growth, jnp.stack(lanes.y), lanes.peak, lanes.outcome)

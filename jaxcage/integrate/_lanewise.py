@@ -93,7 +93,8 @@ class _Program(NamedTuple):
 
 
 def _program(f: ScalarFunction, shared: int, lanes: int) -> _Program:
-    return (_kept if dataclasses.is_dataclass(f) else _trace)(f, shared, lanes)
+    trace: Callable[..., _Program] = _kept if dataclasses.is_dataclass(f) else _trace
+    return trace(f, shared, lanes)
 
 
 def _trace(f: ScalarFunction, shared: int, lanes: int) -> _Program:

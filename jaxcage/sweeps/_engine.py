@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._types import LaneState
-from ..analysis import Lanes, Observation, Plan, observe, settle
+from ..analysis import Lanes, Lengths, Observation, Plan, Room, observe, settle
 from ..integrate import AbstractMethod, StrobeLanes
 from ..models import AbstractForcedSystem
 
@@ -48,10 +48,10 @@ def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array
 
 @compiled
 def _observe_chunk(
-    designs: "Designs", method: AbstractMethod, plan: Plan, rows: int, part: "Part", outcome: Array, level: Array
+    designs: "Designs", method: AbstractMethod, lengths: Lengths, room: Room, part: "Part", outcome: Array, level: Array
 ) -> Observation:
     lanes = Lanes(part.y, jnp.zeros_like(part.speed), outcome, level)
-    return observe(designs.lanes(method, part), lanes, plan, rows)
+    return observe(designs.lanes(method, part), lanes, lengths, room)
 
 
 class Part(NamedTuple):
@@ -175,11 +175,10 @@ def run_lanes(
     which = np.zeros(lanes, int) if which is None else which
     size = _chunk_size(lanes)
     plan = Plan(*map(int, plan))
-    first, watched = int(plan.discard - plan.align), int(plan.align + plan.block * plan.blocks)
+    first, watched = plan.discard - plan.align, plan.align + plan.block * plan.blocks
     share = np.array([first, watched]) / (first + watched)
-    alone, rows = jnp.asarray(first), _room(plan.blocks)
-    lengths = {name: jnp.asarray(getattr(plan, name)) for name in ("discard", "block", "blocks")}
-    roomy = plan._replace(keep=_room(plan.keep), **lengths)
+    alone, lengths = jnp.asarray(first), Lengths(*map(jnp.asarray, (plan.align, plan.block, plan.blocks)))
+    room = Room(_room(plan.keep), _room(plan.blocks), plan.exponents)
     done = [0, 0]
 
     def report(stage: int) -> Callable[[int], None]:
@@ -199,7 +198,7 @@ def run_lanes(
 
     def follow(lane: np.ndarray) -> Observation:
         rest = jnp.asarray(outcome[lane]), jnp.asarray(level[lane])
-        return _observe_chunk(designs, method, roomy, rows, _part(speed, which, settled, lane), *rest)
+        return _observe_chunk(designs, method, lengths, room, _part(speed, which, settled, lane), *rest)
 
     seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))
-    return seen._replace(strobe=seen.strobe[roomy.keep - plan.keep :], growth=seen.growth[: plan.blocks])
+    return seen._replace(strobe=seen.strobe[room.keep - plan.keep :], growth=seen.growth[: plan.blocks])
