@@ -27,12 +27,14 @@ from jaxcage.orbits import (
 )
 from jaxcage.report import (
     coexisting_notes,
+    contact_notes,
     edge_table,
     loss_table,
     multiplier_cell,
     orbits_document,
     shown_unit,
     stretch_table,
+    touching,
 )
 
 
@@ -415,3 +417,20 @@ def test_search_without_an_edge_says_so(
     monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: steady)
     assert main([command, "1a", "--out", str(tmp_path)]) == 1
     assert f"between 18000 and 27500 rpm: there is no edge to {what}." in capsys.readouterr().err
+
+
+# Case 3a: strobe states of two edges' orbits, over the scale; that of the second is beyond contact by 0.007.
+CLEAR = (13190.0103, (0.39853465, -0.18250099, 0.73636913, 0.32681643))
+TOUCHES = (18945.34, (0.49968944, -0.43603818, 0.58386151, 0.51114893))
+
+
+def test_edges_whose_orbit_touches_the_land_are_named():
+    model, method = jc.case("3a"), jc.method("rodas4", steps=512)
+    edges = {}
+    for name, (rpm, scaled) in (("zone 1 exit", CLEAR), ("zone 2 onset", TOUCHES)):
+        speed = rpm * np.pi / 30
+        state = np.array(scaled) * [float(c) for c in model.scale(speed)]
+        edges[name] = SpecialPoint("torus", speed, speed, state, np.ones(4, dtype=complex), np.zeros(4), 0, True)
+    (sentence,) = contact_notes(model, edges, method)
+    assert sentence.startswith("Zone 2 onset: its orbit touches the land (eps 0.977, contact from 0.97)")
+    assert touching(model, edges, method)["zone 2 onset"] == pytest.approx(0.97666, abs=2e-4)

@@ -12,7 +12,7 @@ from ..integrate import OUTCOMES, AbstractMethod
 from ..io import write_columns
 from ..orbits import LossZones, SynchronousOrbits, loss_zones, synchronous_orbits
 from ..plotting import multiplier_circle, new_figure, orbit_diagram_with_branches
-from ..report import coexisting_notes, edge_table, loss_table, orbits_document, stretch_table
+from ..report import coexisting_notes, contact_notes, edge_table, loss_table, orbits_document, stretch_table
 from ._console import progress_in_stages
 from ._errors import ComputationError, require_at_least, require_range
 from ._inputs import Subject, angular_speed, asks_for_a_method, integration, output_folder, save_figure, subject
@@ -104,6 +104,7 @@ def _notes(searched: Searched, files: dict[str, str]) -> list[str]:
     inner = len(found.points) - len(found.edges)
     return [
         *coexisting_notes(searched.loss),
+        *contact_notes(searched.subject.model, searched.loss.edges, searched.method),
         f"Further bifurcations, on unstable parts: {inner} (listed by --json)",
         f"Settled orbits that are on no branch: {found.missed}",
         f"Time: {searched.seconds:.1f} s",

@@ -13,7 +13,7 @@ from ..orbits import (
     loss_zones,
     synchronous_orbits,
 )
-from ..report import edge_slopes, loss_table, zone_document, zones_document, zones_table
+from ..report import contact_notes, edge_slopes, loss_table, zone_document, zones_document, zones_table
 from ._console import progress_in_stages
 from ._inputs import Subject, integration
 from ._options import ZonesOptions
@@ -51,7 +51,8 @@ def run(options: ZonesOptions) -> Report:
         *([_gradient_table(about, slopes)] if slopes else []),
         zones_table(about.name, explained.zones, about.published, swept.range_rpm),
     ]
-    return Report(document, tables, [*_notes(explained), f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])
+    notes = [*_notes(explained), *contact_notes(about.model, loss.edges, chosen)]
+    return Report(document, tables, [*notes, f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])
 
 
 def _slopes_document(slopes: Sensitivity | None) -> dict[str, Any] | None:

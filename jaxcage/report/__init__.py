@@ -6,6 +6,7 @@
 | `_zone_tables`   | chaotic zones beside published ones                                         |
 | `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
 | `_slopes`        | sensitivities of every exact edge                                           |
+| `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
 | `_statics`       | statics as a table                                                          |
 | `_operating`     | operating speeds against zones                                              |
@@ -16,6 +17,7 @@
 | `_page`          | the page                                                                    |
 """
 
+from ._contact import contact_notes as contact_notes, touching as touching
 from ._findings import AllFailed as AllFailed, Findings as Findings, examine as examine
 from ._map import (
     RPM as RPM,
