@@ -1,4 +1,5 @@
 import fnmatch
+import gc
 import os
 import pathlib
 
@@ -16,6 +17,7 @@ import pytest
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+gc.set_threshold(200_000, 50, 100)  # tracing makes so many objects that looking for dead ones takes a tenth of the time
 if PROGRAMS != "off":
     jax.config.update("jax_compilation_cache_dir", PROGRAMS)
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
