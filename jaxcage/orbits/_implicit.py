@@ -20,6 +20,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar
+from ..integrate import StrobeMap
 from ._newton import DampedNewton, NewtonState
 from ._problem import frozen
 
@@ -105,10 +106,24 @@ def _root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, gues
 
 
 def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any]]:
-    """All numbers of `prepared` in a row, and the function that puts such a row back."""
-    numbers, rest = eqx.partition(prepared, eqx.is_inexact_array)
+    """All numbers of `prepared` that its results depend on in a row, and the function that puts such a row back.
+
+    Of a strobe map these are its field's: system and scale only say how far out a state is and how large an error.
+    """
+    numbers, rest = eqx.partition(prepared, jax.tree.map(_matters, prepared, is_leaf=_is_map))
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: eqx.combine(unravel(row), rest)
+
+
+def _is_map(node: Any) -> bool:
+    return isinstance(node, StrobeMap)
+
+
+def _matters(node: Any) -> Any:
+    if not isinstance(node, StrobeMap):
+        return eqx.is_inexact_array(node)
+    nothing = jax.tree.map(lambda _: False, node)
+    return eqx.tree_at(lambda m: m.field, nothing, jax.tree.map(eqx.is_inexact_array, node.field))
 
 
 @eqx.filter_custom_jvp
