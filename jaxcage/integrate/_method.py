@@ -116,7 +116,7 @@ def run_rung(
         y, peak, error, result, state = carry
         t0 = phase + i.astype(float) * h
         y, wrong, _, state, outcome = solver.step(term, t0, t0 + h, y, field, state, False)
-        if wrong is not None:  # no derivative: it would make the tangents of the loop start over, and is never asked for
+        if wrong is not None:  # without derivative: one would make the tangents of the loop be traced again
             error = error + jax.lax.stop_gradient(sum(jnp.abs(e / s) for e, s in zip(wrong, unit, strict=True)))
         if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
             result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
