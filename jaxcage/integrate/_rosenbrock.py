@@ -103,8 +103,7 @@ def rosenbrock_step(
     rates = near.value
     for i, a_row in enumerate(tableau.a):
         if any(a_row):  # else the stage is evaluated at (t0, y0) like the first
-            place = settle(combine(y0, a_row, stages), t0)
-            rates = settle(field(t0 + tableau.alpha[i] * h, place), t0)
+            rates = field(t0 + tableau.alpha[i] * h, combine(y0, a_row, stages))
         r = combine(rates, tableau.c[i], stages, 1 / h)
         if tableau.gamma_sum[i] != 0.0:
             r = tuple(c + tableau.gamma_sum[i] * h * s for c, s in zip(r, near.phase_derivative, strict=True))
