@@ -47,6 +47,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item, name in names.items():
         if any(fnmatch.fnmatchcase(name, pattern) for pattern in WIDE):
             item.add_marker(pytest.mark.wide)
-    idle = [pattern for pattern in WIDE if not fnmatch.filter(names.values(), pattern)]
+    files = {name.partition("::")[0] for name in names.values()}
+    collected = [pattern for pattern in WIDE if pattern.partition("::")[0] in files]
+    idle = [pattern for pattern in collected if not fnmatch.filter(names.values(), pattern)]
     if len(items) > MOST_OF_THE_SUITE and idle:
         raise pytest.UsageError(f"tests/wide.txt names no test by: {', '.join(idle)}")
