@@ -20,7 +20,7 @@ def run_blocks(page: str) -> tuple[dict, str]:
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
         for block in re.findall(r"```python\n(.*?)```", page, flags=re.S):
-            exec(compile(block, "README.md", "exec"), space)
+            exec(compile(block, "<page>", "exec"), space)
     return space, out.getvalue()
 
 

@@ -110,7 +110,7 @@ def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any
 
     Of a strobe map these are its field's: system and scale only say how far out a state is and how large an error.
     """
-    numbers, rest = eqx.partition(prepared, jax.tree.map(_matters, prepared, is_leaf=_is_map))
+    numbers, rest = eqx.partition(prepared, jax.tree.map(_numbers, prepared, is_leaf=_is_map))
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: eqx.combine(unravel(row), rest)
 
@@ -119,11 +119,11 @@ def _is_map(node: Any) -> bool:
     return isinstance(node, StrobeMap)
 
 
-def _matters(node: Any) -> Any:
+def _numbers(node: Any) -> Any:
+    """Which parts of `node` matter, as a filter of Equinox."""
     if not isinstance(node, StrobeMap):
-        return eqx.is_inexact_array(node)
-    nothing = jax.tree.map(lambda _: False, node)
-    return eqx.tree_at(lambda m: m.field, nothing, jax.tree.map(eqx.is_inexact_array, node.field))
+        return eqx.is_inexact_array
+    return eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
 
 
 @eqx.filter_custom_jvp
