@@ -22,7 +22,6 @@ import numpy as np
 
 import jaxcage as jc
 from jaxcage.integrate._kernel import can_be_kernel
-from jaxcage.integrate._method import EqualSteps
 from jaxcage.orbits import edge_speed
 
 
@@ -103,7 +102,7 @@ def results(
             grid = jc.rpm(4000, 27500, 8 if quick else 48)
             swept = jc.sweep(model, grid, starts=model.starts(grid[0])[:1], method=method, discard=100, revolutions=60)
             found[f"width|{name}|"] = float(np.mean(swept.label == "chaotic") * 23500)
-        kernel = isinstance(method, EqualSteps) and can_be_kernel(method.rungs[0].solver)
+        kernel = isinstance(method, FixedSteps) and can_be_kernel(method.solver)
         if name == "1b" and kernel and "optimum" in only:
             found["optimum|1b|"] = optimum(model, method, quick)
     return found | {"seconds": time.perf_counter() - began}

@@ -10,6 +10,3 @@ Scalar: TypeAlias = Float[Array, ""] | float | int
 
 State: TypeAlias = tuple[Scalar, ...]
 """Coordinates, velocities or a whole state as a tuple of scalars, so that lanes stay innermost under `vmap`."""
-
-LaneState: TypeAlias = tuple[Float[Array, " lanes"], ...]
-"""States of many lanes: one array per component, the lanes along it."""

@@ -15,18 +15,21 @@ from jaxcage.integrate import (
     ControlledSteps,
     Rodas3,
     Rodas4,
-    StrobeLanes,
+    _march,
+    compiled,
     controlled,
-    is_lanewise,
-    lanewise,
+    march,
+    march_with_tangents,
     method,
+    revolution,
     strobe_map,
 )
-from jaxcage.integrate._device import steps_on_device
-from jaxcage.integrate._kernel import Step, run_steps, start_lane
+from jaxcage.integrate._device import march_on_device
+from jaxcage.integrate._kernel import kernel_step
+from jaxcage.integrate._march import Sizes, Tangent, is_elementary
+from jaxcage.integrate._method import TERM
 from jaxcage.models._field import _columns
 from jaxcage.sweeps import _engine
-from jaxcage.sweeps._engine import compiled
 
 
 MODEL = jc.case("1a", "preliminary")
@@ -44,57 +47,144 @@ def lane_state(states):
     return tuple(jnp.asarray(c) for c in np.asarray(states).T)
 
 
-# --- the compiled loop --------------------------------------------------------------------------------------------
+# --- the primitive --------------------------------------------------------------------------------------------------
 
 
-def test_lanewise_gives_each_lane_its_value():
-    f = lambda shared, lane: (shared[0] - 3 * lane[0], jnp.sin(lane[1]) * shared[1] + lane[0])
-    x, y = jnp.linspace(-1, 2, 7), jnp.linspace(0, 3, 7)
-    first, second = lanewise(f, (2.0, 0.5), (x, y))
-    np.testing.assert_allclose(first, 2 - 3 * x, rtol=1e-15)
-    np.testing.assert_allclose(second, np.sin(y) * 0.5 + x, rtol=1e-15)
+def heun(i, moved, watched, fixed):
+    """Heun's method on a Duffing oscillator; the largest |x| is watched."""
+    (x, v), (peak,), (h, cubic) = moved, watched, fixed
+    pull = lambda x, v, t: -0.2 * v + x - cubic * x**3 + 0.3 * jnp.cos(t)
+    t = i * h
+    x1, v1, a = x + h * v, v + h * pull(x, v, t), pull(x, v, t)
+    x, v = x + h / 2 * (v + v1), v + h / 2 * (a + pull(x1, v1, t + h))
+    return (x, v), (jnp.maximum(peak, jnp.abs(x)),)
+
+
+def by_march(z, count=48):
+    (x, v), (peak,) = march(heun, count, (z[0], z[1]), (0.0,), (2 * np.pi / 200, z[2]), multiple=4)
+    return jnp.stack([x, v]), peak
+
+
+def by_loop(z, count=48):
+    moved, watched = (z[0], z[1]), (0.0,)
+    for i in range(count):
+        moved, watched = heun(float(i), moved, watched, (2 * np.pi / 200, z[2]))
+    return jnp.stack(moved), watched[0]
+
+
+LANES = jnp.stack([jnp.linspace(0, 1, 7), jnp.linspace(0.5, -0.2, 7), jnp.linspace(1, 2, 7)], axis=1)
+first = lambda f: lambda z: f(z)[0]
+
+
+def test_a_march_is_its_steps_one_by_one_in_one_lane_and_in_many():
+    for got, expected in zip(by_march(LANES[2]), by_loop(LANES[2]), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=1e-13)
+    for got, expected in zip(jax.vmap(by_march)(LANES), jax.vmap(by_loop)(LANES), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("order, tolerance", [(1, 1e-12), (2, 1e-10), (3, 1e-8)])
+def test_derivatives_of_a_march_of_any_order(order, tolerance):
+    """Against the same steps without the primitive; lanes outside the derivative and inside."""
+    few = functools.partial(by_march, count=12), functools.partial(by_loop, count=12)
+    march_d, loop_d = map(first, few)
+    for _ in range(order):
+        march_d, loop_d = jax.jacfwd(march_d), jax.jacfwd(loop_d)
+    expected = jax.vmap(loop_d)(LANES)
+    np.testing.assert_allclose(jax.vmap(march_d)(LANES), expected, rtol=0, atol=tolerance * np.abs(expected).max())
+    if order == 1:
+        inside = jax.jacfwd(lambda z: jax.vmap(first(few[0]))(z))(LANES)
+        each = np.array([inside[i, :, i] for i in range(len(LANES))])
+        np.testing.assert_allclose(each, expected, rtol=0, atol=tolerance)
+
+
+def test_values_keep_their_place_beside_a_jacobian():
+    """`jacfwd` with what else was computed: the values depend on no direction, and are not mapped over any."""
+    both = lambda z: (by_march(z)[0],) * 2
+    slope, value = jax.vmap(jax.jacfwd(both, has_aux=True))(LANES)
+    np.testing.assert_allclose(value, jax.vmap(first(by_loop))(LANES), rtol=1e-12)
+    assert slope.shape == (7, 2, 3)
+
+
+def test_directions_too_many_for_one_kernel_are_lanes(monkeypatch):
+    expected = jax.jacfwd(first(by_march))(LANES[1])
+    monkeypatch.setattr(_march, "DIRECTIONS", 1)
+    np.testing.assert_allclose(jax.jacfwd(first(by_march))(LANES[1]), expected, rtol=1e-12)
+
+
+def test_lanes_may_have_counts_of_their_own():
+    counts = jnp.array([0, 4, 20, 48])
+    got = jax.vmap(lambda n: by_march(LANES[3], n)[0])(counts)
+    expected = [by_loop(LANES[3], int(n))[0] for n in counts]
+    np.testing.assert_allclose(got, np.stack(expected), rtol=1e-12)
+
+
+def test_tangents_with_and_without_those_of_the_fixed_numbers():
+    z, h = LANES[4], 2 * np.pi / 200
+    tangents, drifts = [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)], [(None, None), (None, None), (None, 1.0)]
+    options = dict(tangents=tangents, fixed_tangents=drifts)
+    for whole in (True, False):
+        y, (peak,), pushed = march_with_tangents(heun, 48, (z[0], z[1]), (0.0,), (h, z[2]), **options, whole=whole)
+        value, highest = by_loop(z)
+        np.testing.assert_allclose(jnp.stack(y), value, rtol=1e-12)
+        np.testing.assert_allclose(peak, highest, rtol=1e-12)
+        np.testing.assert_allclose(np.array(pushed).T, jax.jacfwd(first(by_loop))(z), rtol=1e-10)
 
 
 @pytest.mark.parametrize(
     "f, plain",
     [
-        (lambda s, x: (jnp.where(x[0] > s[0], jnp.exp(x[0]), 0.0),), True),
-        (lambda s, x: (jnp.sum(jnp.stack([x[0], s[0]])),), False),  # arrays
-        (lambda s, x: (jax.lax.fori_loop(0, 3, lambda i, v: v * s[0], x[0]),), False),  # control flow
-        (lambda s, x: (jnp.asarray([1.0, 2.0])[0] * x[0],), False),  # a caught array
+        (lambda x, a: jnp.where(x > a, jnp.exp(x), 0.0), True),
+        (lambda x, a: jnp.sum(jnp.stack([x, a])), False),  # arrays
+        (lambda x, a: jax.lax.fori_loop(0, 3, lambda i, v: v * a, x), False),  # control flow
+        (lambda x, a: jnp.asarray([1.0, 2.0])[0] * x, False),  # a caught array
     ],
 )
 def test_what_can_be_one_loop(f, plain):
-    assert is_lanewise(f, 1, 1) == plain
+    assert is_elementary(lambda i, y, seen, x: ((f(y[0], x[0]),), ()), Sizes(1, 0, 1)) == plain
 
 
 def test_a_caught_tracer_cannot_be_in_the_loop():
     seen = []
 
     def outer(a):
-        seen.append(is_lanewise(lambda s, x: (a * x[0],), 1, 1))
+        seen.append(is_elementary(lambda i, y, seen, x: ((a * y[0],), ()), Sizes(1, 0, 0)))
         return a
 
     jax.make_jaxpr(outer)(1.0)
     assert seen == [False]
 
 
-# --- against the strobe map, which does not use it ------------------------------------------------------------------
+# --- lanes against one lane alone, step by step by the solver -------------------------------------------------------
 
 
 def by_lanes(chosen, directions=()):
     @compiled
     def run(model, speed, y, tangents):
-        moved = StrobeLanes.of(model, chosen, speed).revolution(y, tangents)
-        return jnp.stack(moved.y), [jnp.stack(t) for t in moved.tangents], moved.peak, moved.level
+        one = lambda s, y, t: revolution(strobe_map(model, s, chosen), y, t, jnp.zeros((), jnp.int32))
+        return jax.vmap(one)(speed, y, tangents)
 
     tangents = tuple(lane_state(np.broadcast_to(d, STATES.shape)) for d in directions)
-    return run(MODEL, jnp.asarray(SPEEDS), lane_state(STATES), tangents)
+    moved = run(MODEL, jnp.asarray(SPEEDS), lane_state(STATES), tangents)
+    return jnp.stack(moved.y), [jnp.stack(t) for t in moved.tangents], moved.peak, moved.level
 
 
 @eqx.filter_jit
-def by_map(chosen, speed, y, direction):
-    image = lambda y: jnp.stack(strobe_map(MODEL, speed, chosen)(tuple(y)).y)
+def by_solver(chosen, speed, y, direction):
+    """The solver's own steps, one after the other, as diffrax takes them."""
+    field, solver, h = MODEL.at_speed(speed), chosen.solver, 2 * np.pi / chosen.steps
+
+    def image(y):
+        def step(i, carry):
+            y, state = carry
+            t = i.astype(float) * h
+            y, _, _, state, _ = solver.step(TERM, t, t + h, y, field, state, False)
+            return y, state
+
+        y = tuple(y)
+        state = solver.init(TERM, 0.0, h, y, field)
+        return jnp.stack(jax.lax.fori_loop(0, chosen.steps, step, (y, state))[0])
+
     return jax.jvp(image, (y,), (direction,))
 
 
@@ -105,7 +195,7 @@ def test_kernels_give_the_strobe_map_and_its_derivative(name):
     direction = np.array([1.0, -0.4, 300.0, 200.0])
     y, (tangent,), peak, _ = by_lanes(chosen, [direction])
     for i, (speed, state) in enumerate(zip(SPEEDS, STATES, strict=True)):
-        image, slope = by_map(chosen, speed, jnp.asarray(state), jnp.asarray(direction))
+        image, slope = by_solver(chosen, speed, jnp.asarray(state), jnp.asarray(direction))
         scale = CLEARANCE * np.array([1, 1, speed, speed])
         np.testing.assert_allclose(y[:, i] / scale, image / scale, rtol=0, atol=1e-9)
         np.testing.assert_allclose(tangent[:, i], slope, rtol=0, atol=1e-7 * np.abs(slope).max())
@@ -221,7 +311,7 @@ def test_a_lane_takes_the_rung_that_it_needs():
     chosen = controlled()
     y, _, _, level = by_lanes(chosen)
     assert set(np.asarray(level).tolist()) > {0}
-    for rung, (solver, steps) in enumerate(chosen.rungs):
+    for rung, (solver, steps) in enumerate(chosen.ladder):
         name = {ClassicalRK4: "rk4", Rodas4: "rodas4"}[type(solver)]
         fixed = by_lanes(method(name, steps=steps))[0]
         mine = np.asarray(level) == rung
@@ -326,34 +416,39 @@ def test_run_up_and_down_of_several_designs():
 # --- other devices ------------------------------------------------------------------------------------------------
 
 
-def pieces(solver, tangents):
-    speed = jnp.asarray(np.resize(SPEEDS, 200))
-    maps = StrobeLanes.of(MODEL, method("rodas4"), speed)
-    y = lane_state(np.resize(STATES, (200, 4)))
-    direction = tuple(jnp.ones(200) for _ in range(4))
-    return maps._pieces(), start_lane(solver, y, (direction,) * tangents)
+def on_device(solver, tangents, **options):
+    """A march of 12 steps of 200 lanes by the GPU's kernel, its numbers, and the step."""
+    speeds = jnp.asarray(np.resize(SPEEDS, 200))
+    step, _ = kernel_step(solver, MODEL.at_speed(1.0), MODEL, MODEL.scale(1.0))
+    rows = jax.vmap(lambda s: jnp.stack(kernel_step(solver, MODEL.at_speed(s), MODEL, MODEL.scale(s))[1]))(speeds)
+    alike = np.all(rows == rows[:1], axis=0)
+    fixed = [jnp.asarray(0.0), jnp.asarray(0.02), *(r[0] if a else r for r, a in zip(rows.T, alike, strict=True))]
+    watched = [jnp.full(200, w) for w in step.watched(4)]
+    sizes = Sizes(4, len(watched), len(fixed))
+    moved = [*lane_state(np.resize(STATES, (200, 4))), *([jnp.ones(200)] * 4 * tangents)]
+    if tangents:
+        step = Tangent(step, sizes, ((False,) * len(fixed),) * tangents, step)
+        sizes = step.whole
+    program, size = _march._program(step, sizes), sizes.moved + sizes.watched
+    needed = [i - 1 for i in program.needed if i > size]
+    numbers = [*moved, *watched, *fixed]
+    run = lambda numbers: march_on_device(program, size, needed, jnp.asarray(12), numbers, **options)
+    return run, numbers, step, sizes
 
 
 @pytest.mark.parametrize(
     "solver, tangents", [(ClassicalRK4(), 0), slow(ClassicalRK4(), 2), (Rodas3(), 0), slow(Rodas4(), 0)]
 )
 def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
-    """Blocks with a lane that asks for it go through all steps; the others stay where they are."""
-    numbers, lane = pieces(solver, tangents)
-    mine = jnp.arange(200) < 100
-    expected = compiled(lambda lane: run_steps(solver, numbers, lane, 0.02, 12, True))(lane).row()
-    step = Step.of(solver, numbers, lane, True)
-    got = steps_on_device(step, numbers.shared, lane.row(), numbers.own, 0.02, 12, mine, interpret=True)
-    for new, old, ran in zip(got, lane.row(), expected, strict=True):
-        scale = np.nanmax(np.abs(ran)) + 1e-300
-        np.testing.assert_allclose(new[:128] / scale, ran[:128] / scale, atol=1e-11)
-        np.testing.assert_array_equal(new[128:], old[128:])
+    run, numbers, step, sizes = on_device(solver, tangents, interpret=True)
+    by_loops = lambda *x: _march._loops(jnp.asarray(12), *x, how=_march.How(step, step, sizes, 1))
+    for new, ran in zip(run(numbers), compiled(by_loops)(*numbers), strict=True):
+        scale = np.nanmax(np.abs(ran), initial=1e-300)
+        np.testing.assert_allclose(new / scale, ran / scale, atol=1e-11)
 
 
 @pytest.mark.parametrize("solver, tangents", [(ClassicalRK4(), 0), (ClassicalRK4(), 4), (Rodas4(), 1)])
 def test_the_gpu_kernel_translates_for_cuda(solver, tangents):
     """Every operation of the step has its counterpart in Triton; no GPU is needed to see that."""
-    numbers, lane = pieces(solver, tangents)
-    step = Step.of(solver, numbers, lane, True)
-    run = jax.jit(lambda row: steps_on_device(step, numbers.shared, row, numbers.own, 0.02, 12, jnp.ones(200, bool)))
-    assert "triton" in run.trace(lane.row()).lower(lowering_platforms=("cuda",)).as_text()
+    run, numbers, *_ = on_device(solver, tangents)
+    assert "triton" in jax.jit(run).trace(numbers).lower(lowering_platforms=("cuda",)).as_text()

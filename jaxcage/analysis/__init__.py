@@ -40,7 +40,7 @@ from ._measures import (
     orbit_measures as orbit_measures,
 )
 from ._observe import (
-    Lanes as Lanes,
+    Lane as Lane,
     Lengths as Lengths,
     Observation as Observation,
     Plan as Plan,

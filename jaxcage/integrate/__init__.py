@@ -6,18 +6,17 @@
 | `_explicit`    | the classical Runge-Kutta method as a diffrax solver                               |
 | `_newmark`     | the paper's Newmark-beta as a diffrax solver                                       |
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
-| `_lanewise`    | a scalar function in every lane as one compiled loop                               |
-| `_kernel`      | a step as such a function, with tangent vectors                                    |
-| `_device`      | a revolution as one kernel on a GPU                                                |
+| `_march`       | many steps of a scalar function as a primitive: lanes, tangents, one compiled loop |
+| `_kernel`      | a step of a method as such a function                                              |
+| `_device`      | a march as one kernel on a GPU                                                     |
 | `_strobe`      | the strobe map that everything uses                                                |
-| `_lanes`       | strobe maps of many lanes at once                                                  |
+| `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |
 | `_simulate`    | time histories, speed ramps                                                        |
 | `_results`     | how an integration ended                                                           |
 """
 
 from ._explicit import ClassicalRK4 as ClassicalRK4
-from ._lanes import StrobeLanes as StrobeLanes
-from ._lanewise import is_lanewise as is_lanewise, lanewise as lanewise
+from ._march import compiled as compiled, march as march, march_with_tangents as march_with_tangents
 from ._method import (
     REVOLUTION as REVOLUTION,
     AbstractMethod as AbstractMethod,
@@ -30,6 +29,12 @@ from ._method import (
 )
 from ._newmark import NewmarkBeta as NewmarkBeta
 from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
+from ._revolution import (
+    Moved as Moved,
+    pushed as pushed,
+    revolution as revolution,
+    takes_tangents as takes_tangents,
+)
 from ._rosenbrock import (
     RODAS3 as RODAS3,
     RODAS4 as RODAS4,

@@ -1,66 +1,65 @@
-"""A revolution as one kernel on a GPU: the loop over its steps runs inside, in registers.
+"""A march as one kernel on a GPU: the loop over its steps runs inside, in registers.
 
-The same scalar step as on a CPU, applied to blocks of lanes by Pallas (Triton). A block whose lanes do not ask for the
-rung leaves at once. In interpret mode the kernel runs anywhere, slowly: that is how it is tested without a GPU.
+The same scalar step as on a CPU, applied to blocks of lanes by Pallas (Triton). In interpret mode the kernel runs
+anywhere, slowly: that is how it is tested without a GPU.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Int
-
-from .._types import Scalar
-from ._lanewise import ScalarFunction
+from jaxtyping import Array, Int
 
 
 BLOCK = 128
 """Lanes of a block: four warps of a GPU."""
 
 
-def steps_on_device(
-    step: ScalarFunction,
-    shared: Sequence[Scalar],
-    row: Sequence[Array],
-    own: Sequence[Array],
-    h: Scalar,
-    count: Int[Array, ""] | int,
-    mine: Bool[Array, " lanes"],
+def march_on_device(
+    step: Callable[..., Sequence[Any]],
+    moved: int,
+    needed: Sequence[int],
+    count: Int[Array, ""],
+    numbers: Sequence[Array],
     interpret: bool = False,
 ) -> tuple[Array, ...]:
-    """`count` steps of size h from phase 0 in the blocks in which any lane is `mine`; the others stay as they are.
+    """`count` steps in every lane.
 
-    **Arguments:** step, as `lanewise` takes it, with (phase, step, shared numbers); shared numbers; what the step moves
-    and what it only reads, each an array of lanes; step size; number of steps; lanes that need them.
+    **Arguments:** the step as a function (number of the step, numbers) -> the first `moved` of the numbers; which of
+    the other numbers it uses; how many steps; numbers, each a scalar or an array of lanes, all of one shape.
 
     **Returns:** the moved arrays.
     """
     from jax.experimental import pallas as pl  # not on every platform
     from jax.experimental.pallas import triton
 
-    lanes = row[0].shape[0]
+    shape = max((x.shape for x in numbers), key=len)
+    lanes = math.prod(shape)
     blocks = -(-lanes // BLOCK)
-    filled = lambda x: jnp.pad(x, (0, blocks * BLOCK - lanes), mode="edge")
-    width = max(2, 1 << (len(shared)).bit_length())  # array sizes are powers of two
-    numbers = jnp.stack([jnp.asarray(h, float), *(jnp.asarray(s, float) for s in shared)])
-    numbers = jnp.pad(numbers, (0, width - numbers.size))
+    spread = lambda x: jnp.pad(jnp.broadcast_to(x, shape).reshape(lanes), (0, blocks * BLOCK - lanes), mode="edge")
+    row = list(map(spread, numbers[:moved]))
+    own = {i: spread(numbers[i]) for i in needed if numbers[i].shape}
+    alike = [i for i in needed if not numbers[i].shape]
+    width = max(2, 1 << max(len(alike) - 1, 0).bit_length())  # array sizes are powers of two
+    shared = jnp.pad(jnp.stack([jnp.zeros(()), *(numbers[i] for i in alike)])[1:], (0, width - len(alike)))
     steps = jnp.full((2,), count, jnp.int32)
-    moved, fixed = len(row), len(own)
 
     def kernel(*refs) -> None:  # pyright: ignore[reportMissingParameterType]
-        numbers_ref, steps_ref, mine_ref = refs[:3]
-        given, results = refs[3 : 3 + moved + fixed], refs[3 + moved + fixed :]
-        size = numbers_ref[0]
-        alike = tuple(numbers_ref[1 + i] for i in range(len(shared)))
+        shared_ref, steps_ref = refs[:2]
+        given, results = refs[2 : 2 + moved + len(own)], refs[2 + moved + len(own) :]
+        same = {i: shared_ref[k] for k, i in enumerate(alike)}
         rest = tuple(ref[...] for ref in given[moved:])
-        asked = jnp.max(mine_ref[...]) > 0
-        last = jnp.where(asked, steps_ref[0], 0)
+
+        def one(i: Array, *lane: Array) -> Sequence[Any]:
+            known = same | dict(zip(own, lane[moved:], strict=True))
+            return step(i, *lane[:moved], *(known.get(k, 0.0) for k in range(moved, len(numbers))))
 
         def body(i: Array, carry: tuple[Array, ...]) -> tuple[Array, ...]:
-            now = (i.astype(float) * size, size, *alike)
-            return jax.vmap(lambda *lane: step(now, lane))(*carry, *rest)
+            return tuple(jax.vmap(lambda *lane: one(i.astype(float), *lane))(*carry, *rest))
 
-        after = jax.lax.fori_loop(0, last, body, tuple(ref[...] for ref in given[:moved]))
+        after = jax.lax.fori_loop(0, steps_ref[0], body, tuple(ref[...] for ref in given[:moved]))
         for ref, x in zip(results, after, strict=True):
             ref[...] = x
 
@@ -69,10 +68,10 @@ def steps_on_device(
         kernel,
         out_shape=[jax.ShapeDtypeStruct((blocks * BLOCK,), float)] * moved,
         grid=(blocks,),
-        in_specs=[whole(width), whole(2), *[lane] * (1 + moved + fixed)],
+        in_specs=[whole(width), whole(2), *[lane] * (moved + len(own))],
         out_specs=[lane] * moved,
         compiler_params=triton.CompilerParams(num_warps=BLOCK // 32),
         interpret=interpret,
     )
-    after = call(numbers, steps, filled(mine.astype(jnp.int32)), *map(filled, row), *map(filled, own))
-    return tuple(x[:lanes] for x in after)
+    after = call(shared, steps, *row, *own.values())
+    return tuple(x[:lanes].reshape(shape) for x in after)

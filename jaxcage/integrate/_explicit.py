@@ -44,27 +44,16 @@ def combine(base: State, weights: Any, stages: list[State], factor: Scalar = 1.0
 
 
 def explicit_step(
-    tableau: dfx.ButcherTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State, tangents: tuple[State, ...]
-) -> tuple[State, tuple[State, ...], State, State]:
+    tableau: dfx.ButcherTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State
+) -> tuple[State, State, State]:
     """One step of size h from y0 at phase t0, for a method whose last stage is the first of the next step.
 
-    Tangent vectors take the derivative of the same step: each stage is linearised once for all of them.
-
-    **Returns:** the new state, the new tangent vectors, the first stage, and the error estimate over h as far as it is
-    known before the last stage.
+    **Returns:** the new state, the first stage, and the error estimate over h as far as it is known before the last
+    stage.
     """
     rows = ((), *tableau.a_lower)[:-1]
     stages: list[State] = []
-    pushed: list[list[State]] = [[] for _ in tangents]
     for c, row in zip((0.0, *tableau.c), rows, strict=False):
-        t, y = t0 + float(c) * h, combine(y0, row, stages, h)
-        if not tangents:
-            stages.append(field(t, y))
-            continue
-        near = field.linearise(t, y)
-        stages.append(near.value)
-        for start, images in zip(tangents, pushed, strict=True):
-            images.append(near.times(combine(start, row, images, h)))
+        stages.append(field(t0 + float(c) * h, combine(y0, row, stages, h)))
     zero = tuple(0.0 * c for c in y0)
-    ends = tuple(combine(start, tableau.b_sol, images, h) for start, images in zip(tangents, pushed, strict=True))
-    return combine(y0, tableau.b_sol, stages, h), ends, stages[0], combine(zero, tableau.b_error, stages)
+    return combine(y0, tableau.b_sol, stages, h), stages[0], combine(zero, tableau.b_error, stages)

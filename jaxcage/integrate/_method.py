@@ -10,11 +10,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array
+from jaxtyping import Array, Int
 
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._explicit import ClassicalRK4
+from ._kernel import can_be_kernel, kernel_step
+from ._march import march
 from ._newmark import NewmarkBeta
 from ._results import RESULTS
 from ._rosenbrock import Rodas3, Rodas4
@@ -59,7 +61,13 @@ class AbstractMethod(eqx.Module):
 
     @abc.abstractmethod
     def advance(
-        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+        self,
+        field: AbstractField,
+        system: AbstractForcedSystem,
+        scale: State,
+        y: State,
+        phase: Scalar,
+        parts: Int[Array, ""] | int,
     ) -> Stretch:
         """Go one `parts`-th of a revolution from state `y` at `phase`; `scale` is the magnitude of the components."""
 
@@ -83,28 +91,46 @@ class Rung(NamedTuple):
     steps: int
 
 
-class EqualSteps(AbstractMethod):
-    """Equal steps within a revolution: every lane of a batch does the same work."""
-
-    @property
-    @abc.abstractmethod
-    def rungs(self) -> tuple[Rung, ...]:
-        """What is tried in turn, until the error estimate is small enough."""
-
-    @property
-    @abc.abstractmethod
-    def accepted(self) -> float:
-        """Largest sum of a revolution's error estimates, in units of the system's scale."""
-
-
-def run_rung(
-    rung: Rung, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+def run_steps(
+    solver: dfx.AbstractSolver,
+    steps: Int[Array, ""] | int,
+    field: AbstractField,
+    system: AbstractForcedSystem,
+    scale: State,
+    y: State,
+    phase: Scalar = 0.0,
+    parts: Int[Array, ""] | int = 1,
+    multiple: int | None = None,
 ) -> Stretch:
-    """One `parts`-th of a revolution in a single lane."""
-    solver = rung.solver
-    if rung.steps % parts:
-        raise ValueError(f"Argument `parts` must divide the {rung.steps} steps per revolution, but it is {parts}.")
-    h, count = REVOLUTION / rung.steps, rung.steps // parts
+    """One `parts`-th of a revolution of so many equal steps, in a single lane.
+
+    `multiple` is a number that `steps / parts` is known to be a multiple of, by default itself.
+    """
+    if isinstance(steps, int) and isinstance(parts, int):
+        if steps % parts:
+            raise ValueError(f"Argument `parts` must divide the {steps} steps per revolution, but it is {parts}.")
+        multiple = math.gcd(steps // parts, 4)
+    count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
+    if not can_be_kernel(solver):
+        return _by_solver(solver, count, h, field, system, scale, y, phase)
+    step, numbers = kernel_step(solver, field, system, scale)  # pyright: ignore[reportArgumentType]
+    fixed = (phase, h, *numbers)
+    y, watched = march(step, count, y, step.watched(len(y)), fixed, multiple or 1, step.whole, step.loose)
+    peak, error, *_ = watched
+    return Stretch(y, peak, judge(dfx.RESULTS.successful, y, peak, ESCAPE), error)
+
+
+def _by_solver(
+    solver: Any,
+    count: Any,
+    h: Scalar,
+    field: AbstractField,
+    system: AbstractForcedSystem,
+    scale: State,
+    y: State,
+    phase: Scalar,
+) -> Stretch:
+    """The same with a diffrax solver's own step."""
     term = _term(solver)
     if isinstance(solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
         field, y = ScaledField(field, scale), divide(y, scale)
@@ -130,31 +156,30 @@ def run_rung(
     return Stretch(y, peak, judge(result, y, peak, ESCAPE), error)
 
 
-class FixedSteps(EqualSteps):
+class FixedSteps(AbstractMethod):
     """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
 
     solver: dfx.AbstractSolver
-    steps: int = eqx.field(static=True)
+    steps: int | Int[Array, ""]
+    """An array where one program is to serve all numbers of steps."""
 
     def __check_init__(self):
-        if self.steps < 1:
+        if isinstance(self.steps, int) and self.steps < 1:
             raise ValueError(f"Argument `steps` must be at least 1 per revolution, but {self.steps} was given.")
 
-    @property
-    def rungs(self) -> tuple[Rung, ...]:
-        return (Rung(self.solver, self.steps),)
-
-    @property
-    def accepted(self) -> float:
-        return math.inf
-
     def advance(
-        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+        self,
+        field: AbstractField,
+        system: AbstractForcedSystem,
+        scale: State,
+        y: State,
+        phase: Scalar,
+        parts: Int[Array, ""] | int,
     ) -> Stretch:
-        return run_rung(self.rungs[0], field, system, scale, y, phase, parts)
+        return run_steps(self.solver, self.steps, field, system, scale, y, phase, parts)
 
 
-class ControlledSteps(EqualSteps):
+class ControlledSteps(AbstractMethod):
     """As many equal steps as a revolution needs: the first rung of a ladder with a small enough error estimate.
 
     A cage that stays off the rib for a revolution needs a quarter of the steps that a contact asks for, and neither is
@@ -166,22 +191,18 @@ class ControlledSteps(EqualSteps):
     ladder: tuple[Rung, ...]
     tolerance: float = eqx.field(static=True)
 
-    @property
-    def rungs(self) -> tuple[Rung, ...]:
-        return self.ladder
-
-    @property
-    def accepted(self) -> float:
-        return self.tolerance
-
     def advance(
-        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+        self,
+        field: AbstractField,
+        system: AbstractForcedSystem,
+        scale: State,
+        y: State,
+        phase: Scalar,
+        parts: Int[Array, ""] | int,
     ) -> Stretch:
-        attempts = [lambda r=r: run_rung(r, field, system, scale, y, phase, parts) for r in self.ladder]
-
         def from_rung(i: int) -> Stretch:
-            tried = attempts[i]()
-            if i + 1 == len(attempts):
+            tried = run_steps(*self.ladder[i], field, system, scale, y, phase, parts)
+            if i + 1 == len(self.ladder):
                 return tried
             good = (tried.error <= self.tolerance) & (tried.result == RESULTS.successful)
             return jax.lax.cond(good, lambda: tried, lambda: from_rung(i + 1))
@@ -198,7 +219,13 @@ class AdaptiveSteps(AbstractMethod):
     max_steps: int = eqx.field(static=True, default=100_000)
 
     def advance(
-        self, field: AbstractField, system: AbstractForcedSystem, scale: State, y: State, phase: Scalar, parts: int
+        self,
+        field: AbstractField,
+        system: AbstractForcedSystem,
+        scale: State,
+        y: State,
+        phase: Scalar,
+        parts: Int[Array, ""] | int,
     ) -> Stretch:
         watched = max(WATCHED // parts, 1)
         solution = dfx.diffeqsolve(

@@ -111,36 +111,6 @@ def rosenbrock_step(
     return combine(y0, tableau.m, stages), combine(zero, tableau.e, stages), near.value
 
 
-def rosenbrock_step_with_tangent(
-    tableau: RosenbrockTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State, tangent: State
-) -> tuple[State, State, State]:
-    """A step and its derivative along `tangent`, which uses the factorised stages of the step.
-
-    With (shift I - J) U = r in each stage, (shift I - J) U' = r' + J' U.
-
-    **Returns:** the new state, its derivative, the error estimate.
-    """
-    near, change = jax.jvp(lambda y: field.linearise(t0, y), (y0,), (tangent,))
-    solve = near.solver(1 / (tableau.gamma * h))
-    zero = tuple(jnp.zeros_like(c) for c in near.value)
-    stages: list[State] = []
-    slopes: list[State] = []
-    rates, rates_dot = near.value, change.value
-    for i, a_row in enumerate(tableau.a):
-        if any(a_row):
-            here = field.linearise(t0 + tableau.alpha[i] * h, combine(y0, a_row, stages))
-            rates, rates_dot = here.value, here.times(combine(tangent, a_row, slopes))
-        r, r_dot = combine(rates, tableau.c[i], stages, 1 / h), combine(rates_dot, tableau.c[i], slopes, 1 / h)
-        if tableau.gamma_sum[i] != 0.0:
-            late = tableau.gamma_sum[i] * h
-            r = tuple(c + late * s for c, s in zip(r, near.phase_derivative, strict=True))
-            r_dot = tuple(c + late * s for c, s in zip(r_dot, change.phase_derivative, strict=True))
-        stages.append(solve(r))
-        slopes.append(solve(tuple(c + d for c, d in zip(r_dot, near.change_times(change, stages[-1]), strict=True))))
-    moved = combine(y0, tableau.m, stages), combine(tangent, tableau.m, slopes)
-    return *moved, combine(zero, tableau.e, stages)
-
-
 _SolverState: TypeAlias = None
 
 

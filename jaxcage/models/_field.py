@@ -81,10 +81,6 @@ class AbstractLinearisation(eqx.Module):
         """Jacobian times a vector."""
 
     @abc.abstractmethod
-    def change_times(self, change: Any, u: State) -> State:
-        """The same with the derivative of the Jacobian; `change` is what `jax.jvp` of `linearise` returns."""
-
-    @abc.abstractmethod
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         """r -> (shift I - J)^-1 r, factorised once."""
 
@@ -102,9 +98,6 @@ class DenseLinearisation(AbstractLinearisation):
 
     def times(self, u: State) -> State:
         return _times(self.jacobian, u)
-
-    def change_times(self, change: "DenseLinearisation", u: State) -> State:
-        return _times(change.jacobian, u)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         lu = lu_factor(_shifted(shift, self.jacobian))
@@ -127,10 +120,6 @@ class SecondOrderLinearisation(AbstractLinearisation):
     def times(self, u: State) -> State:
         rate = 1 / self.speed
         return (*(rate * c for c in u[len(self.a_q) :]), *(rate * c for c in _pushed(self, u)))
-
-    def change_times(self, change: "SecondOrderLinearisation", u: State) -> State:
-        rate = 1 / self.speed
-        return (*(jnp.zeros_like(c) for c in u[len(self.a_q) :]), *(rate * c for c in _pushed(change, u)))
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         rate = 1 / self.speed
@@ -199,29 +188,59 @@ class SecondOrderField(AbstractField):
     """dq/dtau = v / speed, dv/dtau = acceleration(tau, q, v) / speed.
 
     If `acceleration` has a method `slopes(q, v)` that returns its derivatives with respect to q and v as rows (or None
-    where it cannot), these are used; else it is differentiated.
+    where it cannot), these are used wherever the field is differentiated by its state; else it is differentiated.
     """
 
     acceleration: Callable[[Scalar, State, State], State]
     speed: Scalar
 
     def __call__(self, tau: Scalar, y: State) -> State:
-        n = len(y) // 2
-        q, v = y[:n], y[n:]
-        rate = 1 / self.speed
-        return (*(c * rate for c in v), *(c * rate for c in self.acceleration(tau, q, v)))
+        return _second_order_rates(self, tau, y)
 
     def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
         n = len(y) // 2
         q, v = y[:n], y[n:]
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
-        given = getattr(self.acceleration, "slopes", lambda q, v: None)(q, v)
+        given = self.slopes(q, v)
         if given is not None:
             a_q, a_v = given
         else:
             a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
             a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
         return SecondOrderLinearisation(value, slope, a_q, a_v, self.speed)
+
+    def slopes(self, q: State, v: State) -> tuple[Matrix, Matrix] | None:
+        """Derivatives of the acceleration as its law gives them, None where it gives none."""
+        return getattr(self.acceleration, "slopes", lambda q, v: None)(q, v)
+
+
+def _rates(field: SecondOrderField, tau: Scalar, y: State) -> State:
+    n = len(y) // 2
+    q, v = y[:n], y[n:]
+    rate = 1 / field.speed
+    return (*(c * rate for c in v), *(c * rate for c in field.acceleration(tau, q, v)))
+
+
+@eqx.filter_custom_jvp
+def _second_order_rates(field: SecondOrderField, tau: Scalar, y: State) -> State:
+    """The field's value; a law's own slopes are half the work of differentiating it, shared by all directions."""
+    return _rates(field, tau, y)
+
+
+@_second_order_rates.def_jvp
+def _second_order_rates_jvp(primals: Any, tangents: Any) -> Any:
+    (field, tau, y), (field_dot, tau_dot, y_dot) = primals, tangents
+    n = len(y) // 2
+    given = field.slopes(y[:n], y[n:])
+    if given is None or all(c is None for c in y_dot):
+        return eqx.filter_jvp(_rates, primals, tangents)
+    moved = tuple(jnp.zeros(()) if c is None else c for c in y_dot)
+    slope = SecondOrderLinearisation((), (), *given, field.speed).times(moved)
+    along = (field_dot, tau_dot)
+    if all(x is None for x in jax.tree.leaves(along, is_leaf=lambda x: x is None)):
+        return _rates(field, tau, y), slope
+    value, drift = eqx.filter_jvp(lambda f, t: _rates(f, t, y), (field, tau), along)
+    return value, tuple(a if b is None else a + b for a, b in zip(slope, drift, strict=True))
 
 
 class ScaledLinearisation(AbstractLinearisation):
@@ -238,9 +257,6 @@ class ScaledLinearisation(AbstractLinearisation):
 
     def times(self, u: State) -> State:
         return divide(self.inner.times(multiply(u, self.scale)), self.scale)
-
-    def change_times(self, change: "ScaledLinearisation", u: State) -> State:
-        return divide(self.inner.change_times(change.inner, multiply(u, self.scale)), self.scale)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         solve = self.inner.solver(shift)

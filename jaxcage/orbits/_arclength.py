@@ -16,12 +16,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..integrate import compiled
 from ..sweeps import cores
 from ._implicit import TOLERANCE, AbstractEquations, solve
 
 
-CHUNK = 4
-"""Lanes per call: one program for any number of curves, and work for every core."""
+LANES = (8, 32)
+"""Lanes per call: two programs for any number of curves, and work for every core. Up to eight lanes cost what one does:
+they share the processor's instructions."""
 FOLLOWING = 1e-7
 """Newton's last step while following, in the unknowns' units: points are then good to about its square."""
 CORRECTIONS = 8
@@ -40,6 +42,11 @@ class OnPlane(AbstractEquations):
     def residual(self, u: Array, prepared: Any) -> tuple[Array, Any]:
         r, aux = self.curve.residual(u, prepared)
         return jnp.append(r, jnp.dot(self.normal, u - self.at)), aux
+
+    def linearised(self, u: Array, given: Any) -> tuple[Array, Array, Any]:
+        r, jacobian, aux = self.curve.linearised(u, given)
+        off = jnp.dot(self.normal, u - self.at)
+        return jnp.append(r, off), jnp.concatenate([jacobian, self.normal[None]]), aux
 
 
 class Corrected(NamedTuple):
@@ -65,8 +72,8 @@ def _correct(curve: AbstractEquations, given: Any, at: Array, normal: Array, tol
 
 
 _axes = eqx.if_array(0)
-_correct_shared = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None)))
-_correct_own = eqx.filter_jit(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None)))
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None)))
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None)))
 
 
 def take(tree: Any, lanes: np.ndarray) -> Any:
@@ -94,11 +101,12 @@ def correct(
     """
     lanes = at.shape[0]
     run = _correct_own if own_given else _correct_shared
-    padded = lambda first: np.minimum(np.arange(first, first + CHUNK), lanes - 1)
+    size = LANES[lanes > LANES[0]]
+    padded = lambda first: np.minimum(np.arange(first, first + size), lanes - 1)
     mine = lambda chosen: take(given, chosen) if own_given else given
     got = lambda k: run(take(curves, k), mine(k), jnp.asarray(at[k]), jnp.asarray(normal[k]), jnp.asarray(tolerance))
     part = lambda first: jax.tree.map(lambda x: np.asarray(x)[: lanes - first], got(padded(first)))
-    firsts = range(0, lanes, CHUNK)
+    firsts = range(0, lanes, size)
     if len(firsts) == 1:
         return part(0)
     with concurrent.futures.ThreadPoolExecutor(cores()) as pool:

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._types import Scalar
-from ..integrate import AbstractMethod, method as make_method, strobe_map
+from ..integrate import AbstractMethod, compiled, method as make_method, strobe_map
 from ..models import AbstractForcedSystem
 from ._orbit import Orbit, periodic_orbit
 
@@ -69,7 +69,7 @@ def _images(
     def step(y: Array) -> Array:
         return jnp.stack(strobe(tuple(y[i] for i in range(y.size))).y)
 
-    advance = eqx.filter_jit(jax.vmap(step))
+    advance = compiled(jax.vmap(step))
     rows = [states]
     for _ in range(periods - 1):
         rows.append(advance(rows[-1]))

@@ -36,6 +36,21 @@ class AbstractEquations(eqx.Module):
     def residual(self, u: Float[Array, " n"], prepared: Any) -> tuple[Float[Array, " n"], Any]:
         """The equations, and what else is wanted at the root."""
 
+    @abc.abstractmethod
+    def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
+        """The equations, their derivative, and what else is wanted at the root."""
+
+
+def differentiated(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
+    """What `linearised` returns, by differentiating the residual."""
+
+    def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
+        r, aux = equations.residual(u, equations.prepare(u, given))
+        return r, (r, aux)
+
+    jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
+    return r, jacobian, aux
+
 
 class Found(eqx.Module):
     """How a solve ended; without derivatives."""
@@ -65,12 +80,13 @@ def solve(
     """
 
     def fn(u: Array, given: Any) -> tuple[Array, Any]:
-        return equations.residual(u, equations.prepare(u, given))
+        r, jacobian, aux = equations.linearised(u, given)
+        return r, (jacobian, aux)
 
     solver = DampedNewton(tolerance, tolerance, at_root=at_root)
     got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
-    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux)
+    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1])
 
 
 def implicit_root(

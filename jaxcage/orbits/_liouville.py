@@ -23,13 +23,14 @@ def divergence_integral(
     where the field is smooth.
     """
     parts = strobe.method.steps if isinstance(strobe.method, FixedSteps) else ADAPTIVE_PARTS
+    h = REVOLUTION / jnp.asarray(parts, dtype=float)
 
     def part(i: Array, carry: tuple) -> tuple:
         y, total = carry
-        tau = jnp.mod(i, parts) * (REVOLUTION / parts)
+        tau = jnp.mod(i, parts).astype(float) * h
         divergence = strobe.field.linearise(tau, y).divergence
         return strobe.part(y, jnp.mod(i, parts), parts).y, total + divergence
 
     start = tuple(state[i] for i in range(state.size)), jnp.zeros(())
     _, total = jax.lax.fori_loop(0, periods * parts, part, start)
-    return total * (REVOLUTION / parts)
+    return total * h

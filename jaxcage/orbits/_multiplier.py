@@ -8,14 +8,13 @@ the same as for edges, gives all of it.
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._parameters import get, parameter_paths
-from ..integrate import AbstractMethod, method as make_method
+from ..integrate import AbstractMethod, compiled, method as make_method
 from ..models import AbstractForcedSystem
 from ._lens import SPEED
 from ._problem import Given, OrbitProblem, make_frame
@@ -43,7 +42,7 @@ class _Moved(NamedTuple):
     """d|mu| / d number of the field."""
 
 
-@eqx.filter_jit
+@compiled
 def _moved(n: int, around: _Expansion) -> _Moved:
     mu, left, right = jnp.linalg.eigvals(around.monodromy), *_vectors(around.monodromy)
     i = jnp.argmax(jnp.abs(mu))

@@ -29,7 +29,7 @@ class NewtonState(eqx.Module):
 
 
 class DampedNewton(optx.AbstractRootFinder):
-    """Newton's method with step halving; the Jacobian by forward differentiation, as strobe maps allow no other.
+    """Newton's method with step halving, for a function that returns its Jacobian matrix first in its auxiliary output.
 
     Ends when the full step is below `atol` + `rtol` |y| in every component; that step is still taken, so that the error
     of the result is of the order of its square. With `at_root`, residual and Jacobian are then evaluated once more, so
@@ -52,12 +52,8 @@ class DampedNewton(optx.AbstractRootFinder):
 
     def step(self, fn: Any, y: Any, args: Any, options: Any, state: NewtonState, tags: Any) -> Any:
         del options, tags
-
-        def evaluate(x: Array) -> tuple[Array, tuple[Array, Any]]:
-            f, aux = fn(x, args)
-            return f, (f, aux)
-
-        jacobian, (f, aux) = jax.jacfwd(evaluate, has_aux=True)(y)
+        f, aux = fn(y, args)
+        jacobian = aux[0]
         first = jnp.isinf(state.step[0])
         known = jnp.where(first, jnp.eye(y.size), state.jacobian)
         ahead = jnp.linalg.solve(known, f)

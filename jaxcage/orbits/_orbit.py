@@ -10,9 +10,9 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, method as make_method, strobe_map
+from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method, strobe_map, takes_tangents
 from ..models import AbstractForcedSystem
-from ._implicit import AbstractEquations, by_columns, implicit_root, numbers_of
+from ._implicit import AbstractEquations, by_columns, differentiated, implicit_root, numbers_of
 from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 
@@ -36,6 +36,19 @@ class OrbitEquations(AbstractEquations):
 
     def residual(self, u: Array, prepared: StrobeMap) -> tuple[Array, None]:
         return self.problem.residual(u, prepared, self.frame), None
+
+    def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
+        """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
+        problem, frame, n = self.problem, self.frame, self.problem.dimension
+        if not takes_tangents(problem.method):
+            return differentiated(self, u, given)
+        drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
+        image, columns, _ = ReturnMap(self.prepare(u, given), frame).pushed(u[:n], drifts)
+        r = problem.orbit_residual(u[:n], image, frame)
+        jacobian = columns - jnp.eye(n, u.size)
+        if problem.free_speed:
+            jacobian = jnp.concatenate([jacobian, jnp.zeros((1, u.size)).at[0, :n].set(frame.phase_direction)])
+        return r, jacobian, None
 
 
 class _Monodromy(eqx.Module):
@@ -137,7 +150,7 @@ def settle(
     return jnp.stack(jax.lax.fori_loop(0, revolutions, lambda _, y: strobe(y).y, y))
 
 
-@eqx.filter_jit
+@compiled
 def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, periods: Any, revolutions: Any) -> Orbit:
     if revolutions is not None:
         guess = settle(frozen(given.system), jax.lax.stop_gradient(speed), problem.method, guess, revolutions)

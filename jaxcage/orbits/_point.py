@@ -10,9 +10,9 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, method as make_method
+from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method
 from ..models import AbstractForcedSystem
-from ._implicit import AbstractEquations, Found, implicit_root, numbers_of, solve
+from ._implicit import AbstractEquations, Found, differentiated, implicit_root, numbers_of, solve
 from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._orbit import OrbitEquations, guess_state, is_free, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
@@ -67,6 +67,9 @@ class PointEquations(AbstractEquations):
         k, remake = numbers_of(strobe)
         _, drift = jax.jvp(lambda k: ReturnMap(remake(k), self.frame)(z), (k,), (slope,))
         return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ drift])]), known
+
+    def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
+        return differentiated(self, u, given)
 
     @property
     def borders(self) -> tuple[Array, Array]:
@@ -213,7 +216,7 @@ def _read_guess(
     return guess_state(system, known_speed, state), known_speed, frozen(jnp.asarray(at, dtype=float)), spin
 
 
-@eqx.filter_jit
+@compiled
 def _find_point(
     problem: OrbitProblem,
     given: Given,

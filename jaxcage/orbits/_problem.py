@@ -8,17 +8,30 @@ twenty of them); how these follow from the design is cheap. `prepare` does the l
 derivative with respect to any number of design parameters costs no more than one with respect to the field's numbers.
 """
 
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
+import jax.extend as jex
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, strobe_map
+from ..integrate import AbstractMethod, StrobeMap, pushed, strobe_map
 from ..models import AbstractForcedSystem
 from ._lens import Parameter, with_value
+
+
+def depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
+    """For each array that f(x) returns, whether it depends on x."""
+    traced = jax.make_jaxpr(f)(x).jaxpr
+    touched = set(traced.invars)
+    reached = lambda v: not isinstance(v, jex.core.Literal) and v in touched
+    for equation in traced.eqns:
+        if any(map(reached, equation.invars)):
+            touched.update(equation.outvars)
+    return list(map(reached, traced.outvars))
 
 
 def frozen(tree: Any) -> Any:
@@ -55,6 +68,24 @@ class ReturnMap(eqx.Module):
         y = tuple(z[i] * scale[i] for i in range(z.size))
         y = jax.lax.fori_loop(0, self.frame.periods, lambda _, y: self.strobe(y).y, y)
         return jnp.stack(y) / scale
+
+    def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any]) -> tuple[Array, Array, Array]:
+        """The image of z; its derivatives with respect to z and, behind these, along each drift of the field's numbers
+        (in a column each); and the sum of the error estimates, in units of the system's scale."""
+        scale, n = self.frame.scale, z.size
+        zero = jnp.zeros(())
+        basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
+        start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)), zero)
+        along = [*[None] * n, *drifts]
+
+        def once(_: Array, carry: tuple) -> tuple:
+            y, tangents, error = carry
+            moved = pushed(self.strobe, y, tangents, along)
+            return moved.y, moved.tangents, error + moved.error
+
+        y, tangents, error = jax.lax.fori_loop(0, self.frame.periods, once, start)
+        columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
+        return jnp.stack(y) / scale, columns / scale[:, None], error
 
     def with_monodromy(self, z: Float[Array, " dim"]) -> tuple[Float[Array, " dim"], Float[Array, "dim dim"]]:
         """The image of z and the derivative there."""
@@ -99,6 +130,14 @@ class OrbitProblem(eqx.Module):
     def prepare(self, u: Float[Array, " n"], given: Given, frame: Frame) -> StrobeMap:
         """The strobe map at the unknowns u: all that depends on speed and design."""
         return strobe_map(*self._located(u, given, frame), self.method)
+
+    def drift(self, u: Float[Array, " n"], given: Given, frame: Frame, i: int) -> list[Any]:
+        """How the field's numbers change with the i-th unknown; None for those that do not depend on it."""
+        row = lambda x: jax.tree.leaves(
+            eqx.filter(self.prepare(u.at[i].set(x), given, frame).field, eqx.is_inexact_array)
+        )
+        _, slope = jax.jvp(row, (u[i],), (jnp.ones_like(u[i]),))
+        return [s if d else None for s, d in zip(slope, depends_on_input(row, u[i]), strict=True)]
 
     def orbit_residual(
         self, z: Float[Array, " dim"], image: Float[Array, " dim"], frame: Frame

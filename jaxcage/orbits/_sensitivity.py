@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..integrate import AbstractMethod, method as make_method
+from ..integrate import AbstractMethod, compiled, method as make_method
 from ..models import AbstractForcedSystem
 from ._branch import SpecialPoint
 from ._cascade import FEIGENBAUM, Cascade
@@ -94,7 +94,7 @@ class _Expansion(NamedTuple):
     """dk / d parameter, in the frame's unit."""
 
 
-@eqx.filter_jit
+@compiled
 def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, " n"]) -> _Expansion:
     n = problem.dimension
     row = lambda v: numbers_of(problem.prepare(v, given, frame))[0]
@@ -108,7 +108,7 @@ def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, "
     return _Expansion(values[0], values[1], slopes[0], slopes[1], jax.jacfwd(row)(u)[:, n])
 
 
-@eqx.filter_jit
+@compiled
 def _pull_back(problem: OrbitProblem, given: Given, frame: Frame, u: Array, weight: Array) -> AbstractForcedSystem:
     """d(weight . k) / d system."""
     row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed), frame))[0]
@@ -126,7 +126,7 @@ class _Unfolding(NamedTuple):
     """d|mu| / d parameter in the frame's unit (at a fold: the drift along the critical direction)."""
 
 
-@eqx.filter_jit
+@compiled
 def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
     n = z.size
     left, right = null_vectors(singular_matrix(kind, around.monodromy))

@@ -16,9 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._types import LaneState
-from ..analysis import Lanes, Lengths, Observation, Plan, Room, observe, settle
-from ..integrate import AbstractMethod, StrobeLanes
+from .._types import State
+from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
+from ..integrate import AbstractMethod, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem
 
 
@@ -27,39 +27,37 @@ CHUNKS = (16, 32, 64, 128, 256, 512)
 CALL = 32
 """What a call costs beside its lanes, in lanes."""
 
-COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512, "xla_cpu_use_fusion_emitters": False}
-"""Eight lanes to an instruction where the processor can (XLA's default is four); and the older of XLA's two emitters:
-the newer one cuts the largest kernels, those with tangent vectors, into functions that compute shared terms again and
-again. Both say nothing to a GPU."""
-
 Progress = Callable[[int, int], None]
 """Called with lanes done and lanes in all."""
 
 
-def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`equinox.filter_jit` for programs over lanes."""
-    return eqx.filter_jit(f, compiler_options=COMPILER_OPTIONS)  # pyright: ignore[reportCallIssue]
-
-
 @compiled
-def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array, part: "Part") -> Lanes:
-    return settle(designs.lanes(method, part), part.y, revolutions)
+def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array, part: "Part") -> Lane:
+    return over_lanes(lambda lane: settle(designs.strobe(method, lane), lane.y, revolutions), part)
 
 
 @compiled
 def _observe_chunk(
     designs: "Designs", method: AbstractMethod, lengths: Lengths, room: Room, part: "Part", outcome: Array, level: Array
 ) -> Observation:
-    lanes = Lanes(part.y, jnp.zeros_like(part.speed), outcome, level)
-    return observe(designs.lanes(method, part), lanes, lengths, room)
+    def one(lane: Part, outcome: Array, level: Array) -> Observation:
+        at = Lane(lane.y, jnp.zeros(()), outcome, level)
+        return observe(designs.strobe(method, lane), at, lengths, room)
+
+    return over_lanes(one, part, outcome, level)
+
+
+def over_lanes(f: Callable[..., Any], *parts: Any) -> Any:
+    """f in every lane, the axis of lanes last."""
+    return jax.vmap(f, out_axes=-1)(*parts)
 
 
 class Part(NamedTuple):
-    """The lanes of a chunk."""
+    """Lanes of a chunk, or one of them."""
 
-    speed: Float[Array, " lanes"]
-    which: Int[Array, " lanes"]
-    y: LaneState
+    speed: Float[Array, "*lanes"]
+    which: Int[Array, "*lanes"]
+    y: State
 
 
 class Designs(eqx.Module):
@@ -78,9 +76,12 @@ class Designs(eqx.Module):
             raise ValueError("Argument `systems` must hold systems that differ in their numbers only.")
         return cls(eqx.combine(jax.tree.map(lambda *x: jnp.stack(x), *arrays), rests[0]), len(systems))
 
-    def lanes(self, method: AbstractMethod, part: Part) -> StrobeLanes:
-        """The strobe maps of a chunk."""
-        return StrobeLanes.of(self.systems, method, part.speed, part.which if self.count > 1 else None)
+    def strobe(self, method: AbstractMethod, lane: Part) -> StrobeMap:
+        """The strobe map of a lane."""
+        systems = self.systems
+        if self.count > 1:
+            systems = jax.tree.map(lambda x: x[lane.which] if eqx.is_array(x) else x, systems)
+        return strobe_map(systems, lane.speed, method)
 
 
 def _numbers(system: AbstractForcedSystem) -> AbstractForcedSystem:

@@ -8,20 +8,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
-from .._types import LaneState
-from ..integrate import AbstractMethod, controlled
+from ..integrate import AbstractMethod, compiled, controlled, revolution
 from ..models import AbstractForcedSystem
-from ._engine import Designs, Part, compiled, run_parts
+from ._engine import Designs, Part, over_lanes, run_parts
 
 
 @compiled
 def _monodromy_chunk(designs: Designs, method: AbstractMethod, part: Part) -> tuple[Array, ...]:
-    maps = designs.lanes(method, part)
-    zero, dim = jnp.zeros_like(part.speed), len(part.y)
-    basis: list[LaneState] = [tuple(zero + float(i == j) for j in range(dim)) for i in range(dim)]
-    moved = maps.revolution(part.y, tuple(basis))
-    columns = jnp.stack([jnp.stack(column) for column in moved.tangents])  # direction, component, lane
-    return jnp.stack(moved.y), jnp.swapaxes(columns, 0, 1), moved.outcome
+    def one(lane: Part) -> tuple[Array, ...]:
+        basis = tuple(tuple(jnp.asarray(float(i == j)) for j in range(len(lane.y))) for i in range(len(lane.y)))
+        moved = revolution(designs.strobe(method, lane), lane.y, basis, jnp.zeros((), jnp.int32))
+        return jnp.stack(moved.y), jnp.stack([jnp.stack(t) for t in moved.tangents], axis=1), moved.outcome
+
+    return over_lanes(one, part)
 
 
 def monodromy(
