@@ -16,11 +16,13 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 import jaxcage as jc
+from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
 METHOD = jc.method("rodas4", steps=256)
 FINE = jc.method("rodas4", steps=1024)
-DOUBLING = 0.265581786  # force at which the period doubles first (DOP853)
+DOUBLING = DUFFING_DOUBLINGS[1][1].value
+"""Force at which the period doubles first."""
 
 
 def numbers(**values):
@@ -73,7 +75,8 @@ def test_branch_passes_the_folds_of_the_hardening_duffing(over_speed):
     """DOP853, all printed digits."""
     upper, lower = over_speed.special
     assert upper.kind == lower.kind == "fold" and upper.edge and lower.edge
-    assert abs(upper.value - 1.77971952) < 1e-7 and abs(lower.value - 1.3242362) < 1e-7
+    assert abs(upper.value - DUFFING_FOLDS["up"].value) < 1e-7
+    assert abs(lower.value - DUFFING_FOLDS["down"].value) < 1e-7
     assert upper.speed == upper.value and upper.parameter == "speed"
     for fold in (upper, lower):
         assert abs(fold.critical - 1) < 1e-6
@@ -113,7 +116,7 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
 
 def test_branch_in_the_force_passes_folds_of_its_own():
     """At the speed of a fold over speed, the fold over force is at the force used there."""
-    speed = 1.77971952
+    speed = DUFFING_FOLDS["up"].value
     orbit = jc.periodic_orbit(hardening(0.2), speed, guess=(0.0, 0.0), revolutions=200, method=METHOD)
     branch = jc.branch(hardening(0.2), orbit, "g", lower=0.05, upper=1.5, method=METHOD)
     assert kinds(branch) == ["fold", "fold"] and branch.parameter == "g"
@@ -163,13 +166,14 @@ def test_doubled_branch_has_twice_the_period(doubling):
     assert np.all(np.array(away) > 1) and abs(away[1] / away[0] - 1) < 0.1
     second = [p for p in doubled.special if p.kind == "period-doubling"]
     assert len(second) == 1 and second[0].periods == 2
-    assert abs(second[0].value - 0.286693158) < 2e-9  # DOP853
+    assert abs(second[0].value - DUFFING_DOUBLINGS[2][1].value) < DUFFING_DOUBLINGS[2][1].tolerance
 
 
 def test_cascade_of_the_double_well_duffing(doubling):
     """DOP853, all printed digits; the limit is where chaos sets in, 0.2923 on a grid of simulations."""
     found = jc.cascade(double_well(), doubling, "g", lower=0.1, upper=0.35, levels=4, method=FINE)
-    np.testing.assert_allclose(found.values, [0.265581786, 0.286693158, 0.291089909, 0.292031000], rtol=0, atol=2e-9)
+    known = [number.value for _, number in DUFFING_DOUBLINGS.values()]
+    np.testing.assert_allclose(found.values, known, rtol=0, atol=2e-9)
     assert [int(p.periods) for p in found.points] == [1, 2, 4, 8]
     np.testing.assert_allclose(found.ratios, [4.80, 4.672], atol=0.005)
     assert found.error < 1e-6
@@ -396,16 +400,15 @@ class VanDerPol(eqx.Module):
 
 
 def test_branch_of_a_self_excited_system_over_its_damping():
-    """Periods of van der Pol's limit cycle at mu = 0.1 and 1 as published; multiplier exp(-7.05893281) by DOP853."""
+    """Periods of van der Pol's limit cycle at mu = 0.1 and 1, and its multiplier, by DOP853."""
     system = jc.ForcedSystem(VanDerPol(**numbers(mu=0.3)), dimension=2)
     orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=30, period="free", method=FINE)
     branch = jc.branch(system, orbit, "mu", lower=0.05, upper=1.2, period="free", method=FINE)
     assert branch.ended == ("range", "range") and branch.special == () and np.all(branch.stable)
     up = np.argsort(branch.value)
     at = lambda y: CubicSpline(branch.value[up], y[up])
-    np.testing.assert_allclose(
-        2 * np.pi / at(branch.speed)([0.1, 1.0]), [6.2871112723, 6.6632868593], rtol=0, atol=1e-6
-    )
+    periods = [VAN_DER_POL[mu][0].value for mu in (0.1, 1.0)]
+    np.testing.assert_allclose(2 * np.pi / at(branch.speed)([0.1, 1.0]), periods, rtol=0, atol=1e-6)
     trivial, other = np.sort(branch.multipliers.real, axis=1).T[::-1]
     # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
     np.testing.assert_allclose(trivial, 1.0, atol=1e-5)

@@ -214,7 +214,7 @@ def test_labels_that_rest_on_too_few_revolutions(label: str, exponent: float, er
 
 
 def test_a_short_sweep_says_so_and_a_long_one_does_not():
-    """The chaotic oscillator of Ueda: 0.1034 per unit time, 0.65 a revolution."""
+    """The chaotic oscillator of Ueda: 0.65 a revolution."""
 
     def ueda(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
         (x,), (u,) = q, v

@@ -1,4 +1,4 @@
-"""J. C. Sprott, Chaos and Time-Series Analysis (2003), appendix A: spectra of Lorenz's and Roessler's systems.
+"""Spectra of Lorenz's and Roessler's systems as J. C. Sprott prints them (Common Chaotic Systems).
 
 They have no period: a unit of time, or a phase of 2 pi, takes its place; exponents are those per unit of time.
 """
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
+from jaxcage.validation._literature import LORENZ, LORENZ_DIMENSION, ROESSLER, Number
 
 
 def lorenz(rho):
@@ -39,17 +40,20 @@ def spectrum(rates, speed, centre, steps, revolutions, discard=50, starts=64):
     return found.exponents[0].mean(axis=0) * speed / (2 * math.pi)
 
 
+def agrees(found, known: tuple[Number, ...]):
+    for ours, theirs in zip(found, known, strict=True):
+        assert ours == pytest.approx(theirs.value, abs=theirs.tolerance)
+
+
 def test_lorenz():
-    """0.9056, 0, -14.5723; the sum is the divergence -41/3, exactly."""
+    """The sum is the divergence -41/3, exactly."""
     found = spectrum(lorenz(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 256, 400)
-    np.testing.assert_allclose(found, [0.9056, 0.0, -14.5723], atol=0.006)
+    agrees(found, LORENZ)
     assert found.sum() == pytest.approx(-41 / 3, abs=1e-5)
     dimension = 2 + found[0] / abs(found[2])
-    assert dimension == pytest.approx(2.062, abs=1e-3)  # Kaplan and Yorke's, as printed
+    assert dimension == pytest.approx(LORENZ_DIMENSION.value, abs=LORENZ_DIMENSION.tolerance)  # Kaplan and Yorke's
 
 
 def test_roessler():
-    """0.0714, 0, -5.3943."""
     found = spectrum(roessler, 1.0, (0.0, -5.0, 0.0), 512, 300, discard=20)
-    np.testing.assert_allclose(found[:2], [0.0714, 0.0], atol=0.002)
-    assert found[2] == pytest.approx(-5.3943, abs=0.02)
+    agrees(found, ROESSLER)

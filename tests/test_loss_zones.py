@@ -8,6 +8,7 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.orbits import SpecialPoint, Stretch, SynchronousOrbits
+from jaxcage.validation._literature import DUFFING_FOLDS
 
 
 METHOD = jc.method("rodas4", steps=256)
@@ -250,7 +251,7 @@ def hardening_system():
     return jc.ForcedOscillator(Hardening(jnp.asarray(0.3)), coordinates=1)
 
 
-FOLDS = 1.3242362, 1.77971952  # by SciPy's DOP853 and Newton's method, all digits
+FOLDS = DUFFING_FOLDS["down"].value, DUFFING_FOLDS["up"].value
 LOWER, UPPER = 0.6, 2.4
 GRID = np.linspace(LOWER, UPPER, 13)
 

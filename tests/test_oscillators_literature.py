@@ -1,4 +1,4 @@
-"""Driven oscillators written as a user would: exponents against literature and exact identities.
+"""Driven oscillators written as a user would: exponents against an independent code and exact identities.
 
 The systems have one coordinate; exponents are converted from per revolution of the drive to per
 unit time with the drive's period 2 pi / omega.
@@ -11,6 +11,11 @@ import pytest
 from jaxcage.integrate import method
 from jaxcage.models import ForcedOscillator, ForcedSystem
 from jaxcage.sweeps import sweep
+from jaxcage.validation._literature import EXPONENTS
+
+
+COEXISTING = "Duffing x'' + .15 x' - x + x^3 = .3 cos t"
+"""It has a periodic orbit beside the chaotic one."""
 
 
 def ueda(tau, q, v, speed):
@@ -38,23 +43,21 @@ def starts(count, seed=0):
     return [tuple(map(float, s)) for s in np.random.default_rng(seed).uniform(-1, 1, (count, 2))]
 
 
-# Largest exponent per unit time and what it is good for. J. C. Sprott, Chaos and Time-Series
-# Analysis (2003), gives three decimals of the first three; of Ueda's oscillator other sources give
-# 0.0999. The rest, and the second value of a row, are means of 4 runs of 20000 periods by an
-# independent code at a tolerance of 1e-12, with their standard errors.
+# Law and frequency of the drive by name in the table of numbers.
 LITERATURE = {
-    "ueda": (ueda, 1.0, [(0.1034, 0.004), (0.1038, 0.0003)]),
-    "duffing .25 .4": (duffing(0.25, 0.4), 1.0, [(0.157, 0.0005), (0.1581, 0.0005)]),
-    "pendulum .05 .6": (pendulum(0.05, 0.6), 0.7, [(0.1415, 0.0005)]),
-    "duffing .3 .5": (duffing(0.3, 0.5), 1.2, [(0.1056, 0.001)]),
-    "duffing .15 .3": (duffing(0.15, 0.3), 1.0, [(0.1840, 0.0005)]),
-    "pendulum .5 1.5": (pendulum(0.5, 1.5), 2 / 3, [(0.1123, 0.0003)]),
+    "Ueda x'' + .05 x' + x^3 = 7.5 sin t": (ueda, 1.0),
+    "Duffing x'' + .25 x' - x + x^3 = .4 cos t": (duffing(0.25, 0.4), 1.0),
+    "pendulum x'' + .05 x' + sin x = .6 cos .7t": (pendulum(0.05, 0.6), 0.7),
+    "Duffing x'' + .3 x' - x + x^3 = .5 cos 1.2t": (duffing(0.3, 0.5), 1.2),
+    COEXISTING: (duffing(0.15, 0.3), 1.0),
+    "pendulum x'' + .5 x' + sin x = 1.5 cos 2t/3": (pendulum(0.5, 1.5), 2 / 3),
 }
 
 
 @pytest.mark.parametrize("name", LITERATURE)
 def test_largest_exponent_of_chaotic_oscillators(name):
-    law, omega, known = LITERATURE[name]
+    law, omega = LITERATURE[name]
+    known = EXPONENTS[name]
     result = sweep(
         ForcedOscillator(law, coordinates=1),
         np.array([omega]),
@@ -64,14 +67,13 @@ def test_largest_exponent_of_chaotic_oscillators(name):
         keep=16,
         method=method("rodas4", steps=64),
     )
-    chaotic = result.label == "chaotic"  # Duffing's at 0.15 has a periodic orbit beside it
-    assert np.sum(chaotic) >= (64 if name == "duffing .15 .3" else 128)
+    chaotic = result.label == "chaotic"
+    assert np.sum(chaotic) >= (64 if name == COEXISTING else 128)
     per_time = omega / (2 * np.pi)
     found = np.mean(result.exponents[chaotic, 0]) * per_time
     error = np.sqrt(np.mean(result.standard_error[chaotic, 0] ** 2) / np.sum(chaotic)) * per_time
-    for value, tolerance in known:
-        assert error < 1.25 * tolerance, f"{found:.5f} +- {error:.5f}"
-        assert abs(found - value) < tolerance + 3 * error
+    assert error < 1.25 * known.tolerance, f"{found:.5f} +- {error:.5f}"
+    assert abs(found - known.value) < known.tolerance + 3 * error
 
 
 def spectrum(law, omega, steps=256, **options):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
+from jaxcage.validation._literature import DUFFING_FOLDS
 
 
 def duffing(tau, q, v, speed):
@@ -80,13 +81,12 @@ def test_number_of_exponents_does_not_change_the_first():
 
 
 def test_run_up_and_run_down_show_the_hysteresis_of_a_hardening_oscillator():
-    """Folds of the hardening Duffing oscillator at 1.77972 (upper branch ends) and 1.32424 (lower branch ends): between
-    them run-up stays on the large orbit and run-down on the small one; outside they agree. Folds: SciPy DOP853 and
-    Newton at 1e-12."""
+    """Between the folds of the hardening Duffing oscillator run-up stays on the large orbit and run-down on the small
+    one; outside they agree."""
     speeds = np.linspace(1.1, 2.0, 37)
     got = jc.run_up_down(HARDENING, speeds, start=(0.5, 0.0), discard=150, revolutions=20, method=FAST)
     apart = got.apart > 0.1
-    inside = (speeds > 1.3242362) & (speeds < 1.77971952)
+    inside = (speeds > DUFFING_FOLDS["down"].value) & (speeds < DUFFING_FOLDS["up"].value)
     assert np.array_equal(apart, inside)
     assert np.all(got.up.label == "periodic-1")
 

@@ -8,6 +8,15 @@ import pytest
 
 from jaxcage.cli import main
 from jaxcage.validation import TOPICS, Comparison, page
+from jaxcage.validation._bifurcations import pendulum_comparisons
+from jaxcage.validation._film import (
+    FULL_BEARINGS,
+    full_bearing_comparisons,
+    grooved_whirl,
+    lund_thomsen_comparisons,
+    nicholas_comparisons,
+)
+from jaxcage.validation._literature import FEIGENBAUM
 
 
 def made(theirs=1.0, ours=1.004, tolerance=0.005):
@@ -37,11 +46,44 @@ def test_quick_topics_pass(topic: str):
     assert all(c.source and c.tolerance > 0 for c in found)
 
 
+def failures(rows: list[Comparison]) -> list[str]:
+    return [c.what for c in rows if not c.passed]
+
+
+@pytest.mark.parametrize("slenderness", [1.0, 0.5, 0.25])
+def test_full_bearing(slenderness: float):
+    rows = full_bearing_comparisons([b for b in FULL_BEARINGS if b[0] == slenderness])
+    assert len(rows) == 8 and failures(rows) == []
+
+
+def test_lund_thomsen():
+    """Every number of their table, with two axial grooves and Reynolds cavitation, within 6 %."""
+    rows = lund_thomsen_comparisons()
+    assert len(rows) == 12 * 9 and failures(rows) == []
+
+
+def test_two_grooves_whirl_near_half_speed():
+    rows = nicholas_comparisons()
+    assert len(rows) == 5 and failures(rows) == []
+    assert all(0.45 < float(grooved_whirl(eps).whirl_ratio) < 0.52 for eps in (0.03, 0.04))
+
+
+def test_cascade_of_the_driven_pendulum():
+    rows = pendulum_comparisons((1, 2, 4, 8))
+    assert len(rows) == 4 and failures(rows) == []
+    *_, before, middle, last = (row.ours for row in rows)
+    assert (middle - before) / (last - middle) == pytest.approx(FEIGENBAUM.value, rel=0.02)
+
+
 def test_page_at_the_root_is_whole():
     """What is committed was made by the whole command: every topic, far more than 40 numbers, none of which fails."""
-    text = (Path(__file__).parents[1] / "VALIDATION.md").read_text(encoding="utf-8")
+    root = Path(__file__).parents[1]
+    text = (root / "VALIDATION.md").read_text(encoding="utf-8")
     assert all(f"## {topic.capitalize()}" in text for topic in TOPICS)
-    assert text.count("| pass |") >= 100 and "FAILS**" not in text and "`jaxcage validate`." in text
+    count = text.count("| pass |")
+    assert count >= 100 and "FAILS**" not in text and "`jaxcage validate`." in text
+    assert f"{count} of {count} comparisons pass" in text
+    assert f" {count} numbers beside independent ones" in (root / "README.md").read_text(encoding="utf-8")
 
 
 def test_command(capsys: pytest.CaptureFixture[str], tmp_path: Path):

@@ -1,15 +1,18 @@
 """Numbers of this package beside numbers that others printed, or that follow from a closed form or another program.
 
-| module          | responsibility                                                              |
-|-----------------|-----------------------------------------------------------------------------|
-| `_comparison`   | one number beside another, with the tolerance that its source supports      |
-| `_film`         | oil film: closed forms, printed tables of finite bearings                   |
-| `_statics`      | loads of the rollers, kinematics                                            |
-| `_contact`      | restitution and impact                                                      |
-| `_exponents`    | Lyapunov exponents of well-known systems                                    |
-| `_bifurcations` | periodic orbits and their bifurcations                                      |
-| `_cage`         | the cage: unbalance response, whirl, another integration                    |
-| `_page`         | all of it as one page of Markdown                                           |
+| module            | responsibility                                                         |
+|-------------------|------------------------------------------------------------------------|
+| `_comparison`     | one number beside another, with the tolerance that its source supports |
+| `_literature`     | numbers that others found, each once: the page and the tests read them |
+| `_film`           | oil film: closed forms, printed tables of finite bearings              |
+| `_finite_volumes` | a bearing of finite length a second time, in SciPy                     |
+| `_statics`        | loads of the rollers, kinematics                                       |
+| `_contact`        | restitution and impact                                                 |
+| `_exponents`      | Lyapunov exponents of well-known systems                               |
+| `_bifurcations`   | periodic orbits and their bifurcations                                 |
+| `_shooting`       | doublings and exponents of oscillators a second time, in SciPy         |
+| `_cage`           | the cage: unbalance response, whirl, another integration               |
+| `_page`           | all of it as one page of Markdown                                      |
 """
 
 from collections.abc import Callable, Mapping

@@ -3,6 +3,8 @@
 import dataclasses
 from typing import Any
 
+from ._literature import Number
+
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
@@ -30,6 +32,11 @@ class Comparison:
 def within(what: str, source: str, theirs: float, ours: Any, tolerance: float) -> Comparison:
     """A comparison with an absolute tolerance."""
     return Comparison(what, source, float(theirs), float(ours), float(tolerance))
+
+
+def beside(what: str, number: Number, ours: Any, sample: float = 0.0) -> Comparison:
+    """A comparison with a number of `_literature`; `sample` is what ours is uncertain by as a finite sample."""
+    return within(what, number.source, number.value, ours, number.tolerance + sample)
 
 
 def within_share(what: str, source: str, theirs: float, ours: Any, share: float, least: float = 0.0) -> Comparison:

@@ -19,8 +19,7 @@ def page(found: Mapping[str, Sequence[Comparison]], made_by: str) -> str:
         "",
         "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
         "where theirs was computed on a coarse grid or ours is a finite sample. FAILS marks a difference beyond it.",
-        "The numbers of Raimondi and Boyd, Harris and Taylor were entered from memory of the printed tables and have",
-        "not been held against the pages themselves.",
+        "A source is one that can be opened, or a second computation that shares no code with what it is held against.",
     ]
     for topic, rows in found.items():
         lines += ["", f"## {topic.capitalize()}", "", "| what | theirs | ours | difference | tolerance | | source |"]

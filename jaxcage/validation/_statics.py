@@ -4,6 +4,7 @@ import math
 
 import equinox as eqx
 import numpy as np
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ..bearing import (
@@ -14,13 +15,13 @@ from ..bearing import (
     load_distribution,
     nu2310,
 )
-from ._comparison import Comparison, within, within_share
+from ._comparison import Comparison, beside, within, within_share
+from ._literature import LARGEST_ROLLER_LOAD
 
 
-NSK = "NSK, Rolling Bearings, CAT. No. E728g, section 5: Q_max = 4.08 F/Z for rollers without clearance"
-HARRIS = "T. A. Harris, Rolling Bearing Analysis, load distribution integral J_r of line contacts (Sjoevall)"
+SJOEVALL = "Sjoevall's load integral of line contacts, by SciPy's quad"
 PALMGREN = "A. Palmgren: delta = 3.84e-5 Q^0.9/l^0.8 in N and mm"
-SCIPY = "13 line contacts added up in NumPy, the shift by SciPy's brentq"
+SCIPY = "line contacts added up in NumPy, the shift by SciPy's brentq"
 ROLLING = "rolling without slip, (1 - d_w/d_m)/2"
 CENTRIFUGAL = "m w^2 d_m/2 of a steel cylinder of 7800 kg/m^3"
 
@@ -35,19 +36,29 @@ def _many_rollers(clearance: float) -> Bearing:
     return Bearing(0.05, 0.11, 0.04, 400, 5e-4, 0.027, 0.0921, 0.065, clearance, 3e-4)
 
 
+def load_integral(zone: float) -> float:
+    """J_r = 1/(2 pi) int (1 - (1 - cos a)/(2 zone))^(10/9) cos a da over the loaded angles, to 1e-12."""
+    half = math.acos(1 - 2 * zone)
+    share = lambda a: max(1 - (1 - math.cos(a)) / (2 * zone), 0.0) ** (10 / 9) * math.cos(a)
+    return quad(share, 0.0, half, epsabs=0.0, epsrel=1e-12, limit=200)[0] / math.pi
+
+
 def _load_factors() -> list[Comparison]:
     free = float(load_distribution(_many_rollers(0.0), 4450.0).max_load) * 400 / 4450
-    rows = [within("Q_max Z/F without clearance", NSK, 4.08, free, 0.006)]
+    rows = [
+        beside("Q_max Z/F without clearance", LARGEST_ROLLER_LOAD, free),
+        within_share("load integral at zone parameter 0.5", SJOEVALL, load_integral(0.5), 1 / free, 1e-4),
+    ]
     # J_r = F/(Z Q_max) at the load zone parameter 1/2 - G_r/(4 delta_s): the load that gives it is solved for.
     bearing = _many_rollers(4e-6)
 
     def parameter(load: float) -> float:
         return 0.5 * (1 - 4e-6 / (2 * float(load_distribution(bearing, load).shaft_shift)))
 
-    for zone, printed in ((0.2, 0.1737), (0.3, 0.2055), (0.4, 0.2286)):
+    for zone in (0.1, 0.2, 0.3, 0.4):
         load = float(brentq(lambda load: parameter(load) - zone, 10.0, 1e6, xtol=1e-3))  # pyright: ignore
         ours = load / (400 * float(load_distribution(bearing, load).max_load))
-        rows.append(within_share(f"load distribution integral at zone parameter {zone}", HARRIS, printed, ours, 0.005))
+        rows.append(within_share(f"load integral at zone parameter {zone}", SJOEVALL, load_integral(zone), ours, 1e-4))
     return rows
 
 
@@ -60,23 +71,26 @@ def _contact_law() -> list[Comparison]:
     return rows
 
 
-def _by_scipy(load: float, clearance: float) -> tuple[float, float]:
-    """Shift of the shaft [m] and largest roller load [N] of NU2310, one roller at the bottom."""
-    raceway = 8.06e4 * 27.0 ** (8 / 9) * 1e3 ** (10 / 9)
+def loads_by_scipy(load: float, clearance: float, rollers: int, length: float) -> tuple[float, np.ndarray]:
+    """Shift of the shaft [m] and loads of the rollers [N], one of them at the bottom; nothing of it is the package's.
+
+    **Arguments:** load [N]; clearance of the diameters [m]; rollers; their length [mm].
+    """
+    raceway = 8.06e4 * length ** (8 / 9) * 1e3 ** (10 / 9)
     both = raceway / 2 ** (10 / 9)
-    direction = np.cos(2 * np.pi * np.arange(13) / 13)
+    direction = np.cos(2 * np.pi * np.arange(rollers) / rollers)
     loads = lambda shift: both * np.maximum(shift * direction - clearance / 2, 0.0) ** (10 / 9)
     shift = float(brentq(lambda s: loads(s) @ direction - load, clearance / 2, 1e-3, xtol=1e-16))  # pyright: ignore
-    return shift, float(loads(shift)[0])
+    return shift, loads(shift)
 
 
 def _discrete() -> list[Comparison]:
     rows = []
     for clearance, load in ((0.0, 4450.0), (40e-6, 4450.0), (40e-6, 18600.0)):
         bearing = eqx.tree_at(lambda b: b.radial_clearance, nu2310(), clearance)
-        found, (shift, largest) = load_distribution(bearing, load), _by_scipy(load, clearance)
+        found, (shift, loads) = load_distribution(bearing, load), loads_by_scipy(load, clearance, 13, 27.0)
         where = f"NU2310, {load:g} N, clearance {1e6 * clearance:g} um"
-        rows.append(within_share(f"{where}, Q_max [N]", SCIPY, largest, found.max_load, 1e-6))
+        rows.append(within_share(f"{where}, Q_max [N]", SCIPY, loads[0], found.max_load, 1e-6))
         rows.append(within_share(f"{where}, shift [um]", SCIPY, 1e6 * shift, 1e6 * found.shaft_shift, 1e-6))
     return rows
 
