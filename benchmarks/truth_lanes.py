@@ -29,11 +29,11 @@ class Lane(NamedTuple):
     failed: bool
     """Whether the package says that it failed or is inaccurate."""
     error: float
-    """Distance of the coordinates from the reference [clearances]; NaN where either of them has none."""
+    """Distance of the coordinates from the reference [clearances]; NaN where one of them has none."""
     known: bool
     """Whether two integrators of the reference agree."""
     peak: float
-    """Largest eccentricity ratio by the reference."""
+    """Largest eccentricity ratio by the reference; infinite where the cage leaves for good."""
 
     @property
     def off(self) -> bool:
@@ -59,7 +59,9 @@ def compare(model: jc.CageModel, speeds: np.ndarray, starts: np.ndarray) -> list
         error, known, peak = math.nan, False, math.nan
         try:
             exact = reference.confirmed(field, starts[i, j])
-        except (reference.TooLong, OverflowError):
+        except reference.Outside:
+            error, known, peak = math.inf, True, math.inf
+        except reference.TooLong:
             pass
         else:
             known, peak = exact.spread <= CERTAIN, exact.peak
@@ -98,17 +100,18 @@ def report(seeds: Sequence[int]) -> None:
         begin = time.perf_counter()
         groups: dict[str, list[Lane]] = {"from a start": [], "settled": []}
         worst = []
-        print(
-            f"\nOne revolution, {'wide' if wide else 'narrow'} models\n{HEAD}{'median':>9s}{'largest':>9s}", flush=True
-        )
+        print(f"\nOne revolution, {'wide' if wide else 'narrow'} models\n{HEAD}", flush=True)
         for seed in seeds:
             model, speeds = reference.random_model(seed, wide), reference.random_speeds(seed, SPEEDS, wide)
             first = states(model, speeds, seed)
             settled = jc.sweep(model, speeds, starts=first, discard=0, revolutions=SETTLING, exponents=0, blocks=1)
-            later = np.where(np.isfinite(settled.last), settled.last, first)
+            later = np.where(settled.failed[..., None], first, settled.last)
             of_model = []
-            for name, y in (("from a start", first), ("settled", later)):
-                lanes = compare(model, speeds, y)
+            for name, y, there in (
+                ("from a start", first, np.ones_like(settled.failed)),
+                ("settled", later, ~settled.failed),
+            ):
+                lanes = [lane for lane, ran in zip(compare(model, speeds, y), there.ravel(), strict=True) if ran]
                 groups[name] += lanes
                 of_model += lanes
                 worst += [(seed, name, lane) for lane in lanes if lane.off]

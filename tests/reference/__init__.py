@@ -17,6 +17,7 @@ and `benchmarks.truth`.
 from ._field import Field as Field, field as field, numbers_of as numbers_of
 from ._integrate import (
     Confirmed as Confirmed,
+    Outside as Outside,
     Revolutions as Revolutions,
     TooLong as TooLong,
     confirmed as confirmed,

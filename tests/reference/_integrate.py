@@ -19,12 +19,18 @@ REVOLUTION = 2 * math.pi
 STEPS = 512
 """Fewest steps of a revolution."""
 TOLERANCE = 1e-11
+ESCAPE = 2.0
+"""Eccentricity ratio beyond which the cage is outside."""
 STEP = 1e-20
 """Imaginary part that carries a tangent: its square is lost beside 1."""
 
 
 class TooLong(RuntimeError):
     """The field was evaluated more often than allowed."""
+
+
+class Outside(ArithmeticError):
+    """The cage left the model for good: its integration ends where the state grows without bound."""
 
 
 class Revolutions(NamedTuple):
@@ -49,12 +55,16 @@ def _counted(f: Callable, budget: float) -> tuple[Callable, list[int]]:
     return counted, count
 
 
-def _one(f: Callable, z: np.ndarray, method: str, tolerance: float, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Phases and states at every step of one revolution."""
+def _one(
+    field: Field, f: Callable, z: np.ndarray, method: str, tolerance: float, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Phases and states at every step of one revolution; states over the scale, a tangent perhaps behind them."""
     done = solve_ivp(
         f, (0.0, REVOLUTION), z, method=method, rtol=tolerance, atol=0.1 * tolerance, max_step=REVOLUTION / steps
     )
     if not done.success or not np.all(np.isfinite(done.y)):
+        if np.max(field.excursion(done.y[: field.scale.size] * field.scale[:, None])) > ESCAPE:
+            raise Outside(f"{method} left at tau = {done.t[-1]:g}: {done.message}")
         raise FloatingPointError(f"{method} stopped at tau = {done.t[-1]:g}: {done.message}")
     return done.t, done.y
 
@@ -89,14 +99,20 @@ def revolutions(
     **Arguments:** field; state in SI units; SciPy's name of an integrator; relative tolerance, the absolute one being a
     tenth of it in units of the scale; fewest steps of a revolution; most evaluations of the field.
 
-    **Raises:** `TooLong`, or `FloatingPointError` where the integrator gives up.
+    **Raises:** `TooLong`; `ValueError` or `ArithmeticError` where the integrator gives up.
     """
     unit = field.scale
-    f, used = _counted(lambda tau, z: np.array(field(tau, (z * unit).tolist())) / unit, budget)
+
+    def scaled(tau: float, z: np.ndarray) -> np.ndarray:
+        rate = np.array(field(tau, (z * unit).tolist())) / unit
+        # A trial step far outside can ask for the root of a negative film: the integrator then has to shorten it.
+        return np.full(unit.size, np.nan) if np.iscomplexobj(rate) else rate
+
+    f, used = _counted(scaled, budget)
     z = np.asarray(state, dtype=float) / unit
     strobe, peak = [z * unit], []
     for _ in range(count):
-        tau, y = _one(f, z, method, tolerance, steps)
+        tau, y = _one(field, f, z, method, tolerance, steps)
         z = y[:, -1]
         strobe.append(z * unit)
         peak.append(_largest(field, tau, y * unit[:, None]))
@@ -133,7 +149,7 @@ def growth(
     z = np.concatenate([np.asarray(state, dtype=float) / unit, w / np.linalg.norm(w)])
     found = []
     for _ in range(count):
-        z = _one(f, z, method, tolerance, steps)[1][:, -1]
+        z = _one(field, f, z, method, tolerance, steps)[1][:, -1]
         size = np.linalg.norm(z[n:])
         z[n:] /= size
         found.append(math.log(size))
@@ -158,14 +174,19 @@ PAIR = (("LSODA", 1e-11), ("DOP853", 1e-11), ("Radau", 1e-10))
 def confirmed(field: Field, state: Sequence[float] | np.ndarray, count: int = 1, budget: float = 2e5) -> Confirmed:
     """Integrate `count` revolutions twice, by the first two of `PAIR` that need at most `budget` evaluations each.
 
-    **Raises:** `TooLong` where no two of them finish.
+    **Raises:** `Outside` where two of them say that the cage leaves; `TooLong` where no two of them finish.
     """
     found: list[Revolutions] = []
+    left = 0
     for method, tolerance in PAIR:
         try:
             found.append(revolutions(field, state, count, method=method, tolerance=tolerance, budget=budget))
-        except (TooLong, FloatingPointError, OverflowError, ZeroDivisionError):
+        except Outside:
+            left += 1
+        except (TooLong, ValueError, ArithmeticError):
             continue
+        if left == 2:
+            raise Outside("Two integrators say that the cage leaves.")
         if len(found) == 2:
             first, second = found
             apart = np.abs(first.strobe - second.strobe)[:, : field.coordinates] / field.clearance
