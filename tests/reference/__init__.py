@@ -1,0 +1,30 @@
+"""The cage model written a second time, in plain Python, and integrated by SciPy.
+
+| module        | responsibility                                                               |
+|---------------|------------------------------------------------------------------------------|
+| `_land`       | film and contact of the lands, in polar coordinates                          |
+| `_statics`    | viscosity, loaded zone, restitution: what is worked out once                 |
+| `_pulses`     | the impact of a roller on a bar, and the train of all of them                |
+| `_field`      | the equations of motion of a dictionary of numbers, cage alone or with a rib |
+| `_integrate`  | revolutions and the growth of a tangent vector                               |
+| `_random`     | random legal models by seed                                                  |
+
+Formulas come from the physics page and, where that leaves a detail open, from the package's docstrings; none of its
+code is used but what makes a model and lists its numbers. The film of finite length is left out. Shared by the tests
+and `benchmarks.truth`.
+"""
+
+from ._field import Field as Field, field as field, numbers_of as numbers_of
+from ._integrate import (
+    Confirmed as Confirmed,
+    Outside as Outside,
+    Revolutions as Revolutions,
+    TooLong as TooLong,
+    confirmed as confirmed,
+    growth as growth,
+    revolutions as revolutions,
+)
+from ._land import film_in_polar as film_in_polar, ramp as ramp
+from ._pulses import Pulse as Pulse, pulse as pulse
+from ._random import random_model as random_model, random_speeds as random_speeds, random_state as random_state
+from ._statics import half_angle as half_angle, hunt_crossley_number as hunt_crossley_number, viscosity as viscosity

@@ -1,0 +1,115 @@
+"""The impact of a roller on a cage bar, (14), and the train of impacts of all rollers, as a Fourier series."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+
+PANELS, NODES = 48, 12
+
+
+class Pulse(NamedTuple):
+    """The force of one impact at the nodes of a quadrature over the time of contact."""
+
+    time: np.ndarray
+    """[s], from the first touch."""
+    force: np.ndarray
+    """Q_cw [N]."""
+    weight: np.ndarray
+    """Of each node in an integral over time [s]."""
+
+
+def pulse(oscillator: dict[str, Any], roller_mass: float, speed: float, window: float = math.inf) -> Pulse:
+    """Solve (14) from the touch at approach speed [m/s] until the roller is out of the bar's reach, or `window` [s].
+
+    While they are apart the roller flies and the bar swings, both in closed form.
+    """
+    k, bar, mass = oscillator["contact_stiffness"], oscillator["bar_stiffness"], oscillator["bar_mass"]
+    swing = math.sqrt(bar / mass)
+    depth = (roller_mass * speed**2 / k) ** (9 / 19)
+    unit, length = depth / speed, depth
+
+    def rates(s: float, y: np.ndarray) -> list[float]:
+        q = k * max((y[0] - y[1]) * length, 0.0) ** (10 / 9) * unit / speed
+        return [y[2], y[3], -q / roller_mass, (q - bar * y[1] * length * unit / speed) / mass]
+
+    def apart(s: float, y: np.ndarray) -> float:
+        return y[0] - y[1]
+
+    apart.terminal, apart.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
+    y, start, found = np.array([0.0, 0.0, 1.0, 0.0]), 0.0, []
+    while start < window / unit:
+        end = min(window / unit, start + 1e6)
+        step = 0.05 / max(1.0, swing * unit)
+        done = solve_ivp(
+            rates, (start, end), y, "DOP853", dense_output=True, events=apart, rtol=1e-12, atol=1e-14, max_step=step
+        )
+        assert done.success and done.sol is not None, done.message
+        found.append(_nodes(done.t[-1], start, done.sol, k, length))
+        y, start = done.y[:, -1], done.t[-1]
+        again = _next_touch(y, swing * unit)
+        if again is None:
+            break
+        flown, y = again
+        start += flown
+    time, force, weight = (np.concatenate(part) for part in zip(*found, strict=True))
+    return Pulse(time * unit, force, weight * unit)
+
+
+def _nodes(end: float, start: float, motion: Any, stiffness: float, length: float) -> tuple:
+    """Gauss nodes in s, with time going as 3 s^2 - 2 s^3: the force leaves zero as a power of 10/9."""
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    s = (np.arange(PANELS)[:, None] + (x + 1) / 2).ravel() / PANELS
+    time = start + (end - start) * s * s * (3 - 2 * s)
+    weight = np.tile(w, PANELS) / (2 * PANELS) * (end - start) * 6 * s * (1 - s)
+    y = motion(time)
+    return time, stiffness * (np.maximum(y[0] - y[1], 0.0) * length) ** (10 / 9), weight
+
+
+def _next_touch(y: np.ndarray, swing: float) -> tuple[float, np.ndarray] | None:
+    """When the roller, flying on, meets the swinging bar again, and the state then; None if it never does."""
+    reach = math.hypot(y[1], y[3] / swing)
+
+    def gap(t: float) -> float:
+        return y[1] * math.cos(swing * t) + y[3] / swing * math.sin(swing * t) - (y[0] + y[2] * t)
+
+    if y[2] < 0:
+        last = (y[0] + reach) / -y[2]
+    elif y[2] > 0:
+        last = (reach - y[0]) / y[2] + 1 / swing
+    else:
+        last = 2 * math.pi / swing
+    step = 2 * math.pi / swing / 400
+    before = 1e-9 * step
+    while before < last:
+        after = before + step
+        if gap(before) > 0 >= gap(after):
+            t = float(brentq(gap, before, after, xtol=1e-18, rtol=1e-14))
+            c, s = math.cos(swing * t), math.sin(swing * t)
+            bar = [y[1] * c + y[3] / swing * s, y[3] * c - y[1] * swing * s]
+            return t, np.array([bar[0], bar[0], y[2], bar[1]])
+        before = after
+    return None
+
+
+def train(given: dict[str, Any], omega: float, zone: float) -> np.ndarray:
+    """Coefficients C of F = Re sum over k of C_k exp(i k Z tau) [N], shape (2, harmonics + 1).
+
+    Every roller hits a bar where it enters the loaded zone, along the cage's motion, and where it leaves it, against:
+    at the angles -pi/2 -+ theta, where the motion goes along (-sin, cos) of the angle. v_0 = kappa omega T.
+    """
+    bearing, oscillator = given["bearing"], given["impact"]["oscillator"]
+    size = math.pi * bearing["roller_diameter"] ** 2 / 4 * bearing["roller_length"]
+    speed = oscillator["approach_ratio"] * omega * bearing["pocket_clearance"]
+    hit = pulse(oscillator, bearing["roller_material"]["density"] * size, speed)
+    order = bearing["n_rollers"] * np.arange(given["impact"]["harmonics"] + 1)
+    spectrum = np.exp(-1j * omega * np.outer(order, hit.time)) @ (hit.force * hit.weight)
+    spectrum = spectrum * bearing["n_rollers"] * omega / (2 * math.pi) * np.where(order == 0, 1, 2)
+    total = np.zeros((2, order.size), dtype=complex)
+    for sign, angle in ((1, -math.pi / 2 - zone), (-1, -math.pi / 2 + zone)):
+        along = np.array([-math.sin(angle), math.cos(angle)])
+        total += sign * along[:, None] * spectrum * np.exp(-1j * order * angle)
+    return total

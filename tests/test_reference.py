@@ -1,0 +1,159 @@
+"""The package against the reference: the whole model written a second time, and its integrals by quadrature."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import reference
+from reference._land import pressurised_half
+from scipy.integrate import quad
+
+import jaxcage as jc
+
+
+def as_state(y):
+    return tuple(map(jnp.asarray, y))
+
+
+def synchronous(seed, wide):
+    """The random model, its roller-by-roller impact replaced: the package's pulses are a quadrature of few points."""
+    model = reference.random_model(seed, wide)
+    return jc.replace(model, impact=jc.case("1a").impact)
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_accelerations_of_random_models_inside_and_in_contact(wide):
+    for seed in range(10):
+        model, speed = synchronous(seed, wide), reference.random_speeds(seed, 1, wide)[0]
+        ours, theirs = model.at_speed(speed), reference.field(model, speed)
+        for i, reach in enumerate((0.5, 0.95, 1.1, 1.1)):
+            y = reference.random_state(10 * seed + i, theirs, reach)
+            found = np.array([float(c) for c in ours(jnp.asarray(0.7), as_state(y))])
+            expected = np.array(theirs(0.7, y.tolist()))
+            for k in range(0, theirs.coordinates, 2):  # cage and rib, each against the size of its own acceleration
+                part = slice(theirs.coordinates + k, theirs.coordinates + k + 2)
+                size = np.linalg.norm(expected[part])
+                np.testing.assert_allclose(found[part], expected[part], rtol=0, atol=1e-9 * size, err_msg=f"{seed} {y}")
+
+
+def pressure_force(model, eps, eps_rate, phi_rate):
+    """(26) over the pressurised arc by quadrature: radial and tangential force in units mu omega R L^3/c^2."""
+    drive = lambda a: (1 - 2 * phi_rate) * eps * math.sin(a) - 2 * eps_rate * math.cos(a)
+    pressure = lambda a: 3 * (1 / 4 - 1 / 12) * drive(a) / (1 + eps * math.cos(a)) ** 3
+    zero = math.atan2(2 * eps_rate, (1 - 2 * phi_rate) * eps)
+    first, last = {"fixed_half": (0, math.pi), "full": (0, 2 * math.pi)}.get(model, (zero, zero + math.pi))
+    # The widest gap is opposite the cage's displacement, and pressure there pushes the cage back.
+    radial = quad(lambda a: pressure(a) * math.cos(a), first, last, epsabs=1e-12)[0]
+    tangential = quad(lambda a: pressure(a) * math.sin(a), first, last, epsabs=1e-12)[0]
+    return radial, tangential
+
+
+# The physics page, section 4: (eps, eps', phi') and the forces of the three films.
+PRINTED = {
+    (0.5, 0.0, 0.0): ((-0.444444, 0.604600), (-0.444444, 0.604600), (0.0, 1.209200)),
+    (0.5, 0.1, 0.0): ((-0.928124, 0.782378), (-1.069483, 0.764804), (-0.967360, 1.209200)),
+    (0.5, 0.1, 0.5): ((-0.483680, 0.177778), (-0.911573, 0.0), (-0.967360, 0.0)),
+}
+
+
+@pytest.mark.parametrize("point", [*PRINTED, (0.93, -0.2, 0.3), (0.2, 0.05, -0.4), (0.97, 0.3, 0.49)])
+def test_films_are_the_quadrature_of_their_pressure(point):
+    eps, eps_rate, phi_rate = point
+    for i, model in enumerate(("fixed_half", "positive_pressure", "full")):
+        expected = pressure_force(model, *point)
+        if model == "positive_pressure":
+            found = pressurised_half(eps, 0.0, 2 * eps_rate, (2 * phi_rate - 1) * eps, 0.0)
+        else:
+            found = reference.film_in_polar(model, eps, eps_rate, (1 - 2 * phi_rate) * eps)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+        if point in PRINTED:
+            np.testing.assert_allclose(found, PRINTED[point][i], rtol=0, atol=2e-6)
+
+
+def test_restitution_of_the_reference_is_that_of_a_bounce():
+    """m dv/dt = -K p^(10/9) (1 + chi v/v0): the contact takes up as much between v0 and 0 as it gives back to -e v0."""
+    for e in (0.05, 0.5, 0.9, 0.999142):
+        chi = reference.hunt_crossley_number(e)
+        inward = quad(lambda v: v / (1 + chi * v), 0, 1, epsabs=1e-14)[0]
+        outward = quad(lambda v: v / (1 - chi * v), 0, e, epsabs=1e-14)[0]
+        assert inward == pytest.approx(outward, rel=1e-9)
+
+
+def test_pulses_of_rollers():
+    """The package samples the force of one impact; on the paper's bearing that is good to 3e-4 of the force."""
+    model = jc.replace(jc.case("1a"), impact=jc.RollerPassImpact(jc.PocketImpact()))
+    phases = np.linspace(0, 2 * np.pi / 13, 50)
+    force = eqx.filter_jit(lambda speed: jax.vmap(model.cage_at(speed).impact_force)(phases))
+    for speed in (300.0, 2800.0):
+        found, theirs = np.stack(force(jnp.asarray(speed)), axis=1), reference.field(model, speed)
+        expected = np.array([theirs.impact(tau) for tau in phases])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=3e-4 * np.abs(expected).max())
+
+
+def test_an_impact_on_a_stiff_bar():
+    """It turns the roller round, and takes the time of a Hertz contact with the force K d^(10/9)."""
+    stiffness, mass, speed = 2e8, 0.04, 0.2
+    hit = reference.pulse({"contact_stiffness": stiffness, "bar_stiffness": 1e10, "bar_mass": 1e-2}, mass, speed)
+    assert hit.force @ hit.weight == pytest.approx(2 * mass * speed, rel=1e-3)
+    depth = (19 / 18 * mass * speed**2 / stiffness) ** (9 / 19)
+    spent = 2 * depth / speed * math.sqrt(math.pi) * math.gamma(28 / 19) / math.gamma(1 / 2 + 9 / 19)
+    assert hit.time[-1] == pytest.approx(spent, rel=1e-2)
+
+
+@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure", "full"])
+def test_one_revolution_of_each_film(film):
+    """At 24000 rpm the cage touches the land, where the package's equal steps are good to 1e-6."""
+    model = jc.replace(jc.case("1a"), **{"film.model": film})
+    image = eqx.filter_jit(lambda speed, y: jc.strobe_map(model, speed, jc.method("rk4", steps=8192))(y))
+    for rpm, tolerance in ((6000, 1e-9), (24000, 1e-6)):
+        speed = jc.rpm(rpm)
+        field, start = reference.field(model, speed), [float(c) for c in model.starts(speed)[0]]
+        found, expected = image(jnp.asarray(speed), as_state(start)), reference.confirmed(field, start)
+        apart = (np.array([float(c) for c in found.y]) - expected.strobe[-1]) / field.scale
+        assert expected.spread < 1e-8
+        np.testing.assert_allclose(apart, 0, atol=tolerance)
+        assert expected.peak == pytest.approx(float(found.peak), abs=1e-6)
+
+
+def test_one_revolution_of_cage_and_rib():
+    """Printed cross-coupling, supply pressure, both stiffnesses, an elastic rib."""
+    model = synchronous(11, False)
+    assert reference.numbers_of(model)["rib"]["kind"] == "elastic"
+    speed = float(reference.random_speeds(11, 1)[0])
+    field = reference.field(model, speed)
+    start = reference.random_state(3, field, 0.5)
+    found = jc.strobe_map(model, speed, jc.method("rk4", steps=8192))(as_state(start))
+    exact = reference.confirmed(field, start)
+    apart = (np.array([float(c) for c in found.y]) - exact.strobe[-1]) / field.scale
+    np.testing.assert_allclose(apart, 0, atol=1e-7)
+
+
+def test_growth_is_that_of_neighbouring_trajectories():
+    model, speed = jc.case("1a"), jc.rpm(9000)
+    field, direction = reference.field(model, speed), np.array([0.6, -0.3, 0.1, 0.7])
+    start = reference.random_state(1, field, 0.5)
+    found = np.sum(reference.growth(field, start, 3, direction=direction))
+    unit, h = field.scale, 1e-6 / np.linalg.norm(direction)
+    ahead, behind = (
+        reference.revolutions(field, start + s * h * direction * unit, 3, tolerance=1e-12).strobe[-1] for s in (1, -1)
+    )
+    expected = math.log(np.linalg.norm((ahead - behind) / unit) / 2e-6)
+    assert found == pytest.approx(expected, abs=1e-5)
+
+
+def test_random_models_are_legal_and_the_same_again():
+    for wide in (False, True):
+        for seed in range(8):
+            model = reference.random_model(seed, wide)
+            info = jc.parameter_info(model)
+            for name, value in jc.parameters(model).items():
+                assert info[name].lower <= float(value) <= info[name].upper, name
+            assert reference.numbers_of(model) == reference.numbers_of(reference.random_model(seed, wide))
+
+
+def test_the_finite_film_is_not_of_the_reference():
+    with pytest.raises(ValueError, match="finite length"):
+        reference.field(jc.replace(jc.case("1a"), **{"film.model": "finite_length"}), 1000.0)
