@@ -25,7 +25,7 @@ REFERENCE = jc.method("rodas4", steps=8192)
 METHODS = [
     *(("rodas3", n) for n in (64, 128, 256, 512, 1024)),
     *(("rodas4", n) for n in (64, 96, 128, 192, 256, 512)),
-    *(("rk4", n) for n in (64, 96, 128, 192, 256, 384, 512, 768)),
+    *(("rk4", n) for n in (64, 96, 128, 192, 256, 384, 512, 768, 1024, 2048)),
     ("controlled", 0),
     *(("newmark", n) for n in (128, 512, 2048)),
 ]
@@ -37,6 +37,7 @@ PICTURES = [
     ("rodas4", 64),
     ("rodas4", 128),
     ("rodas4", 256),
+    ("rk4", 1024),
     ("controlled", 0),
 ]
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 import jaxcage as jc
+from jaxcage.integrate import FixedSteps
 from jaxcage.integrate._kernel import can_be_kernel
 from jaxcage.orbits import edge_speed
 

@@ -21,7 +21,7 @@ from jaxcage.report import zones_table
 
 
 TINY = ["--first", "12000", "--last", "13000", "--count", "3", "--discard", "20", "--revolutions"]
-TINY += ["20", "--steps", "64"]
+TINY += ["20", "--solver", "rodas4", "--steps", "64"]
 PNG = b"\x89PNG\r\n"
 
 
@@ -248,7 +248,9 @@ def test_as_a_module_from_a_shell(tmp_path: Path):
 
 def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     tiny = ["--first", "9000", "--last", "13000", "--count", "5", "--discard", "20", "--revolutions", "20"]
-    found = document(capsys, "sweep", "1a", *tiny, "--steps", "64", "--waterfall", "3", "--out", str(tmp_path))
+    found = document(
+        capsys, "sweep", "1a", *tiny, "--solver", "rodas4", "--steps", "64", "--waterfall", "3", "--out", str(tmp_path)
+    )
     assert is_png(found["waterfall"]) and is_png(found["figure"])
     assert all(z["kind"] == "synchronous-loss" for z in found["synchronous"])
     closed = [z for z in found["zones"] if z["width_rpm"]]

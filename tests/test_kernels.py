@@ -419,7 +419,8 @@ def test_run_up_and_down_of_several_designs():
 def on_device(solver, tangents, **options):
     """A march of 12 steps of 200 lanes by the GPU's kernel, its numbers, and the step."""
     speeds = jnp.asarray(np.resize(SPEEDS, 200))
-    step, _ = kernel_step(solver, MODEL.at_speed(1.0), MODEL, MODEL.scale(1.0))
+    one = jnp.asarray(1.0)
+    step, _ = kernel_step(solver, MODEL.at_speed(one), MODEL, MODEL.scale(one))
     rows = jax.vmap(lambda s: jnp.stack(kernel_step(solver, MODEL.at_speed(s), MODEL, MODEL.scale(s))[1]))(speeds)
     alike = np.all(rows == rows[:1], axis=0)
     fixed = [jnp.asarray(0.0), jnp.asarray(0.02), *(r[0] if a else r for r, a in zip(rows.T, alike, strict=True))]

@@ -28,7 +28,7 @@ def synchronous(seed, wide):
 def test_accelerations_of_random_models_inside_and_in_contact(wide):
     for seed in range(10):
         model, speed = synchronous(seed, wide), reference.random_speeds(seed, 1, wide)[0]
-        ours, theirs = model.at_speed(speed), reference.field(model, speed)
+        ours, theirs = model.at_speed(jnp.asarray(speed)), reference.field(model, speed)
         for i, reach in enumerate((0.5, 0.95, 1.1, 1.1)):
             y = reference.random_state(10 * seed + i, theirs, reach)
             found = np.array([float(c) for c in ours(jnp.asarray(0.7), as_state(y))])

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._types import Scalar, State
+from .._types import State
 from ..integrate import StrobeMap, outcome_code, revolution
 from ..models import divide, multiply
 
@@ -60,7 +60,7 @@ class Lane(NamedTuple):
     """Where a lane is, how far out it has been, whether it still runs, and how many steps it needed last."""
 
     y: State
-    peak: Scalar
+    peak: Float[Array, ""]
     outcome: Int[Array, ""]
     level: Int[Array, ""]
 

@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from .._types import Scalar, State
+from .._types import State
 from ..models import AbstractField, AbstractForcedSystem
 from ._explicit import explicit_step
 from ._march import Numbers, Sizes, is_elementary
@@ -101,7 +101,7 @@ class KernelStep:
 
 def kernel_step(
     solver: KernelSolver, field: AbstractField, system: AbstractForcedSystem, scale: State
-) -> tuple[KernelStep, list[Scalar]]:
+) -> tuple[KernelStep, list[Any]]:
     """A step and its fixed numbers behind phase and step size; system and scale have no derivative."""
     watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
     structure, numbers = Structure.of((field, *watching))

@@ -25,11 +25,10 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer, eval_jaxpr
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
-
-from .._types import Scalar
 
 
 Numbers = tuple[Any, ...]
@@ -61,14 +60,18 @@ _ours = contextvars.ContextVar("ours", default=False)
 def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
     """`equinox.filter_jit` for programs that march: the largest kernels are for these alone.
 
-    Within another compiled function, whose options hold, it is the function itself.
+    Options are for programs that are called with numbers: within another compiled function it is the function itself,
+    and where it is differentiated or mapped from outside it is compiled with XLA's own.
     """
     jitted = eqx.filter_jit(f, compiler_options=COMPILER_OPTIONS)  # pyright: ignore[reportCallIssue]
+    traced = eqx.filter_jit(f)
 
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
-        if jex.core.unsafe_am_i_under_a_jit_DO_NOT_USE():
+        if jex.core.unsafe_am_i_under_a_jit_DO_NOT_USE():  # pyright: ignore[reportPrivateImportUsage]
             return f(*args, **kwargs)
+        if any(isinstance(x, Tracer) for x in jax.tree.leaves((args, kwargs))):
+            return traced(*args, **kwargs)
         token = _ours.set(True)
         try:
             return jitted(*args, **kwargs)
@@ -103,9 +106,9 @@ class How(NamedTuple):
 def march(
     step: Step,
     count: Int[Array, ""] | int,
-    moved: Sequence[Scalar],
-    watched: Sequence[Scalar] = (),
-    fixed: Sequence[Scalar] = (),
+    moved: Sequence[Any],
+    watched: Sequence[Any] = (),
+    fixed: Sequence[Any] = (),
     multiple: int = 1,
     whole: bool = True,
     loose: Step | None = None,
@@ -131,11 +134,11 @@ def march(
 def march_with_tangents(
     step: Step,
     count: Int[Array, ""] | int,
-    moved: Sequence[Scalar],
-    watched: Sequence[Scalar],
-    fixed: Sequence[Scalar],
-    tangents: Sequence[Sequence[Scalar]],
-    fixed_tangents: Sequence[Sequence[Scalar | None]] = (),
+    moved: Sequence[Any],
+    watched: Sequence[Any],
+    fixed: Sequence[Any],
+    tangents: Sequence[Sequence[Any]],
+    fixed_tangents: Sequence[Sequence[Any]] = (),
     multiple: int = 1,
     whole: bool = True,
     loose: Step | None = None,
@@ -155,7 +158,7 @@ def march_with_tangents(
     several = Tangent(step, sizes, known, loose or step)
     if whole and _share(several):
         pushed, drifts = [x for t in tangents for x in t], [x for row in along for x in row if x is not None]
-        y, seen = march(several, count, (*moved, *pushed), watched, (*fixed, *drifts), multiple, loose=several.slack)
+        y, seen = march(several, count, (*moved, *pushed), watched, (*fixed, *drifts), multiple, loose=several.loose)
         return y[: sizes.moved], seen, tuple(_rows(y[sizes.moved :], sizes.moved))
 
     def one(tangent: Numbers, row: Numbers) -> Any:
@@ -184,12 +187,7 @@ class Tangent:
     known: tuple[tuple[bool, ...], ...]
     """For each direction, which of the fixed numbers have a tangent."""
     loose: Step
-    """The step as it should be where it is left to XLA."""
-
-    @property
-    def slack(self) -> "Tangent":
-        """The same of the step that is left to XLA."""
-        return dataclasses.replace(self, step=self.loose)
+    """The step itself as it should be where it is left to XLA."""
 
     @property
     def whole(self) -> Sizes:
@@ -296,7 +294,7 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
         x = [read(v) for v in e.invars]
         called = next((e.params[k] for k in ("jaxpr", "call_jaxpr") if k in e.params), None)
         if called is None or e.primitive.name in _CONTROL_FLOW:
-            same = (e.primitive, str(e.params), *(id(c) if isinstance(c, Tracer) else repr(c) for c in x))
+            same = (e.primitive, str(e.params), *map(_identity, x))
             if same not in seen:
                 out = e.primitive.bind(*x, **e.params)
                 seen[same] = out if e.primitive.multiple_results else [out]
@@ -305,6 +303,11 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
             out = _inlined(called.jaxpr, called.consts, *x, seen=seen)
         known.update(zip(e.outvars, out, strict=True))
     return [read(v) for v in jaxpr.outvars]
+
+
+def _identity(x: Any) -> Any:
+    """What two numbers must have in common to be the same one."""
+    return id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
 
 
 def _variables(atoms: Sequence[Any]) -> set[Any]:
@@ -366,7 +369,9 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
 
 def _loose(how: How, count: Any, *numbers: Any) -> list[Any]:
     """The march left to XLA, in every lane."""
-    sizes = how.sizes
+    step, sizes = how.step, how.sizes
+    if isinstance(step, Tangent):
+        return _loose_tangents(step, count, *sizes.split(numbers))
 
     def run(*x: Any) -> list[Any]:
         moved, watched = _plain(how.loose, count, *sizes.split(x))
@@ -378,6 +383,23 @@ def _loose(how: How, count: Any, *numbers: Any) -> list[Any]:
     flat = [x.reshape(-1) if jnp.shape(x) else x for x in numbers]
     out = jax.vmap(run, in_axes=tuple(0 if jnp.ndim(x) else None for x in numbers), out_axes=0)(*flat)
     return [x.reshape(shape) for x in out]
+
+
+def _loose_tangents(step: Tangent, count: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> list[Any]:
+    """The same with tangent vectors, their directions an axis of arrays: written out they would be too much."""
+    inner, size = How(step.step, step.loose, step.sizes, 1), step.sizes.moved
+    y, *tangents = _rows(moved, size)
+    x, rest = fixed[: step.sizes.fixed], iter(fixed[step.sizes.fixed :])
+    drifts = [[next(rest) if k else jnp.zeros_like(c) for c, k in zip(x, row, strict=True)] for row in step.known]
+
+    def go(y: list[Any], x: list[Any]) -> tuple[list[Any], list[Any]]:
+        out = _loose(inner, count, *y, *watched, *x)
+        return out[:size], out[size:]
+
+    along = lambda t, d: jax.jvp(go, (list(y), list(x)), (t, d), has_aux=True)
+    stacked = [[jnp.stack(c) for c in zip(*rows, strict=True)] for rows in (tangents, drifts)]
+    values, slopes, seen = jax.vmap(along, out_axes=(None, 0, None))(*stacked)
+    return [*values, *(c[k] for k in range(len(tangents)) for c in slopes), *seen]
 
 
 def _lanewise(
@@ -500,7 +522,7 @@ def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How
         slices = lambda k, row, flags: [v[k] if m else v for v, m in zip(row, flags, strict=True)]
         tangents = [v for k in range(size) for v in slices(k, moved[inner.moved :], moved_mapped[inner.moved :])]
         drifts = [v for k in range(size) for v in slices(k, fixed[inner.fixed :], fixed_mapped[inner.fixed :])]
-        shared = How(several, several.slack, several.whole, how.multiple)
+        shared = How(several, several.loose, several.whole, how.multiple)
         got = march_p.bind(count, *y, *tangents, *watched, *x, *drifts, how=shared)
         width = inner.moved * old
         each = [got[inner.moved + k * width : inner.moved + (k + 1) * width] for k in range(size)]
@@ -523,7 +545,7 @@ def _jvp(primals: Sequence[Any], tangents: Sequence[Any], *, how: How) -> Any:
         values, slopes = jax.jvp(functools.partial(_loose, how, count), numbers, [*pushed, *rest])
         return values, slopes
     drifts = [d for d, k in zip(fixed_dot, known, strict=True) if k]
-    shared = How(along, along.slack, along.whole, how.multiple)
+    shared = How(along, along.loose, along.whole, how.multiple)
     out = march_p.bind(count, *moved, *pushed, *watched, *fixed, *drifts, how=shared)
     values, slopes, seen = out[: sizes.moved], out[sizes.moved : 2 * sizes.moved], out[2 * sizes.moved :]
     none = [ad.Zero(jax.typeof(x).to_tangent_aval()) for x in seen]

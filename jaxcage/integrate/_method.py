@@ -227,7 +227,7 @@ class AdaptiveSteps(AbstractMethod):
         phase: Scalar,
         parts: Int[Array, ""] | int,
     ) -> Stretch:
-        watched = max(WATCHED // parts, 1)
+        watched = max(WATCHED // int(parts), 1)
         solution = dfx.diffeqsolve(
             _term(self.solver),
             self.solver,
@@ -274,8 +274,8 @@ _ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
     "kvaerno5": dfx.Kvaerno5,
     "kencarp4": dfx.KenCarp4,
 }
-DEFAULT_SOLVER = "rodas4"
-DEFAULT_STEPS = 256
+DEFAULT_SOLVER = "rk4"
+DEFAULT_STEPS = 1024
 DEFAULT_LADDER = (("rk4", 128), ("rk4", 384), ("rk4", 768), ("rodas4", 1024))
 DEFAULT_ERROR = 1e-2
 

@@ -116,12 +116,12 @@ def _controlled(method: ControlledSteps, strobe: StrobeMap, y: State, tangents: 
     remake = lambda row: eqx.combine(jax.tree.unflatten(form, row), rest)
 
     @custom_vmap
-    def run(row: list[Array], y: State, tangents: Tangents, level: Array) -> Moved:
+    def run(row: list[Any], y: Any, tangents: Any, level: Any) -> Moved:
         lane = jax.tree.map(lambda x: x[None], (y, tangents, level))
         return jax.tree.map(lambda x: x[0], _lanes(method, remake, row, [False] * len(row), *lane))
 
     @run.def_vmap
-    def rule(size: int, batched: Any, row: list[Array], y: State, tangents: Tangents, level: Array) -> Any:
+    def rule(size: int, batched: Any, row: list[Any], y: Any, tangents: Any, level: Any) -> Any:
         spread = lambda x, is_lanes: x if is_lanes else jnp.broadcast_to(x, (size, *x.shape))
         lanes = jax.tree.map(spread, (y, tangents, level), tuple(batched[1:]))
         moved = _lanes(method, remake, row, batched[0], *lanes)
@@ -145,7 +145,7 @@ def _lanes(
     def attempts(solver: Any, first: int, steps: list[int], carry: Moved) -> Moved:
         counts, multiple = jnp.asarray(steps), math.gcd(*steps, 4)
 
-        def one(row: Sequence[Array], y: State, tangents: Tangents, level: Array) -> Moved:
+        def one(row: Sequence[Any], y: State, tangents: Tangents, level: Any) -> Moved:
             strobe = remake(row)
             pieces = strobe.field, strobe.system, strobe.scale
             advance = lambda y: run_steps(solver, counts[level - first], *pieces, y, multiple=multiple)

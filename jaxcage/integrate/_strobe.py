@@ -45,4 +45,5 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
     """
     require_x64()
     chosen = make_method() if method is None else method
+    speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

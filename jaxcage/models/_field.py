@@ -235,7 +235,7 @@ def _second_order_rates_jvp(primals: Any, tangents: Any) -> Any:
     if given is None or all(c is None for c in y_dot):
         return eqx.filter_jvp(_rates, primals, tangents)
     moved = tuple(jnp.zeros(()) if c is None else c for c in y_dot)
-    slope = SecondOrderLinearisation((), (), *given, field.speed).times(moved)
+    slope = SecondOrderLinearisation((), (), given[0], given[1], field.speed).times(moved)
     along = (field_dot, tau_dot)
     if all(x is None for x in jax.tree.leaves(along, is_leaf=lambda x: x is None)):
         return _rates(field, tau, y), slope
