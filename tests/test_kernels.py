@@ -13,6 +13,7 @@ import jaxcage as jc
 from jaxcage.integrate import (
     ClassicalRK4,
     ControlledSteps,
+    FixedSteps,
     Rodas3,
     Rodas4,
     _march,
@@ -29,6 +30,9 @@ from jaxcage.integrate._kernel import kernel_step
 from jaxcage.integrate._march import Sizes, Tangent, is_elementary
 from jaxcage.integrate._method import TERM
 from jaxcage.models._field import _columns
+from jaxcage.orbits._implicit import differentiated
+from jaxcage.orbits._orbit import OrbitEquations
+from jaxcage.orbits._problem import Given, OrbitProblem, make_frame
 from jaxcage.sweeps import _engine
 
 
@@ -245,6 +249,50 @@ def test_the_positive_pressure_film_is_left_to_autodiff():
     film = dataclasses.replace(MODEL.film, model="positive_pressure")
     law = eqx.tree_at(lambda m: m.film, MODEL, film).at_speed(1200.0).acceleration
     assert law.slopes((1e-5, 1e-5), (0.0, 0.0)) is None
+
+
+# --- the evaluator of orbits ----------------------------------------------------------------------------------------
+
+
+def test_one_program_serves_all_numbers_of_steps():
+    y = tuple(jnp.asarray(STATES[3]))
+
+    def image(steps):
+        return jnp.stack(strobe_map(MODEL, SPEEDS[3], FixedSteps(ClassicalRK4(scan_kind="lax"), steps))(y).y)
+
+    run = compiled(eqx.debug.assert_max_traces(image, max_traces=1))
+    for steps in (384, 1000):
+        np.testing.assert_allclose(run(jnp.asarray(steps)), compiled(image)(steps), rtol=1e-12)
+
+
+def van_der_pol(tau, q, v, speed):
+    (x,), (u,) = q, v
+    return (0.8 * (1 - x * x) * u - x,)
+
+
+@pytest.mark.parametrize("solver", ["rk4", slow("rodas4")])
+@pytest.mark.parametrize("kind", ["cage", slow("elastic rib"), "self-excited"])
+def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):
+    """The orbit's equations linearised at once, against their derivative by `jacfwd`; away from any orbit."""
+    if kind == "self-excited":
+        system, state, free, parameters = jc.ForcedOscillator(van_der_pol, coordinates=1), (1.2, -0.4), True, ()
+        speed = jnp.asarray(0.95)
+    else:
+        system, free, parameters, speed = MODEL, False, ("speed", "guidance_gap"), jnp.asarray(SPEEDS[2])
+        if kind == "elastic rib":
+            rib = jc.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=0.0)
+            system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.RigidRib))
+        state = np.asarray(system.starts(speed)[1])
+    problem = OrbitProblem(method(solver, steps=96), system.dimension, free, parameters)
+    given = Given(system, speed)
+    values = jnp.asarray([float(speed), float(MODEL.guidance_gap)])[: len(parameters)]
+    frame = make_frame(problem, given, jnp.asarray(state), speed, values / 10, 2)
+    u = jnp.concatenate([jnp.asarray(state) / frame.scale, jnp.ones(int(free)), jnp.full(len(parameters), 10.0)])
+    equations = OrbitEquations(problem, frame)
+    r, jacobian, _ = compiled(lambda u: equations.linearised(u, given))(u)
+    expected_r, expected, _ = compiled(lambda u: differentiated(equations, u, given))(u)
+    np.testing.assert_allclose(r, expected_r, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(jacobian, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
 # --- monodromy matrices -------------------------------------------------------------------------------------------
