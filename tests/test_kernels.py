@@ -27,8 +27,9 @@ from jaxcage.integrate import (
 )
 from jaxcage.integrate._device import march_on_device
 from jaxcage.integrate._kernel import kernel_step
-from jaxcage.integrate._march import Sizes, Tangent, is_elementary
+from jaxcage.integrate._march import Tangent, is_elementary
 from jaxcage.integrate._method import TERM
+from jaxcage.integrate._program import Sizes, program_of
 from jaxcage.models._field import _columns
 from jaxcage.orbits._implicit import differentiated
 from jaxcage.orbits._orbit import OrbitEquations
@@ -478,7 +479,7 @@ def on_device(solver, tangents, **options):
     if tangents:
         step = Tangent(step, sizes, ((False,) * len(fixed),) * tangents, step)
         sizes = step.whole
-    program, size = _march._program(step, sizes), sizes.moved + sizes.watched
+    program, size = program_of(step, sizes), sizes.moved + sizes.watched
     needed = [i - 1 for i in program.needed if i > size]
     numbers = [*moved, *watched, *fixed]
     run = lambda numbers: march_on_device(program, size, needed, jnp.asarray(12), numbers, **options)

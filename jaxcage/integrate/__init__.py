@@ -7,6 +7,7 @@
 | `_newmark`     | the paper's Newmark-beta as a diffrax solver                                       |
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
 | `_march`       | many steps of a scalar function as a primitive: lanes, tangents, one compiled loop |
+| `_program`     | a scalar function traced: its elementary operations                                |
 | `_kernel`      | a step of a method as such a function                                              |
 | `_device`      | a march as one kernel on a GPU                                                     |
 | `_strobe`      | the strobe map that everything uses                                                |

@@ -15,7 +15,8 @@ import jax.numpy as jnp
 from .._types import State
 from ..models import AbstractField, AbstractForcedSystem
 from ._explicit import explicit_step
-from ._march import Numbers, Sizes, is_elementary
+from ._march import is_elementary
+from ._program import Numbers, Sizes
 from ._rosenbrock import AbstractRosenbrock, computed_once, rosenbrock_step
 
 

@@ -25,20 +25,13 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
-import numpy as np
-from jax.core import Tracer, eval_jaxpr
+from jax.core import Tracer
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
+from ._program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
 
-Numbers = tuple[Any, ...]
-Step = Callable[[Any, Numbers, Numbers, Numbers], tuple[Sequence[Any], Sequence[Any]]]
-"""(number of the step, what it moves, what it watches, what is fixed) -> (moved, watched), all scalars.
 
-What is watched (a maximum, an error estimate) has no derivative. A dataclass is known by its fields, which are no
-arrays: one that equals an earlier one is not traced again."""
-
-_CONTROL_FLOW = {"while", "scan", "cond"}
 LARGEST = {False: 2800, True: 12000}
 """Operations of a kernel, at most: where XLA's own options hold, and where those of `compiled` do. The newer of XLA's
 two emitters for CPUs, its default, cuts larger kernels into functions that compute shared terms again and again,
@@ -79,19 +72,6 @@ def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
             _ours.reset(token)
 
     return run
-
-
-class Sizes(NamedTuple):
-    """How many numbers of each kind a step has."""
-
-    moved: int
-    watched: int
-    fixed: int
-
-    def split(self, numbers: Sequence[Any]) -> tuple[Numbers, Numbers, Numbers]:
-        """Moved, watched, fixed."""
-        a, b = self.moved, self.moved + self.watched
-        return tuple(numbers[:a]), tuple(numbers[a:b]), tuple(numbers[b:])
 
 
 class How(NamedTuple):
@@ -228,7 +208,7 @@ class Several:
         sizes = Sizes(len(moved), len(watched), len(fixed))
         row = (*moved, *watched)
         for k in range(self.count):
-            row = tuple(_program(self.step, sizes)(i + k, *row, *fixed))
+            row = tuple(program_of(self.step, sizes)(i + k, *row, *fixed))
         return row[: len(moved)], row[len(moved) :]
 
 
@@ -245,88 +225,11 @@ class Limited:
         return keep(new, moved), keep(seen, watched)
 
 
-# --- programs ------------------------------------------------------------------------------------------------------
-
-
-class _Program(NamedTuple):
-    """A scalar function traced."""
-
-    jaxpr: Any
-    consts: Any
-    needed: list[int]
-    """Which of its arguments it uses."""
-
-    def __call__(self, *x: Any) -> list[Any]:
-        return eval_jaxpr(self.jaxpr, self.consts, *x)
-
-
-def _program(step: Any, sizes: Sizes) -> _Program:
-    trace: Callable[..., _Program] = _kept if dataclasses.is_dataclass(step) else _trace
-    return trace(step, sizes)
-
-
-def _trace(step: Step, sizes: Sizes) -> _Program:
-    """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
-
-    def flat(i: Any, *x: Any) -> tuple[Any, ...]:
-        moved, watched = step(i, *sizes.split(x))
-        return tuple(jnp.asarray(c, dtype=float) for c in (*moved, *watched))
-
-    number = jax.ShapeDtypeStruct((), float)
-    traced = jax.make_jaxpr(flat)(*[number] * (1 + sum(sizes)))
-    once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={})
-    traced = jax.make_jaxpr(once)(*[number] * (1 + sum(sizes)))
-    jaxpr = traced.jaxpr
-    equations = _needed(jaxpr.eqns, jaxpr.outvars)
-    jaxpr = jaxpr.replace(eqns=equations)
-    read = _variables(jaxpr.outvars).union(*(_variables(e.invars) for e in equations))
-    return _Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
-
-
-_kept = functools.lru_cache(maxsize=128)(_trace)
-
-
-def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]) -> list[Any]:
-    """The function with the functions that it calls written out, and what it computes twice computed once."""
-    known = dict(zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *args], strict=True))
-    read = lambda v: v.val if isinstance(v, jex.core.Literal) else known[v]
-    for e in jaxpr.eqns:
-        x = [read(v) for v in e.invars]
-        called = next((e.params[k] for k in ("jaxpr", "call_jaxpr") if k in e.params), None)
-        if called is None or e.primitive.name in _CONTROL_FLOW:
-            same = (e.primitive, str(e.params), *map(_identity, x))
-            if same not in seen:
-                out = e.primitive.bind(*x, **e.params)
-                seen[same] = out if e.primitive.multiple_results else [out]
-            out = seen[same]
-        else:
-            out = _inlined(called.jaxpr, called.consts, *x, seen=seen)
-        known.update(zip(e.outvars, out, strict=True))
-    return [read(v) for v in jaxpr.outvars]
-
-
-def _identity(x: Any) -> Any:
-    """What two numbers must have in common to be the same one."""
-    return id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
-
-
-def _variables(atoms: Sequence[Any]) -> set[Any]:
-    return {v for v in atoms if not isinstance(v, jex.core.Literal)}
-
-
-def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
-    """Those of the equations that what is wanted follows from, in their order."""
-    reached = _variables(wanted)
-    kept = []
-    for e in reversed(equations):
-        if reached.intersection(e.outvars):
-            kept.append(e)
-            reached |= _variables(e.invars)
-    return kept[::-1]
+# --- what fits into a kernel ---------------------------------------------------------------------------------------
 
 
 def _operations(step: Step, sizes: Sizes) -> int:
-    return len(_program(step, sizes).jaxpr.eqns)
+    return len(program_of(step, sizes).jaxpr.eqns)
 
 
 def _share(tangent: Tangent) -> bool:
@@ -338,10 +241,10 @@ def is_elementary(step: Step, sizes: Sizes) -> bool:
     """Whether `step` is made of elementary operations on scalars alone."""
     if isinstance(step, Tangent):
         return is_elementary(step.step, step.sizes)
-    program = _program(step, sizes)
+    program = program_of(step, sizes)
     caught = any(isinstance(c, Tracer) for c in program.consts)
     scalar = lambda e: not any(v.aval.shape for v in (*e.invars, *e.outvars))
-    plain = all(e.primitive.name not in _CONTROL_FLOW and scalar(e) for e in program.jaxpr.eqns)
+    plain = all(e.primitive.name not in CONTROL_FLOW and scalar(e) for e in program.jaxpr.eqns)
     return not caught and plain and _in_order()
 
 
@@ -431,7 +334,7 @@ def _loops(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
     operations = _operations(step, sizes)
     most = 1 if isinstance(step, Tangent) else min(TOGETHER, LARGEST[_ours.get()]) // operations
     together = max(d for d in range(1, multiple + 1) if multiple % d == 0 and (d == 1 or d <= most))
-    program = _program(Several(step, together) if together > 1 else step, sizes)
+    program = program_of(Several(step, together) if together > 1 else step, sizes)
     used = [i - 1 - moving for i in program.needed if i > moving]
     alike, own = [i for i in used if not fixed[i].shape], [i for i in used if fixed[i].shape]
 
@@ -451,7 +354,7 @@ def _loops(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
 def _kernel_on_gpu(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
     from ._device import march_on_device
 
-    program, moved = _program(how.step, how.sizes), how.sizes.moved + how.sizes.watched
+    program, moved = program_of(how.step, how.sizes), how.sizes.moved + how.sizes.watched
     return march_on_device(program, moved, [i - 1 for i in program.needed if i > moved], count, numbers)
 
 

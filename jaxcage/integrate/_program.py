@@ -1,0 +1,112 @@
+"""Scalar functions traced once: what a step computes, written out as elementary operations."""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.extend as jex
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer, eval_jaxpr
+
+
+Numbers = tuple[Any, ...]
+Step = Callable[[Any, Numbers, Numbers, Numbers], tuple[Sequence[Any], Sequence[Any]]]
+"""(number of the step, what it moves, what it watches, what is fixed) -> (moved, watched), all scalars.
+
+What is watched (a maximum, an error estimate) has no derivative. A dataclass is known by its fields, which are no
+arrays: one that equals an earlier one is not traced again."""
+
+CONTROL_FLOW = {"while", "scan", "cond"}
+
+
+class Sizes(NamedTuple):
+    """How many numbers of each kind a step has."""
+
+    moved: int
+    watched: int
+    fixed: int
+
+    def split(self, numbers: Sequence[Any]) -> tuple[Numbers, Numbers, Numbers]:
+        """Moved, watched, fixed."""
+        a, b = self.moved, self.moved + self.watched
+        return tuple(numbers[:a]), tuple(numbers[a:b]), tuple(numbers[b:])
+
+
+class Program(NamedTuple):
+    """A scalar function traced."""
+
+    jaxpr: Any
+    consts: Any
+    needed: list[int]
+    """Which of its arguments it uses."""
+
+    def __call__(self, *x: Any) -> list[Any]:
+        return eval_jaxpr(self.jaxpr, self.consts, *x)
+
+
+def program_of(step: Any, sizes: Sizes) -> Program:
+    trace: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _trace
+    return trace(step, sizes)
+
+
+def _trace(step: Step, sizes: Sizes) -> Program:
+    """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
+
+    def flat(i: Any, *x: Any) -> tuple[Any, ...]:
+        moved, watched = step(i, *sizes.split(x))
+        return tuple(jnp.asarray(c, dtype=float) for c in (*moved, *watched))
+
+    number = jax.ShapeDtypeStruct((), float)
+    traced = jax.make_jaxpr(flat)(*[number] * (1 + sum(sizes)))
+    once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={})
+    traced = jax.make_jaxpr(once)(*[number] * (1 + sum(sizes)))
+    jaxpr = traced.jaxpr
+    equations = _needed(jaxpr.eqns, jaxpr.outvars)
+    jaxpr = jaxpr.replace(eqns=equations)
+    read = _variables(jaxpr.outvars).union(*(_variables(e.invars) for e in equations))
+    return Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
+
+
+_kept = functools.lru_cache(maxsize=128)(_trace)
+
+
+def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]) -> list[Any]:
+    """The function with the functions that it calls written out, and what it computes twice computed once."""
+    known = dict(zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *args], strict=True))
+    read = lambda v: v.val if isinstance(v, jex.core.Literal) else known[v]
+    for e in jaxpr.eqns:
+        x = [read(v) for v in e.invars]
+        called = next((e.params[k] for k in ("jaxpr", "call_jaxpr") if k in e.params), None)
+        if called is None or e.primitive.name in CONTROL_FLOW:
+            same = (e.primitive, str(e.params), *map(_identity, x))
+            if same not in seen:
+                out = e.primitive.bind(*x, **e.params)
+                seen[same] = out if e.primitive.multiple_results else [out]
+            out = seen[same]
+        else:
+            out = _inlined(called.jaxpr, called.consts, *x, seen=seen)
+        known.update(zip(e.outvars, out, strict=True))
+    return [read(v) for v in jaxpr.outvars]
+
+
+def _identity(x: Any) -> Any:
+    """What two numbers must have in common to be the same one."""
+    return id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
+
+
+def _variables(atoms: Sequence[Any]) -> set[Any]:
+    return {v for v in atoms if not isinstance(v, jex.core.Literal)}
+
+
+def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
+    """Those of the equations that what is wanted follows from, in their order."""
+    reached = _variables(wanted)
+    kept = []
+    for e in reversed(equations):
+        if reached.intersection(e.outvars):
+            kept.append(e)
+            reached |= _variables(e.invars)
+    return kept[::-1]
