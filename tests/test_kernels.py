@@ -124,6 +124,17 @@ def test_lanes_may_have_counts_of_their_own():
     np.testing.assert_allclose(got, np.stack(expected), rtol=1e-12)
 
 
+@pytest.mark.parametrize("largest", [None, 0])
+def test_lanes_with_counts_of_their_own_are_differentiated(largest, monkeypatch):
+    """As kernels, and left to XLA."""
+    if largest is not None:
+        monkeypatch.setattr(_march, "LARGEST", {False: largest, True: largest})
+    counts = jnp.array([4, 12])
+    got = jax.vmap(lambda n: jax.jacfwd(lambda z: by_march(z, n)[0])(LANES[3]))(counts)
+    expected = [jax.jacfwd(lambda z, n=n: by_loop(z, int(n))[0])(LANES[3]) for n in counts]
+    np.testing.assert_allclose(got, np.stack(expected), rtol=0, atol=1e-12)
+
+
 def test_tangents_with_and_without_those_of_the_fixed_numbers():
     z, h = LANES[4], 2 * np.pi / 200
     tangents, drifts = [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)], [(None, None), (None, None), (None, 1.0)]

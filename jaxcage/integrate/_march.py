@@ -225,6 +225,18 @@ class Limited:
         return keep(new, moved), keep(seen, watched)
 
 
+def _limited(step: Any) -> Any:
+    """The step that stops after a count of its own, tangents outside."""
+    if not isinstance(step, Tangent):
+        return Limited(step)
+    known = tuple((False, *row) for row in step.known)
+    return Tangent(_limited(step.step), _one_more(step.sizes), known, Limited(step.loose))
+
+
+def _one_more(sizes: Sizes) -> Sizes:
+    return sizes._replace(fixed=sizes.fixed + 1)
+
+
 # --- what fits into a kernel ---------------------------------------------------------------------------------------
 
 
@@ -384,8 +396,7 @@ def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
         count, *numbers = args
         args = [jnp.max(count), *numbers[:results], count.astype(float), *numbers[results:]]
         mapped = [False, *mapped[1 : 1 + results], True, *mapped[1 + results :]]
-        sizes = how.sizes._replace(fixed=how.sizes.fixed + 1)
-        how = How(Limited(how.step), Limited(how.loose), sizes, how.multiple)
+        how = How(_limited(how.step), Limited(how.loose), _one_more(how.sizes), how.multiple)
     if isinstance(how.step, Tangent):
         moved, watched, fixed = how.sizes.split(mapped[1:])
         inner = how.step.sizes

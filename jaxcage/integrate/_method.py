@@ -104,7 +104,7 @@ def run_steps(
 ) -> Stretch:
     """One `parts`-th of a revolution of so many equal steps, in a single lane.
 
-    `multiple` is a number that `steps / parts` is known to be a multiple of, by default itself.
+    `multiple` is what a number of steps that is an array is known to be a multiple of.
     """
     if isinstance(steps, int) and isinstance(parts, int):
         if steps % parts:
