@@ -57,6 +57,8 @@ _QUANTITIES = (
     Quantity("largest_exponent", r"$\lambda_1$", "1", "largest exponent per revolution"),
     Quantity("standard_error", r"$s_\lambda$", "1", "standard error of the exponents"),
     Quantity("peak", r"$\epsilon$", "1", "largest excursion (cage: eccentricity ratio) observed"),
+    Quantity("error", "", "1", "largest change of a revolution's end (of the scale) with half as many steps"),
+    Quantity("doubt", "", "1", "change of the exponents with half as many steps"),
     Quantity("period", "", "1", "revolutions after which the orbit closes, 0 if it does not"),
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
     Quantity("label", "", "1", "what each lane does"),

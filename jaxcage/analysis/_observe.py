@@ -54,22 +54,22 @@ class Observation(NamedTuple):
     last: Float[Array | np.ndarray, " dim *lanes"]
     peak: Float[Array | np.ndarray, "*lanes"]  # largest excursion (for a cage: eps) while observed
     outcome: Int[Array | np.ndarray, "*lanes"]
+    error: Float[Array | np.ndarray, "*lanes"]  # largest error of a revolution from the start on, in units of the scale
+    doubt: Float[Array | np.ndarray, "exponents *lanes"]  # mean growth less that with half as many steps
 
 
 class Lane(NamedTuple):
-    """Where a lane is, how far out it has been, whether it still runs, and how many steps it needed last."""
+    """Where a lane is, how far out it has been, whether it still runs, how many steps it needed last, and its error."""
 
     y: State
     peak: Float[Array, ""]
     outcome: Int[Array, ""]
     level: Int[Array, ""]
+    error: Float[Array, ""]
 
 
 Tangents = tuple[State, ...]
 """One tangent vector after the other, in units of the state's scale."""
-
-RETRY = 16
-"""Once in so many revolutions a lane tries the next smaller number of steps again."""
 
 
 def orthonormalise(tangents: Tangents) -> tuple[Tangents, Float[Array, " exponents"]]:
@@ -92,23 +92,23 @@ def orthonormalise(tangents: Tangents) -> tuple[Tangents, Float[Array, " exponen
     return tuple(done), jnp.stack(logs)
 
 
-def _advance(strobe: StrobeMap, lane: Lane, n: Int[Array, ""], tangents: Tangents = ()) -> tuple[Lane, Tangents]:
-    """A lane through revolution `n`, with its tangent vectors.
+def _advance(strobe: StrobeMap, lane: Lane, tangents: Tangents = ()) -> tuple[Lane, Tangents, Tangents]:
+    """A lane through a revolution, with its tangent vectors, and these by half as many steps.
 
     A lane that fails turns to NaN and keeps the code of its first failure.
     """
     # A failed lane runs on from rest, unseen: solvers that check their input would otherwise stop the whole batch.
     runs = lane.outcome == 0
-    level = jnp.where((n + 1) % RETRY == 0, jnp.maximum(lane.level - 1, 0), lane.level)
     moved = revolution(
         strobe,
         tuple(jnp.where(runs, c, 0.0) for c in lane.y),
         tuple(multiply(t, strobe.scale) for t in tangents),
-        jnp.where(runs, level, 0),
+        jnp.where(runs, lane.level, 0),
     )
     outcome = jnp.where(runs, moved.outcome, lane.outcome)
-    after = Lane(_blank(moved.y, outcome), jnp.maximum(lane.peak, moved.peak), outcome, moved.level)
-    return after, tuple(divide(t, strobe.scale) for t in moved.tangents)
+    error = jnp.where(runs, jnp.maximum(lane.error, moved.error), lane.error)
+    after = Lane(_blank(moved.y, outcome), jnp.maximum(lane.peak, moved.peak), outcome, moved.level, error)
+    return after, *(tuple(divide(t, strobe.scale) for t in each) for each in (moved.tangents, moved.half))
 
 
 def _blank(y: State, outcome: Int[Array, ""]) -> State:
@@ -124,8 +124,9 @@ def _start_tangents(dimension: int, exponents: int) -> Tangents:
 def settle(strobe: StrobeMap, y0: State, revolutions: Int[Array, ""]) -> Lane:
     """Run a lane from `y0` without recording anything; one that may not start there has failed."""
     admitted = outcome_code(strobe.admit(y0))
-    lane = Lane(_blank(y0, admitted), jnp.zeros(()), admitted, jnp.zeros((), jnp.int32))
-    return jax.lax.fori_loop(0, revolutions, lambda n, c: _advance(strobe, c, n)[0], lane)
+    zero = jnp.zeros(())
+    lane = Lane(_blank(y0, admitted), zero, admitted, jnp.zeros((), jnp.int32), zero)
+    return jax.lax.fori_loop(0, revolutions, lambda _, c: _advance(strobe, c)[0], lane)
 
 
 def observe(strobe: StrobeMap, lane: Lane, lengths: Lengths, room: Room) -> Observation:
@@ -148,29 +149,32 @@ def observe(strobe: StrobeMap, lane: Lane, lengths: Lengths, room: Room) -> Obse
 
         def watch(n: Array, carry: tuple) -> tuple:
             lane, ring = carry
-            lane, _ = _advance(strobe, lane, n)
+            lane = _advance(strobe, lane)[0]
             return lane, record(ring, n, lane)
 
         lane, ring = jax.lax.fori_loop(0, observed, watch, (lane, ring))
-        growth = jnp.zeros((room.blocks, 0))
+        growth, doubt = jnp.zeros((room.blocks, 0)), jnp.zeros(0)
     else:
         zero = jnp.zeros(room.exponents)
         sums = jnp.zeros((room.blocks + 1, room.exponents))
 
         def follow(n: Array, carry: tuple) -> tuple:
             # Revolutions n < 0 only align the tangent vectors; their growth goes to the extra row of `sums`.
-            lane, ring, tangents, total, sums = carry
-            lane, moved = _advance(strobe, lane, n, tangents)
+            lane, ring, tangents, total, doubt, sums = carry
+            lane, *pushed = _advance(strobe, lane, tangents)
             runs = lane.outcome == 0
-            tangents, logs = orthonormalise(jax.tree.map(lambda t: jnp.where(runs, t, 1.0), moved))
+            (tangents, logs), (_, rough) = (
+                orthonormalise(jax.tree.map(lambda t: jnp.where(runs, t, 1.0), each)) for each in pushed
+            )
             total = total + jnp.where(runs, logs, jnp.nan)
+            doubt = doubt + jnp.where(n < 0, 0.0, logs - rough)
             row = jnp.where(n < 0, room.blocks, n // lengths.block)
             sums = jax.lax.dynamic_update_index_in_dim(sums, total, row, 0)
             total = jnp.where((n + 1) % lengths.block == 0, zero, total)
-            return lane, record(ring, jnp.maximum(n, 0), lane), tangents, total, sums
+            return lane, record(ring, jnp.maximum(n, 0), lane), tangents, total, doubt, sums
 
-        carry = (lane, ring, _start_tangents(dim, room.exponents), zero, sums)
-        lane, ring, _, _, sums = jax.lax.fori_loop(-lengths.align, observed, follow, carry)
-        growth = sums[:-1] / lengths.block.astype(float)
+        carry = (lane, ring, _start_tangents(dim, room.exponents), zero, zero, sums)
+        lane, ring, _, _, doubt, sums = jax.lax.fori_loop(-lengths.align, observed, follow, carry)
+        growth, doubt = sums[:-1] / lengths.block.astype(float), doubt / observed.astype(float)
     strobe_states = jnp.roll(ring, -(observed % room.keep), axis=0)
-    return Observation(strobe_states, growth, jnp.stack(lane.y), lane.peak, lane.outcome)
+    return Observation(strobe_states, growth, jnp.stack(lane.y), lane.peak, lane.outcome, lane.error, doubt)

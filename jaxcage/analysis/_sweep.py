@@ -31,6 +31,10 @@ class Sweep:
     """Largest excursion while observed: for a cage the largest eps, flagged above 1 (overlap of the surfaces)."""
     outcome: Int[np.ndarray, "speeds starts"]
     """Code of how each lane ended: its place in `jaxcage.OUTCOMES`."""
+    error: Float[np.ndarray, "speeds starts"]
+    """Largest error of a revolution, by halving its steps, in units of `scale` (for a cage: clearances)."""
+    doubt: Float[np.ndarray, "speeds starts exponents"]
+    """How much the exponents would change with half as many steps."""
     scale: Float[np.ndarray, "speeds dim"]
     """Characteristic magnitude of each state component."""
     discard: int
@@ -65,11 +69,11 @@ class Sweep:
 
     @property
     def standard_error(self) -> Float[np.ndarray, "speeds starts exponents"]:
-        """Standard error of the exponents from the scatter of the blocks."""
+        """Standard error of the exponents from the scatter of the blocks, and what the steps add to it."""
         blocks = self.block_growth.shape[2]
         if blocks < 2:
             return np.full(self.exponents.shape, np.inf)
-        return np.std(self.block_growth, axis=2, ddof=1) / np.sqrt(blocks)
+        return np.hypot(np.std(self.block_growth, axis=2, ddof=1) / np.sqrt(blocks), self.doubt)
 
     @property
     def failed(self) -> Shaped[np.ndarray, "speeds starts"]:

@@ -6,6 +6,7 @@
 | `_explicit`    | the classical Runge-Kutta method as a diffrax solver                               |
 | `_newmark`     | the paper's Newmark-beta as a diffrax solver                                       |
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
+| `_controlled`  | as many steps as a revolution needs, and its error                                 |
 | `_march`       | many steps of a scalar function as a primitive: lanes, tangents, one compiled loop |
 | `_program`     | a scalar function traced: its elementary operations                                |
 | `_kernel`      | a step of a method as such a function                                              |
@@ -16,22 +17,25 @@
 | `_results`     | how an integration ended                                                           |
 """
 
+from ._controlled import (
+    ControlledSteps as ControlledSteps,
+    controlled as controlled,
+    stated as stated,
+)
 from ._explicit import ClassicalRK4 as ClassicalRK4
 from ._march import compiled as compiled, march as march, march_with_tangents as march_with_tangents
 from ._method import (
     REVOLUTION as REVOLUTION,
     AbstractMethod as AbstractMethod,
     AdaptiveSteps as AdaptiveSteps,
-    ControlledSteps as ControlledSteps,
     FixedSteps as FixedSteps,
     Stretch as Stretch,
-    controlled as controlled,
     method as method,
 )
+from ._moved import Moved as Moved
 from ._newmark import NewmarkBeta as NewmarkBeta
 from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
 from ._revolution import (
-    Moved as Moved,
     pushed as pushed,
     revolution as revolution,
     takes_tangents as takes_tangents,

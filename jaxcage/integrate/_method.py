@@ -2,7 +2,7 @@
 
 import abc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -82,13 +82,6 @@ def judge(result: Any, y: State, excursion: Scalar, limit: float) -> RESULTS:
     finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     return _worse(RESULTS.promote(result), RESULTS.where(finite, state, RESULTS.not_finite))  # pyright: ignore
-
-
-class Rung(NamedTuple):
-    """A solver and its number of equal steps per revolution."""
-
-    solver: dfx.AbstractSolver
-    steps: int
 
 
 def run_steps(
@@ -179,37 +172,6 @@ class FixedSteps(AbstractMethod):
         return run_steps(self.solver, self.steps, field, system, scale, y, phase, parts)
 
 
-class ControlledSteps(AbstractMethod):
-    """As many equal steps as a revolution needs: the first rung of a ladder with a small enough error estimate.
-
-    A cage that stays off the rib for a revolution needs a quarter of the steps that a contact asks for, and neither is
-    stiff as a rule. Explicit rungs come first; the last ones are L-stable, for what is stiff. The last rung is accepted
-    whatever its error. The price of control is that the strobe map is smooth only between the states at which the rung
-    changes: for sweeps, not for Newton's method.
-    """
-
-    ladder: tuple[Rung, ...]
-    tolerance: float = eqx.field(static=True)
-
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | int,
-    ) -> Stretch:
-        def from_rung(i: int) -> Stretch:
-            tried = run_steps(*self.ladder[i], field, system, scale, y, phase, parts)
-            if i + 1 == len(self.ladder):
-                return tried
-            good = (tried.error <= self.tolerance) & (tried.result == RESULTS.successful)
-            return jax.lax.cond(good, lambda: tried, lambda: from_rung(i + 1))
-
-        return from_rung(0)
-
-
 class AdaptiveSteps(AbstractMethod):
     """Steps chosen by an error estimate relative to the state and to the system's own scale."""
 
@@ -276,8 +238,16 @@ _ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
 }
 DEFAULT_SOLVER = "rk4"
 DEFAULT_STEPS = 1024
-DEFAULT_LADDER = (("rk4", 128), ("rk4", 384), ("rk4", 768), ("rodas4", 1024))
-DEFAULT_ERROR = 1e-2
+
+
+def make_fixed(solver: str, steps: int) -> FixedSteps:
+    """Equal steps of a solver by name.
+
+    **Raises:** `ValueError` for a name that is not known.
+    """
+    if solver not in _FIXED:
+        raise ValueError(f"Argument `solver` must be one of {', '.join(_FIXED)}, but '{solver}' was given.")
+    return FixedSteps(_FIXED[solver](), steps)
 
 
 def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:
@@ -293,30 +263,12 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
 
     **Raises:** `ValueError` for a name that is not known, or both `steps` and `tolerance`.
     """
-    table = _FIXED if tolerance is None else _ADAPTIVE
-    if solver not in table:
-        raise ValueError(f"Argument `solver` must be one of {', '.join(table)}, but '{solver}' was given.")
     if tolerance is None:
-        return FixedSteps(_FIXED[solver](), DEFAULT_STEPS if steps is None else steps)
+        return make_fixed(solver, DEFAULT_STEPS if steps is None else steps)
+    if solver not in _ADAPTIVE:
+        raise ValueError(f"Argument `solver` must be one of {', '.join(_ADAPTIVE)}, but '{solver}' was given.")
     if steps is not None:
         raise ValueError("Arguments `steps` and `tolerance` must not both be given: steps are fixed or adaptive.")
     if not 0 < tolerance < 1:
         raise ValueError(f"Argument `tolerance` must lie between 0 and 1, but {tolerance} was given.")
     return AdaptiveSteps(_ADAPTIVE[solver](), tolerance, tolerance)
-
-
-def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] = DEFAULT_LADDER) -> ControlledSteps:
-    """The method of sweeps: in each revolution the first rung of `ladder` whose error estimate is at most `error`.
-
-    **Arguments:** sum of a revolution's error estimates, in units of the system's own scale; solvers by name with their
-    steps per revolution, in the order in which they are tried.
-
-    **Raises:** `ValueError` for an error that is not positive, an empty ladder, or a solver without an estimate.
-    """
-    known = [name for name, make in _FIXED.items() if isinstance(make(), dfx.AbstractAdaptiveSolver)]
-    bad = [name for name, _ in ladder if name not in known]
-    if bad or not ladder:
-        raise ValueError(f"Argument `ladder` must be made of {', '.join(known)}, but it is {ladder}.")
-    if not error > 0:
-        raise ValueError(f"Argument `error` must be positive, but {error} was given.")
-    return ControlledSteps(tuple(Rung(_FIXED[name](), int(steps)) for name, steps in ladder), float(error))

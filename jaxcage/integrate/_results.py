@@ -13,6 +13,10 @@ class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "The state started outside, or went far outside, what the model holds for (a cage: eps > 1 at the start, "
         "eps > 2 later): start inside the clearance, or use a stiffer contact or more steps per revolution."
     )
+    inaccurate = (
+        "A revolution still moves by more than the tolerance when its steps are halved, on the finest steps allowed: "
+        "allow a larger error or finer steps, or look for a contact or spring that is stiffer than meant."
+    )
 
 
 OUTCOMES = (
@@ -23,13 +27,26 @@ OUTCOMES = (
     "nonlinear_divergence",
     "dt_min_reached",
     "other",
+    "inaccurate",
 )
 """Names of outcomes in the order of the integer codes that sweeps store."""
 
 
+INACCURATE = OUTCOMES.index("inaccurate")
+_KNOWN = {name: i for i, name in enumerate(OUTCOMES) if name != "other"}
+
+
 def outcome_code(result: RESULTS) -> Int[Array, ""]:
     """The place of `result` in `OUTCOMES`."""
-    code = jnp.full((), len(OUTCOMES) - 1, dtype=jnp.int32)
-    for i, name in enumerate(OUTCOMES[:-1]):
+    code = jnp.full((), OUTCOMES.index("other"), dtype=jnp.int32)
+    for name, i in _KNOWN.items():
         code = jnp.where(result == getattr(RESULTS, name), jnp.int32(i), code)
     return code
+
+
+def result_of(code: Int[Array, ""]) -> RESULTS:
+    """The outcome whose place in `OUTCOMES` is `code`."""
+    result = RESULTS.internal_error
+    for name, i in _KNOWN.items():
+        result = RESULTS.where(code == i, getattr(RESULTS, name), result)
+    return result  # pyright: ignore[reportReturnType]

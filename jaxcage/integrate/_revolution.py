@@ -4,10 +4,8 @@ Written for one lane. Where `jax.vmap` makes many of it, lanes that ask for the 
 together, so that the work is that of the lanes which ask for it, whatever their neighbours need.
 """
 
-import itertools
-import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import diffrax as dfx
 import equinox as eqx
@@ -18,31 +16,20 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar, State
 from ..models import ESCAPE
+from ._controlled import ControlledSteps, Rung, climb, nowhere, run_rung
 from ._kernel import KernelSolver, can_be_kernel, kernel_step
 from ._march import march_with_tangents
-from ._method import REVOLUTION, AbstractMethod, ControlledSteps, FixedSteps, Stretch, judge, run_steps
+from ._method import REVOLUTION, AbstractMethod, FixedSteps, judge
+from ._moved import Moved, Tangents, moved_by
 from ._results import outcome_code
 from ._strobe import StrobeMap
 
 
-Tangents = tuple[State, ...]
-LaneState = tuple[Float[Array, " lanes"], ...]
 BLOCK = 16
 """Lanes packed together on a CPU: smaller blocks cost more calls, larger ones run more lanes for nothing."""
 BLOCK_ON_GPU = 1 << 14
 
-
-class Moved(NamedTuple):
-    """A lane after a revolution."""
-
-    y: State
-    tangents: Tangents
-    peak: Scalar
-    """Largest excursion on the way."""
-    outcome: Int[Array, ""]
-    level: Int[Array, ""]
-    """Which of the method's step counts the lane needed."""
-    error: Scalar
+LaneState = tuple[Float[Array, " lanes"], ...]
 
 
 def revolution(strobe: StrobeMap, y: State, tangents: Tangents, level: Int[Array, ""]) -> Moved:
@@ -50,10 +37,9 @@ def revolution(strobe: StrobeMap, y: State, tangents: Tangents, level: Int[Array
 
     `level` is where a method with several step counts begins.
     """
-    method = strobe.method
-    if isinstance(method, ControlledSteps) and len(method.ladder) > 1:
-        return _controlled(method, strobe, y, tangents, level)
-    return _moved(strobe, y, tangents, level)
+    if isinstance(strobe.method, ControlledSteps):
+        return _controlled(strobe.method, strobe, y, tangents, level)
+    return moved_by(strobe, y, tangents)
 
 
 Drift = Sequence[Scalar | None]
@@ -90,27 +76,11 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
         loose=step.loose,
     )
     code = outcome_code(judge(dfx.RESULTS.successful, y, peak, ESCAPE))
-    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error)
-
-
-def _moved(advance: Callable[[State], Stretch], y: State, tangents: Tangents, level: Any) -> Moved:
-    def move(y: State) -> tuple[State, tuple[Any, ...]]:
-        stretch = advance(y)
-        return stretch.y, (jnp.asarray(stretch.peak), outcome_code(stretch.result), jnp.asarray(stretch.error))
-
-    if not tangents:
-        after, (peak, code, error) = move(y)
-        return Moved(after, (), peak, code, level, error)
-    along = lambda t: jax.jvp(move, (y,), (t,), has_aux=True)
-    if len(tangents) == 1:  # without the extra axis the compiled loops are nearly twice as fast
-        after, pushed, (peak, code, error) = along(tangents[0])
-        return Moved(after, (pushed,), peak, code, level, error)
-    stacked = tuple(map(jnp.stack, zip(*tangents, strict=True)))
-    after, pushed, (peak, code, error) = jax.vmap(along, out_axes=(None, 0, None))(stacked)
-    return Moved(after, tuple(zip(*pushed, strict=True)), peak, code, level, error)
+    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error, ())
 
 
 def _controlled(method: ControlledSteps, strobe: StrobeMap, y: State, tangents: Tangents, level: Any) -> Moved:
+    """A lane one revolution on; under `jax.vmap`, lanes that ask for the same rung are packed together."""
     numbers, rest = eqx.partition(strobe, eqx.is_array)
     row, form = jax.tree.flatten(numbers)
     remake = lambda row: eqx.combine(jax.tree.unflatten(form, row), rest)
@@ -139,40 +109,21 @@ def _lanes(
     tangents: tuple[LaneState, ...],
     level: Int[Array, " lanes"],
 ) -> Moved:
-    """Each rung in turn, for the lanes that ask for it: those whose error is too large ask for the next."""
-    last = len(method.ladder) - 1
-
-    def attempts(solver: Any, first: int, steps: list[int], carry: Moved) -> Moved:
-        counts, multiple = jnp.asarray(steps), math.gcd(*steps, 4)
-
-        def one(row: Sequence[Any], y: State, tangents: Tangents, level: Any) -> Moved:
+    def attempt(rungs: tuple[Rung, ...], i: Array, mine: Bool[Array, " lanes"]) -> Moved:
+        def one(row: Sequence[Any], y: State, tangents: Tangents) -> Moved:
             strobe = remake(row)
-            pieces = strobe.field, strobe.system, strobe.scale
-            advance = lambda y: run_steps(solver, counts[level - first], *pieces, y, multiple=multiple)
-            return _moved(advance, y, tangents, level)
+            return moved_by(run_rung(method, rungs, i, (strobe.field, strobe.system, strobe.scale)), y, tangents)
 
-        def attempt(i: Array, carry: Moved) -> Moved:
-            mine = carry.level == first + i
-            tried = _packed(one, mine, (first + i).astype(jnp.int32), row, own, y, tangents)
-            new = tried._replace(level=carry.level)
-            kept = jax.tree.map(lambda a, b: jnp.where(mine, a, b), new, carry)
-            poor = mine & ~((tried.error <= method.tolerance) & (tried.outcome == 0)) & (first + i < last)
-            return kept._replace(level=jnp.where(poor, carry.level + 1, carry.level))
+        return _packed(one, mine, row, own, y, tangents)
 
-        return jax.lax.fori_loop(0, len(steps), attempt, carry)
-
-    zero = jnp.zeros(level.shape)
-    moved = Moved(y, tangents, zero, jnp.zeros_like(level), level, zero)
-    for solver, group in itertools.groupby(enumerate(method.ladder), key=lambda pair: pair[1].solver):
-        places = list(group)
-        moved = attempts(solver, places[0][0], [rung.steps for _, rung in places], moved)
-    return moved
+    each = [0 if o else None for o in own]
+    scale = jax.vmap(lambda row, _: remake(row).scale, in_axes=(each, 0))(list(row), level)
+    return climb(method, level, nowhere(y, tangents), scale, attempt)
 
 
 def _packed(
     one: Callable[..., Moved],
     mine: Bool[Array, " lanes"],
-    level: Int[Array, ""],
     row: Sequence[Array],
     own: Sequence[bool],
     y: LaneState,
@@ -183,20 +134,19 @@ def _packed(
     block = min(lanes, BLOCK if jax.default_backend() == "cpu" else BLOCK_ON_GPU)
     order = jnp.argsort(~mine, stable=True) if lanes > block else jnp.arange(lanes)
     packed = jax.tree.map(lambda x: x[order], ([x for x, o in zip(row, own, strict=True) if o], y, tangents))
-    over = jax.vmap(one, in_axes=([0 if o else None for o in own], 0, 0, None))
+    over = jax.vmap(one, in_axes=([0 if o else None for o in own], 0, 0))
 
     def of(cut: Callable[[Array], Array]) -> Moved:
         mine, y, tangents = jax.tree.map(cut, packed)
         each = iter(mine)
-        return over([next(each) if o else x for x, o in zip(row, own, strict=True)], y, tangents, level)
+        return over([next(each) if o else x for x, o in zip(row, own, strict=True)], y, tangents)
 
     def run_block(i: Array, done: Moved) -> Moved:
         first = jnp.minimum(i * block, lanes - block)  # the last block begins earlier where it must
         moved = of(lambda x: jax.lax.dynamic_slice_in_dim(x, first, block))
         return jax.tree.map(lambda x, new: jax.lax.dynamic_update_slice_in_dim(x, new, first, 0), done, moved)
 
-    zero = jnp.zeros(lanes)
-    nothing = Moved(packed[1], packed[2], zero, jnp.zeros(lanes, jnp.int32), jnp.zeros(lanes, jnp.int32), zero)
+    nothing = nowhere(packed[1], packed[2])._replace(half=())
     done = jax.lax.fori_loop(0, (jnp.sum(mine) + block - 1) // block, run_block, nothing)
     back = jnp.argsort(order)
     return jax.tree.map(lambda x: x[back], done)

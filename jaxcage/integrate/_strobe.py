@@ -12,7 +12,8 @@ from jaxtyping import Array, Int
 from .._checks import require_x64
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
-from ._method import REVOLUTION, AbstractMethod, Stretch, judge, method as make_method
+from ._controlled import controlled
+from ._method import REVOLUTION, AbstractMethod, Stretch, judge
 from ._results import RESULTS
 
 
@@ -41,9 +42,9 @@ class StrobeMap(eqx.Module):
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
     """The strobe map of `system` at `speed` [rad/s].
 
-    **Arguments:** system; speed; integration method, by default the library's own (`jaxcage.method()`).
+    **Arguments:** system; speed; integration method, by default `jaxcage.controlled()`.
     """
     require_x64()
-    chosen = make_method() if method is None else method
+    chosen = controlled() if method is None else method
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

@@ -22,6 +22,8 @@ _DIMENSIONS: dict[str, tuple[str, ...]] = {
     "block_growth": ("speed", "start", "block", "exponent"),
     "peak": ("speed", "start"),
     "outcome": ("speed", "start"),
+    "error": ("speed", "start"),
+    "doubt": ("speed", "start", "exponent"),
     "scale": ("speed", "component"),
 }
 """Labelled dimensions of everything that a sweep consists of."""

@@ -175,7 +175,7 @@ def _extents(study: Study) -> dict[str, int]:
 def _shapes(study: Study) -> dict[str, tuple[tuple[str, ...], str]]:
     """Dimensions and kind of number of every variable."""
     lanes = tuple(study.plan.axes)
-    one = {name: (lanes, "float64") for name in ("largest_exponent", "standard_error", "peak")}
+    one = {name: (lanes, "float64") for name in ("largest_exponent", "standard_error", "peak", "error")}
     one |= {name: (lanes, "int8") for name in ("period", "label", "outcome")}
     if study.exponents > 1:
         one |= {name: ((*lanes, "exponent"), "float64") for name in ("exponents", "standard_errors")}

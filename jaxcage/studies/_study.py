@@ -140,13 +140,13 @@ class Study:
 
     def _judged(self, seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Results:
         """What is stored of lanes; here they are the first axis of an observation."""
-        strobe, growth, peak, outcome = (np.asarray(x) for x in (seen.strobe, seen.growth, seen.peak, seen.outcome))
+        strobe, growth, _, peak, outcome, largest, doubt = (np.asarray(x) for x in seen)
         failed = outcome != 0
         period = np.where(failed, 0, closing_period(strobe[:, -CLOSING:], scale))
         exponents = np.mean(growth, axis=1)
         error = np.full(exponents.shape, np.inf)
         if self.blocks > 1:
-            error = np.std(growth, axis=1, ddof=1) / np.sqrt(self.blocks)
+            error = np.hypot(np.std(growth, axis=1, ddof=1) / np.sqrt(self.blocks), doubt)
         label = label_lanes(failed, period, exponents[:, 0], error[:, 0])
         several = {"exponents": exponents, "standard_errors": error} if self.exponents > 1 else {}
         kept = {"strobe": strobe[:, -self.strobe :]} if self.strobe else {}
@@ -156,6 +156,7 @@ class Study:
             **several,
             **kept,
             "peak": peak,
+            "error": largest,
             "period": period.astype(np.int8),
             "label": np.array([LABELS.index(name) for name in label], dtype=np.int8),
             "outcome": outcome.astype(np.int8),

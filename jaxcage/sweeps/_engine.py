@@ -18,7 +18,7 @@ from jaxtyping import Array, Float, Int
 
 from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
-from ..integrate import AbstractMethod, StrobeMap, compiled, strobe_map
+from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import AbstractForcedSystem
 
 
@@ -38,13 +38,12 @@ def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array
 
 @compiled
 def _observe_chunk(
-    designs: "Designs", method: AbstractMethod, lengths: Lengths, room: Room, part: "Part", outcome: Array, level: Array
+    designs: "Designs", method: AbstractMethod, lengths: Lengths, room: Room, part: "Part", *left: Array
 ) -> Observation:
-    def one(lane: Part, outcome: Array, level: Array) -> Observation:
-        at = Lane(lane.y, jnp.zeros(()), outcome, level)
-        return observe(designs.strobe(method, lane), at, lengths, room)
+    def one(lane: Part, *left: Array) -> Observation:
+        return observe(designs.strobe(method, lane), Lane(lane.y, jnp.zeros(()), *left), lengths, room)
 
-    return over_lanes(one, part, outcome, level)
+    return over_lanes(one, part, *left)
 
 
 def over_lanes(f: Callable[..., Any], *parts: Any) -> Any:
@@ -81,7 +80,7 @@ class Designs(eqx.Module):
         systems = self.systems
         if self.count > 1:
             systems = jax.tree.map(lambda x: x[lane.which] if eqx.is_array(x) else x, systems)
-        return strobe_map(systems, lane.speed, method)
+        return strobe_map(systems, lane.speed, stated(method))
 
 
 def _numbers(system: AbstractForcedSystem) -> AbstractForcedSystem:
@@ -192,13 +191,13 @@ def run_lanes(
 
     def begin(lane: np.ndarray) -> tuple[Any, ...]:
         got = _settle_chunk(designs, method, alone, _part(speed, which, y0, lane))
-        return *got.y, got.outcome, got.level
+        return *got.y, got.outcome, got.level, got.error
 
-    *y, outcome, level = _in_chunks(begin, np.arange(lanes), size, report(0))
+    *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0))
     settled = np.stack(y, axis=-1).reshape(lanes, dim)
 
     def follow(lane: np.ndarray) -> Observation:
-        rest = jnp.asarray(outcome[lane]), jnp.asarray(level[lane])
+        rest = [jnp.asarray(x[lane]) for x in (outcome, level, error)]
         return _observe_chunk(designs, method, lengths, room, _part(speed, which, settled, lane), *rest)
 
     seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))

@@ -171,7 +171,7 @@ def assemble(
     shape: tuple[int, ...],
 ) -> Sweep:
     """A `Sweep` from the fields of an `Observation` whose lanes are laid out as `shape` = (speeds, starts)."""
-    strobe, growth, last, peak, outcome = (np.moveaxis(np.asarray(x), -1, 0) for x in seen)
+    strobe, growth, last, peak, outcome, error, doubt = (np.moveaxis(np.asarray(x), -1, 0) for x in seen)
     return Sweep(
         speed=speed,
         strobe=strobe.reshape(*shape, plan.keep, system.dimension),
@@ -179,6 +179,8 @@ def assemble(
         block_growth=growth.reshape(*shape, plan.blocks, plan.exponents),
         peak=peak.reshape(shape),
         outcome=outcome.reshape(shape),
+        error=error.reshape(shape),
+        doubt=doubt.reshape(*shape, plan.exponents),
         scale=np.asarray(_scales(system, jnp.asarray(speed))),
         discard=plan.discard,
         revolutions=plan.block * plan.blocks,
