@@ -71,6 +71,13 @@ class ControlledSteps(AbstractMethod):
         )
         return Stretch(moved.y, moved.peak, result_of(moved.outcome), moved.error)
 
+    def resolving(self, harmonics: int) -> "ControlledSteps":
+        """Without the rungs of fewer than two steps to a period of the forcing's highest harmonic, which would agree on
+        a slower forcing that is not there."""
+        enough = [not isinstance(r, FixedSteps) or r.steps >= 2 * harmonics for r in self.ladder[:-2]]
+        kept = tuple(rung for rung, good in zip(self.ladder, [*enough, True, True], strict=True) if good)
+        return eqx.tree_at(lambda m: m.ladder, self, kept)
+
     @property
     def groups(self) -> list[tuple[Rung, ...]]:
         """Neighbouring rungs of one solver, which one program serves; each adaptive one by itself."""

@@ -12,8 +12,9 @@ from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar, State
 from ..models import AbstractForcedSystem
-from ._method import REVOLUTION, AbstractMethod, method as make_method
-from ._results import OUTCOMES, outcome_code
+from ._controlled import ControlledSteps, controlled, stated
+from ._method import REVOLUTION, AbstractMethod, FixedSteps
+from ._results import INACCURATE, OUTCOMES, outcome_code
 from ._strobe import strobe_map
 
 
@@ -35,6 +36,9 @@ class Trajectory:
     """Largest excursion at any step, between the samples too; for a cage eps."""
     outcome: str
     """`successful`, or the name of what went wrong."""
+    error: float
+    """Largest error of a revolution, in units of the system's scale (for a cage: clearances): how far the ends of its
+    parts move, in all, with half as many steps."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " n"]:
@@ -45,7 +49,8 @@ class Trajectory:
         revolutions = self.time.size / self.samples
         return (
             f"Trajectory of {revolutions:g} revolutions, {self.samples} samples each, "
-            f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, largest excursion {self.peak:.3f}"
+            f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, largest excursion {self.peak:.3f}, "
+            f"error of a revolution at most {self.error:.0e}"
         )
 
     _repr_html_ = notebook_html
@@ -54,31 +59,34 @@ class Trajectory:
 @eqx.filter_jit
 def _run(
     system: AbstractForcedSystem,
-    method: AbstractMethod,
+    method: ControlledSteps,
     speeds: Float[Array, " revolutions"],
     rise: Scalar,
     y0: State,
     samples: int,
-) -> tuple[Float[Array, "revolutions samples dim"], Float[Array, " revolutions"], Int[Array, ""]]:
+) -> tuple[Float[Array, "revolutions samples dim"], Float[Array, " revolutions"], Float[Array, " revolutions"], Array]:
     """Whole revolutions one after the other; within one the speed rises by `rise`, in `samples` small steps."""
 
     def part(carry: tuple, i: Array, first: Array) -> tuple[tuple, Array]:
-        y, peak, outcome = carry
+        y, peak, error, outcome = carry
         strobe = strobe_map(system, first + rise * (i.astype(float) + 0.5) / samples, method)
         stretch = strobe.part(y, i, samples)
-        code = jnp.where(outcome == 0, outcome_code(stretch.result), outcome)
+        error = error + stretch.error
+        now = outcome_code(stretch.result)
+        code = jnp.where(outcome == 0, jnp.where((now == 0) & (error > method.tolerance), INACCURATE, now), outcome)
         y1 = tuple(jnp.where(code == 0, c, jnp.nan) for c in stretch.y)
-        return (y1, jnp.maximum(peak, stretch.peak), code), jnp.stack(y)
+        return (y1, jnp.maximum(peak, stretch.peak), error, code), jnp.stack(y)
 
     def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, Array]]:
-        carry = (carry[0], jnp.zeros(()), carry[2])
+        carry = (carry[0], jnp.zeros(()), jnp.zeros(()), carry[3])
         carry, states = jax.lax.scan(lambda c, i: part(c, i, first), carry, jnp.arange(samples))
-        return carry, (states, carry[1])
+        return carry, (states, *carry[1:3])
 
     admitted = outcome_code(strobe_map(system, speeds[0], method).admit(y0))
     y0 = tuple(jnp.where(admitted == 0, c, jnp.nan) for c in y0)
-    (_, _, code), (states, peaks) = jax.lax.scan(revolution, (y0, jnp.zeros(()), admitted), speeds)
-    return states, peaks, code
+    start = (y0, jnp.zeros(()), jnp.zeros(()), admitted)
+    (*_, code), (states, peaks, errors) = jax.lax.scan(revolution, start, speeds)
+    return states, peaks, errors, code
 
 
 def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> State:
@@ -98,9 +106,18 @@ def _check(speed: float, revolutions: int, samples: int, discard: int = 0) -> No
         )
 
 
+def _method(method: AbstractMethod | None, samples: int) -> ControlledSteps:
+    if isinstance(method, FixedSteps) and method.steps % samples:
+        raise ValueError(
+            f"Argument `samples` must divide the {method.steps} steps per revolution of the method, but is {samples}."
+        )
+    return stated(controlled() if method is None else method)
+
+
 def _trajectory(
-    states: Array, speeds: np.ndarray, rise: float, peaks: Array, code: Array, samples: int, discard: int
+    ran: tuple[Array, ...], speeds: np.ndarray, rise: float, samples: int, discard: int
 ) -> Trajectory:
+    states, peaks, errors, code = ran
     grid = np.arange(samples) / samples
     speed = (speeds[:, None] + rise * grid).ravel()[discard * samples :]
     tau = REVOLUTION * (np.arange(speeds.size)[:, None] + grid).ravel()[discard * samples :]
@@ -108,7 +125,7 @@ def _trajectory(
     time = np.concatenate([[0.0], np.cumsum(step / (speed[:-1] + 0.5 * rise / samples))])
     state = np.asarray(states).reshape(-1, states.shape[-1])[discard * samples :]
     peak = float(np.max(np.asarray(peaks)[discard:]))
-    return Trajectory(time, tau, state, speed, samples, peak, OUTCOMES[int(code)])
+    return Trajectory(time, tau, state, speed, samples, peak, OUTCOMES[int(code)], float(np.max(errors)))
 
 
 def simulate(
@@ -125,21 +142,19 @@ def simulate(
 
     **Arguments:** system; speed [rad/s]; revolutions recorded and discarded before; samples per revolution (they must
     divide the steps per revolution of a method with fixed steps); initial state, by default the system's first start;
-    integration method.
+    integration method, by default `jaxcage.controlled()`.
 
-    **Returns:** `Trajectory`; a run that fails is NaN from there on and says why in `outcome`.
+    **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on and says why in `outcome`.
 
     **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
     """
     require_x64()
     value = float(speed)
     _check(value, revolutions, samples, discard)
-    chosen = make_method() if method is None else method
+    chosen = _method(method, samples)
     speeds = np.full(discard + revolutions, value)
-    states, peaks, code = _run(
-        system, chosen, jnp.asarray(speeds), jnp.asarray(0.0), _start(system, value, start), samples
-    )
-    return _trajectory(states, speeds, 0.0, peaks, code, samples, discard)
+    ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(0.0), _start(system, value, start), samples)
+    return _trajectory(ran, speeds, 0.0, samples, discard)
 
 
 def ramp(
@@ -165,10 +180,8 @@ def ramp(
     require_x64()
     low, high = float(first), float(last)
     _check(min(low, high), revolutions, samples)
-    chosen = make_method() if method is None else method
+    chosen = _method(method, samples)
     rise = (high - low) / revolutions
     speeds = low + rise * np.arange(revolutions)
-    states, peaks, code = _run(
-        system, chosen, jnp.asarray(speeds), jnp.asarray(rise), _start(system, low, start), samples
-    )
-    return _trajectory(states, speeds, rise, peaks, code, samples, 0)
+    ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(rise), _start(system, low, start), samples)
+    return _trajectory(ran, speeds, rise, samples, 0)
