@@ -24,10 +24,10 @@ NODES = 16
 SWEEPS = 14
 """Of fixed-point iteration in a step."""
 CONVERGED = 1e-13
-SMOOTH = 1e-8
+SMOOTH = 1e-9
 """Largest last Legendre coefficient of a step; what follows from a step is as good as its square."""
-PHASE = 16.0
-"""Of the highest harmonic in a step [rad]; 16 Gauss points resolve 20 to 1e-12."""
+PHASE = 8.0
+"""Of the highest harmonic in a step [rad], in which time runs unevenly."""
 MOST_STEPS = 20_000
 
 
@@ -164,7 +164,7 @@ def _contact_step(
     def pace(r: Array) -> Array:
         return jnp.where(leaving, -1 / jnp.where(leaving, r, 1.0), 1.0)
 
-    def sweep(_: int, guess: tuple[_Motion, Array]) -> tuple[_Motion, Array]:
+    def sweep(_: Int[Array, ""], guess: tuple[_Motion, Array]) -> tuple[_Motion, Array]:
         y, _ = guess
         r = at.r + step * (inner @ (pace(y.r) * 9 * y.w**8 * (swing * y.bar - y.w**10)))
         w = at.w + step * (inner @ (pace(r) * r))

@@ -32,7 +32,7 @@ class Trajectory:
     samples: int
     """Samples per revolution."""
     peak: float
-    """Largest excursion at any step, between the samples too; for a cage eps."""
+    """Largest excursion of the first sample and at any step after it, between the samples too; for a cage eps."""
     outcome: str
     """`successful`, or the name of what went wrong."""
 
@@ -71,7 +71,7 @@ def _run(
         return (y1, jnp.maximum(peak, stretch.peak), code), jnp.stack(y)
 
     def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, Array]]:
-        carry = (carry[0], jnp.zeros(()), carry[2])
+        carry = (carry[0], jnp.asarray(system.excursion(carry[0]), dtype=float), carry[2])
         carry, states = jax.lax.scan(lambda c, i: part(c, i, first), carry, jnp.arange(samples))
         return carry, (states, carry[1])
 
