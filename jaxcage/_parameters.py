@@ -166,12 +166,23 @@ def replace(module: M, **values: PyTree) -> M:
         if offered and value not in offered:
             raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
     if exchanged := {name: values[name] for name in parts if name in values}:
-        module = dataclasses.replace(module, **exchanged)
+        new = {id(getattr(module, name)): part for name, part in exchanged.items()}
+        module = jax.tree.map(lambda x: new.get(id(x), x), module, is_leaf=lambda x: id(x) in new)
     changed = [name for name in leaves if name in values and name not in parts]
     if changed:
         at = lambda m: [get(m, leaves[name]) for name in changed]
         module = eqx.tree_at(at, module, [jax.tree.map(_as_leaf, values[name]) for name in changed])
-    for name in choices:
-        if name in values:
-            module = _with_static(module, choices[name], values[name])
+    own = {name: values[name] for name, path in choices.items() if name in values and len(path) == 1}
+    for name, path in choices.items():
+        if name in values and name not in own:
+            module = _with_static(module, path, values[name])
+    # Last, and at once: what is checked of the module is what was asked for, and not a half of it.
+    return dataclasses.replace(module, **own) if own else _checked(module)
+
+
+def _checked(module: M) -> M:
+    """`module`, of which tree surgery has not asked whether its parts go together."""
+    for kind in type(module).__mro__:
+        if check := vars(kind).get("__check_init__"):
+            check(module)
     return module

@@ -139,7 +139,7 @@ def observe(strobe: StrobeMap, lane: Lane, lengths: Lengths, room: Room) -> Obse
     """
     dim = len(lane.y)
     observed = lengths.block * lengths.blocks
-    lane = lane._replace(peak=jnp.zeros(()))
+    lane = lane._replace(peak=jnp.asarray(strobe.system.excursion(lane.y), dtype=float))
     ring = jnp.zeros((room.keep, dim))
 
     def record(ring: Array, n: Array, lane: Lane) -> Array:

@@ -72,3 +72,4 @@ from ._statics import (
     roller_angles as roller_angles,
     static_cage_displacement as static_cage_displacement,
 )
+from ._validate import is_concrete as is_concrete

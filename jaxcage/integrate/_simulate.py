@@ -33,7 +33,7 @@ class Trajectory:
     samples: int
     """Samples per revolution."""
     peak: float
-    """Largest excursion at any step, between the samples too; for a cage eps."""
+    """Largest excursion of the first sample and at any step after it, between the samples too; for a cage eps."""
     outcome: str
     """`successful`, or the name of what went wrong."""
     error: float
@@ -78,7 +78,7 @@ def _run(
         return (y1, jnp.maximum(peak, stretch.peak), error, code), jnp.stack(y)
 
     def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, Array]]:
-        carry = (carry[0], jnp.zeros(()), jnp.zeros(()), carry[3])
+        carry = (carry[0], jnp.asarray(system.excursion(carry[0]), dtype=float), jnp.zeros(()), carry[3])
         carry, states = jax.lax.scan(lambda c, i: part(c, i, first), carry, jnp.arange(samples))
         return carry, (states, *carry[1:3])
 

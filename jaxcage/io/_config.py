@@ -196,10 +196,3 @@ def _check_together(model: CageModel) -> None:
     width, limit = 1e3 * float(model.film.land_width), 1e3 * float(model.bearing.land_width_limit)
     if width > limit:
         raise ConfigError(f"`film.land_width` must fit beside the rollers, in {limit:g} mm, but is {width:g} mm.")
-    clearance = 1e3 * float(model.clearance)
-    for name, law in (("contact", model.contact), ("film", model.film)):
-        length = 1e3 * float(law.smoothing)
-        if length > 0.1 * clearance:
-            raise ConfigError(
-                f"`{name}.smoothing` must be at most a tenth of the clearance, {clearance:g} mm, but is {length:g} mm."
-            )

@@ -6,11 +6,12 @@ from typing import Literal
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array
 
 from .._parameters import choice, parameter
 from .._types import Scalar, State
-from ..bearing import Bearing, Lubricant
+from ..bearing import Bearing, Lubricant, is_concrete
 from ..forces import (
     ElasticRib,
     LandContact,
@@ -28,6 +29,9 @@ from ._system import AbstractForcedSystem
 
 
 ClearanceReading = Literal["as_printed", "radial"]
+
+SMOOTHEST = 0.1
+"""Largest smoothing length over clearance: beyond, it is no longer a detail of the contact or of the film's centre."""
 
 
 class CageModel(AbstractForcedSystem):
@@ -57,6 +61,16 @@ class CageModel(AbstractForcedSystem):
         "physical", "as_printed", text="eccentricity as given, or as (20) prints it", default="physical"
     )
 
+    def __check_init__(self) -> None:
+        clearance = self.clearance
+        for name, length in (("contact", self.contact.smoothing), ("film", self.film.smoothing)):
+            if is_concrete(length, clearance) and np.any(np.asarray(length) > SMOOTHEST * np.asarray(clearance)):
+                given, room = (1e3 * float(a) for a in _worst(length, clearance))
+                raise ValueError(
+                    f"Argument `{name}.smoothing` must be at most a tenth of the clearance, {room:g} mm, but is "
+                    f"{given:g} mm."
+                )
+
     @property
     def dimension(self) -> int:
         return 4 if isinstance(self.rib, RigidRib) else 8
@@ -70,6 +84,13 @@ class CageModel(AbstractForcedSystem):
     def land_radius(self) -> Array:
         """Radius of the cage's guiding land R = (d_g - C_r)/2 [m]."""
         return jnp.asarray((self.bearing.rib_diameter - self.guidance_gap) / 2)
+
+    @property
+    def harmonics(self) -> int:
+        """Unbalance and the impact of (15) turn with the cage; rollers pass Z times in a revolution."""
+        if isinstance(self.impact, RollerPassImpact):
+            return self.bearing.n_rollers * self.impact.harmonics
+        return 1
 
     def cage_at(self, speed: Scalar) -> CageAtSpeed:
         """The cage's force laws at `speed` [rad/s]."""
@@ -98,3 +119,10 @@ class CageModel(AbstractForcedSystem):
         """Eccentricity ratio eps of the cage centre in its clearance circle; 1 where the surfaces would overlap."""
         x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
         return smooth_norm(x, dy, self.film.smoothing) / self.clearance
+
+
+def _worst(length: Scalar, clearance: Scalar) -> tuple[Scalar, Scalar]:
+    """The pair with the largest ratio, of one model or of many."""
+    lengths, rooms = np.broadcast_arrays(np.asarray(length), np.asarray(clearance))
+    most = int(np.argmax(lengths / rooms))
+    return lengths.ravel()[most], rooms.ravel()[most]

@@ -27,6 +27,16 @@ class AbstractForcedSystem(eqx.Module):
     def dimension(self) -> int:
         """Number of state components; a second-order system has its velocities behind its coordinates."""
 
+    @property
+    def harmonics(self) -> int:
+        """The highest harmonic of the revolution in the forcing, a static number; 1 by default.
+
+        Fewer than two steps in its period cannot tell it from a slower one, whatever an error estimate says. A system
+        of one's own whose law holds cos(k tau) with k > 1 says so: by an argument of `ForcedSystem` and
+        `ForcedOscillator`, in a class of one's own with a property of this name.
+        """
+        return 1
+
     @abc.abstractmethod
     def at_speed(self, speed: Scalar) -> AbstractField:
         """The field dy/dtau at `speed` [rad/s], with all that depends on the speed alone worked out once."""
@@ -66,6 +76,7 @@ class ForcedSystem(AbstractForcedSystem):
     _dimension: int = eqx.field(static=True)
     _scale: float | tuple[float, ...] = eqx.field(static=True)
     _starts: tuple[Any, ...] = eqx.field(static=True)
+    _harmonics: int = eqx.field(static=True, default=1)
 
     def __init__(
         self,
@@ -73,15 +84,22 @@ class ForcedSystem(AbstractForcedSystem):
         dimension: int,
         scale: float | tuple[float, ...] = 1.0,
         starts: tuple[tuple[float, ...], ...] = (),
+        harmonics: int = 1,
     ):
         """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
-        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps.
+        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps; highest
+        harmonic of the revolution in the law.
         """
         self.rates, self._dimension, self._scale, self._starts = rates, dimension, scale, starts
+        self._harmonics = harmonics
 
     @property
     def dimension(self) -> int:
         return self._dimension
+
+    @property
+    def harmonics(self) -> int:
+        return self._harmonics
 
     def at_speed(self, speed: Scalar) -> AbstractField:
         return FirstOrderField(_Bound(self.rates, speed), speed)
@@ -115,6 +133,7 @@ class ForcedOscillator(AbstractForcedSystem):
     coordinates: int = eqx.field(static=True)
     _scale: float | tuple[float, ...] = eqx.field(static=True)
     _starts: tuple[Any, ...] = eqx.field(static=True)
+    _harmonics: int = eqx.field(static=True, default=1)
 
     def __init__(
         self,
@@ -122,16 +141,22 @@ class ForcedOscillator(AbstractForcedSystem):
         coordinates: int,
         scale: float | tuple[float, ...] = 1.0,
         starts: tuple[tuple[float, ...], ...] = (),
+        harmonics: int = 1,
     ):
         """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
         parameters), with velocities v = dq/dt; number of coordinates; characteristic magnitude of the state components
-        (coordinates first); initial states (q, v) for sweeps.
+        (coordinates first); initial states (q, v) for sweeps; highest harmonic of the revolution in the law.
         """
         self.acceleration, self.coordinates, self._scale, self._starts = acceleration, coordinates, scale, starts
+        self._harmonics = harmonics
 
     @property
     def dimension(self) -> int:
         return 2 * self.coordinates
+
+    @property
+    def harmonics(self) -> int:
+        return self._harmonics
 
     def at_speed(self, speed: Scalar) -> AbstractField:
         return SecondOrderField(_Bound(self.acceleration, speed), speed)

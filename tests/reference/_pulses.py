@@ -22,15 +22,19 @@ class Pulse(NamedTuple):
     """Of each node in an integral over time [s]."""
 
 
-def pulse(oscillator: dict[str, Any], roller_mass: float, speed: float, window: float = math.inf) -> Pulse:
+def pulse(
+    oscillator: dict[str, Any], roller_mass: float, speed: float, window: float = math.inf, fastest: float = 0.0
+) -> Pulse:
     """Solve (14) from the touch at approach speed [m/s] until the roller is out of the bar's reach, or `window` [s].
 
-    While they are apart the roller flies and the bar swings, both in closed form.
+    While they are apart the roller flies and the bar swings, both in closed form. The nodes resolve the bar's swing, in
+    contact too, and waves of the angular frequency `fastest` [rad/s].
     """
     k, bar, mass = oscillator["contact_stiffness"], oscillator["bar_stiffness"], oscillator["bar_mass"]
     swing = math.sqrt(bar / mass)
     depth = (roller_mass * speed**2 / k) ** (9 / 19)
     unit, length = depth / speed, depth
+    held = math.sqrt((bar + k * depth ** (1 / 9)) / mass)
 
     def rates(s: float, y: np.ndarray) -> list[float]:
         q = k * max((y[0] - y[1]) * length, 0.0) ** (10 / 9) * unit / speed
@@ -42,14 +46,15 @@ def pulse(oscillator: dict[str, Any], roller_mass: float, speed: float, window: 
     apart.terminal, apart.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
     y, start, found = np.array([0.0, 0.0, 1.0, 0.0]), 0.0, []
     while start < window / unit:
-        end = min(window / unit, start + 1e6)
-        step = 0.05 / max(1.0, swing * unit)
+        end = min(window / unit - start, 1e6)  # time counts from each touch, which rounds off less of it
+        step = 0.02 / max(1.0, swing * unit, held * unit / 4)
         done = solve_ivp(
-            rates, (start, end), y, "DOP853", dense_output=True, events=apart, rtol=1e-12, atol=1e-14, max_step=step
+            rates, (0.0, end), y, "DOP853", dense_output=True, events=apart, rtol=1e-13, atol=1e-15, max_step=step
         )
         assert done.success and done.sol is not None, done.message
-        found.append(_nodes(done.t[-1], start, done.sol, k, length))
-        y, start = done.y[:, -1], done.t[-1]
+        panels = max(PANELS, math.ceil(done.t[-1] * unit * max(fastest, held) / 3))
+        found.append(_nodes(done.t[-1], start, done.sol, k, length, panels))
+        y, start = done.y[:, -1], start + done.t[-1]
         again = _next_touch(y, swing * unit)
         if again is None:
             break
@@ -59,14 +64,14 @@ def pulse(oscillator: dict[str, Any], roller_mass: float, speed: float, window: 
     return Pulse(time * unit, force, weight * unit)
 
 
-def _nodes(end: float, start: float, motion: Any, stiffness: float, length: float) -> tuple:
+def _nodes(end: float, start: float, motion: Any, stiffness: float, length: float, panels: int) -> tuple:
     """Gauss nodes in s, with time going as 3 s^2 - 2 s^3: the force leaves zero as a power of 10/9."""
     x, w = np.polynomial.legendre.leggauss(NODES)
-    s = (np.arange(PANELS)[:, None] + (x + 1) / 2).ravel() / PANELS
-    time = start + (end - start) * s * s * (3 - 2 * s)
-    weight = np.tile(w, PANELS) / (2 * PANELS) * (end - start) * 6 * s * (1 - s)
+    s = (np.arange(panels)[:, None] + (x + 1) / 2).ravel() / panels
+    time = end * s * s * (3 - 2 * s)
+    weight = np.tile(w, panels) / (2 * panels) * end * 6 * s * (1 - s)
     y = motion(time)
-    return time, stiffness * (np.maximum(y[0] - y[1], 0.0) * length) ** (10 / 9), weight
+    return start + time, stiffness * (np.maximum(y[0] - y[1], 0.0) * length) ** (10 / 9), weight
 
 
 def _next_touch(y: np.ndarray, swing: float) -> tuple[float, np.ndarray] | None:
@@ -104,8 +109,8 @@ def train(given: dict[str, Any], omega: float, zone: float) -> np.ndarray:
     bearing, oscillator = given["bearing"], given["impact"]["oscillator"]
     size = math.pi * bearing["roller_diameter"] ** 2 / 4 * bearing["roller_length"]
     speed = oscillator["approach_ratio"] * omega * bearing["pocket_clearance"]
-    hit = pulse(oscillator, bearing["roller_material"]["density"] * size, speed)
     order = bearing["n_rollers"] * np.arange(given["impact"]["harmonics"] + 1)
+    hit = pulse(oscillator, bearing["roller_material"]["density"] * size, speed, fastest=float(omega * order[-1]))
     spectrum = np.exp(-1j * omega * np.outer(order, hit.time)) @ (hit.force * hit.weight)
     spectrum = spectrum * bearing["n_rollers"] * omega / (2 * math.pi) * np.where(order == 0, 1, 2)
     total = np.zeros((2, order.size), dtype=complex)

@@ -51,6 +51,9 @@ def random_model(seed: int, wide: bool = False) -> CageModel:
     drawn = (_wide if wide else _narrow)(rng, model)
     size = math.exp(rng.uniform(-1, 1) * math.log(FACTOR if wide else 1.5))
     lengths = {name: size * float(jc.parameters(model)[name]) for name in BEARING}
+    clearance = drawn["guidance_gap"] / (1 if model.clearance_reading == "as_printed" else 2)
+    for name in ("contact.smoothing", "film.smoothing"):
+        drawn[name] = min(drawn[name], 0.09 * clearance)
     model = jc.replace(model, **(drawn | lengths))
     return jc.replace(model, **{"bearing.n_rollers": int(rng.integers(8, 14))})
 
