@@ -7,6 +7,7 @@
 | `_labels`       | periodic, chaotic, quasi-periodic, undecided or failed                               |
 | `_zones`        | zones and both kinds of edge                                                         |
 | `_zero_one`     | the 0-1 test for chaos                                                               |
+| `_transients`   | an attractor or a chaotic transient: escapes, mean life, shares of coexisting ends   |
 | `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
@@ -58,5 +59,17 @@ from ._spectra import (
     whirl_spectrum as whirl_spectrum,
 )
 from ._sweep import Sweep as Sweep
+from ._transients import (
+    Comparison as Comparison,
+    Share as Share,
+    Survival as Survival,
+    calm_at_the_end as calm_at_the_end,
+    calm_threshold as calm_threshold,
+    coexisting as coexisting,
+    compare as compare,
+    escape_times as escape_times,
+    survival as survival,
+    when_t0_doubles as when_t0_doubles,
+)
 from ._zero_one import zero_one as zero_one
 from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones

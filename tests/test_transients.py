@@ -1,0 +1,560 @@
+"""Mean lives of transients against escape rates that are known exactly or computed in another way."""
+
+import itertools
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.stats
+
+import jaxcage as jc
+from jaxcage.analysis import (
+    Survival,
+    calm_at_the_end,
+    calm_threshold,
+    coexisting,
+    compare,
+    escape_times,
+    label_lanes,
+    survival,
+    when_t0_doubles,
+)
+
+
+SEEDS = 100
+"""Seeds 0 to 99: about 95 of them should recover the mean life within two standard errors."""
+
+
+# Maps with a known escape rate. Each gives the number of the first iterate outside, infinity for none.
+
+
+def iterate(step, x, horizon, rng):
+    times = np.full(x.shape, np.inf)
+    for n in range(1, horizon + 1):
+        x, outside = step(x, rng)
+        times[outside & np.isinf(times)] = n
+    return times
+
+
+def tent(slope):
+    """Steeper than 2 it throws a share 1 - 2/slope of the unit interval out in each step: kappa = log(slope/2)."""
+
+    def step(x, rng):
+        x = slope * np.minimum(x, 1 - x)
+        return x, (x < 0) | (x > 1)
+
+    return step
+
+
+def tent_with_a_hole(cells, hole):
+    """Slope 2, and a hole in one of the equal cells."""
+
+    def step(x, rng):
+        # Rounding is exact here and would end every orbit at 0: new last digits keep them going.
+        x = 1 - np.abs(1 - 2 * x) * (1 - 1e-12 * rng.random(x.shape))
+        return x, np.floor(cells * x) == hole
+
+    return step
+
+
+def hole_rate(cells, hole):
+    """-log of the largest eigenvalue of the matrix of transitions between the cells that are left."""
+    matrix = np.zeros((cells, cells))
+    for i in range(cells):
+        for j in (2 * i, 2 * i + 1):
+            matrix[i, min(j, 2 * cells - 1 - j)] += 0.5
+    left = [i for i in range(cells) if i != hole]
+    return -np.log(np.max(np.abs(np.linalg.eigvals(matrix[np.ix_(left, left)]))))
+
+
+def logistic(mu):
+    def step(x, rng):
+        x = mu * x * (1 - x)
+        return np.where(x < 0, -1.0, x), (x < 0) | (x > 1)
+
+    return step
+
+
+def logistic_rate(mu, nodes=60):
+    """-log of the leading eigenvalue of the transfer operator, collocated at Chebyshev nodes.
+
+    (L f)(y) = sum over the two preimages x of f(x) / |T'(x)|, with T'(x) = +- mu sqrt(1 - 4 y / mu).
+    """
+    angle = np.pi * (np.arange(nodes) + 0.5) / nodes
+    y = (1 + np.cos(angle)) / 2
+    weight = (-1.0) ** np.arange(nodes) * np.sin(angle)
+    root = np.sqrt(1 - 4 * y / mu)
+    operator = np.zeros((nodes, nodes))
+    for x in ((1 + root) / 2, (1 - root) / 2):
+        basis = weight / (x[:, None] - y)
+        operator += basis / np.sum(basis, axis=1, keepdims=True) / (mu * root)[:, None]
+    return -np.log(np.max(np.linalg.eigvals(operator).real))
+
+
+def cycle_rate(mu, longest=12):
+    """The same from unstable cycles: the first zero of the spectral determinant det(1 - z L)."""
+    traces = []
+    for n in range(1, longest + 1):
+        sides = np.array(list(itertools.product([1.0, -1.0], repeat=n))).T
+        x = np.full(2**n, 0.5)
+        for side in [*sides[::-1]] * (60 // n + 4):  # backwards along each sequence of branches, to its cycle
+            x = (1 + side * np.sqrt(1 - 4 * x / mu)) / 2
+        growth = np.ones(2**n)
+        for _ in range(n):
+            growth *= mu * (1 - 2 * x)
+            x = mu * x * (1 - x)
+        traces.append(np.sum(1 / np.abs(1 - growth)))
+    terms = [1.0]
+    for n in range(1, longest + 1):
+        terms.append(-sum(traces[k - 1] * terms[n - k] for k in range(1, n + 1)) / n)
+    roots = np.roots(terms[::-1])
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    return np.log(np.min(real[real > 0]))
+
+
+@pytest.mark.parametrize("mu", [4.1, 4.5, 5.0, 6.0])
+def test_rates_of_the_open_logistic_map_by_two_ways(mu):
+    assert logistic_rate(mu) == pytest.approx(cycle_rate(mu), abs=1e-9)
+
+
+def test_rate_of_the_open_logistic_map_as_printed():
+    """P. Cvitanovic and others, Chaos: Classical and Quantum (ChaosBook.org), repeller of x -> 9/2 x (1 - x)."""
+    assert logistic_rate(4.5) == pytest.approx(0.3615096698, abs=1e-9)
+
+
+def test_rates_of_holes_in_closed_form():
+    """Sequences of two symbols without the word of the hole: a golden mean, a tribonacci number, or linearly many."""
+    golden = (1 + 5**0.5) / 2
+    tribonacci = np.max(np.roots([1, -1, -1, -1]).real)
+    found = sorted({round(hole_rate(8, hole), 9) for hole in range(8)})
+    assert found[0] == pytest.approx(np.log(2 / tribonacci))
+    assert any(np.isclose(rate, np.log(2 / golden)) for rate in found)
+    # Equal holes, unequal rates: one in eight is left out in each step, but never at rate log(8/7).
+    assert not any(np.isclose(rate, np.log(8 / 7)) for rate in found)
+
+
+MAPS = {
+    "tent 2.05": (tent(2.05), np.log(2.05 / 2), 0, 200, 120),
+    "tent 3": (tent(3.0), np.log(3 / 2), 0, 30, 120),
+    "hole 0 of 8": (tent_with_a_hole(8, 0), hole_rate(8, 0), 10, 120, 120),
+    "hole 2 of 8": (tent_with_a_hole(8, 2), hole_rate(8, 2), 10, 60, 800),
+    "logistic 4.1": (logistic(4.1), logistic_rate(4.1), 10, 60, 400),
+    "logistic 4.5": (logistic(4.5), logistic_rate(4.5), 5, 40, 800),
+    "logistic 5": (logistic(5.0), logistic_rate(5.0), 5, 40, 2000),
+}
+"""Step, escape rate per iterate, t0, horizon and lanes: about 100 escapes after t0 or more."""
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("block", [1, 5])
+def test_mean_life_of_maps(name, block):
+    """1/kappa within two standard errors for 90 of 100 seeds at least, seen at each iterate or each fifth."""
+    step, rate, t0, horizon, lanes = MAPS[name]
+    within = covered = 0
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        times = iterate(step, rng.random(lanes), horizon, rng)
+        found = survival(np.ceil(times / block) * block, horizon, t0=t0, block=block)
+        assert found.kind == "transient" and found.escapes >= 10
+        within += abs(found.mean_life - 1 / rate) < 2 * found.standard_error
+        low, high = found.interval
+        covered += low <= 1 / rate <= high
+    assert within >= 90 and covered >= 90
+
+
+def test_continuous_and_discrete_time_are_not_confused():
+    """Of the tent map with slope 3 a third leaves in each step: E/n is 2 steps survived in full, 1/kappa is 2.466."""
+    rng = np.random.default_rng(0)
+    found = survival(iterate(tent(3.0), rng.random(50_000), 60, rng), 60, block=1)
+    assert found.survived / found.escapes == pytest.approx(2, abs=0.03)
+    assert found.mean_life == pytest.approx(1 / np.log(1.5), abs=0.03)
+    assert found.rate == pytest.approx(np.log(1.5), abs=0.01)
+
+
+@pytest.mark.parametrize("block", [0, 10, 60])
+def test_estimate_maximises_the_likelihood(block):
+    """Against a search over the likelihood as it is written down, and its curvature."""
+    rng = np.random.default_rng(3)
+    times = rng.exponential(80.0, 40)
+    times = np.ceil(times / block) * block if block else times
+    found = survival(times, 120, block=block)
+    escaped = times <= 120
+    rates = np.linspace(0.5, 1.5, 20001) * found.rate
+    if block:
+        each = np.log(np.exp(-rates * (times[escaped, None] - block)) - np.exp(-rates * times[escaped, None]))
+    else:
+        each = np.log(rates) - rates * times[escaped, None]
+    likelihood = np.sum(each, axis=0) - rates * 120 * np.sum(~escaped)
+    assert rates[np.argmax(likelihood)] == pytest.approx(found.rate, rel=1e-4)
+    middle, h = 10000, (rates[1] - rates[0]) * 100
+    curvature = (likelihood[middle + 100] - 2 * likelihood[middle] + likelihood[middle - 100]) / h**2
+    assert found.standard_error / found.mean_life == pytest.approx((-curvature) ** -0.5 / found.rate, rel=1e-3)
+
+
+def test_relative_error_of_short_blocks_is_one_over_the_root_of_escapes():
+    times = np.random.default_rng(0).exponential(1000.0, 100)
+    exact = survival(times, 1e5)
+    assert exact.mean_life == pytest.approx(np.mean(times))
+    assert exact.standard_error / exact.mean_life == pytest.approx(0.1)
+    blocks = survival(np.ceil(times), 1e5, block=1)
+    assert blocks.mean_life == pytest.approx(exact.mean_life, rel=1e-3)
+    assert blocks.standard_error == pytest.approx(exact.standard_error, rel=1e-3)
+
+
+@pytest.mark.parametrize("n", [1, 4, 9, 25])
+def test_interval_is_garwoods(n):
+    """Quantiles of chi squared, as the paper tabulates them; blocks come to the same when they are short."""
+    times = np.concatenate([np.full(n, 50.0), np.full(60, np.inf)])
+    exposure = 50.0 * n + 60 * 1000
+    low = 2 * exposure / scipy.stats.chi2.ppf(0.975, 2 * n + 2)
+    high = 2 * exposure / scipy.stats.chi2.ppf(0.025, 2 * n)
+    assert survival(times, 1000).interval == pytest.approx((low, high))
+    assert survival(times, 1000, block=0.5).interval == pytest.approx((low, high), rel=2e-3)
+    bound = 2 * exposure / scipy.stats.chi2.ppf(0.95, 2 * n + 2)
+    assert survival(times, 1000).lower_bound == pytest.approx(bound)
+
+
+@pytest.mark.parametrize("mean_life, lanes", [(300.0, 8), (1500.0, 20), (4000.0, 10)])
+def test_intervals_of_few_escapes_cover(mean_life, lanes):
+    """At least 95 % less three standard errors of the count, bounds without escapes included."""
+    rng = np.random.default_rng(0)
+    runs, covered, bounded, few = 1000, 0, 0, 0
+    for _ in range(runs):
+        found = survival(np.ceil(rng.exponential(mean_life, lanes) / 25) * 25, 500, block=25)
+        low, high = found.interval
+        covered += low <= mean_life <= high
+        bounded += found.lower_bound <= mean_life
+        few += found.escapes < 10
+    assert few > 100
+    assert covered >= 0.93 * runs and bounded >= 0.93 * runs
+
+
+def test_no_escape_gives_a_bound():
+    found = survival(np.full(40, np.inf), 1050, t0=50, block=25)
+    assert (found.kind, found.escapes, found.remaining) == ("chaotic", 0, 1.0)
+    assert found.lower_bound == pytest.approx(40 * 1000 / 3)
+    # What it says: lives shorter than that leave all 40 with a probability of less than 5 %.
+    assert np.exp(-1000 / found.lower_bound) ** 40 == pytest.approx(0.05, abs=0.001)
+    assert np.isinf(found.mean_life) and np.isnan(found.standard_error)
+    assert str(found) == "none of 40 lanes escaped in 1000 revolutions (mean life > E/3 = 13333 revolutions)"
+
+
+def test_what_it_says():
+    never = [np.inf] * 10
+    some = survival(np.array([75.0, 100, 100, 300, 475, *never]), 1050, t0=50, block=25)
+    low, high = some.interval
+    assert str(some) == (
+        f"transient, mean life {some.mean_life:.0f} ({low:.0f} to {high:.0f}) revolutions "
+        "(5 of 15 lanes escaped in 1000 revolutions)"
+    )
+    assert low < some.mean_life < high
+    many = survival(np.array([*range(100, 400, 25), *never], dtype=float), 1050, t0=50, block=25)
+    assert str(many) == (
+        f"transient, mean life {many.mean_life:.0f} +- {many.standard_error:.0f} revolutions "
+        "(12 of 22 lanes escaped in 1000 revolutions)"
+    )
+    both = survival(np.array([0.0, 25, np.nan, *never]), 1050, t0=50, block=25)
+    assert both.kind == "coexisting"
+    assert str(both) == (
+        "none of 10 lanes escaped in 1000 revolutions (mean life > E/3 = 3333 revolutions); "
+        "2 were calm after 50; 1 failed"
+    )
+    calm = survival(np.array([0.0, 25, 50]), 1050, t0=50, block=25)
+    assert (calm.kind, str(calm)) == ("calm", "none of 3 lanes was chaotic after 50 revolutions")
+    assert np.isnan(calm.remaining)
+    at_once = survival(np.full(12, 75.0), 1050, t0=50, block=25)
+    assert at_once.mean_life == 0 and at_once.interval[0] == 0 < at_once.interval[1] < 25
+    assert str(at_once).startswith(f"transient, mean life below {at_once.interval[1]:.3g} revolutions (12 of 12")
+
+
+def test_lanes_calm_at_t0_and_failed_lanes_do_not_count():
+    times = np.array([75.0, 150, 400, np.inf, np.inf, 2000])
+    more = np.concatenate([times, [0.0, 25, 50, np.nan, np.nan]])
+    plain, mixed = (survival(t, 1050, t0=50, block=25) for t in (times, more))
+    assert mixed.survived == plain.survived == 0 + 75 + 325 + 3 * 1000
+    assert (mixed.escapes, mixed.calm, mixed.failed, mixed.lanes, mixed.chaotic) == (3, 3, 2, 9, 6)
+    assert mixed.mean_life == plain.mean_life and mixed.interval == plain.interval
+
+
+@pytest.mark.parametrize(
+    "times, horizon, options, words",
+    [
+        ([10.0], 100, {"t0": 100}, "between 0 and the horizon"),
+        ([10.0], 100, {"t0": -1}, "between 0 and the horizon"),
+        ([30.0], 100, {"block": 25}, "multiples of the block"),
+        ([25.0], 100, {"block": 25, "t0": 10}, "multiples of the block"),
+        ([25.0], 110, {"block": 25}, "multiples of the block"),
+    ],
+)
+def test_impossible_times_are_refused(times, horizon, options, words):
+    with pytest.raises(ValueError, match=words):
+        survival(np.array(times), horizon, **options)
+
+
+# Doubling t0, and two runs side by side.
+
+
+def test_mean_life_holds_when_t0_doubles():
+    held = 0
+    for seed in range(SEEDS):
+        times = np.ceil(np.random.default_rng(seed).exponential(400.0, 80) / 25) * 25
+        doubled = when_t0_doubles(times, 1500, t0=100, block=25)
+        assert (doubled.first.t0, doubled.second.t0) == (100, 200)
+        held += doubled.agree
+    assert held >= 98  # 99.7 at three standard errors
+
+
+def test_t0_too_short_is_found_out():
+    """Two thirds of the lanes leave quickly, from beside the chaotic set; the others have a mean life of 1000."""
+    short, long = 0, 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        times = np.ceil(np.concatenate([rng.exponential(40.0, 200), rng.exponential(1000.0, 100)]) / 10) * 10
+        hurried, patient = (when_t0_doubles(times, 3000, t0=t0, block=10) for t0 in (20, 300))
+        short += hurried.agree
+        long += patient.agree
+        assert abs(patient.first.mean_life - 1000) < 4 * patient.first.standard_error
+    assert short == 0 and long >= 19
+
+
+@pytest.mark.parametrize("block", [0, 25])
+def test_equal_rates_agree_and_unequal_ones_do_not(block):
+    equal = unequal = 0
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        runs = [rng.exponential(tau, 200) for tau in (300.0, 300.0, 600.0)]
+        a, b, c = (survival(np.ceil(t / block) * block if block else t, 800, block=block) for t in runs)
+        equal += compare(a, b).agree
+        unequal += compare(a, c).agree
+        assert compare(a, b).resolved
+    assert equal >= 98 and unequal <= 5
+
+
+def test_comparison_needs_lanes_left_and_lanes_escaped():
+    few = np.array([100.0, *[np.inf] * 150])
+    one, none = survival(few, 1000, block=25), survival(np.full(151, np.inf), 1000, block=25)
+    assert compare(one, none).agree and not compare(one, one).resolved  # 0.7 % escaped
+    calm = survival(np.zeros(10), 1000, block=25)
+    unknown = compare(one, calm)
+    assert not unknown.agree and "cannot be compared" in str(unknown)
+    many = survival(np.repeat(np.arange(1, 21) * 25.0, 10), 1000, block=25)
+    differ = compare(many, none)
+    assert not differ.agree and not differ.resolved  # none left of one, none gone of the other
+    assert "escape rates differ" in str(differ)
+
+
+def test_shares_of_coexisting_attractors():
+    ends = np.array(["chaotic"] * 30 + ["periodic-1"] * 10 + ["failed"] * 5)
+    shares = coexisting(ends)
+    assert list(shares) == ["chaotic", "periodic-1"]
+    found = shares["periodic-1"]
+    assert (found.number, found.lanes, found.share) == (10, 40, 0.25)
+    # Wilson: the shares p with |0.25 - p| = 1.96 sqrt(p (1 - p) / 40).
+    z = scipy.stats.norm.ppf(0.975)
+    assert found.interval == pytest.approx(np.sort(np.roots([1 + z**2 / 40, -(0.5 + z**2 / 40), 0.0625])))
+    assert str(found) == "25.0% of starts (14.2% to 40.2%)"
+    assert coexisting(np.array(["failed"])) == {}
+
+
+# From growth in blocks to escape times.
+
+BLOCK, BLOCKS = 25, 80
+
+
+def weak_chaos(rng, times, end):
+    """Exponent 0.15 +- 0.1 a block up to the escape, mixed with the calm growth `end` in the block of the escape."""
+    start = np.arange(BLOCKS) * BLOCK
+    chaotic = np.clip((times[:, None] - start) / BLOCK, 0, 1)
+    return chaotic * rng.normal(0.15, 0.1, (times.size, BLOCKS)) + (1 - chaotic) * end(rng, (times.size, BLOCKS))
+
+
+def periodic(rng, shape):
+    return np.full(shape, -0.3)
+
+
+def torus(rng, shape):
+    """Bounded sums: a block ends with the logarithm of the tangent's length where it was, but for 0.4."""
+    length = 0.4 * np.sin(2 * np.pi * (rng.random((shape[0], 1)) + 0.618 * np.arange(shape[1] + 1)))
+    return np.diff(length, axis=1) / BLOCK
+
+
+@pytest.mark.parametrize("end", [periodic, torus])
+def test_mean_life_from_weak_chaos_that_dips_below_zero(end):
+    """One block in four of the chaotic ones looks calm; the label of the end and the confirmation decide."""
+    within = 0
+    lasting = weak_chaos(np.random.default_rng(0), np.full(100, np.inf), end)
+    assert 0.2 < np.mean(lasting < calm_threshold(BLOCK)) < 0.3
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        times = rng.exponential(500.0, 100)
+        growth = weak_chaos(rng, times, end)
+        nowhere = np.cumsum(np.ones((100, 64, 2)), axis=1)  # strobe states that never return
+        calm_end = calm_at_the_end(nowhere, np.ones(2), growth, BLOCK)
+        found, horizon = escape_times(growth, calm_end, BLOCK)
+        assert horizon == (BLOCKS - 8) * BLOCK
+        # No lane that stays chaotic passes for calm, and none that is calm at the horizon passes for chaotic.
+        assert np.all(np.isinf(found[times > BLOCK * BLOCKS]))
+        assert np.all(np.isfinite(found[times < horizon]))
+        estimate = survival(found, horizon, t0=100, block=BLOCK)
+        within += abs(estimate.mean_life - 500) < 2 * estimate.standard_error
+    assert within >= 90
+
+
+def test_chaos_that_lasts_never_escapes():
+    """1000 lanes that dip in the last few blocks now and then: none is counted."""
+    rng = np.random.default_rng(1)
+    growth = rng.normal(0.15, 0.1, (1000, BLOCKS))
+    last_two = np.all(growth[:, -2:] < calm_threshold(BLOCK), axis=1)
+    assert np.sum(last_two) > 5
+    strobe = rng.random((1000, 64, 2))
+    times, horizon = escape_times(growth, calm_at_the_end(strobe, np.ones(2), growth, BLOCK), BLOCK)
+    found = survival(times, horizon, t0=100, block=BLOCK)
+    assert (found.kind, found.calm, found.escapes) == ("chaotic", 0, 0)
+
+
+def test_label_of_the_end_decides_about_its_last_blocks():
+    """Two lanes with the same calm blocks at the end, one of which does not end calm by its label."""
+    growth = np.full((2, 20), 0.3)
+    growth[:, 10:] = -0.1
+    times, horizon = escape_times(growth, np.array([True, False]), 25, confirm=4)
+    assert times.tolist() == [250.0, np.inf] and horizon == 400
+
+
+def test_escapes_in_the_last_blocks_are_after_the_horizon():
+    growth = np.full((3, 20), 0.3)
+    growth[0, 15:], growth[1, 16:], growth[2, 17:] = -0.1, -0.1, -0.1
+    times, horizon = escape_times(growth, np.ones(3, dtype=bool), 25, confirm=4)
+    assert times.tolist() == [375.0, 400.0, np.inf] and horizon == 400
+    found = survival(times, horizon, block=25)
+    assert (found.escapes, found.survived) == (2, 350 + 375 + 400)
+
+
+def test_failed_lanes_have_no_time():
+    growth = np.full((4, 20), -0.1)
+    growth[0, 12:] = np.nan
+    growth[3, 3] = 0.2
+    times, _ = escape_times(growth, np.ones(4, dtype=bool), 25, failed=np.array([False, True, False, False]))
+    np.testing.assert_array_equal(times, [np.nan, np.nan, 0, 100])
+    with pytest.raises(ValueError, match="between 1 and the 19 blocks"):
+        escape_times(growth, np.ones(4, dtype=bool), 25, confirm=20)
+
+
+def test_ends_are_calm_as_their_labels_say():
+    rng = np.random.default_rng(0)
+    around = np.exp(2j * np.pi * 0.618 * np.arange(64))
+    kinds = {
+        "periodic-2": (np.tile([[1.0, 0.0], [-1.0, 0.0]], (32, 1)), np.full(8, -0.2)),
+        "quasi-periodic": (np.stack([around.real, around.imag], axis=1), 0.002 * rng.standard_normal(8)),
+        "chaotic": (rng.random((64, 2)), rng.normal(0.15, 0.05, 8)),
+    }
+    strobe, growth = (np.stack(part) for part in zip(*kinds.values(), strict=True))
+    error = np.std(growth, axis=1, ddof=1) / 8**0.5
+    label = label_lanes(np.zeros(3), np.array([2, 0, 0]), np.mean(growth, axis=1), error)
+    assert label.tolist() == list(kinds)
+    assert calm_at_the_end(strobe, np.ones(2), growth, BLOCK).tolist() == [True, True, False]
+    # Still on its way to an orbit, or on one of period 16: it does not close, but does not grow either.
+    assert calm_at_the_end(strobe[2:], np.ones(2), np.full((1, 8), -0.1), BLOCK).tolist() == [True]
+    assert calm_at_the_end(strobe[1:2], np.ones(2), np.full((1, 8), np.nan), BLOCK).tolist() == [False]
+
+
+def test_escape_to_a_torus():
+    """An open tent map whose lanes end on a circle map: quasi-periodic, never closed, exponent zero."""
+    slope, turn, lanes = 2.05, 0.3819660, 400
+    rng = np.random.default_rng(0)
+    x, inside = rng.random(lanes), np.ones(lanes, dtype=bool)
+    revolutions, keep = 600, 64
+    logs, strobe = np.empty((lanes, revolutions)), np.empty((lanes, keep, 2))
+    for n in range(revolutions):
+        logs[:, n] = np.where(inside, np.log(slope), np.log(1 - 0.8 * np.cos(2 * np.pi * x)))
+        moved = slope * np.minimum(x, 1 - x)
+        x = np.where(inside, moved, x + turn - 0.8 / (2 * np.pi) * np.sin(2 * np.pi * x))
+        inside &= (x >= 0) & (x <= 1)
+        strobe[:, n % keep] = np.stack([np.cos(2 * np.pi * x), np.sin(2 * np.pi * x)], axis=1)
+    strobe = np.roll(strobe, -(revolutions % keep), axis=1)
+    growth = np.mean(logs.reshape(lanes, -1, 10), axis=2)
+    times, horizon = escape_times(growth, calm_at_the_end(strobe, np.ones(2), growth, 10), 10)
+    assert np.all(np.isfinite(times))
+    found = survival(times, horizon, t0=10, block=10)
+    assert found.escapes > 0.7 * lanes
+    assert abs(found.mean_life - 1 / np.log(slope / 2)) < 3 * found.standard_error
+
+
+# The crisis of Ueda's oscillator.
+
+
+class Ueda(eqx.Module):
+    """x'' + 0.1 x' + x^3 = force cos t."""
+
+    force: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        del speed
+        (x,), (u,) = q, v
+        return (-0.1 * u - x**3 + self.force * jnp.cos(tau),)
+
+
+CRISIS = 13.388
+BEYOND = (13.391, 13.4, 13.42, 13.45, 13.5)
+
+
+def ueda(force):
+    return jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)
+
+
+def lives(forces, starts, steps, revolutions) -> list[Survival]:
+    """A `Survival` for each force; t0 is 50 revolutions."""
+    method = jc.method("rk4", steps=steps)
+    length = dict(discard=0, revolutions=revolutions, blocks=revolutions // BLOCK)
+    found = []
+    for s in jc.sweep_designs([ueda(f) for f in forces], 1.0, starts=starts, method=method, **length):
+        growth = s.block_growth[0, :, :, 0]
+        calm_end = calm_at_the_end(s.strobe[0], s.scale, growth, BLOCK)
+        times, horizon = escape_times(growth, calm_end, BLOCK, failed=s.failed[0])
+        found.append(survival(times, horizon, t0=50, block=BLOCK))
+    return found
+
+
+@pytest.fixture(scope="module")
+def chaotic_starts():
+    """States on the chaotic attractor before the crisis; elsewhere lanes end on a periodic orbit beside it."""
+    starts = [tuple(map(float, s)) for s in np.random.default_rng(1).uniform((-2, -4), (4, 8), (260, 2))]
+    length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rk4", steps=128))
+    s = jc.sweep(ueda(13.3), 1.0, starts=starts, **length)
+    shares = coexisting(s.label[0])
+    assert set(shares) == {"chaotic", "periodic-1"} and 0.3 < shares["chaotic"].share < 0.6
+    return [tuple(map(float, y)) for y in s.last[0][s.label[0] == "chaotic"][:80]]
+
+
+def test_crisis_of_uedas_oscillator(chaotic_starts):
+    """The chaotic attractor ends at a force of 13.388: J. M. T. Thompson and H. B. Stewart, Nonlinear Dynamics and
+    Chaos (Wiley).
+
+    Beyond it the mean life falls as a power of the distance, with an exponent 1/2 + log |a| / |log |b|| where the
+    unstable manifold of an orbit with multipliers a and b touches the basin's boundary (C. Grebogi, E. Ott,
+    F. Romeiras and J. A. Yorke, Phys. Rev. A 36 (1987) 5365): 1.22 with the orbit of period 1 in the attractor. The
+    mean lives lie on steps about that power, so that 550 lanes at nine forces gave 1.24 +- 0.02 by their own errors,
+    but 1.08 to 1.41 by parts of the range and +- 0.0005 in the force of the crisis.
+    """
+    orbit = jc.periodic_orbit(ueda(CRISIS), 1.0, guess=(3.55, -0.52))
+    assert orbit.status == "converged"
+    grown, shrunk = np.log(np.abs(np.asarray(orbit.multipliers)))
+    expected = 0.5 + grown / -shrunk
+    assert expected == pytest.approx(1.22, abs=0.005)
+
+    before, *beyond = lives((13.387, *BEYOND), chaotic_starts, 512, 1500)
+    assert (before.kind, before.chaotic) == ("chaotic", 80)
+    assert all(s.kind == "transient" and s.escapes >= 10 for s in beyond)
+    tau = np.array([s.mean_life for s in beyond])
+    assert np.all(np.diff(tau) < 0) and before.lower_bound > 3 * tau[0]
+    fit = np.polyfit(np.log(np.array(BEYOND) - CRISIS), np.log(tau), 1)
+    assert -fit[0] == pytest.approx(expected, abs=0.2)
+
+
+def test_crisis_with_four_times_the_steps(chaotic_starts):
+    coarse, fine = (lives((13.42,), chaotic_starts, steps, 1000)[0] for steps in (512, 2048))
+    steps = compare(coarse, fine)
+    assert steps.agree and steps.resolved, str(steps)
+    (other,) = lives((13.5,), chaotic_starts, 512, 1000)
+    assert not compare(coarse, other).agree
