@@ -59,6 +59,7 @@ _QUANTITIES = (
     Quantity("peak", r"$\epsilon$", "1", "largest excursion (cage: eccentricity ratio) observed"),
     Quantity("error", "", "1", "largest change of a revolution's end (of the scale) with half as many steps"),
     Quantity("doubt", "", "1", "change of the exponents with half as many steps"),
+    Quantity("escape", "", "1", "revolutions of the run after which a lane is calm, infinite if chaotic to the end"),
     Quantity("period", "", "1", "revolutions after which the orbit closes, 0 if it does not"),
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
     Quantity("label", "", "1", "what each lane does"),

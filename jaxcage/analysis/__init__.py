@@ -58,8 +58,9 @@ from ._spectra import (
     waterfall as waterfall,
     whirl_spectrum as whirl_spectrum,
 )
-from ._sweep import Sweep as Sweep
+from ._sweep import LIFE_BLOCK as LIFE_BLOCK, Confirmation as Confirmation, Sweep as Sweep
 from ._transients import (
+    CONFIRM as CONFIRM,
     Comparison as Comparison,
     Share as Share,
     Survival as Survival,

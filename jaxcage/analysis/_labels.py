@@ -1,10 +1,12 @@
 """What a lane does, judged from its strobe states and exponents.
 
-Labels are given in this order: `failed`, `periodic-k`, `chaotic`, `quasi-periodic`, `undecided`.
+Labels are given in this order: `inaccurate`, `failed`, `periodic-k`, `chaotic`, `quasi-periodic`, `undecided`.
 """
 
 import numpy as np
 from jaxtyping import Float, Int, Shaped
+
+from ..integrate import OUTCOMES
 
 
 CLOSING_TOLERANCE = 1e-4
@@ -35,18 +37,19 @@ def closing_period(
 
 
 def label_lanes(
-    failed: Shaped[np.ndarray, "*lanes"],
+    outcome: Int[np.ndarray, "*lanes"],
     period: Int[np.ndarray, "*lanes"],
     exponent: Float[np.ndarray, "*lanes"],
     standard_error: Float[np.ndarray, "*lanes"],
 ) -> Shaped[np.ndarray, "*lanes"]:
-    """Labels from the outcome, the closing period and the largest exponent per revolution with its standard error."""
+    """Labels from the code of the outcome, the closing period and the largest exponent per revolution with its standard error."""
     labels = np.full(np.shape(period), "undecided", dtype="<U14")
     labels[np.abs(exponent) <= np.maximum(2 * standard_error, TORUS_THRESHOLD)] = "quasi-periodic"
     labels[exponent - 2 * standard_error > CHAOS_THRESHOLD] = "chaotic"
     for k in range(1, LONGEST_PERIOD + 1):
         labels[period == k] = f"periodic-{k}"
-    labels[np.asarray(failed, dtype=bool)] = "failed"
+    labels[np.asarray(outcome) != 0] = "failed"
+    labels[np.asarray(outcome) == OUTCOMES.index("inaccurate")] = "inaccurate"
     return labels
 
 

@@ -2,14 +2,33 @@
 
 import collections
 import dataclasses
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
 from .._notebook import notebook_html
 from ..integrate import OUTCOMES
 from ._labels import closing_period, label_lanes, too_few_revolutions
+from ._transients import Survival, survival
+
+
+LIFE_BLOCK = 30
+"""Revolutions within which an escape from chaos is known."""
+
+
+class Confirmation(NamedTuple):
+    """What became of the lanes that were run again with finer steps."""
+
+    lanes: int
+    changed: int
+    """Lanes whose label is another one."""
+    moved: int
+    """Lanes of the same label whose exponent differs by more than its error."""
+
+    def __str__(self) -> str:
+        moved = f", {self.moved} exponents moved" if self.moved else ""
+        return f"{self.changed} of {self.lanes} labels changed{moved}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,15 +60,20 @@ class Sweep:
     """Revolutions run before anything was recorded."""
     revolutions: int
     """Revolutions observed."""
-    persist: int = 0
-    """Revolutions that chaos had to outlast, discarded of the lanes that looked chaotic; 0 if that was not asked."""
+    escape: Float[np.ndarray, "speeds starts"] | None = None
+    """Revolutions of the whole run after which a lane stays calm: infinity for one that is chaotic at the horizon, NaN
+    for a failure. None if lanes were not followed."""
+    horizon: int = 0
+    """Revolutions to which chaotic lanes were followed; 0 if they were not."""
+    confirmed: tuple[Confirmation, ...] = ()
+    """What became of labels that were confirmed by steps at most half as long, then a quarter."""
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
     """How it was computed: method, versions, configuration."""
 
     @property
     def length(self) -> str:
         """How long lanes were run, in words."""
-        lasting = f", chaos that outlasts {self.persist}" if self.persist else ""
+        lasting = f", chaos followed to {self.horizon}" if self.horizon else ""
         return f"{self.discard} + {self.revolutions} revolutions{lasting}"
 
     @property
@@ -81,13 +105,45 @@ class Sweep:
         return self.outcome != 0
 
     @property
-    def label(self) -> Shaped[np.ndarray, "speeds starts"]:
-        """What each lane does: `periodic-k`, `chaotic`, `quasi-periodic`, `undecided` or `failed`."""
+    def observed_label(self) -> Shaped[np.ndarray, "speeds starts"]:
+        """What each lane does while observed: `periodic-k`, `chaotic`, `quasi-periodic`, `undecided`, `failed` or
+        `inaccurate`."""
         period = closing_period(self.strobe, self.scale[:, None, :])
-        if self.exponents.shape[-1] == 0:
-            unknown = np.full(period.shape, np.nan)
-            return label_lanes(self.failed, period, unknown, unknown)
-        return label_lanes(self.failed, period, self.exponents[..., 0], self.standard_error[..., 0])
+        growth = self.exponents.shape[-1] > 0
+        unknown = np.full(period.shape, np.nan)
+        exponent, error = (self.exponents[..., 0], self.standard_error[..., 0]) if growth else (unknown, unknown)
+        return label_lanes(self.outcome, period, exponent, error)
+
+    @property
+    def label(self) -> Shaped[np.ndarray, "speeds starts"]:
+        """What each lane does; `transient` where it is chaotic while observed, and calm at the horizon."""
+        label = self.observed_label
+        if self.escape is not None:
+            label[(label == "chaotic") & np.isfinite(self.escape)] = "transient"
+        return label
+
+    def survival(self, i: int) -> Survival:
+        """How long chaos lasts at the i-th speed, from all lanes there and at the speeds next to it.
+
+        **Raises:** `ValueError` where lanes were not followed.
+        """
+        if self.escape is None:
+            raise ValueError("Argument `horizon` of the sweep must be given for this, but lanes were not followed.")
+        times = self.escape[max(i - 1, 0) : i + 2].ravel() - self.discard
+        return survival(np.maximum(times, 0.0), self.horizon - self.discard, block=LIFE_BLOCK)
+
+    @property
+    def restless(self) -> Bool[np.ndarray, " speeds"]:
+        """Speeds at which some lane is or was chaotic while observed."""
+        return np.any(np.isin(self.label, ("chaotic", "transient")), axis=1)
+
+    @property
+    def lasting(self) -> Bool[np.ndarray, " speeds"]:
+        """Speeds at which chaos lasts: by its mean life beyond the horizon, if lanes were followed to one."""
+        chaotic = np.any(self.label == "chaotic", axis=1)
+        if self.escape is None:
+            return chaotic
+        return np.array([c and self.survival(i).mean_life >= self.horizon for i, c in enumerate(chaotic)], dtype=bool)
 
     @property
     def too_short(self) -> Shaped[np.ndarray, "speeds starts"]:
@@ -119,6 +175,10 @@ class Sweep:
         if short:
             lines.append(f"  {short:6d} labels rest on too few revolutions: their exponents are too uncertain")
         lines += [f"  {n:6d} lanes failed: {OUTCOMES[code]}" for code, n in sorted(codes.items())]
+        lines += [f"  confirmed by finer steps: {each}" for each in self.confirmed]
+        finished = self.error[~self.failed]
+        if finished.size:
+            lines.append(f"  error of a revolution: at most {np.max(finished):.0e} of the scale")
         return "\n".join(lines)
 
     _repr_html_ = notebook_html

@@ -20,6 +20,7 @@
 from ._controlled import (
     ControlledSteps as ControlledSteps,
     controlled as controlled,
+    finer as finer,
     stated as stated,
 )
 from ._explicit import ClassicalRK4 as ClassicalRK4

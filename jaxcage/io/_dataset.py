@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from .._glossary import component_names, quantity
-from ..analysis import Sweep
+from ..analysis import Confirmation, Sweep
 from ..integrate import OUTCOMES
 from ..models import CageModel
 from ._files import replacing
@@ -44,6 +44,8 @@ def to_dataset(sweep: Sweep, model: CageModel | None = None) -> xr.Dataset:
     with units and words; configuration, method and versions in the attributes.
     """
     stored = {name: (dims, getattr(sweep, name)) for name, dims in _DIMENSIONS.items()}
+    if sweep.escape is not None:
+        stored["escape"] = ("speed", "start"), sweep.escape
     derived = {name: (dims, getattr(sweep, name)) for name, dims in _DERIVED.items()}
     labels, codes = np.unique(sweep.label, return_inverse=True)
     codes = codes.reshape(sweep.label.shape).astype(np.int32)
@@ -77,7 +79,8 @@ def _attributes(sweep: Sweep, model: CageModel | None) -> dict[str, Any]:
         "title": "jaxcage sweep over speed",
         "discard": sweep.discard,
         "revolutions": sweep.revolutions,
-        "persist": sweep.persist,
+        "horizon": sweep.horizon,
+        "confirmed": json.dumps(sweep.confirmed),
         "resolution_rpm": sweep.resolution_rpm if np.isfinite(sweep.resolution_rpm) else "none",
         "settings": json.dumps(sweep.settings),
         **configured,
@@ -101,7 +104,9 @@ def from_dataset(dataset: xr.Dataset) -> Sweep:
         speed=np.asarray(dataset["speed"].values),
         discard=int(dataset.attrs["discard"]),
         revolutions=int(dataset.attrs["revolutions"]),
-        persist=int(dataset.attrs.get("persist", 0)),
+        escape=np.asarray(dataset["escape"].values) if "escape" in dataset else None,
+        horizon=int(dataset.attrs.get("horizon", 0)),
+        confirmed=tuple(Confirmation(*each) for each in json.loads(dataset.attrs.get("confirmed", "[]"))),
         settings=json.loads(dataset.attrs["settings"]),
         **stored,
     )

@@ -147,7 +147,7 @@ class Study:
         error = np.full(exponents.shape, np.inf)
         if self.blocks > 1:
             error = np.hypot(np.std(growth, axis=1, ddof=1) / np.sqrt(self.blocks), doubt)
-        label = label_lanes(failed, period, exponents[:, 0], error[:, 0])
+        label = label_lanes(outcome, period, exponents[:, 0], error[:, 0])
         several = {"exponents": exponents, "standard_errors": error} if self.exponents > 1 else {}
         kept = {"strobe": strobe[:, -self.strobe :]} if self.strobe else {}
         return {

@@ -15,10 +15,12 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._types import State
-from ..analysis import Plan, Sweep
-from ..integrate import AbstractMethod, controlled
+from ..analysis import LIFE_BLOCK, Confirmation, Observation, Plan, Sweep
+from ..integrate import AbstractMethod, controlled, finer
 from ..models import AbstractForcedSystem
+from ._confirm import Judged, confirm as confirm_lanes, doubtful
 from ._engine import Progress, run_lanes
+from ._lasting import blocks_to, follow
 
 
 def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> Any:
@@ -72,7 +74,8 @@ def sweep(
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
-    persist: int = 0,
+    confirm: bool = True,
+    horizon: int = 3000,
     exponents: int = 1,
     blocks: int = 20,
     keep: int = 64,
@@ -88,8 +91,10 @@ def sweep(
     - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; by default the
         system's own.
     - `discard`, `revolutions`: revolutions left out at the beginning, and observed after that.
-    - `persist`: revolutions that chaos must outlast to count: lanes found chaotic are run again with so many discarded,
-        and what has died out by then was a transient. With 0 it is not asked.
+    - `confirm`: run what is not periodic, its neighbours in speed and a tenth of the rest again with steps at most half
+        as long, and what changes with finer ones still (`Sweep.confirmed`).
+    - `horizon`: revolutions of the whole run to which lanes that have not settled are followed, to tell how long their
+        chaos lasts (`Sweep.survival`); with 0 that is not asked.
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
     - `keep`: number of strobe states kept, the last ones.
@@ -102,7 +107,13 @@ def sweep(
     `RuntimeError` without double precision.
     """
     options = dict(
-        discard=discard, revolutions=revolutions, persist=persist, exponents=exponents, blocks=blocks, keep=keep
+        discard=discard,
+        revolutions=revolutions,
+        confirm=confirm,
+        horizon=horizon,
+        exponents=exponents,
+        blocks=blocks,
+        keep=keep,
     )
     return sweep_designs([system], speeds, starts=starts, method=method, progress=progress, **options)[0]
 
@@ -114,7 +125,8 @@ def sweep_designs(
     starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
-    persist: int = 0,
+    confirm: bool = True,
+    horizon: int = 3000,
     exponents: int = 1,
     blocks: int = 20,
     keep: int = 64,
@@ -134,7 +146,6 @@ def sweep_designs(
         raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
-    require_persist(persist, discard, exponents, blocks)
     y0 = np.stack([initial_states(s, speed, starts) for s in systems])  # systems, speeds, starts, dim
     shape = y0.shape[1:3]
     each = shape[0] * shape[1]
@@ -143,23 +154,59 @@ def sweep_designs(
     lane_start = y0.reshape(-1, dim)
     how = settings_of(chosen)
 
-    def run(plan: Plan, lane: np.ndarray) -> list[np.ndarray]:
-        seen = run_lanes(systems, chosen, plan, lane_speed[lane], lane_start[lane], progress, which[lane])
-        return [np.asarray(x) for x in seen]
 
-    def each_system(seen: Sequence[np.ndarray]) -> list[Sweep]:
-        parts = [tuple(x[..., i * each : (i + 1) * each] for x in seen) for i in range(len(systems))]
+    def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray = lane_start) -> Observation:
+        return run_lanes(systems, method, plan, lane_speed[lane], y[lane], progress, which[lane])
+
+    def each_system(seen: Observation) -> list[Sweep]:
+        parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
         return [assemble(s, speed, how, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
 
     seen = run(plan, np.arange(which.size))
     found = each_system(seen)
-    if not persist:
+    if exponents < 1 or blocks < 2:  # without an error of the exponent nothing is called chaotic
         return found
-    chaotic = np.flatnonzero(np.concatenate([s.label.ravel() for s in found]) == "chaotic")
-    if chaotic.size:
-        for x, late in zip(seen, run(plan._replace(discard=persist), chaotic), strict=True):
-            x[..., chaotic] = late
-    return [dataclasses.replace(s, persist=persist) for s in each_system(seen)]
+    rounds: tuple[Confirmation, ...] = ()
+    if confirm:
+        judged = _judged(found)
+
+        def again(lanes: np.ndarray, times: int) -> Judged:
+            _put(seen, lanes, run(plan, lanes, finer(chosen, times)))
+            return _judged(each_system(seen)).at(lanes)
+
+        wanted = doubtful(judged.label.reshape(len(systems), *shape))
+        rounds = confirm_lanes(wanted, judged, again)
+        found = each_system(seen)
+    if horizon <= discard + revolutions:
+        return [dataclasses.replace(s, confirmed=rounds) for s in found]
+    late = Plan(0, LIFE_BLOCK, blocks_to(horizon, discard + revolutions), plan.keep, 1)
+    label = _judged(found).label
+    scale = np.concatenate([np.repeat(s.scale, shape[1], axis=0) for s in found])
+    onward = lambda lanes: run(late, lanes, chosen, np.asarray(seen.last).T)
+    lanes, later, lasting = follow(label, seen.growth[:, 0], plan.block, discard, scale, late.blocks, onward)
+    if later is not None:
+        seen.last[:, lanes] = later.last
+        seen.error[lanes] = np.fmax(seen.error[lanes], later.error)
+        seen.outcome[lanes] = later.outcome
+        open_ = label[lanes] == "undecided"
+        seen.strobe[..., lanes[open_]] = later.strobe[..., open_]
+    escapes = np.split(lasting.escape, len(systems))
+    return [
+        dataclasses.replace(s, escape=e.reshape(shape), horizon=lasting.horizon, confirmed=rounds)
+        for s, e in zip(each_system(seen), escapes, strict=True)
+    ]
+
+
+def _judged(found: Sequence[Sweep]) -> Judged:
+    """What the lanes of several sweeps are called, in a row."""
+    rows = [(s.observed_label, s.exponents[..., 0], s.standard_error[..., 0]) for s in found]
+    return Judged(*(np.concatenate([x.ravel() for x in column]) for column in zip(*rows, strict=True)))
+
+
+def _put(seen: Observation, lanes: np.ndarray, new: Observation) -> None:
+    """`new` in place of what was seen of `lanes`."""
+    for x, late in zip(seen, new, strict=True):
+        x[..., lanes] = late
 
 
 def assemble(
@@ -171,7 +218,7 @@ def assemble(
     shape: tuple[int, ...],
 ) -> Sweep:
     """A `Sweep` from the fields of an `Observation` whose lanes are laid out as `shape` = (speeds, starts)."""
-    strobe, growth, last, peak, outcome, error, doubt = (np.moveaxis(np.asarray(x), -1, 0) for x in seen)
+    strobe, growth, last, peak, outcome, error, doubt = (np.moveaxis(np.array(x), -1, 0) for x in seen)
     return Sweep(
         speed=speed,
         strobe=strobe.reshape(*shape, plan.keep, system.dimension),
