@@ -16,6 +16,7 @@ from jaxcage.analysis import (
     calm_threshold,
     coexisting,
     compare,
+    dips,
     escape_times,
     label_lanes,
     survival,
@@ -342,6 +343,8 @@ def test_comparison_needs_lanes_left_and_lanes_escaped():
     many = survival(np.repeat(np.arange(1, 21) * 25.0, 10), 1000, block=25)
     differ = compare(many, none)
     assert not differ.agree and not differ.resolved  # none left of one, none gone of the other
+    half = survival(np.array([*np.arange(1, 21) * 25.0, *[np.inf] * 20]), 1000, block=25)
+    assert compare(half, half).resolved and not compare(half, none).resolved
     assert "escape rates differ" in str(differ)
 
 
@@ -412,6 +415,34 @@ def test_chaos_that_lasts_never_escapes():
     times, horizon = escape_times(growth, calm_at_the_end(strobe, np.ones(2), growth, BLOCK), BLOCK)
     found = survival(times, horizon, t0=100, block=BLOCK)
     assert (found.kind, found.calm, found.escapes) == ("chaotic", 0, 0)
+    # As many as a normal law has below the threshold; few enough for 8 blocks in a row, too many for 4.
+    share = dips(growth, times, horizon, BLOCK)
+    assert share == pytest.approx(scipy.stats.norm.cdf((0.08 - 0.15) / 0.1), abs=0.01)
+    assert 1000 * share**8 < 0.05 < 1 < 1000 * share**4
+
+
+def test_dips_are_counted_while_lanes_are_chaotic():
+    growth = np.full((4, 10), 0.3)
+    growth[0, 4:] = -0.1  # calm after 4 blocks, of which 1 dips
+    growth[0, 2] = -0.1
+    growth[1, [1, 5, 9]] = 0.0  # dips twice before the horizon
+    growth[2] = -0.1
+    growth[3, 5:] = np.nan
+    times, horizon = escape_times(growth, np.array([True, False, True, True]), 25, confirm=2)
+    np.testing.assert_array_equal(times, [100, np.inf, 0, np.nan])
+    assert dips(growth, times, horizon, 25) == (1 + 2) / (4 + 8)
+    assert dips(growth, times, horizon, 25, threshold=-0.05) == 1 / 12
+    assert np.isnan(dips(growth[2:], times[2:], horizon, 25))
+
+
+def test_chaos_too_weak_for_its_blocks_is_told_by_its_dips():
+    """Exponent 0.03 in blocks of 25: what escapes seems calm from early on, and `dips` says why."""
+    rng = np.random.default_rng(0)
+    growth = rng.normal(0.03, 0.03, (100, BLOCKS))
+    growth[:50, 40:] = -0.3
+    times, horizon = escape_times(growth, np.arange(100) < 50, BLOCK)
+    assert np.mean(times[:50]) < 0.9 * 40 * BLOCK
+    assert dips(growth, times, horizon, BLOCK) > 0.9
 
 
 def test_label_of_the_end_decides_about_its_last_blocks():
@@ -457,6 +488,11 @@ def test_ends_are_calm_as_their_labels_say():
     # Still on its way to an orbit, or on one of period 16: it does not close, but does not grow either.
     assert calm_at_the_end(strobe[2:], np.ones(2), np.full((1, 8), -0.1), BLOCK).tolist() == [True]
     assert calm_at_the_end(strobe[1:2], np.ones(2), np.full((1, 8), np.nan), BLOCK).tolist() == [False]
+    # States that close are an orbit, however uncertain its exponent; others need one that is not above its error.
+    above, scattered = np.full((1, 8), 0.03), np.array([[0.21, -0.19] * 4])
+    assert calm_at_the_end(strobe[:1], np.ones(2), above, BLOCK).tolist() == [True]
+    assert calm_at_the_end(strobe[1:2], np.ones(2), above, BLOCK).tolist() == [False]
+    assert calm_at_the_end(strobe[1:2], np.ones(2), scattered, BLOCK).tolist() == [True]
 
 
 def test_escape_to_a_torus():

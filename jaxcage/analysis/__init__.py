@@ -7,7 +7,8 @@
 | `_labels`       | periodic, chaotic, quasi-periodic, undecided or failed                               |
 | `_zones`        | zones and both kinds of edge                                                         |
 | `_zero_one`     | the 0-1 test for chaos                                                               |
-| `_transients`   | an attractor or a chaotic transient: escapes, mean life, shares of coexisting ends   |
+| `_escapes`      | when lanes left chaos for good                                                       |
+| `_transients`   | an attractor or a chaotic transient: mean life with its error, coexisting ends       |
 | `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
@@ -27,6 +28,12 @@ from ._equilibrium import (
     load_number as load_number,
     stability_chart as stability_chart,
     whirl_threshold as whirl_threshold,
+)
+from ._escapes import (
+    calm_at_the_end as calm_at_the_end,
+    calm_threshold as calm_threshold,
+    dips as dips,
+    escape_times as escape_times,
 )
 from ._labels import (
     CHAOS_THRESHOLD as CHAOS_THRESHOLD,
@@ -64,11 +71,8 @@ from ._transients import (
     Comparison as Comparison,
     Share as Share,
     Survival as Survival,
-    calm_at_the_end as calm_at_the_end,
-    calm_threshold as calm_threshold,
     coexisting as coexisting,
     compare as compare,
-    escape_times as escape_times,
     survival as survival,
     when_t0_doubles as when_t0_doubles,
 )
