@@ -205,7 +205,10 @@ SMOOTH = jc.case("1a")
 @pytest.mark.parametrize(
     "change, said",
     [
-        ({"contact.smoothing": 1e-5, "guidance_gap": 1e-5}, "`contact.smoothing` .* clearance, 0.01 mm, but is 0.01 mm"),
+        (
+            {"contact.smoothing": 1e-5, "guidance_gap": 1e-5},
+            "`contact.smoothing` .* 0.01 mm, but is 0.01 mm",
+        ),
         ({"film.smoothing": 9e-6, "guidance_gap": 8e-5}, "`film.smoothing` .* clearance, 0.08 mm, but is 0.009 mm"),
         ({"contact.smoothing": 6e-6, "guidance_gap": 1e-4, "clearance_reading": "radial"}, "clearance, 0.05 mm"),
         ({"contact": jc.replace(SMOOTH.contact, smoothing=1e-5), "guidance_gap": 5e-5}, "`contact.smoothing`"),

@@ -163,7 +163,9 @@ def test_replace_by_name():
 class Decay(jc.AbstractForcedSystem):
     """It falls to zero from where it starts, its farthest point."""
 
-    dimension = 1
+    @property
+    def dimension(self):
+        return 1
 
     def at_speed(self, speed):
         return FirstOrderField(lambda tau, y: (-0.1 * y[0],), speed)
