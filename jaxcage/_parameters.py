@@ -172,12 +172,13 @@ def replace(module: M, **values: PyTree) -> M:
     if changed:
         at = lambda m: [get(m, leaves[name]) for name in changed]
         module = eqx.tree_at(at, module, [jax.tree.map(_as_leaf, values[name]) for name in changed])
+    # Last, and those of the module itself at once: what is checked is what was asked for, and not a half of it.
     own = {name: values[name] for name, path in choices.items() if name in values and len(path) == 1}
+    module = dataclasses.replace(module, **own) if own else _checked(module)
     for name, path in choices.items():
         if name in values and name not in own:
             module = _with_static(module, path, values[name])
-    # Last, and at once: what is checked of the module is what was asked for, and not a half of it.
-    return dataclasses.replace(module, **own) if own else _checked(module)
+    return module
 
 
 def _checked(module: M) -> M:

@@ -157,3 +157,84 @@ def test_dimensionless_groups_have_no_dimension(base: str):
         assert float(there[name]) == pytest.approx(float(value), rel=1e-12), name
     assert float(here["eccentricity"]) == pytest.approx(23 / 450)
     assert float(here["speed"]) == pytest.approx(1000 * np.sqrt(0.45e-3 / 9.81))
+
+
+@pytest.mark.parametrize("harmonics", [1, 5])
+@pytest.mark.parametrize("name", ["rigid", "elastic", "roller-pass"])
+def test_harmonics_are_where_the_spectrum_of_the_forcing_ends(name: str, harmonics: int):
+    model = MODELS[name]()
+    if name == "roller-pass":
+        model = jc.replace(model, **{"impact.harmonics": harmonics, "bearing.n_rollers": 12})
+        assert model.harmonics == 12 * harmonics
+    highest = model.harmonics
+    speed, count = jnp.asarray(900.0), 4 * highest + 4
+    y = tuple(state(model, 900.0))
+    tau = 2 * np.pi * np.arange(count) / count
+    rates = jax.jit(jax.vmap(lambda t: jnp.stack(model.at_speed(speed)(t, y))))(tau)
+    size = np.abs(np.fft.rfft(rates[:, model.dimension // 2 :], axis=0)).max(axis=1) / count
+    assert size[highest] > 1e-4 * size[1:].max()
+    assert size[highest + 1 :].max() < 1e-9 * size[1:].max()
+
+
+def test_harmonics_stay_a_number_under_a_transformation():
+    """They decide how many steps a program makes: no array may."""
+    seen = []
+
+    def look(model):
+        seen.append(model.harmonics)
+        return model.cage_mass
+
+    model = MODELS["roller-pass"]()
+    eqx.filter_jit(look)(model)
+    jax.vmap(lambda gap: look(jc.replace(model, guidance_gap=gap)))(jnp.array([3e-4, 4e-4]))
+    assert seen == [13 * 48] * 2 and type(seen[0]) is int
+
+
+def test_harmonics_of_a_system_of_ones_own():
+    law = lambda tau, q, v, speed: (-q[0] + jnp.cos(7 * tau),)
+    assert jc.ForcedOscillator(law, coordinates=1).harmonics == 1
+    assert jc.ForcedOscillator(law, coordinates=1, harmonics=7).harmonics == 7
+    rates = lambda tau, y, speed: (-y[0] + jnp.cos(3 * tau),)
+    assert jc.ForcedSystem(rates, 1).harmonics == 1
+    assert jc.ForcedSystem(rates, 1, harmonics=3).harmonics == 3
+
+
+SMOOTH = jc.case("1a")
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (
+            {"contact.smoothing": 1e-5, "guidance_gap": 1e-5},
+            "`contact.smoothing` .* 0.01 mm, but is 0.01 mm",
+        ),
+        ({"film.smoothing": 9e-6, "guidance_gap": 8e-5}, "`film.smoothing` .* clearance, 0.08 mm, but is 0.009 mm"),
+        ({"contact.smoothing": 6e-6, "guidance_gap": 1e-4, "clearance_reading": "radial"}, "clearance, 0.05 mm"),
+        ({"contact": jc.replace(SMOOTH.contact, smoothing=1e-5), "guidance_gap": 5e-5}, "`contact.smoothing`"),
+    ],
+)
+def test_smoothing_beyond_a_tenth_of_the_clearance_is_refused(change: dict, said: str):
+    with pytest.raises(ValueError, match=said):
+        jc.replace(SMOOTH, **change)
+    eqx.filter_jit(lambda gap: jc.replace(SMOOTH, **{**change, "guidance_gap": gap}).clearance)(jnp.asarray(1e-5))
+    jax.vmap(lambda gap: jc.replace(SMOOTH, **{**change, "guidance_gap": gap}).clearance)(jnp.array([1e-5, 1e-3]))
+    jax.grad(lambda gap: jc.replace(SMOOTH, **{**change, "guidance_gap": gap}).clearance)(1e-5)
+
+
+def test_smoothing_is_checked_of_what_was_asked_for_and_not_of_a_half_of_it():
+    narrow = jc.replace(SMOOTH, guidance_gap=4e-5)
+    coarse = jc.replace(SMOOTH.contact, smoothing=1e-5)
+    wide = jc.replace(narrow, contact=coarse, guidance_gap=3e-4, unbalance="as_printed")
+    assert float(wide.contact.smoothing) == 1e-5 and wide.unbalance == "as_printed"
+    radial = jc.replace(SMOOTH, clearance_reading="radial", guidance_gap=1e-4)
+    read = {"unbalance": "as_printed", "clearance_reading": "as_printed", "film.n_lands": 1}
+    assert float(jc.replace(radial, contact=jc.replace(SMOOTH.contact, smoothing=8e-6), **read).clearance) == 1e-4
+    assert jc.replace(SMOOTH, **{"contact.smoothing": 4.5e-5 * (1 - 1e-12)}).dimension == 4
+
+
+def test_smoothing_of_many_models_at_once_is_checked():
+    many = eqx.filter_vmap(lambda gap: jc.replace(SMOOTH, guidance_gap=gap))(jnp.array([1e-3, 6e-5, 9e-5]))
+    assert jc.replace(many, unbalance="as_printed").unbalance == "as_printed"
+    with pytest.raises(ValueError, match=r"a tenth of the clearance, 0.06 mm, but is 0.008 mm"):
+        jc.replace(many, **{"contact.smoothing": 8e-6})

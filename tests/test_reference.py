@@ -99,7 +99,7 @@ spectrum = eqx.filter_jit(pulse_spectrum)
     "changed",
     [
         *({name: limit} for name, limits in LIMITS.items() for limit in limits),
-        {"contact_stiffness": 1e13, "bar_stiffness": 1e3},  # it bounces from the bar, and meets it again
+        {"contact_stiffness": 1e13, "bar_stiffness": 1e5},  # it bounces from the bar, and meets it again
         {"roller_mass": 5.0},
         {"roller_mass": 1e-6},
         {"omega": 30.0},

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
+from jaxcage.models import FirstOrderField
 from jaxcage.validation._literature import DUFFING_FOLDS
 
 
@@ -157,3 +158,49 @@ def test_replace_by_name():
         jc.replace(model, gap=1.0)
     with pytest.raises(ValueError, match="must be one of fixed_half, positive_pressure, full"):
         jc.replace(model, **{"film.model": "half"})
+
+
+class Decay(jc.AbstractForcedSystem):
+    """It falls to zero from where it starts, its farthest point."""
+
+    @property
+    def dimension(self):
+        return 1
+
+    def at_speed(self, speed):
+        return FirstOrderField(lambda tau, y: (-0.1 * y[0],), speed)
+
+    def scale(self, speed):
+        return (jnp.ones(()),)
+
+    def starts(self, speed):
+        return ((jnp.asarray(0.8),),)
+
+    def excursion(self, y):
+        return jnp.abs(y[0])
+
+
+FALL = float(np.exp(-0.1 * 2 * np.pi))
+"""What is left after a revolution at speed 1."""
+
+
+@pytest.mark.parametrize("discard", [0, 1])
+def test_the_peak_of_a_run_counts_the_state_it_is_kept_from(discard: int):
+    run = jc.simulate(Decay(), 1.0, revolutions=2, samples=4, discard=discard, method=FAST)
+    assert run.peak == pytest.approx(0.8 * FALL**discard, rel=1e-6)
+    assert run.peak >= np.abs(run.state).max() * (1 - 1e-12)
+
+
+def test_the_peak_of_a_ramp_counts_its_start():
+    assert jc.ramp(Decay(), 1.0, 1.2, revolutions=2, samples=4, method=FAST).peak == 0.8
+
+
+@pytest.mark.parametrize("discard", [0, 3])
+def test_the_peak_of_a_sweep_counts_the_state_it_is_observed_from(discard: int):
+    found = jc.sweep(Decay(), np.array([1.0]), discard=discard, revolutions=2, exponents=0, blocks=1, method=FAST)
+    np.testing.assert_allclose(found.peak, 0.8 * FALL**discard, rtol=1e-6)
+
+
+def test_a_lane_that_never_started_has_no_peak():
+    found = jc.sweep(Decay(), np.array([1.0]), starts=[(1.5,)], discard=1, revolutions=1, exponents=0, blocks=1)
+    assert found.failed.all() and np.isnan(found.peak).all()

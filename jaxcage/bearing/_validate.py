@@ -9,8 +9,8 @@ from jaxtyping import Array
 from .._types import Scalar
 
 
-def is_concrete(*values: Scalar) -> bool:
-    """Whether every one of `values` is a known number, so that Python may compare it."""
+def is_concrete(*values: Scalar | Array) -> bool:
+    """Whether every one of `values` is a known number, or an array of them, so that Python may compare it."""
     return not any(isinstance(value, Tracer) for value in values)
 
 

@@ -12,6 +12,7 @@
 | `_unbalance`       | centrifugal force of the cage's mass centre                                 |
 | `_gravity`         | weight                                                                      |
 | `_pocket_impact`   | roller-bar impact oscillator (14) and its force history                     |
+| `_pulse`           | Fourier integrals of the force of one impact                                |
 | `_impact_forcing`  | impacts on the cage: synchronous (15) or roller by roller                   |
 | `_smooth`          | regularised elementary functions                                            |
 

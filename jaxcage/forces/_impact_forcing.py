@@ -54,8 +54,8 @@ def pulse_spectrum(
 
     Pulses that last longer than the time between two rollers add up: summing shifted pulses and sampling the spectrum
     of one pulse at the multiples of Z are the same thing (Poisson). Every bounce on the swinging bar is part of a
-    pulse. Coefficients are good to 1e-10 of the largest; NaN for a bar so light and stiff that it swings some 40 000
-    rad during one impact.
+    pulse. Coefficients are good to 1e-10 of the largest (1e-9 where it bounces ten times). They are NaN where 20 000
+    steps do not resolve a pulse: a bar that swings tens of thousands of radians, or waves as many, during one impact.
     """
     law = impact.oscillator
     v0 = approach_speed(law.approach_ratio, omega, pocket_clearance)

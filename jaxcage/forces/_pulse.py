@@ -71,7 +71,7 @@ def pulse_integrals(share: Scalar, swing: Scalar, phase: Scalar, harmonics: int)
     `phase` of the first harmonic in a unit of time; the number of harmonics.
 
     **Returns:** integrals in units of m v_0 with m = M_w beta, and of P/v_0 with P = (m v_0^2/K)^(9/19); NaN for an
-    impact of more than 20 000 steps, in which the bar swings some 40 000 rad.
+    impact that takes more than `MOST_STEPS`.
     """
     return _program(harmonics)(jnp.stack([share, swing, phase]))
 

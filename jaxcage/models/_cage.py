@@ -65,7 +65,7 @@ class CageModel(AbstractForcedSystem):
         clearance = self.clearance
         for name, length in (("contact", self.contact.smoothing), ("film", self.film.smoothing)):
             if is_concrete(length, clearance) and np.any(np.asarray(length) > SMOOTHEST * np.asarray(clearance)):
-                given, room = (1e3 * float(a) for a in _worst(length, clearance))
+                given, room = (1e3 * a for a in _worst(length, clearance))
                 raise ValueError(
                     f"Argument `{name}.smoothing` must be at most a tenth of the clearance, {room:g} mm, but is "
                     f"{given:g} mm."
@@ -121,8 +121,8 @@ class CageModel(AbstractForcedSystem):
         return smooth_norm(x, dy, self.film.smoothing) / self.clearance
 
 
-def _worst(length: Scalar, clearance: Scalar) -> tuple[Scalar, Scalar]:
+def _worst(length: Scalar | Array, clearance: Scalar | Array) -> tuple[float, float]:
     """The pair with the largest ratio, of one model or of many."""
     lengths, rooms = np.broadcast_arrays(np.asarray(length), np.asarray(clearance))
     most = int(np.argmax(lengths / rooms))
-    return lengths.ravel()[most], rooms.ravel()[most]
+    return float(lengths.ravel()[most]), float(rooms.ravel()[most])

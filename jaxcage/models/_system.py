@@ -87,8 +87,8 @@ class ForcedSystem(AbstractForcedSystem):
         harmonics: int = 1,
     ):
         """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
-        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps; highest
-        harmonic of the revolution in the law.
+        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps;
+        highest harmonic of the revolution in the law.
         """
         self.rates, self._dimension, self._scale, self._starts = rates, dimension, scale, starts
         self._harmonics = harmonics

@@ -37,19 +37,21 @@ def pulse(
     held = math.sqrt((bar + k * depth ** (1 / 9)) / mass)
 
     def rates(s: float, y: np.ndarray) -> list[float]:
-        q = k * max((y[0] - y[1]) * length, 0.0) ** (10 / 9) * unit / speed
-        return [y[2], y[3], -q / roller_mass, (q - bar * y[1] * length * unit / speed) / mass]
+        """Of the penetration and the bar's position: a bar far out would round off more of the difference of two."""
+        q = k * max(y[0] * length, 0.0) ** (10 / 9) * unit / speed
+        bent = (q - bar * y[1] * length * unit / speed) / mass
+        return [y[2], y[3], -q / roller_mass - bent, bent]
 
     def apart(s: float, y: np.ndarray) -> float:
-        return y[0] - y[1]
+        return y[0]
 
     apart.terminal, apart.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
     y, start, found = np.array([0.0, 0.0, 1.0, 0.0]), 0.0, []
     while start < window / unit:
         end = min(window / unit - start, 1e6)  # time counts from each touch, which rounds off less of it
-        step = 0.02 / max(1.0, swing * unit, held * unit / 4)
+        step = 0.05 / max(1.0, swing * unit, held * unit / 4)
         done = solve_ivp(
-            rates, (0.0, end), y, "DOP853", dense_output=True, events=apart, rtol=1e-13, atol=1e-15, max_step=step
+            rates, (0.0, end), y, "DOP853", dense_output=True, events=apart, rtol=3e-14, atol=3e-16, max_step=step
         )
         assert done.success and done.sol is not None, done.message
         panels = max(PANELS, math.ceil(done.t[-1] * unit * max(fastest, held) / 3))
@@ -71,20 +73,20 @@ def _nodes(end: float, start: float, motion: Any, stiffness: float, length: floa
     time = end * s * s * (3 - 2 * s)
     weight = np.tile(w, panels) / (2 * panels) * end * 6 * s * (1 - s)
     y = motion(time)
-    return start + time, stiffness * (np.maximum(y[0] - y[1], 0.0) * length) ** (10 / 9), weight
+    return start + time, stiffness * (np.maximum(y[0], 0.0) * length) ** (10 / 9), weight
 
 
 def _next_touch(y: np.ndarray, swing: float) -> tuple[float, np.ndarray] | None:
     """When the roller, flying on, meets the swinging bar again, and the state then; None if it never does."""
-    reach = math.hypot(y[1], y[3] / swing)
+    reach, speed = math.hypot(y[1], y[3] / swing), y[2] + y[3]
 
     def gap(t: float) -> float:
-        return y[1] * math.cos(swing * t) + y[3] / swing * math.sin(swing * t) - (y[0] + y[2] * t)
+        return y[3] / swing * math.sin(swing * t) - 2 * y[1] * math.sin(swing * t / 2) ** 2 - speed * t
 
-    if y[2] < 0:
-        last = (y[0] + reach) / -y[2]
-    elif y[2] > 0:
-        last = (reach - y[0]) / y[2] + 1 / swing
+    if speed < 0:
+        last = (y[1] + reach) / -speed
+    elif speed > 0:
+        last = (reach - y[1]) / speed + 1 / swing
     else:
         last = 2 * math.pi / swing
     step = 2 * math.pi / swing / 400
@@ -95,7 +97,7 @@ def _next_touch(y: np.ndarray, swing: float) -> tuple[float, np.ndarray] | None:
             t = float(brentq(gap, before, after, xtol=1e-18, rtol=1e-14))
             c, s = math.cos(swing * t), math.sin(swing * t)
             bar = [y[1] * c + y[3] / swing * s, y[3] * c - y[1] * swing * s]
-            return t, np.array([bar[0], bar[0], y[2], bar[1]])
+            return t, np.array([0.0, bar[0], speed - bar[1], bar[1]])
         before = after
     return None
 
