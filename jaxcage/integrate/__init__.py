@@ -34,7 +34,6 @@ from ._revolution import (
     Moved as Moved,
     pushed as pushed,
     revolution as revolution,
-    takes_tangents as takes_tangents,
 )
 from ._rosenbrock import (
     RODAS3 as RODAS3,
