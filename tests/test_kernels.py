@@ -488,7 +488,7 @@ def on_device(solver, tangents, **options):
     sizes = Sizes(4, len(watched), len(fixed))
     moved = [*lane_state(np.resize(STATES, (200, 4))), *([jnp.ones(200)] * 4 * tangents)]
     if tangents:
-        step = Tangent(step, sizes, ((False,) * len(fixed),) * tangents, step)
+        step = Tangent(step, sizes, ((False,) * len(fixed),) * tangents)
         sizes = step.whole
     program, size = program_of(step, sizes), sizes.moved + sizes.watched
     needed = [i - 1 for i in program.needed if i > size]
@@ -502,7 +502,7 @@ def on_device(solver, tangents, **options):
 )
 def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
     run, numbers, step, sizes = on_device(solver, tangents, interpret=True)
-    by_loops = lambda *x: _march._loops(jnp.asarray(12), *x, how=_march.How(step, step, sizes, 1))
+    by_loops = lambda *x: _march._loops(jnp.asarray(12), *x, how=_march.How(step, sizes, 1))
     for new, ran in zip(run(numbers), compiled(by_loops)(*numbers), strict=True):
         scale = np.nanmax(np.abs(ran), initial=1e-300)
         np.testing.assert_allclose(new / scale, ran / scale, atol=1e-11)

@@ -30,6 +30,7 @@ from ._equilibrium import (
     whirl_threshold as whirl_threshold,
 )
 from ._escapes import (
+    CONFIRM as CONFIRM,
     calm_at_the_end as calm_at_the_end,
     calm_threshold as calm_threshold,
     dips as dips,
@@ -67,7 +68,6 @@ from ._spectra import (
 )
 from ._sweep import LIFE_BLOCK as LIFE_BLOCK, Confirmation as Confirmation, Sweep as Sweep
 from ._transients import (
-    CONFIRM as CONFIRM,
     Comparison as Comparison,
     Share as Share,
     Survival as Survival,

@@ -39,7 +39,6 @@ from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as 
 from ._revolution import (
     pushed as pushed,
     revolution as revolution,
-    takes_tangents as takes_tangents,
 )
 from ._rosenbrock import (
     RODAS3 as RODAS3,

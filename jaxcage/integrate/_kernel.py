@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from .._types import State
 from ..models import AbstractField, AbstractForcedSystem
-from ._explicit import explicit_step
+from ._explicit import Stages, chosen, explicit_step
 from ._march import is_elementary
 from ._program import Numbers, Sizes
 from ._rosenbrock import AbstractRosenbrock, computed_once, rosenbrock_step
@@ -69,9 +69,9 @@ class KernelStep:
     """Whether the step is one kernel; else it is left to XLA's fusions, and told what to work out once."""
 
     @property
-    def loose(self) -> "KernelStep":
-        """The same for XLA's fusions."""
-        return dataclasses.replace(self, whole=False)
+    def stage(self) -> "KernelStage | None":
+        """The part that a step of an explicit method is made of."""
+        return KernelStage(self.solver, self.structure) if isinstance(self.solver, dfx.AbstractERK) else None
 
     def watched(self, dimension: int) -> Numbers:
         """What is watched, at the beginning."""
@@ -100,6 +100,58 @@ class KernelStep:
         return y, (peak, grown, *pending)
 
 
+@dataclasses.dataclass(frozen=True)
+class KernelStage:
+    """One stage of such a step: the loop's body has the field once, a quarter of a Runge-Kutta step to compile.
+
+    Moved are the arguments of the stages to come as far as they are known, the state at the beginning of the step and
+    that at its end; after the last stage all of them are the new state. Watched and fixed as in a step.
+    """
+
+    solver: dfx.AbstractERK
+    structure: Structure
+
+    @property
+    def stages(self) -> Stages:
+        """The method's coefficients."""
+        assert isinstance(self.solver.tableau, dfx.ButcherTableau)
+        return Stages.of(self.solver.tableau)
+
+    @property
+    def count(self) -> int:
+        """Stages of a step."""
+        return len(self.stages.phase)
+
+    @property
+    def copies(self) -> int:
+        """How many times the numbers of a state it moves."""
+        return len(self.stages.ahead) + 2
+
+    def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
+        phase, h, *numbers = fixed
+        pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.remake(numbers)
+        field, system, scale = pieces
+        method, n = self.stages, len(scale)
+        step = jnp.floor(i / self.count)
+        place = i - self.count * step
+        first, last = place == 0.0, place == self.count - 1.0
+        argument, *later, end = (moved[k : k + n] for k in range(0, len(moved), n))
+        peak, grown, *pending = watched
+
+        rate = field(phase + (step + chosen(method.phase, place)) * h, argument)
+        push = lambda y, row: tuple(c + h * chosen(row, place) * k for c, k in zip(y, rate, strict=True))
+        at_last = lambda new, old: tuple(jnp.where(last, a, b) for a, b in zip(new, old, strict=True))
+        end = push(end, method.weight)
+        later = [at_last(end, y) for y in (*map(push, later, method.ahead), later[-1])]
+        late = tuple(h * (p + method.last_error * k) for p, k in zip(pending, rate, strict=True))
+        error = tuple(jnp.where(first & (p == p), e, 0.0) for p, e in zip(pending, late, strict=True))
+        kept = tuple(jnp.where(first, 0.0, p) for p in pending)
+        pending = tuple(p + chosen(method.error, place) * k for p, k in zip(kept, rate, strict=True))
+        grown = grown + sum(jnp.abs(e / s) for e, s in zip(error, scale, strict=True))
+        peak = jnp.where(last, jnp.maximum(peak, jnp.asarray(system.excursion(end))), peak)
+        return tuple(c for y in (*later, end) for c in y), (peak, grown, *pending)
+
+
 def kernel_step(
     solver: KernelSolver, field: AbstractField, system: AbstractForcedSystem, scale: State
 ) -> tuple[KernelStep, list[Any]]:
@@ -111,4 +163,4 @@ def kernel_step(
         dimension = len(scale)
         if is_elementary(step, Sizes(dimension, len(step.watched(dimension)), 2 + len(numbers))):
             return step, numbers
-    return step.loose, numbers
+    return dataclasses.replace(step, whole=False), numbers

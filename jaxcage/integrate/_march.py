@@ -25,17 +25,22 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
-from jax.core import Tracer
+from jax.core import Tracer, eval_jaxpr
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
-from ._program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
+from ._program import CONTROL_FLOW, Numbers, Sizes, Step, pieces, program_of
 
 
 LARGEST = {False: 2800, True: 12000}
 """Operations of a kernel, at most: where XLA's own options hold, and where those of `compiled` do. The newer of XLA's
 two emitters for CPUs, its default, cuts larger kernels into functions that compute shared terms again and again,
-without end. A larger step is left to XLA's fusions, which is slower, but ends."""
+without end. A larger step is several kernels."""
+SHARED = 12000
+"""Operations of a step with several directions, at most; else each direction is a lane with values of its own."""
+WHOLE, GROWTH = 2800, 2.5
+"""Operations of a derivative of second or higher order by whole steps, at most, and how many times as many it has as
+what is differentiated."""
 TOGETHER = 4500
 """As many operations are put into one kernel, of several steps, since between kernels all numbers are copied. With
 tangents two steps in one kernel measure slower than one."""
@@ -78,7 +83,6 @@ class How(NamedTuple):
     """What a march is of."""
 
     step: Any
-    loose: Any
     sizes: Sizes
     multiple: int
 
@@ -91,23 +95,20 @@ def march(
     fixed: Sequence[Any] = (),
     multiple: int = 1,
     whole: bool = True,
-    loose: Step | None = None,
 ) -> tuple[Numbers, Numbers]:
     """`count` steps one after the other.
 
     **Arguments:** the step; how many (an array: one program serves all counts); what is moved; what is watched; what
     stays the same. `multiple` is a number that `count` is known to be a multiple of. `whole` is whether the step is
-    made of elementary operations on scalars alone (`is_elementary`): else the loop is left to XLA, as it is where the
-    step is too large for a kernel. `loose` is the step as it should then be, by default the same.
+    made of elementary operations on scalars alone (`is_elementary`): else the loop is left to XLA.
 
     **Returns:** what was moved and what was watched.
     """
     if not whole:
-        return _plain(loose or step, count, tuple(moved), tuple(watched), tuple(fixed))
+        return _plain(step, count, tuple(moved), tuple(watched), tuple(fixed))
     numbers = [jnp.asarray(x, dtype=float) for x in (*moved, *watched, *fixed)]
     sizes = Sizes(len(moved), len(watched), len(fixed))
-    how = How(step, loose or step, sizes, multiple)
-    out = march_p.bind(jnp.asarray(count, jnp.int32), *numbers, how=how)
+    out = march_p.bind(jnp.asarray(count, jnp.int32), *numbers, how=How(step, sizes, multiple))
     return sizes._replace(fixed=0).split(out)[:2]
 
 
@@ -121,7 +122,6 @@ def march_with_tangents(
     fixed_tangents: Sequence[Sequence[Any]] = (),
     multiple: int = 1,
     whole: bool = True,
-    loose: Step | None = None,
 ) -> tuple[Numbers, Numbers, tuple[Numbers, ...]]:
     """`march`, and what it does to tangent vectors.
 
@@ -131,18 +131,18 @@ def march_with_tangents(
     **Returns:** what was moved, what was watched, the tangent vectors of what was moved.
     """
     if not tangents:
-        return *march(step, count, moved, watched, fixed, multiple, whole, loose), ()
+        return *march(step, count, moved, watched, fixed, multiple, whole), ()
     sizes = Sizes(len(moved), len(watched), len(fixed))
     along = list(fixed_tangents) or [(None,) * len(fixed)] * len(tangents)
     known = tuple(tuple(x is not None for x in row) for row in along)
-    several = Tangent(step, sizes, known, loose or step)
+    several = Tangent(step, sizes, known)
     if whole and _share(several):
         pushed, drifts = [x for t in tangents for x in t], [x for row in along for x in row if x is not None]
-        y, seen = march(several, count, (*moved, *pushed), watched, (*fixed, *drifts), multiple, loose=several.loose)
+        y, seen = march(several, count, (*moved, *pushed), watched, (*fixed, *drifts), multiple)
         return y[: sizes.moved], seen, tuple(_rows(y[sizes.moved :], sizes.moved))
 
     def one(tangent: Numbers, row: Numbers) -> Any:
-        go = lambda y, x: march(step, count, y, watched, x, multiple, whole, loose)
+        go = lambda y, x: march(step, count, y, watched, x, multiple, whole)
         return jax.jvp(go, (tuple(moved), tuple(fixed)), (tangent, row))
 
     filled = [tuple(jnp.zeros_like(x) if d is None else d for x, d in zip(fixed, row, strict=True)) for row in along]
@@ -166,8 +166,6 @@ class Tangent:
     sizes: Sizes
     known: tuple[tuple[bool, ...], ...]
     """For each direction, which of the fixed numbers have a tangent."""
-    loose: Step
-    """The step itself as it should be where it is left to XLA."""
 
     @property
     def whole(self) -> Sizes:
@@ -178,6 +176,7 @@ class Tangent:
     def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
         y, *tangents = _rows(moved, self.sizes.moved)
         x, drifts = fixed[: self.sizes.fixed], iter(fixed[self.sizes.fixed :])
+        step = program_of(self.step, self.sizes, rules=True)
 
         @functools.cache
         def linear(known: tuple[bool, ...]) -> Any:
@@ -185,8 +184,8 @@ class Tangent:
 
             def go(y: Numbers, some: Numbers) -> tuple[Numbers, Numbers]:
                 given = iter(some)
-                new, seen = self.step(i, y, watched, tuple(next(given) if k else c for c, k in zip(x, known)))
-                return tuple(new), tuple(seen)
+                new = step(i, *y, *watched, *(next(given) if k else c for c, k in zip(x, known, strict=True)))
+                return tuple(new[: len(y)]), tuple(new[len(y) :])
 
             return jax.linearize(go, y, tuple(c for c, k in zip(x, known) if k), has_aux=True)
 
@@ -217,11 +216,13 @@ class Limited:
     """A step of lanes that stop after their own counts, the first fixed number."""
 
     step: Step
+    parts: int = 1
+    """How many of these steps are one of those that are counted."""
 
     def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
         count, *rest = fixed
         new, seen = self.step(i, moved, watched, tuple(rest))
-        keep = lambda a, b: tuple(jnp.where(i < count, x, y) for x, y in zip(a, b, strict=True))
+        keep = lambda a, b: tuple(jnp.where(i < count * self.parts, x, y) for x, y in zip(a, b, strict=True))
         return keep(new, moved), keep(seen, watched)
 
 
@@ -230,7 +231,51 @@ def _limited(step: Any) -> Any:
     if not isinstance(step, Tangent):
         return Limited(step)
     known = tuple((False, *row) for row in step.known)
-    return Tangent(_limited(step.step), _one_more(step.sizes), known, Limited(step.loose))
+    return Tangent(_limited(step.step), _one_more(step.sizes), known)
+
+
+class Parts(NamedTuple):
+    """A step as `count` parts, each a step that moves `copies` times as many numbers, `size` of them at a time."""
+
+    count: int
+    copies: int
+    size: int
+
+    def begun(self, moved: Sequence[Any]) -> list[Any]:
+        """What the first part is given."""
+        return [x for row in _rows(moved, self.size) for x in row * self.copies]
+
+    def ended(self, moved: Sequence[Any]) -> list[Any]:
+        """What the last part leaves."""
+        return [x for row in _rows(moved, self.size * self.copies) for x in row[: self.size]]
+
+
+def _in_parts(how: How) -> tuple[How, Parts]:
+    """What is to be differentiated: the march, or, where that is large and has a derivative in it already, that of the
+    parts of its steps. Compiled in a fraction of the time; with fewer derivatives whole steps run faster."""
+    parts = _parts(how.step, how.sizes) if isinstance(how.step, Tangent) else None
+    if parts is None or GROWTH * _operations(how.step, how.sizes) < WHOLE:
+        return how, Parts(1, 1, how.sizes.moved)
+    step, sizes, parts = parts
+    return How(step, sizes, how.multiple), parts
+
+
+def _parts(step: Any, sizes: Sizes) -> tuple[Any, Sizes, Parts] | None:
+    """A part of the step, its sizes, and how the step is made of it; None where it is not."""
+    if isinstance(step, Tangent | Limited):
+        inner = step.sizes if isinstance(step, Tangent) else sizes._replace(fixed=sizes.fixed - 1)
+        found = _parts(step.step, inner)
+        if found is None:
+            return None
+        part, inner, parts = found
+        if isinstance(step, Limited):
+            return Limited(part, parts.count), _one_more(inner), parts
+        part = Tangent(part, inner, step.known)
+        return part, part.whole, parts
+    stage = getattr(step, "stage", None)
+    if stage is None:
+        return None
+    return stage, sizes._replace(moved=sizes.moved * stage.copies), Parts(stage.count, stage.copies, sizes.moved)
 
 
 def _one_more(sizes: Sizes) -> Sizes:
@@ -245,8 +290,9 @@ def _operations(step: Step, sizes: Sizes) -> int:
 
 
 def _share(tangent: Tangent) -> bool:
-    """Whether all directions of a step go into one kernel."""
-    return len(tangent.known) <= DIRECTIONS and _operations(tangent, tangent.whole) <= LARGEST[_ours.get()]
+    """Whether all directions of a step are computed together."""
+    first = not isinstance(tangent.step, Tangent)  # of higher derivatives a single direction is enough for a kernel
+    return first and len(tangent.known) <= DIRECTIONS and _operations(tangent, tangent.whole) <= SHARED
 
 
 def is_elementary(step: Step, sizes: Sizes) -> bool:
@@ -282,41 +328,6 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
     return jax.lax.fori_loop(0, count, body, (moved, tuple(jax.lax.stop_gradient(x) for x in watched)))
 
 
-def _loose(how: How, count: Any, *numbers: Any) -> list[Any]:
-    """The march left to XLA, in every lane."""
-    step, sizes = how.step, how.sizes
-    if isinstance(step, Tangent):
-        return _loose_tangents(step, count, *sizes.split(numbers))
-
-    def run(*x: Any) -> list[Any]:
-        moved, watched = _plain(how.loose, count, *sizes.split(x))
-        return [*moved, *watched]
-
-    shape = max((jnp.shape(x) for x in numbers), key=len)
-    if not shape:
-        return run(*numbers)
-    flat = [x.reshape(-1) if jnp.shape(x) else x for x in numbers]
-    out = jax.vmap(run, in_axes=tuple(0 if jnp.ndim(x) else None for x in numbers), out_axes=0)(*flat)
-    return [x.reshape(shape) for x in out]
-
-
-def _loose_tangents(step: Tangent, count: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> list[Any]:
-    """The same with tangent vectors, their directions an axis of arrays: written out they would be too much."""
-    inner, size = How(step.step, step.loose, step.sizes, 1), step.sizes.moved
-    y, *tangents = _rows(moved, size)
-    x, rest = fixed[: step.sizes.fixed], iter(fixed[step.sizes.fixed :])
-    drifts = [[next(rest) if k else jnp.zeros_like(c) for c, k in zip(x, row, strict=True)] for row in step.known]
-
-    def go(y: list[Any], x: list[Any]) -> tuple[list[Any], list[Any]]:
-        out = _loose(inner, count, *y, *watched, *x)
-        return out[:size], out[size:]
-
-    along = lambda t, d: jax.jvp(go, (list(y), list(x)), (t, d), has_aux=True)
-    stacked = [[jnp.stack(c) for c in zip(*rows, strict=True)] for rows in (tangents, drifts)]
-    values, slopes, seen = jax.vmap(along, out_axes=(None, 0, None))(*stacked)
-    return [*values, *(c[k] for k in range(len(tangents)) for c in slopes), *seen]
-
-
 def _lanewise(
     f: Callable[[Numbers, Numbers], Sequence[Any]], shared: Sequence[Array], lanes: Sequence[Array]
 ) -> tuple[Array, ...]:
@@ -335,32 +346,41 @@ def _lanewise(
 
 def _loops(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
     """The march on a CPU: a loop over kernels, each a loop along the lanes."""
-    step, _, sizes, multiple = how
-    if _operations(step, sizes) > LARGEST[_ours.get()]:
-        return tuple(_loose(how, count, *numbers))
+    step, sizes, multiple = how
     shape = max((x.shape for x in numbers), key=len)
     lanes = math.prod(shape)
     moving = sizes.moved + sizes.watched
     row = tuple(jnp.broadcast_to(x, shape).reshape(lanes) for x in numbers[:moving])
     fixed = [x.reshape(lanes) if x.shape else x for x in numbers[moving:]]
-    operations = _operations(step, sizes)
-    most = 1 if isinstance(step, Tangent) else min(TOGETHER, LARGEST[_ours.get()]) // operations
+    largest = LARGEST[_ours.get()]
+    most = 1 if isinstance(step, Tangent) else min(TOGETHER, largest) // _operations(step, sizes)
     together = max(d for d in range(1, multiple + 1) if multiple % d == 0 and (d == 1 or d <= most))
     program = program_of(Several(step, together) if together > 1 else step, sizes)
-    used = [i - 1 - moving for i in program.needed if i > moving]
-    alike, own = [i for i in used if not fixed[i].shape], [i for i in used if fixed[i].shape]
-
-    def kernel(shared: Numbers, lane: Numbers) -> Sequence[Any]:
-        known = dict(zip((*alike, *own), (*shared[1:], *lane[moving:]), strict=True))
-        return program(shared[0], *lane[:moving], *(known.get(i, 0.0) for i in range(len(fixed))))
-
-    shared, varying = [fixed[i] for i in alike], [fixed[i] for i in own]
+    parts = pieces(program, largest)
 
     def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
-        return _lanewise(kernel, [(i * together).astype(float), *shared], (*row, *varying))
+        known = dict(zip(program.jaxpr.invars, ((i * together).astype(float), *row, *fixed), strict=True))
+        for part in parts:
+            got = _piece(part, program.consts, [known[v] for v in part.invars], row[0])
+            known.update(zip(part.outvars, got, strict=True))
+        read = lambda v: jnp.asarray(v.val if isinstance(v, jex.core.Literal) else known[v])
+        return tuple(jnp.broadcast_to(read(v), lanes) for v in program.jaxpr.outvars)
 
     row = jax.lax.fori_loop(0, count // together, body, row)
     return tuple(x.reshape(shape) for x in row)
+
+
+def _piece(part: Any, consts: Sequence[Any], given: Sequence[Array], like: Array) -> tuple[Array, ...]:
+    """A part of a program as a kernel; between kernels all numbers are floating."""
+    own = [i for i, x in enumerate(given) if x.shape]
+    alike = [i for i, x in enumerate(given) if not x.shape]
+
+    def kernel(shared: Numbers, lane: Numbers) -> Sequence[Any]:
+        known = dict(zip((*alike, *own), (*shared, *lane), strict=False))
+        x = [known[i].astype(v.aval.dtype) for i, v in enumerate(part.invars)]
+        return [y.astype(float) for y in eval_jaxpr(part, consts, *x)]
+
+    return _lanewise(kernel, [given[i] for i in alike], [given[i] for i in own] or [like])
 
 
 def _kernel_on_gpu(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
@@ -396,7 +416,7 @@ def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
         count, *numbers = args
         args = [jnp.max(count), *numbers[:results], count.astype(float), *numbers[results:]]
         mapped = [False, *mapped[1 : 1 + results], True, *mapped[1 + results :]]
-        how = How(_limited(how.step), Limited(how.loose), _one_more(how.sizes), how.multiple)
+        how = How(_limited(how.step), _one_more(how.sizes), how.multiple)
     if isinstance(how.step, Tangent):
         moved, watched, fixed = how.sizes.split(mapped[1:])
         inner = how.step.sizes
@@ -429,14 +449,14 @@ def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How
     y, x = moved[: inner.moved], fixed[: inner.fixed]
     several = dataclasses.replace(step, known=step.known * size)
     if not _share(several):
-        values = march_p.bind(count, *y, *watched, *x, how=How(step.step, step.loose, inner, how.multiple))
         out = _lanes(args, mapped, size, how)
-        out = [*values[: inner.moved], *out[inner.moved : sizes.moved], *values[inner.moved :]]
+        once = lambda row: [x[0] for x in row]  # values are the same in every lane
+        out = [*once(out[: inner.moved]), *out[inner.moved : sizes.moved], *once(out[sizes.moved :])]
     else:
         slices = lambda k, row, flags: [v[k] if m else v for v, m in zip(row, flags, strict=True)]
         tangents = [v for k in range(size) for v in slices(k, moved[inner.moved :], moved_mapped[inner.moved :])]
         drifts = [v for k in range(size) for v in slices(k, fixed[inner.fixed :], fixed_mapped[inner.fixed :])]
-        shared = How(several, several.loose, several.whole, how.multiple)
+        shared = How(several, several.whole, how.multiple)
         got = march_p.bind(count, *y, *tangents, *watched, *x, *drifts, how=shared)
         width = inner.moved * old
         each = [got[inner.moved + k * width : inner.moved + (k + 1) * width] for k in range(size)]
@@ -448,22 +468,19 @@ def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How
 
 def _jvp(primals: Sequence[Any], tangents: Sequence[Any], *, how: How) -> Any:
     count, *numbers = primals
-    sizes = how.sizes
-    moved, watched, fixed = sizes.split(numbers)
-    moved_dot, _, fixed_dot = sizes.split(tangents[1:])
+    (step, sizes, multiple), parts = _in_parts(how)
+    moved, watched, fixed = how.sizes.split(numbers)
+    moved_dot, _, fixed_dot = how.sizes.split(tangents[1:])
     known = tuple(not isinstance(d, ad.Zero) for d in fixed_dot)
     pushed = [ad.instantiate_zeros(d) for d in moved_dot]
-    along = Tangent(how.step, sizes, (known,), how.loose)
-    if _operations(along, along.whole) > LARGEST[_ours.get()]:
-        rest = [ad.instantiate_zeros(d) for d in tangents[1 + sizes.moved :]]
-        values, slopes = jax.jvp(functools.partial(_loose, how, count), numbers, [*pushed, *rest])
-        return values, slopes
+    along = Tangent(step, sizes, (known,))
     drifts = [d for d, k in zip(fixed_dot, known, strict=True) if k]
-    shared = How(along, along.loose, along.whole, how.multiple)
-    out = march_p.bind(count, *moved, *pushed, *watched, *fixed, *drifts, how=shared)
+    begun = [*parts.begun(moved), *parts.begun(pushed)]
+    shared = How(along, along.whole, multiple * parts.count)
+    out = march_p.bind(count * parts.count, *begun, *watched, *fixed, *drifts, how=shared)
     values, slopes, seen = out[: sizes.moved], out[sizes.moved : 2 * sizes.moved], out[2 * sizes.moved :]
     none = [ad.Zero(jax.typeof(x).to_tangent_aval()) for x in seen]
-    return [*values, *seen], [*slopes, *none]
+    return [*parts.ended(values), *seen], [*parts.ended(slopes), *none]
 
 
 march_p.def_impl(lambda *args, how: _compiled(how)(*args))

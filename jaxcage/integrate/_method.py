@@ -108,7 +108,7 @@ def run_steps(
         return _by_solver(solver, count, h, field, system, scale, y, phase)
     step, numbers = kernel_step(solver, field, system, scale)  # pyright: ignore[reportArgumentType]
     fixed = (phase, h, *numbers)
-    y, watched = march(step, count, y, step.watched(len(y)), fixed, multiple or 1, step.whole, step.loose)
+    y, watched = march(step, count, y, step.watched(len(y)), fixed, multiple or 1, step.whole)
     peak, error, *_ = watched
     return Stretch(y, peak, judge(dfx.RESULTS.successful, y, peak, ESCAPE), error)
 

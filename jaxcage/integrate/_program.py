@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -47,12 +48,14 @@ class Program(NamedTuple):
         return eval_jaxpr(self.jaxpr, self.consts, *x)
 
 
-def program_of(step: Any, sizes: Sizes) -> Program:
+def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
+    """What a step computes; with `rules`, functions that have a derivative of their own stay calls: to be
+    differentiated, for which a program is traced much faster than the code that it came from."""
     trace: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _trace
-    return trace(step, sizes)
+    return trace(step, sizes, rules)
 
 
-def _trace(step: Step, sizes: Sizes) -> Program:
+def _trace(step: Step, sizes: Sizes, rules: bool) -> Program:
     """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
 
     def flat(i: Any, *x: Any) -> tuple[Any, ...]:
@@ -61,33 +64,36 @@ def _trace(step: Step, sizes: Sizes) -> Program:
 
     number = jax.ShapeDtypeStruct((), float)
     traced = jax.make_jaxpr(flat)(*[number] * (1 + sum(sizes)))
-    once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={})
+    once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={}, rules=rules)
     traced = jax.make_jaxpr(once)(*[number] * (1 + sum(sizes)))
     jaxpr = traced.jaxpr
     equations = _needed(jaxpr.eqns, jaxpr.outvars)
     jaxpr = jaxpr.replace(eqns=equations)
-    read = _variables(jaxpr.outvars).union(*(_variables(e.invars) for e in equations))
+    read = _variables(jaxpr.outvars).union(*map(_read, equations))
     return Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
 
 
 _kept = functools.lru_cache(maxsize=128)(_trace)
 
 
-def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]) -> list[Any]:
+def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any], rules: bool) -> list[Any]:
     """The function with the functions that it calls written out, and what it computes twice computed once."""
     known = dict(zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *args], strict=True))
     read = lambda v: v.val if isinstance(v, jex.core.Literal) else known[v]
     for e in jaxpr.eqns:
         x = [read(v) for v in e.invars]
         called = next((e.params[k] for k in ("jaxpr", "call_jaxpr") if k in e.params), None)
-        if called is None or e.primitive.name in CONTROL_FLOW:
+        if rules and e.primitive.name == "custom_jvp_call":
+            alone = jaxpr.replace(constvars=[], invars=list(_read(e)), eqns=[e], outvars=e.outvars)
+            out = eval_jaxpr(alone, [], *map(read, alone.invars))
+        elif called is None or e.primitive.name in CONTROL_FLOW:
             same = (e.primitive, str(e.params), *map(_identity, x))
             if same not in seen:
                 out = e.primitive.bind(*x, **e.params)
                 seen[same] = out if e.primitive.multiple_results else [out]
             out = seen[same]
         else:
-            out = _inlined(called.jaxpr, called.consts, *x, seen=seen)
+            out = _inlined(called.jaxpr, called.consts, *x, seen=seen, rules=rules)
         known.update(zip(e.outvars, out, strict=True))
     return [read(v) for v in jaxpr.outvars]
 
@@ -110,3 +116,22 @@ def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
             kept.append(e)
             reached |= _variables(e.invars)
     return kept[::-1]
+
+
+def pieces(program: Program, largest: int) -> list[Any]:
+    """A program in parts of at most so many operations: what one part makes and a later one reads is a result of it."""
+    jaxpr, parts = program.jaxpr, []
+    count = max(1, -(-len(jaxpr.eqns) // largest))
+    cuts = [len(jaxpr.eqns) * k // count for k in range(count + 1)]
+    for first, last in itertools.pairwise(cuts):
+        part, rest = jaxpr.eqns[first:last], jaxpr.eqns[last:]
+        made, later = ({v for e in part for v in e.outvars}, _variables(jaxpr.outvars).union(*map(_read, rest)))
+        read = set().union(*map(_read, part)) - made - set(jaxpr.constvars)
+        in_order = lambda rows, some: list(dict.fromkeys(v for row in rows for v in row if v in some))
+        given = in_order([jaxpr.invars, *(e.outvars for e in jaxpr.eqns[:first])], read)
+        parts.append(jaxpr.replace(eqns=part, invars=given, outvars=in_order([e.outvars for e in part], later)))
+    return parts
+
+
+def _read(equation: Any) -> set[Any]:
+    return _variables(equation.invars)

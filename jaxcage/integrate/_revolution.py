@@ -19,7 +19,7 @@ from ..models import ESCAPE
 from ._controlled import ControlledSteps, Rung, climb, nowhere, run_rung
 from ._kernel import KernelSolver, can_be_kernel, kernel_step
 from ._march import march_with_tangents
-from ._method import REVOLUTION, AbstractMethod, FixedSteps, judge
+from ._method import REVOLUTION, FixedSteps, Stretch, judge
 from ._moved import Moved, Tangents, moved_by
 from ._results import outcome_code
 from ._strobe import StrobeMap
@@ -46,37 +46,46 @@ Drift = Sequence[Scalar | None]
 """Tangents of the numbers of a field, in the order of its leaves; None where there is none."""
 
 
-def takes_tangents(method: AbstractMethod) -> bool:
-    """Whether `pushed` can follow tangent vectors by this method: equal steps that are plain formulas."""
-    return isinstance(method, FixedSteps) and can_be_kernel(method.solver)
-
-
 def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Drift | None]) -> Moved:
-    """A lane one revolution on by equal steps, with tangent vectors along which the field changes too.
+    """A lane one revolution on, with tangent vectors along which the field changes too.
 
-    **Arguments:** strobe map of a method that `takes_tangents`; state; tangent vectors (in units of the state), and for
-    each of them the tangents of the field's numbers, None where there are none.
+    **Arguments:** strobe map; state; tangent vectors (in units of the state), and for each of them the tangents of the
+    field's numbers, None where there are none.
     """
     method = strobe.method
-    assert isinstance(method, FixedSteps)
+    if not (isinstance(method, FixedSteps) and can_be_kernel(method.solver)):
+        return _pushed_from_outside(strobe, y, tangents, drifts)
     solver = cast(KernelSolver, method.solver)
     step, numbers = kernel_step(solver, strobe.field, strobe.system, strobe.scale)
     h = REVOLUTION / jnp.asarray(method.steps, dtype=float)
     fixed = (jnp.zeros(()), h, *numbers)
     row = lambda drift: (None, None, *(drift or ()), *(None,) * (len(numbers) - len(drift or ())))
+    along = [row(d) for d in drifts]
     y, (peak, error, *_), after = march_with_tangents(
-        step,
-        method.steps,
-        y,
-        step.watched(len(y)),
-        fixed,
-        tangents,
-        [row(d) for d in drifts],
-        whole=step.whole,
-        loose=step.loose,
+        step, method.steps, y, step.watched(len(y)), fixed, tangents, along, whole=step.whole
     )
     code = outcome_code(judge(dfx.RESULTS.successful, y, peak, ESCAPE))
     return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error, ())
+
+
+def _pushed_from_outside(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Drift | None]) -> Moved:
+    """The same by a method that is no plain formula, whatever it does."""
+    numbers, rest = eqx.partition(strobe.field, eqx.is_inexact_array)
+    row, form = jax.tree.flatten(numbers)
+
+    def move(y: State, row: list[Any]) -> tuple[State, Stretch]:
+        field = eqx.combine(jax.tree.unflatten(form, row), rest)
+        stretch = eqx.tree_at(lambda s: s.field, strobe, field)(y)
+        return stretch.y, stretch
+
+    zero = list(map(jnp.zeros_like, row))
+    filled = [[z if d is None else d for z, d in zip(zero, drift or zero, strict=True)] for drift in drifts]
+    stacked = [jax.tree.map(lambda *x: jnp.stack(x), *rows) for rows in (tangents, filled)]
+    along = lambda t, d: jax.jvp(move, (y, row), (t, d), has_aux=True)
+    y, after, seen = jax.vmap(along, out_axes=(None, 0, None))(*stacked)
+    columns = tuple(tuple(c[i] for c in after) for i in range(len(tangents)))
+    peak, code = jnp.asarray(seen.peak), outcome_code(seen.result)
+    return Moved(y, columns, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(seen.error), ())
 
 
 def _controlled(method: ControlledSteps, strobe: StrobeMap, y: State, tangents: Tangents, level: Any) -> Moved:

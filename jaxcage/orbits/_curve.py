@@ -163,7 +163,7 @@ class _Tracer(eqx.Module):
         z = np.asarray(point.state) / np.asarray(self.scale)
         u = np.array([*z, *free, *(v / w for v, w in zip(values, self.units, strict=True))])
         strobe = self.problem.prepare(jnp.asarray(u), self.given, self.frame)
-        _, monodromy = ReturnMap(strobe, self.frame).with_monodromy(jnp.asarray(z))
+        _, monodromy, _ = ReturnMap(strobe, self.frame).pushed(jnp.asarray(z))
         a = critical_matrix(self.problem, self.kind, strobe, jnp.asarray(z), monodromy, self.frame)
         equations = stack(PointEquations(self.problem, self.frame, *null_vectors(a), self.kind), 1)
         normal = np.zeros((1, u.size))

@@ -10,9 +10,9 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method, strobe_map, takes_tangents
+from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method, strobe_map
 from ..models import AbstractForcedSystem
-from ._implicit import AbstractEquations, by_columns, differentiated, implicit_root, numbers_of
+from ._implicit import AbstractEquations, by_columns, implicit_root, numbers_of
 from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 
@@ -40,8 +40,6 @@ class OrbitEquations(AbstractEquations):
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
         problem, frame, n = self.problem, self.frame, self.problem.dimension
-        if not takes_tangents(problem.method):
-            return differentiated(self, u, given)
         drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
         image, columns, _ = ReturnMap(self.prepare(u, given), frame).pushed(u[:n], drifts)
         r = problem.orbit_residual(u[:n], image, frame)
@@ -60,7 +58,7 @@ class _Monodromy(eqx.Module):
     def __call__(self, x: Array) -> Array:
         n = self.frame.scale.size
         _, remake = numbers_of(self.like)
-        return ReturnMap(remake(x[n:]), self.frame).with_monodromy(x[:n])[1]
+        return ReturnMap(remake(x[n:]), self.frame).pushed(x[:n])[1]
 
 
 class Orbit(eqx.Module):

@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple, cast, get_args
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float, Int
 
@@ -12,7 +11,7 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method
 from ..models import AbstractForcedSystem
-from ._implicit import AbstractEquations, Found, differentiated, implicit_root, numbers_of, solve
+from ._implicit import AbstractEquations, Found, differentiated, implicit_root, solve
 from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._orbit import OrbitEquations, guess_state, is_free, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
@@ -50,23 +49,20 @@ class PointEquations(AbstractEquations):
         strobe = self.problem.prepare(u, given, self.frame)
         if self.kind != "branch-point":
             return strobe, None
-        m = self.problem.equations
-        moved = lambda s: numbers_of(self.problem.prepare(u.at[m].set(s), given, self.frame))[0]
-        return strobe, jax.jacfwd(moved)(u[m])
+        return strobe, self.problem.drift(u, given, self.frame, self.problem.equations)
 
     def residual(self, u: Array, prepared: Any) -> tuple[Array, Singular]:
-        strobe, slope = prepared
+        strobe, drift = prepared
         n, m = self.problem.dimension, self.problem.equations
         z = u[:n]
-        image, monodromy = ReturnMap(strobe, self.frame).with_monodromy(z)
+        image, columns, _ = ReturnMap(strobe, self.frame).pushed(z, [] if drift is None else [drift])
+        monodromy = columns[:, :n]
         closing = self.problem.orbit_residual(z, image, self.frame)
         g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
         known = Singular(monodromy, q, p)
-        if slope is None:
+        if drift is None:
             return jnp.append(closing, g), known
-        k, remake = numbers_of(strobe)
-        _, drift = jax.jvp(lambda k: ReturnMap(remake(k), self.frame)(z), (k,), (slope,))
-        return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ drift])]), known
+        return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ columns[:, n]])]), known
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
         return differentiated(self, u, given)
@@ -242,7 +238,7 @@ def _find_point(
         u0 = jnp.where(found.converged, u1, u0)
     u0 = jnp.append(u0, at / unit)
     strobe = problem.prepare(u0, frozen(given), frame)
-    _, monodromy = ReturnMap(strobe, frame).with_monodromy(u0[: problem.dimension])
+    _, monodromy, _ = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
     a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":

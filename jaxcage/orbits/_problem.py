@@ -69,9 +69,9 @@ class ReturnMap(eqx.Module):
         y = jax.lax.fori_loop(0, self.frame.periods, lambda _, y: self.strobe(y).y, y)
         return jnp.stack(y) / scale
 
-    def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any]) -> tuple[Array, Array, Array]:
-        """The image of z; its derivatives with respect to z and, behind these, along each drift of the field's numbers
-        (in a column each); and the sum of the error estimates, in units of the system's scale."""
+    def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array, Array]:
+        """The image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each drift
+        of the field's numbers (in a column each); the sum of the error estimates, in units of the system's scale."""
         scale, n = self.frame.scale, z.size
         zero = jnp.zeros(())
         basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
@@ -86,11 +86,6 @@ class ReturnMap(eqx.Module):
         y, tangents, error = jax.lax.fori_loop(0, self.frame.periods, once, start)
         columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
         return jnp.stack(y) / scale, columns / scale[:, None], error
-
-    def with_monodromy(self, z: Float[Array, " dim"]) -> tuple[Float[Array, " dim"], Float[Array, "dim dim"]]:
-        """The image of z and the derivative there."""
-        m, image = jax.jacfwd(lambda z: (self(z),) * 2, has_aux=True)(z)
-        return image, m
 
 
 class OrbitProblem(eqx.Module):

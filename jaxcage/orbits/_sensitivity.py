@@ -101,8 +101,8 @@ def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, "
     k, remake = numbers_of(problem.prepare(u, given, frame))
 
     def both(x: Array) -> tuple[Any, Any]:
-        found = ReturnMap(remake(x[n:]), frame).with_monodromy(x[:n])
-        return found, found
+        image, monodromy, _ = ReturnMap(remake(x[n:]), frame).pushed(x[:n])
+        return (image, monodromy), (image, monodromy)
 
     slopes, values = jax.jacfwd(both, has_aux=True)(jnp.concatenate([u[:n], k]))
     return _Expansion(values[0], values[1], slopes[0], slopes[1], jax.jacfwd(row)(u)[:, n])
