@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from .._parameters import count, parameter
 from .._types import Scalar
+from ._phase import cos_sin
 from ._pocket_impact import PocketImpact, approach_speed
 from ._pulse import pulse_integrals
 
@@ -19,7 +20,7 @@ def synchronous_amplitude(omega: Scalar, amplitude: Scalar, reference_speed: Sca
 
 def synchronous_force(tau: Scalar, amplitude: Scalar) -> tuple[Array, Array]:
     """(15): f_x = Q [sin tau + sin(pi - tau)] cos(theta) = A sin tau, and f_y = 0 identically [N]."""
-    f_x = amplitude * jnp.sin(tau)
+    f_x = amplitude * cos_sin(tau)[1]
     return f_x, jnp.zeros_like(f_x)
 
 

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._types import Scalar
+from ._phase import cos_sin
 
 
 UnbalanceReading = Literal["physical", "as_printed"]
@@ -14,7 +15,8 @@ UnbalanceReading = Literal["physical", "as_printed"]
 def unbalance_force(tau: Scalar, mass: Scalar, eccentricity: Scalar, omega: Scalar) -> tuple[Array, Array]:
     """M e omega^2 (cos tau, sin tau) [N], with mass [kg], eccentricity [m], speed [rad/s]."""
     amplitude = mass * eccentricity * omega**2
-    return amplitude * jnp.cos(tau), amplitude * jnp.sin(tau)
+    cosine, sine = cos_sin(tau)
+    return amplitude * cosine, amplitude * sine
 
 
 def effective_eccentricity(

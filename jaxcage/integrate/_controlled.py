@@ -190,11 +190,7 @@ def finer(method: AbstractMethod, times: int = 1) -> ControlledSteps:
     """
     rough = stated(method)
     steps, error = 1 << times, 32.0**-times
-    each = lambda r: (
-        FixedSteps(r.solver, steps * r.steps)
-        if isinstance(r, FixedSteps)
-        else _with_tolerances(r, error)
-    )
+    each = lambda r: FixedSteps(r.solver, steps * r.steps) if isinstance(r, FixedSteps) else _with_tolerances(r, error)
     return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance)
 
 
@@ -208,7 +204,9 @@ def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] =
     **Raises:** `ValueError` for an error that is not positive, a ladder of fewer than two rungs, or an unknown solver.
     """
     if len(ladder) < 2 or any(int(steps) < 1 for _, steps in ladder):
-        raise ValueError(f"Argument `ladder` must have two or more pairs of a solver and its steps, but it is {ladder}.")
+        raise ValueError(
+            f"Argument `ladder` must have two or more pairs of a solver and its steps, but it is {ladder}."
+        )
     if not error > 0:
         raise ValueError(f"Argument `error` must be positive, but {error} was given.")
     return ControlledSteps(tuple(make_fixed(name, int(steps)) for name, steps in ladder), float(error))

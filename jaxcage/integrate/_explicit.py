@@ -46,19 +46,19 @@ def combine(base: State, weights: Any, stages: list[State], factor: Scalar = 1.0
 
 
 def explicit_step(
-    tableau: dfx.ButcherTableau, field: AbstractField, t0: Scalar, h: Scalar, y0: State
-) -> tuple[State, State, State]:
-    """One step of size h from y0 at phase t0, for a method whose last stage is the first of the next step.
+    tableau: dfx.ButcherTableau, field: AbstractField, t0: Scalar, size: Callable[[State], Scalar], y0: State
+) -> tuple[State, Scalar]:
+    """One step from y0 at phase t0, for a method whose last stage is the first of the next step.
 
-    **Returns:** the new state, the first stage, and the error estimate over h as far as it is known before the last
-    stage.
+    **Arguments:** `size` tells the step from the rate at its beginning.
+
+    **Returns:** the new state, the step.
     """
-    rows = ((), *tableau.a_lower)[:-1]
-    stages: list[State] = []
-    for c, row in zip((0.0, *tableau.c), rows, strict=False):
+    stages = [field(t0, y0)]
+    h = size(stages[0])
+    for c, row in zip(tableau.c, tableau.a_lower[:-1], strict=False):
         stages.append(field(t0 + float(c) * h, combine(y0, row, stages, h)))
-    zero = tuple(0.0 * c for c in y0)
-    return combine(y0, tableau.b_sol, stages, h), stages[0], combine(zero, tableau.b_error, stages)
+    return combine(y0, tableau.b_sol, stages, h), h
 
 
 class Stages(NamedTuple):
@@ -72,8 +72,6 @@ class Stages(NamedTuple):
     ahead: tuple[tuple[float, ...], ...]
     """Weights of each stage in the argument of the stage 1, 2, ... places behind it."""
     weight: tuple[float, ...]
-    error: tuple[float, ...]
-    last_error: float
 
     @classmethod
     def of(cls, tableau: dfx.ButcherTableau) -> "Stages":
@@ -85,7 +83,7 @@ class Stages(NamedTuple):
         ahead = tuple(tuple(weight(j + d, j) for j in range(n)) for d in range(1, furthest + 1))
         each = lambda x: tuple(map(float, x))[:n]
         phase = (0.0, *each(tableau.c))[:n]
-        return cls(phase, ahead, each(tableau.b_sol), each(tableau.b_error), float(tableau.b_error[-1]))
+        return cls(phase, ahead, each(tableau.b_sol))
 
 
 def chosen(row: tuple[float, ...], i: Scalar) -> Scalar:

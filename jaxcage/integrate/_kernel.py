@@ -4,6 +4,7 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,14 +13,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from .._types import State
+from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
 from ._explicit import Stages, chosen, explicit_step
-from ._march import is_elementary
+from ._march import is_elementary, march_with_tangents
 from ._program import Numbers, Sizes
 from ._rosenbrock import AbstractRosenbrock, computed_once, rosenbrock_step
 
 
+REVOLUTION = 2 * math.pi
 KernelSolver = AbstractRosenbrock | dfx.AbstractERK
 
 
@@ -57,47 +59,70 @@ class Structure:
         return eqx.combine(jax.tree.unflatten(self.numbers, list(numbers)), rest)
 
 
+NEARNESS = 0.05
+"""Time to a place of abrupt change [rad], at the pace of the moment, at which steps are half as long."""
+FAR = 0.5
+"""Time [rad] from which on they are not shortened."""
+MORE = 8
+"""Steps are added by so many parts of a revolution's, until all lanes are through."""
+
+
+def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end: Scalar) -> Scalar:
+    """The step from `phase`, of the size h far from abrupt changes; the last one ends at `end`, and is 0 beyond it.
+
+    It has no derivative: the mesh is what it is while the state on it is differentiated.
+    """
+    assert near is not None
+    distance, speed = near
+    short = h * distance / (distance + NEARNESS * jnp.maximum(speed - distance / FAR, 0.0))
+    left = jnp.maximum(end - phase, 0.0)
+    return jax.lax.stop_gradient(jnp.where(left < 1.0001 * short, left, short))
+
+
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
-    """One step for `march`: moved is the state; watched the largest excursion, the sum of the error estimates, and
-    of an explicit method the part of its estimate that is complete with the first stage of the next step only; fixed
-    the first phase, the step, and the numbers of (field, system, scale)."""
+    """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
+    phase; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
 
     solver: KernelSolver
     structure: Structure
+    abrupt: bool
+    """Whether the law changes abruptly somewhere, and steps are shortened there."""
     whole: bool = True
     """Whether the step is one kernel; else it is left to XLA's fusions, and told what to work out once."""
 
     @property
     def stage(self) -> "KernelStage | None":
         """The part that a step of an explicit method is made of."""
-        return KernelStage(self.solver, self.structure) if isinstance(self.solver, dfx.AbstractERK) else None
+        explicit = isinstance(self.solver, dfx.AbstractERK)
+        return KernelStage(self.solver, self.structure, self.abrupt) if explicit else None  # pyright: ignore
 
-    def watched(self, dimension: int) -> Numbers:
-        """What is watched, at the beginning."""
+    def watched(self, phase: Any) -> Numbers:
+        """What is watched, at the beginning: the excursion, the phase and the length of the step."""
         zero = jnp.zeros(())
-        unknown = (zero + jnp.nan,) * (dimension if isinstance(self.solver, dfx.AbstractERK) else 0)
-        return (zero, zero, *unknown)
+        return (zero, zero + phase, zero) if self.abrupt else (zero,)
 
     def __call__(self, i: Any, moved: State, watched: Numbers, fixed: Numbers) -> tuple[State, Numbers]:
-        phase, h, *numbers = fixed
+        phase, h, end, *numbers = fixed
         pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.remake(numbers)
-        field, system, scale = pieces
-        t0, (peak, grown, *pending) = phase + i * h, watched
+        field, system, _ = pieces
+        peak, *clock = watched
+        t0 = clock[0] if self.abrupt else phase + i * h
+
+        def size(rate: State) -> Scalar:
+            return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
+
         if isinstance(self.solver, dfx.AbstractERK):
-            tableau = self.solver.tableau
-            assert isinstance(tableau, dfx.ButcherTableau)
-            y, first, early = explicit_step(tableau, field, t0, h, moved)
-            last = float(tableau.b_error[-1])
-            late = tuple(h * (p + last * k) for p, k in zip(pending, first, strict=True))
-            error = tuple(jnp.where(p == p, e, 0.0) for p, e in zip(pending, late, strict=True))  # not NaN: known
-            pending = early
+            assert isinstance(self.solver.tableau, dfx.ButcherTableau)
+            y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
         else:
             settle = (lambda x, t0: x) if self.whole else computed_once
-            y, error, _ = rosenbrock_step(self.solver.tableau, field, t0, h, moved, settle)
-        grown = grown + sum(jnp.abs(e / s) for e, s in zip(error, scale, strict=True))
-        peak = jnp.maximum(peak, jnp.asarray(system.excursion(y)))  # the maximum keeps a NaN
-        return y, (peak, grown, *pending)
+            y, _, _, step = rosenbrock_step(self.solver.tableau, field, t0, size, moved, settle)
+            if self.abrupt:  # no step at all divides by zero
+                y = tuple(jnp.where(step > 0, a, b) for a, b in zip(y, moved, strict=True))
+        if self.abrupt:
+            clock = [t0 + step, step]
+        return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # the maximum keeps a NaN
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,6 +135,7 @@ class KernelStage:
 
     solver: dfx.AbstractERK
     structure: Structure
+    abrupt: bool
 
     @property
     def stages(self) -> Stages:
@@ -128,7 +154,7 @@ class KernelStage:
         return len(self.stages.ahead) + 2
 
     def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
-        phase, h, *numbers = fixed
+        phase, h, until, *numbers = fixed
         pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.remake(numbers)
         field, system, scale = pieces
         method, n = self.stages, len(scale)
@@ -136,31 +162,71 @@ class KernelStage:
         place = i - self.count * step
         first, last = place == 0.0, place == self.count - 1.0
         argument, *later, end = (moved[k : k + n] for k in range(0, len(moved), n))
-        peak, grown, *pending = watched
+        peak, *clock = watched
 
-        rate = field(phase + (step + chosen(method.phase, place)) * h, argument)
+        t0 = clock[0] if self.abrupt else phase + step * h
+        kept = clock[1] if self.abrupt else h  # of a step at its first stage, the one before it
+        rate = field(t0 + jnp.where(first, 0.0, chosen(method.phase, place) * kept), argument)
+        if self.abrupt:
+            h = jnp.where(first, shortened(h, system.abrupt(argument, rate), t0, until), kept)
+            clock = [jnp.where(last, t0 + h, t0), h]
         push = lambda y, row: tuple(c + h * chosen(row, place) * k for c, k in zip(y, rate, strict=True))
         at_last = lambda new, old: tuple(jnp.where(last, a, b) for a, b in zip(new, old, strict=True))
         end = push(end, method.weight)
         later = [at_last(end, y) for y in (*map(push, later, method.ahead), later[-1])]
-        late = tuple(h * (p + method.last_error * k) for p, k in zip(pending, rate, strict=True))
-        error = tuple(jnp.where(first & (p == p), e, 0.0) for p, e in zip(pending, late, strict=True))
-        kept = tuple(jnp.where(first, 0.0, p) for p in pending)
-        pending = tuple(p + chosen(method.error, place) * k for p, k in zip(kept, rate, strict=True))
-        grown = grown + sum(jnp.abs(e / s) for e, s in zip(error, scale, strict=True))
         peak = jnp.where(last, jnp.maximum(peak, jnp.asarray(system.excursion(end))), peak)
-        return tuple(c for y in (*later, end) for c in y), (peak, grown, *pending)
+        return tuple(c for y in (*later, end) for c in y), (peak, *clock)
 
 
 def kernel_step(
     solver: KernelSolver, field: AbstractField, system: AbstractForcedSystem, scale: State
 ) -> tuple[KernelStep, list[Any]]:
-    """A step and its fixed numbers behind phase and step size; system and scale have no derivative."""
+    """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
     watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
     structure, numbers = Structure.of((field, *watching))
-    step = KernelStep(solver, structure)
+    step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
     if structure.plain and all(jnp.ndim(x) == 0 for x in numbers):
-        dimension = len(scale)
-        if is_elementary(step, Sizes(dimension, len(step.watched(dimension)), 2 + len(numbers))):
+        if is_elementary(step, Sizes(len(scale), len(step.watched(0.0)), 3 + len(numbers))):
             return step, numbers
     return dataclasses.replace(step, whole=False), numbers
+
+
+def steps_through(
+    solver: KernelSolver,
+    steps: Any,
+    field: AbstractField,
+    system: AbstractForcedSystem,
+    scale: State,
+    y: State,
+    tangents: Sequence[State] = (),
+    drifts: Sequence[Sequence[Any] | None] = (),
+    phase: Any = 0.0,
+    parts: Any = 1,
+    multiple: int = 1,
+) -> tuple[State, Scalar, tuple[State, ...]]:
+    """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
+
+    **Arguments:** solver; steps of a revolution; field, system and its scale; state; tangent vectors, and for each of
+    them the tangents of the field's numbers, None where there are none; phase and part; a number that the steps of a
+    part are known to be a multiple of.
+
+    **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
+    """
+    step, numbers = kernel_step(solver, field, system, scale)
+    count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
+    end = phase + REVOLUTION / jnp.asarray(parts, dtype=float)
+    fixed = (jnp.asarray(phase, dtype=float), h, end, *numbers)
+    row = lambda drift: (None, None, None, *(drift or ()), *(None,) * (len(numbers) - len(drift or ())))
+    along = [row(d) for d in drifts]
+
+    def go(carry: tuple, count: Any, multiple: int) -> tuple:
+        y, watched, tangents = carry
+        return march_with_tangents(step, count, y, watched, fixed, tangents, along, multiple, step.whole)
+
+    carry = go((tuple(y), step.watched(phase), tuple(tangents)), count, multiple)
+    if step.abrupt:
+        more = jnp.maximum(count // MORE, 1)
+        # NaN: the phase of a lane that is lost is undefined, and ends the loop.
+        carry = jax.lax.while_loop(lambda c: c[1][1] < end, lambda c: go(c, more, 1), carry)
+    y, (peak, *_), tangents = carry
+    return y, peak, tangents

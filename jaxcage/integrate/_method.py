@@ -15,14 +15,12 @@ from jaxtyping import Array, Int
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._explicit import ClassicalRK4
-from ._kernel import can_be_kernel, kernel_step
-from ._march import march
+from ._kernel import REVOLUTION, can_be_kernel, steps_through
 from ._newmark import NewmarkBeta
 from ._results import RESULTS
 from ._rosenbrock import Rodas3, Rodas4
 
 
-REVOLUTION = 2 * math.pi
 WATCHED = 1024
 """Phases of a revolution of adaptive steps at which the largest excursion is looked for."""
 
@@ -33,8 +31,8 @@ class Stretch(NamedTuple):
     y: State
     peak: Scalar
     result: RESULTS
-    error: Scalar = 0.0
-    """Sum of the error estimates of equal steps, in units of the system's scale."""
+    error: Scalar = math.nan
+    """How far the end moves with half as many steps, in units of the system's scale; NaN where that was not tried."""
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -103,14 +101,19 @@ def run_steps(
         if steps % parts:
             raise ValueError(f"Argument `parts` must divide the {steps} steps per revolution, but it is {parts}.")
         multiple = math.gcd(steps // parts, 4)
-    count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
-    if not can_be_kernel(solver):
-        return _by_solver(solver, count, h, field, system, scale, y, phase)
-    step, numbers = kernel_step(solver, field, system, scale)  # pyright: ignore[reportArgumentType]
-    fixed = (phase, h, *numbers)
-    y, watched = march(step, count, y, step.watched(len(y)), fixed, multiple or 1, step.whole)
-    peak, error, *_ = watched
-    return Stretch(y, peak, judge(dfx.RESULTS.successful, y, peak, ESCAPE), error)
+    pieces = (field, system, scale)
+    if can_be_kernel(solver):
+        y, peak, _ = steps_through(
+            solver,  # pyright: ignore[reportArgumentType]
+            steps,
+            *pieces,
+            y,
+            phase=phase,
+            parts=parts,
+            multiple=multiple or 1,
+        )
+        return Stretch(y, peak, judge(dfx.RESULTS.successful, y, peak, ESCAPE))
+    return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), *pieces, y, phase)
 
 
 def _by_solver(
@@ -127,26 +130,24 @@ def _by_solver(
     term = _term(solver)
     if isinstance(solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
         field, y = ScaledField(field, scale), divide(y, scale)
-        unscale, unit = lambda state: multiply(state, scale), tuple(jnp.ones_like(jnp.asarray(c)) for c in scale)
+        unscale = lambda state: multiply(state, scale)
     else:
-        unscale, unit = lambda state: state, scale
+        unscale = lambda state: state
 
     def step(i: Array, carry: tuple) -> tuple:
-        y, peak, error, result, state = carry
+        y, peak, result, state = carry
         t0 = phase + i.astype(float) * h
-        y, wrong, _, state, outcome = solver.step(term, t0, t0 + h, y, field, state, False)
-        if wrong is not None:  # without derivative: one would make the tangents of the loop be traced again
-            error = error + jax.lax.stop_gradient(sum(jnp.abs(e / s) for e, s in zip(wrong, unit, strict=True)))
+        y, _, _, state, outcome = solver.step(term, t0, t0 + h, y, field, state, False)
         if outcome is not dfx.RESULTS.successful:  # solvers that cannot fail say so without tracing anything
             result = dfx.RESULTS.where(result == dfx.RESULTS.successful, outcome, result)
         excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(unscale(y))))
-        return y, jnp.maximum(peak, excursion), error, result, state  # the maximum keeps a NaN
+        return y, jnp.maximum(peak, excursion), result, state  # the maximum keeps a NaN
 
     state = solver.init(term, phase, phase + h, y, field)
-    start = (y, jnp.zeros(()), jnp.zeros(()), dfx.RESULTS.successful, state)
-    y, peak, error, result, _ = jax.lax.fori_loop(0, count, step, start)
+    start = (y, jnp.zeros(()), dfx.RESULTS.successful, state)
+    y, peak, result, _ = jax.lax.fori_loop(0, count, step, start)
     y = unscale(y)
-    return Stretch(y, peak, judge(result, y, peak, ESCAPE), error)
+    return Stretch(y, peak, judge(result, y, peak, ESCAPE))
 
 
 class FixedSteps(AbstractMethod):

@@ -17,9 +17,8 @@ from jaxtyping import Array, Bool, Float, Int
 from .._types import Scalar, State
 from ..models import ESCAPE
 from ._controlled import ControlledSteps, Rung, climb, nowhere, run_rung
-from ._kernel import KernelSolver, can_be_kernel, kernel_step
-from ._march import march_with_tangents
-from ._method import REVOLUTION, FixedSteps, Stretch, judge
+from ._kernel import KernelSolver, can_be_kernel, steps_through
+from ._method import FixedSteps, Stretch, judge
 from ._moved import Moved, Tangents, moved_by
 from ._results import outcome_code
 from ._strobe import StrobeMap
@@ -56,16 +55,9 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
     if not (isinstance(method, FixedSteps) and can_be_kernel(method.solver)):
         return _pushed_from_outside(strobe, y, tangents, drifts)
     solver = cast(KernelSolver, method.solver)
-    step, numbers = kernel_step(solver, strobe.field, strobe.system, strobe.scale)
-    h = REVOLUTION / jnp.asarray(method.steps, dtype=float)
-    fixed = (jnp.zeros(()), h, *numbers)
-    row = lambda drift: (None, None, *(drift or ()), *(None,) * (len(numbers) - len(drift or ())))
-    along = [row(d) for d in drifts]
-    y, (peak, error, *_), after = march_with_tangents(
-        step, method.steps, y, step.watched(len(y)), fixed, tangents, along, whole=step.whole
-    )
+    y, peak, after = steps_through(solver, method.steps, strobe.field, strobe.system, strobe.scale, y, tangents, drifts)
     code = outcome_code(judge(dfx.RESULTS.successful, y, peak, ESCAPE))
-    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error, ())
+    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(jnp.nan), ())
 
 
 def _pushed_from_outside(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Drift | None]) -> Moved:

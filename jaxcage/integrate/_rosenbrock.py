@@ -85,18 +85,20 @@ def rosenbrock_step(
     tableau: RosenbrockTableau,
     field: AbstractField,
     t0: Scalar,
-    h: Scalar,
+    size: Callable[[State], Scalar],
     y0: State,
     settle: Callable[[Any, Scalar], Any] = lambda x, t0: x,
-) -> tuple[State, State, State]:
-    """One step of size h from y0 at phase t0.
+) -> tuple[State, State, State, Scalar]:
+    """One step from y0 at phase t0, of the size that is told from the rate at its beginning.
 
     `settle` is told what had better be worked out in full before it is used: `computed_once` where the step is left to
     XLA's fusions, nothing where it is one kernel.
 
-    **Returns:** the new state, the error estimate of the embedded method, and dy/dtau at the beginning of the step.
+    **Returns:** the new state, the error estimate of the embedded method, dy/dtau at the beginning of the step, and the
+    step.
     """
     near = settle(field.linearise(t0, y0), t0)
+    h = size(near.value)
     solve = near.solver(1 / (tableau.gamma * h))
     zero = tuple(jnp.zeros_like(c) for c in near.value)
     stages: list[State] = []
@@ -108,7 +110,7 @@ def rosenbrock_step(
         if tableau.gamma_sum[i] != 0.0:
             r = tuple(c + tableau.gamma_sum[i] * h * s for c, s in zip(r, near.phase_derivative, strict=True))
         stages.append(settle(solve(r), t0))
-    return combine(y0, tableau.m, stages), combine(zero, tableau.e, stages), near.value
+    return combine(y0, tableau.m, stages), combine(zero, tableau.e, stages), near.value, h
 
 
 _SolverState: TypeAlias = None
@@ -134,7 +136,7 @@ class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     ) -> tuple[Any, Any, dict[str, Any], _SolverState, dfx.RESULTS]:
         del terms, solver_state, made_jump
         h = t1 - t0
-        y1, error, rate0 = rosenbrock_step(self.tableau, args, t0, h, y0, computed_once)
+        y1, error, rate0, _ = rosenbrock_step(self.tableau, args, t0, lambda _: h, y0, computed_once)
         rate1 = args(t1, y1)
         k0, k1 = (tuple(h * c for c in rate) for rate in (rate0, rate1))
         return y1, error, dict(y0=y0, y1=y1, k0=k0, k1=k1), None, dfx.RESULTS.successful

@@ -114,9 +114,7 @@ def _method(method: AbstractMethod | None, samples: int) -> ControlledSteps:
     return stated(controlled() if method is None else method)
 
 
-def _trajectory(
-    ran: tuple[Array, ...], speeds: np.ndarray, rise: float, samples: int, discard: int
-) -> Trajectory:
+def _trajectory(ran: tuple[Array, ...], speeds: np.ndarray, rise: float, samples: int, discard: int) -> Trajectory:
     states, peaks, errors, code = ran
     grid = np.arange(samples) / samples
     speed = (speeds[:, None] + rise * grid).ravel()[discard * samples :]

@@ -5,6 +5,7 @@ M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin 
 from typing import Literal
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -30,6 +31,8 @@ from ._system import AbstractForcedSystem
 
 ClearanceReading = Literal["as_printed", "radial"]
 
+ONSET_WIDTH = 4.0
+"""Distance from the onset of land contact, in smoothing lengths, within which steps are not shortened any more."""
 SMOOTHEST = 0.1
 """Largest smoothing length over clearance: beyond, it is no longer a detail of the contact or of the film's centre."""
 
@@ -119,6 +122,12 @@ class CageModel(AbstractForcedSystem):
         """Eccentricity ratio eps of the cage centre in its clearance circle; 1 where the surfaces would overlap."""
         x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
         return smooth_norm(x, dy, self.film.smoothing) / self.clearance
+
+    def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar]:
+        """The onset of land contact, whose force sets in within a smoothing length."""
+        eps, growth = jax.jvp(lambda *y: jnp.asarray(self.excursion(y)), y, rate)
+        width = ONSET_WIDTH * self.contact.smoothing / self.clearance
+        return smooth_norm(eps - self.contact.onset, 0.0, width), jnp.abs(growth)
 
 
 def _worst(length: Scalar | Array, clearance: Scalar | Array) -> tuple[float, float]:

@@ -154,7 +154,6 @@ def sweep_designs(
     lane_start = y0.reshape(-1, dim)
     how = settings_of(chosen)
 
-
     def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray = lane_start) -> Observation:
         return run_lanes(systems, method, plan, lane_speed[lane], y[lane], progress, which[lane])
 
