@@ -154,9 +154,9 @@ class Sweep:
 
     @property
     def chaotic_share(self) -> Float[np.ndarray, " speeds"]:
-        """Share of the finished starts that are chaotic; NaN where every start failed."""
+        """Share of the finished starts that are chaotic while observed; NaN where every start failed."""
         finished = np.sum(~self.failed, axis=1)
-        chaotic = np.sum(self.label == "chaotic", axis=1)
+        chaotic = np.sum(np.isin(self.label, ("chaotic", "transient")), axis=1)
         return np.where(finished > 0, chaotic / np.maximum(finished, 1), np.nan)
 
     def __str__(self) -> str:

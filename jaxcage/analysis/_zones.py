@@ -1,7 +1,8 @@
 """Zones and their edges, as found in a sweep.
 
 Two kinds of edge are never mixed. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower than
-a stated width are closed: it is statistical, and no more certain than the grid. A **synchronous-loss edge** is where
+a stated width are closed: it is statistical, and no more certain than the grid. Chaos that lasts beyond the horizon of
+the sweep and chaos that dies out before it make zones of their own. A **synchronous-loss edge** is where
 the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
 """
 
@@ -49,6 +50,9 @@ class Zone:
     exit: Edge | None
     share: float
     """Mean share of the starts, over the zone's speeds, that do what the zone is named for."""
+    life: tuple[float, float] | None = None
+    """Shortest and longest mean life of chaos at the zone's speeds [revolutions], each from the starts there and next
+    to it; a lower bound where none of them left chaos. None where lanes were not followed."""
 
     @property
     def width_rpm(self) -> float | None:
@@ -61,23 +65,32 @@ class Zones:
     """What a sweep says about its speed range, at the resolution of its grid."""
 
     zones: tuple[Zone, ...]
-    """Chaotic zones, ascending."""
+    """Zones of chaos that lasts, ascending."""
     synchronous: tuple[Zone, ...]
     """Stretches in which a stable period-1 orbit was met; their ends are synchronous-loss edges."""
     resolution_rpm: float
     close_below_rpm: float
+    transient: tuple[Zone, ...] = ()
+    """Zones of chaos that dies out before the horizon, ascending; what lasts lies between them."""
+    horizon: int = 0
+    """Revolutions that chaos must last; 0 if that was not asked."""
 
     def __str__(self) -> str:
-        rows = [f"Chaotic zones at a resolution of {self.resolution_rpm:.0f} rpm"]
-        for i, zone in enumerate(self.zones, start=1):
-            width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.0f} rpm wide"
-            rows.append(
-                f"  zone {i}: {zone.onset or 'below the range'} to {zone.exit or 'above the range'}, {width}, "
-                f"{zone.share:.0%} of starts chaotic"
-            )
-        return "\n".join(rows if self.zones else [*rows, "  none"])
+        lasting = f" of chaos that lasts beyond {self.horizon} revolutions" if self.horizon else ""
+        rows = [f"Chaotic zones{lasting}, at a resolution of {self.resolution_rpm:.0f} rpm"]
+        rows += [f"  zone {i}: {_row(zone)}" for i, zone in enumerate(self.zones, start=1)] or ["  none"]
+        if self.transient:
+            rows += ["Transient chaos", *(f"  {_row(zone)}" for zone in self.transient)]
+        return "\n".join(rows)
 
     _repr_html_ = notebook_html
+
+
+def _row(zone: Zone) -> str:
+    width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.0f} rpm wide"
+    ends = f"{zone.onset or 'below the range'} to {zone.exit or 'above the range'}"
+    life = "" if zone.life is None else ", mean life {:.0f} to {:.0f} revolutions".format(*zone.life)
+    return f"{ends}, {width}, {zone.share:.0%} of starts chaotic{life}"
 
 
 def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
@@ -117,29 +130,49 @@ def _zones(
     sweep: Sweep, known: np.ndarray, share: np.ndarray, spans: Sequence[tuple[int, int]], kind: str
 ) -> tuple[Zone, ...]:
     edge: Callable[[int, int], Edge | None] = lambda i, step: _edge(sweep.rpm, known, i, step, kind)
-    return tuple(Zone(kind, edge(a, -1), edge(b, 1), float(np.nanmean(share[a : b + 1]))) for a, b in spans)
+    followed = kind != "synchronous-loss" and sweep.escape is not None
+    return tuple(
+        Zone(
+            kind,
+            edge(a, -1),
+            edge(b, 1),
+            float(np.nanmean(share[a : b + 1])),
+            _life(sweep, a, b) if followed else None,
+        )
+        for a, b in spans
+    )
+
+
+def _life(sweep: Sweep, first: int, last: int) -> tuple[float, float]:
+    """Shortest and longest mean life at the speeds of a zone at which there is chaos."""
+    seen = [sweep.survival(i) for i in range(first, last + 1) if sweep.restless[i]]
+    lives = [s.mean_life if s.escapes else s.lower_bound for s in seen]
+    return min(lives), max(lives)
 
 
 def zones(sweep: Sweep, close_below_rpm: float = CLOSE_BELOW_RPM) -> Zones:
     """Chaotic zones of a sweep, and the stretches in which the synchronous orbit was met.
 
-    A speed counts as chaotic if any start is. Where no start is chaotic but some failed, nothing is known: such speeds
-    are neither in a zone nor outside, and an edge next to them is as uncertain as their gap is wide.
+    A speed counts as chaotic if any start is and, where lanes were followed to a horizon, if the mean life of its chaos
+    is beyond that; else as transient. Where no start is chaotic but some failed or were inaccurate, nothing is known:
+    such speeds are neither in a zone nor outside, and an edge next to them is as uncertain as their gap is wide.
 
     **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm].
 
     **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty.
     """
     label = sweep.label
-    chaotic = np.any(label == "chaotic", axis=1)
-    known = chaotic | ~np.any(sweep.failed, axis=1)
+    lasting = sweep.lasting
+    transient = sweep.restless & ~lasting
+    sound = ~np.any(sweep.failed, axis=1)
     synchronous = np.any(label == "periodic-1", axis=1)
-    settled = synchronous | ~np.any(sweep.failed, axis=1)
     share_1 = np.mean(label == "periodic-1", axis=1)
-    spans = close_windows(sweep.rpm, chaotic, close_below_rpm)
+    between = lambda chaotic: close_windows(sweep.rpm, chaotic, close_below_rpm)
     return Zones(
-        _zones(sweep, known, sweep.chaotic_share, spans, "chaotic"),
-        _zones(sweep, settled, share_1, runs(synchronous), "synchronous-loss"),
+        _zones(sweep, lasting | sound, sweep.chaotic_share, between(lasting), "chaotic"),
+        _zones(sweep, synchronous | sound, share_1, runs(synchronous), "synchronous-loss"),
         sweep.resolution_rpm,
         close_below_rpm,
+        _zones(sweep, transient | sound, sweep.chaotic_share, runs(transient), "transient"),
+        sweep.horizon,
     )

@@ -14,7 +14,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
@@ -31,9 +31,9 @@ TURN = 0.5
 EASY = 512
 """A lane whose error is so many times below the tolerance begins the next revolution one rung lower."""
 
-Rung = FixedSteps | AdaptiveSteps
-Attempt = Callable[[tuple[Rung, ...], Int[Array, ""], Bool[Array, "*lanes"]], Moved]
-"""The revolution of those lanes that are marked by the i-th rung of a group."""
+Rungs = FixedSteps | AdaptiveSteps
+Attempt = Callable[[Rungs, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
+"""The revolution of those lanes that are marked by the i-th rung of a solver."""
 
 
 class ControlledSteps(AbstractMethod):
@@ -43,13 +43,16 @@ class ControlledSteps(AbstractMethod):
     for a revolution needs far fewer steps than a contact asks for, and neither is stiff as a rule: explicit rungs come
     first, L-stable ones last. A revolution whose error is too large on the last rung too is `inaccurate`. The price of
     control is that the strobe map is smooth only between the states at which the rung changes: for sweeps, not for
-    Newton's method.
+    Newton's method. One program serves all tolerances and step counts.
     """
 
-    ladder: tuple[Rung, ...]
-    """At least two."""
-    tolerance: float = eqx.field(static=True)
+    ladder: tuple[Rungs, ...]
+    """One after the other: a solver with an array of step counts, or one with tolerances of its own. Two rungs at least
+    in all."""
+    tolerance: Float[Array, ""]
     """Infinite where the last rung is to be taken whatever its error, which is stated all the same."""
+    multiple: int = eqx.field(static=True)
+    """What all step counts are multiples of."""
 
     def advance(
         self,
@@ -61,47 +64,45 @@ class ControlledSteps(AbstractMethod):
         parts: Int[Array, ""] | int,
     ) -> Stretch:
         """One part, by the first rung whose error is within the part's share of the tolerance, else by the last."""
-        moved = climb(
-            self,
-            jnp.zeros((), jnp.int32),
-            nowhere(y, ()),
-            scale,
-            lambda rungs, i, _: moved_by(run_rung(self, rungs, i, (field, system, scale), phase, parts), y, ()),
-            parts,
-        )
+        pieces = (field, system, scale)
+        attempt = lambda rungs, i, _: moved_by(run_rung(self, rungs, i, pieces, phase, parts), y, ())
+        moved = climb(self, jnp.zeros((), jnp.int32), nowhere(y, ()), scale, attempt, system.harmonics, parts)
         return Stretch(moved.y, moved.peak, result_of(moved.outcome), moved.error)
 
-    def resolving(self, harmonics: int) -> "ControlledSteps":
-        """Without the rungs of fewer than two steps to a period of the forcing's highest harmonic, which would agree on
-        a slower forcing that is not there."""
-        enough = [not isinstance(r, FixedSteps) or r.steps >= 2 * harmonics for r in self.ladder[:-2]]
-        kept = tuple(rung for rung, good in zip(self.ladder, [*enough, True, True], strict=True) if good)
-        return eqx.tree_at(lambda m: m.ladder, self, kept)
-
     @property
-    def groups(self) -> list[tuple[Rung, ...]]:
-        """Neighbouring rungs of one solver, which one program serves; each adaptive one by itself."""
-        kind = lambda pair: pair[1].solver if isinstance(pair[1], FixedSteps) else pair[0]
-        return [tuple(r for _, r in group) for _, group in itertools.groupby(enumerate(self.ladder), key=kind)]
+    def sizes(self) -> list[int]:
+        """Rungs of each solver."""
+        return [r.steps.size if isinstance(r, FixedSteps) else 1 for r in self.ladder]  # pyright: ignore
 
     @property
     def floors(self) -> list[int]:
         """For each rung, the lowest one of its own solver that can be compared with one of that solver too."""
-        firsts = [0, *itertools.accumulate(map(len, self.groups))]
-        return [first + min(1, len(g) - 1) for first, g in zip(firsts, self.groups, strict=False) for _ in g]
+        firsts = [0, *itertools.accumulate(self.sizes)]
+        return [first + min(1, n - 1) for first, n in zip(firsts, self.sizes, strict=False) for _ in range(n)]
+
+    def lowest(self, harmonics: int) -> Int[Array, ""]:
+        """The first rung of two steps at least to a period of the forcing's highest harmonic: two with fewer would agree
+        on a slower forcing that is not there."""
+        coarse = [jnp.sum(r.steps < 2 * harmonics) for r in self.ladder[:1] if isinstance(r, FixedSteps)]
+        return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 2).astype(jnp.int32)
+
+    def __str__(self) -> str:
+        of = lambda r: f"{type(r.solver).__name__} {', '.join(map(str, r.steps.tolist()))}"  # pyright: ignore
+        rungs = [of(r) if isinstance(r, FixedSteps) else str(r) for r in self.ladder]
+        return f"steps per revolution for an error of {float(self.tolerance):g}: {'; '.join(rungs)}"
 
 
 def run_rung(
-    method: ControlledSteps, rungs: Sequence[Rung], i: Int[Array, ""], pieces: tuple, phase: Any = 0.0, parts: Any = 1
+    method: ControlledSteps, rungs: Rungs, i: Int[Array, ""], pieces: tuple, phase: Any = 0.0, parts: Any = 1
 ) -> Callable[[State], Stretch]:
     """One part by the i-th of `rungs`, with as many times the steps of the ladder's first rung as in a revolution."""
-    rung, first = rungs[0], method.ladder[0]
-    if isinstance(rung, AdaptiveSteps):
-        return lambda y: rung.advance(*pieces, y, phase, parts)
-    unit = first.steps if isinstance(first, FixedSteps) else 1
-    counts = [-(-(-(-unit // parts) * r.steps) // unit) for r in rungs if isinstance(r, FixedSteps)]
-    steps = jnp.asarray(counts)[i] * parts
-    return lambda y: run_steps(rung.solver, steps, *pieces, y, phase, parts, multiple=math.gcd(*counts, 4))
+    if isinstance(rungs, AdaptiveSteps):
+        return lambda y: rungs.advance(*pieces, y, phase, parts)
+    steps, multiple = jnp.asarray(rungs.steps)[i], method.multiple
+    if not (isinstance(parts, int) and parts == 1):
+        unit = jnp.asarray(method.ladder[0].steps)[0] if isinstance(method.ladder[0], FixedSteps) else 1
+        steps, multiple = -(-(-(-unit // parts) * steps) // unit) * parts, 1
+    return lambda y: run_steps(rungs.solver, steps, *pieces, y, phase, parts, multiple=multiple)
 
 
 def nowhere(y: Any, tangents: Any) -> Moved:
@@ -117,37 +118,41 @@ def climb(
     start: Moved,
     scale: tuple[Any, ...],
     attempt: Attempt,
+    harmonics: int = 1,
     parts: Any = 1,
 ) -> Moved:
     """Lanes, or one without an axis, by the first rung whose error is small enough, beginning just below `level`."""
-    begin = jnp.maximum(level, 1) - 1
+    lowest = method.lowest(harmonics)
+    begin = jnp.maximum(level - 1, lowest)
     carry = (begin, start, jnp.zeros(begin.shape, bool))
+    turn = jnp.where(jnp.isfinite(method.tolerance), TURN, jnp.inf)
     first = 0
-    for rungs in method.groups:
+    for rungs, size in zip(method.ladder, method.sizes, strict=True):
 
-        def asked(carry: tuple, end: int = first + len(rungs)) -> Any:
+        def asked(carry: tuple, end: int = first + size) -> Any:
             rung, _, done = carry
             return jnp.any(~done & (rung < end))
 
-        def once(carry: tuple, rungs: tuple[Rung, ...] = rungs, first: int = first) -> tuple:
+        def once(carry: tuple, rungs: Rungs = rungs, first: int = first) -> tuple:
             rung, before, done = carry
-            lowest = jnp.min(jnp.where(done, len(method.ladder), rung))
+            lowest = jnp.min(jnp.where(done, sum(method.sizes), rung))
             mine = ~done & (rung == lowest)
             tried = attempt(rungs, lowest - first, mine)
             alone = rung == begin
             error = jnp.where(alone, jnp.inf, _apart(tried.y, before.y, scale))
             fine = (tried.outcome == 0) & (error <= method.tolerance / parts) & ~alone
-            if tried.tangents and math.isfinite(method.tolerance):
-                fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= TURN
+            if tried.tangents:
+                fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= turn
             tried = tried._replace(error=error, half=before.tangents, level=rung)
             now = jax.tree.map(lambda a, b: jnp.where(mine, a, b), tried, before)
             return jnp.where(mine & ~fine, rung + 1, rung), now, done | (mine & fine)
 
         carry = jax.lax.while_loop(asked, once, carry)
-        first += len(rungs)
+        first += size
     _, moved, done = carry
-    bad = ~done & math.isfinite(method.tolerance) & ((parts == 1) | (moved.error > method.tolerance))
-    easy = (moved.error * EASY <= method.tolerance) & (moved.level > jnp.asarray(method.floors)[moved.level])
+    bad = ~done & jnp.isfinite(method.tolerance) & ((parts == 1) | (moved.error > method.tolerance))
+    floor = jnp.maximum(jnp.asarray(method.floors)[moved.level], lowest + 1)
+    easy = (moved.error * EASY <= method.tolerance) & (moved.level > floor)
     return moved._replace(
         outcome=jnp.where(bad & (moved.outcome == 0), INACCURATE, moved.outcome),
         level=jnp.where(easy, moved.level - 1, moved.level),
@@ -168,13 +173,21 @@ def _turned(tangent: tuple[Any, ...], other: tuple[Any, ...], scale: tuple[Any, 
 
 
 def stated(method: AbstractMethod) -> ControlledSteps:
-    """`method` with its error measured: a fixed number of steps beside half as many, a tolerance beside a larger one."""
+    """`method` with its error measured: a number of steps beside half as many, a tolerance beside a larger one."""
     if isinstance(method, ControlledSteps):
         return method
     if isinstance(method, FixedSteps):
-        return ControlledSteps((FixedSteps(method.solver, -(-method.steps // 2)), method), math.inf)
+        return _ladder([(method.solver, [-(-method.steps // 2), method.steps])], math.inf)
     assert isinstance(method, AdaptiveSteps)
-    return ControlledSteps((_with_tolerances(method, 16.0), method), math.inf)
+    return ControlledSteps((_with_tolerances(method, 16.0), method), jnp.asarray(math.inf), 1)
+
+
+def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:
+    """Of solvers with their step counts."""
+    counts = [steps for _, each in rungs for steps in each]
+    multiple = math.gcd(*counts, 4) if all(isinstance(c, int) for c in counts) else 1
+    fixed = tuple(FixedSteps(solver, jnp.asarray(each)) for solver, each in rungs)
+    return ControlledSteps(fixed, jnp.asarray(float(tolerance)), multiple)
 
 
 def _with_tolerances(method: AdaptiveSteps, times: float) -> AdaptiveSteps:
@@ -186,16 +199,17 @@ def _with_tolerances(method: AdaptiveSteps, times: float) -> AdaptiveSteps:
 def finer(method: AbstractMethod, times: int = 1) -> ControlledSteps:
     """`method` with steps at most half as long, `times` over, for what it is to be confirmed by.
 
-    A controlled method has an error 32 times as small, which a solver of fourth order reaches with 2.4 times the steps.
+    Of a controlled method the tolerance is 16 times as small, which a solver of fourth order reaches with twice the
+    steps, and the ladder begins and ends with twice as many.
     """
     rough = stated(method)
-    steps, error = 1 << times, 32.0**-times
+    steps, error = 1 << times, 16.0**-times
     each = lambda r: FixedSteps(r.solver, steps * r.steps) if isinstance(r, FixedSteps) else _with_tolerances(r, error)
-    return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance)
+    return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance, rough.multiple)
 
 
 def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] = DEFAULT_LADDER) -> ControlledSteps:
-    """The method of everything by default: in each revolution the first rung of `ladder` whose error is at most `error`.
+    """The default method: in each revolution the first rung of `ladder` whose error is at most `error`.
 
     **Arguments:** how far the end of a revolution may move if it is run with the rung before, in units of the system's
     own scale (for a cage: clearances); solvers by name with their steps per revolution, in the order in which they are
@@ -204,9 +218,8 @@ def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] =
     **Raises:** `ValueError` for an error that is not positive, a ladder of fewer than two rungs, or an unknown solver.
     """
     if len(ladder) < 2 or any(int(steps) < 1 for _, steps in ladder):
-        raise ValueError(
-            f"Argument `ladder` must have two or more pairs of a solver and its steps, but it is {ladder}."
-        )
+        raise ValueError(f"Argument `ladder` must have two or more pairs of a solver and its steps, but is {ladder}.")
     if not error > 0:
         raise ValueError(f"Argument `error` must be positive, but {error} was given.")
-    return ControlledSteps(tuple(make_fixed(name, int(steps)) for name, steps in ladder), float(error))
+    groups = itertools.groupby(ladder, key=lambda pair: pair[0])
+    return _ladder([(make_fixed(name, 1).solver, [int(n) for _, n in rungs]) for name, rungs in groups], error)

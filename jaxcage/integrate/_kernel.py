@@ -228,5 +228,5 @@ def steps_through(
         more = jnp.maximum(count // MORE, 1)
         # NaN: the phase of a lane that is lost is undefined, and ends the loop.
         carry = jax.lax.while_loop(lambda c: c[1][1] < end, lambda c: go(c, more, 1), carry)
-    y, (peak, *_), tangents = carry
-    return y, peak, tangents
+    y, (peak, *_), after = carry
+    return y, peak, tuple(after)

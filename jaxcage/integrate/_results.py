@@ -1,5 +1,7 @@
 """How an integration ended: diffrax's outcomes and our own, each a sentence with the cure."""
 
+from typing import Any
+
 import diffrax as dfx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
@@ -46,7 +48,7 @@ def outcome_code(result: RESULTS) -> Int[Array, ""]:
 
 def result_of(code: Int[Array, ""]) -> RESULTS:
     """The outcome whose place in `OUTCOMES` is `code`."""
-    result = RESULTS.internal_error
+    result: Any = RESULTS.internal_error
     for name, i in _KNOWN.items():
         result = RESULTS.where(code == i, getattr(RESULTS, name), result)
-    return result  # pyright: ignore[reportReturnType]
+    return result

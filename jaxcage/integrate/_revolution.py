@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar, State
 from ..models import ESCAPE
-from ._controlled import ControlledSteps, Rung, climb, nowhere, run_rung
+from ._controlled import ControlledSteps, Rungs, climb, nowhere, run_rung
 from ._kernel import KernelSolver, can_be_kernel, steps_through
 from ._method import FixedSteps, Stretch, judge
 from ._moved import Moved, Tangents, moved_by
@@ -110,7 +110,7 @@ def _lanes(
     tangents: tuple[LaneState, ...],
     level: Int[Array, " lanes"],
 ) -> Moved:
-    def attempt(rungs: tuple[Rung, ...], i: Array, mine: Bool[Array, " lanes"]) -> Moved:
+    def attempt(rungs: Rungs, i: Array, mine: Bool[Array, " lanes"]) -> Moved:
         def one(row: Sequence[Any], y: State, tangents: Tangents) -> Moved:
             strobe = remake(row)
             return moved_by(run_rung(method, rungs, i, (strobe.field, strobe.system, strobe.scale)), y, tangents)
@@ -119,7 +119,7 @@ def _lanes(
 
     each = [0 if o else None for o in own]
     scale = jax.vmap(lambda row, _: remake(row).scale, in_axes=(each, 0))(list(row), level)
-    return climb(method, level, nowhere(y, tangents), scale, attempt)
+    return climb(method, level, nowhere(y, tangents), scale, attempt, remake(row).system.harmonics)
 
 
 def _packed(

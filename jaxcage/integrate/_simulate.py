@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._notebook import notebook_html
@@ -77,7 +77,7 @@ def _run(
         y1 = tuple(jnp.where(code == 0, c, jnp.nan) for c in stretch.y)
         return (y1, jnp.maximum(peak, stretch.peak), error, code), jnp.stack(y)
 
-    def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, Array]]:
+    def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, ...]]:
         carry = (carry[0], jnp.asarray(system.excursion(carry[0]), dtype=float), jnp.zeros(()), carry[3])
         carry, states = jax.lax.scan(lambda c, i: part(c, i, first), carry, jnp.arange(samples))
         return carry, (states, *carry[1:3])

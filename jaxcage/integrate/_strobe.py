@@ -12,7 +12,7 @@ from jaxtyping import Array, Int
 from .._checks import require_x64
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
-from ._controlled import ControlledSteps, controlled
+from ._controlled import controlled
 from ._method import REVOLUTION, AbstractMethod, Stretch, judge
 from ._results import RESULTS
 
@@ -46,7 +46,5 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
     """
     require_x64()
     chosen = controlled() if method is None else method
-    if isinstance(chosen, ControlledSteps):
-        chosen = chosen.resolving(system.harmonics)
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

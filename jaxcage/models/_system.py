@@ -38,9 +38,9 @@ class AbstractForcedSystem(eqx.Module):
         return 1
 
     def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar] | None:
-        """Where the law changes abruptly: how far a state is from there, not below the width of the change, and how fast
-        that changes [1/rad] where the state does by `rate`. Steps are shortened in proportion to their ratio. None, as
-        here, where the law has no such place.
+        """Where the law changes abruptly: how far a state is from there, not below the width of the change, and how
+        fast that changes [1/rad] where the state does by `rate`. Steps are shortened in proportion to their ratio.
+        None, as here, where the law has no such place.
         """
         return None
 

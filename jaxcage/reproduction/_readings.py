@@ -125,7 +125,7 @@ def try_readings(
             starts=starts,
             discard=discard,
             revolutions=revolutions,
-            persist=reading.persist,
+            horizon=reading.persist,
             method=reading.method(),
         )
         found = dataclasses.replace(found, speed=found.speed / ratio)

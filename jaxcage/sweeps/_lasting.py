@@ -46,8 +46,8 @@ def follow(
     """Follow the lanes that are not settled.
 
     **Arguments:** labels; growth of the largest exponent in the observed blocks of so many revolutions, after those
-    that were discarded; scale of each lane's state; blocks of `LIFE_BLOCK` to follow; `run(lanes)` follows lanes from where
-    they are.
+    that were discarded; scale of each lane's state; blocks of `LIFE_BLOCK` to follow; `run(lanes)` follows lanes from
+    where they are.
 
     **Returns:** the lanes that were followed, what was seen of them, and when lanes escaped.
     """

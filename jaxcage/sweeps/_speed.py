@@ -106,7 +106,7 @@ def sweep(
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
     `RuntimeError` without double precision.
     """
-    options = dict(
+    options: dict[str, Any] = dict(
         discard=discard,
         revolutions=revolutions,
         confirm=confirm,
