@@ -42,8 +42,8 @@ def label_lanes(
     exponent: Float[np.ndarray, "*lanes"],
     standard_error: Float[np.ndarray, "*lanes"],
 ) -> Shaped[np.ndarray, "*lanes"]:
-    """Labels from the code of the outcome, the closing period, and the largest exponent per revolution with its standard
-    error."""
+    """Labels from the code of the outcome, the closing period, and the largest exponent per revolution with its
+    standard error."""
     labels = np.full(np.shape(period), "undecided", dtype="<U14")
     labels[np.abs(exponent) <= np.maximum(2 * standard_error, TORUS_THRESHOLD)] = "quasi-periodic"
     labels[exponent - 2 * standard_error > CHAOS_THRESHOLD] = "chaotic"

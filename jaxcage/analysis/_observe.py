@@ -55,7 +55,7 @@ class Observation(NamedTuple):
     peak: Float[Array | np.ndarray, "*lanes"]  # largest excursion (for a cage: eps) while observed
     outcome: Int[Array | np.ndarray, "*lanes"]
     error: Float[Array | np.ndarray, "*lanes"]  # largest error of a revolution from the start on, in units of the scale
-    doubt: Float[Array | np.ndarray, "n *lanes"]  # mean growth of each exponent less that with half as many steps
+    doubt: Float[Array | np.ndarray, "exponents *lanes"]  # change of the mean growth with half as many steps
 
 
 class Lane(NamedTuple):
@@ -108,7 +108,8 @@ def _advance(strobe: StrobeMap, lane: Lane, tangents: Tangents = ()) -> tuple[La
     outcome = jnp.where(runs, moved.outcome, lane.outcome)
     error = jnp.where(runs, jnp.maximum(lane.error, moved.error), lane.error)
     after = Lane(_blank(moved.y, outcome), jnp.maximum(lane.peak, moved.peak), outcome, moved.level, error)
-    return after, *(tuple(divide(t, strobe.scale) for t in each) for each in (moved.tangents, moved.half))
+    scaled = lambda tangents: tuple(divide(t, strobe.scale) for t in tangents)
+    return after, scaled(moved.tangents), scaled(moved.half)
 
 
 def _blank(y: State, outcome: Int[Array, ""]) -> State:

@@ -164,8 +164,8 @@ def zones(sweep: Sweep, close_below_rpm: float = CLOSE_BELOW_RPM) -> Zones:
     label = sweep.label
     lasting = sweep.lasting
     transient = sweep.restless & ~lasting
-    sound = ~np.any(sweep.failed, axis=1)
-    synchronous = np.any(label == "periodic-1", axis=1)
+    sound = np.all(~sweep.failed, axis=1)
+    synchronous = np.asarray(np.any(label == "periodic-1", axis=1))
     share_1 = np.mean(label == "periodic-1", axis=1)
     between = lambda chaotic: close_windows(sweep.rpm, chaotic, close_below_rpm)
     return Zones(

@@ -70,8 +70,10 @@ class SweepOptions(IntegrationOptions):
     """Revolutions left out at the beginning."""
     revolutions: int = 300
     """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
-    persist: int = 0
-    """Revolutions that chaos must outlast to count, e.g. 3000; what has died out by then was a transient."""
+    confirm: bool = True
+    """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
+    horizon: int = 3000
+    """Revolutions to which chaos is followed, to tell how long it lasts; 0 does not ask."""
     exponents: int = 1
     """Number of Lyapunov exponents."""
     waterfall: int = 0

@@ -12,7 +12,7 @@ from ..analysis import Sweep, Zones, waterfall, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
 from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
-from ..report import zones_document, zones_table
+from ..report import transient_tables, zones_document, zones_table
 from ..sweeps import rpm, sweep
 from ._console import progress, say, warn_of_short
 from ._errors import (
@@ -20,7 +20,6 @@ from ._errors import (
     UsageError,
     require_at_least,
     require_blocks,
-    require_persist,
     require_range,
     require_speed,
 )
@@ -60,7 +59,7 @@ def _check(options: SweepOptions) -> None:
     if options.count > 1:
         require_range(options.first, options.last)
     require_at_least("--discard", options.discard, 0)
-    require_persist(options.persist, options.discard)
+    require_at_least("--horizon", options.horizon, 0)
     require_at_least("--exponents", options.exponents, 1)
     require_at_least("--waterfall", options.waterfall, 0)
 
@@ -84,7 +83,8 @@ def sweep_case(options: SweepOptions) -> Swept:
             speeds,
             discard=options.discard,
             revolutions=options.revolutions,
-            persist=options.persist,
+            confirm=options.confirm,
+            horizon=options.horizon,
             exponents=options.exponents,
             blocks=blocks,
             method=chosen,
@@ -113,12 +113,15 @@ def run(options: SweepOptions) -> Report:
         "failed": failed_lanes(found),
         "beyond_clearance": int(np.sum(found.peak > 1)),
         "too_short": int(np.sum(found.too_short)),
+        "confirmed": [each._asdict() for each in found.confirmed],
+        "error": float(np.max(found.error[~found.failed])),
         "seconds": round(swept.seconds, 2),
         **figures,
         "data": swept.data,
     }
     zone_table = zones_table(about.name, edges, about.published, swept.range_rpm)
-    return Report(document, [_label_table(found, counts), zone_table], _notes(document))
+    tables = [_label_table(found, counts), zone_table, *transient_tables(about.name, edges)]
+    return Report(document, tables, _notes(document))
 
 
 def _zoom(swept: Swept, edges: Zones) -> dict[str, str]:
@@ -160,7 +163,7 @@ def _title(swept: Swept) -> str:
     published, model = swept.subject.published, swept.subject.model
     what = f"Case {swept.subject.name}" if published is not None else swept.subject.name
     gap, e = 1e3 * float(model.guidance_gap), 1e6 * float(model.eccentricity)
-    lasting = f", chaos that outlasts {swept.sweep.persist} revolutions" if swept.sweep.persist else ""
+    lasting = f", chaos followed to {swept.sweep.horizon} revolutions" if swept.sweep.horizon else ""
     return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm{lasting}"
 
 
@@ -180,6 +183,11 @@ def _notes(document: dict[str, Any]) -> list[str]:
     return [
         f"Failed lanes: {failed or 'none'}",
         f"Lanes beyond eps = 1: {beyond}",
+        f"Error of a revolution: at most {document['error']:.0e} of the clearance",
+        *(
+            f"Confirmed by steps at most 1/{2 << i} as long: {each['changed']} of {each['lanes']} labels changed"
+            for i, each in enumerate(document["confirmed"])
+        ),
         f"Time: {document['seconds']:.1f} s",
         *(f"{name.capitalize()}: {document[name]}" for name in ("figure", "zoom", "waterfall") if name in document),
         f"Data: {document['data']}",

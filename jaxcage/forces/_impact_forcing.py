@@ -18,7 +18,7 @@ def synchronous_amplitude(omega: Scalar, amplitude: Scalar, reference_speed: Sca
     return jnp.asarray(amplitude * (omega / reference_speed) ** exponent)
 
 
-def synchronous_force(tau: Scalar, amplitude: Scalar) -> tuple[Array, Array]:
+def synchronous_force(tau: Scalar, amplitude: Scalar) -> tuple[Scalar, Scalar]:
     """(15): f_x = Q [sin tau + sin(pi - tau)] cos(theta) = A sin tau, and f_y = 0 identically [N]."""
     f_x = amplitude * cos_sin(tau)[1]
     return f_x, jnp.zeros_like(f_x)

@@ -12,7 +12,7 @@ from ._phase import cos_sin
 UnbalanceReading = Literal["physical", "as_printed"]
 
 
-def unbalance_force(tau: Scalar, mass: Scalar, eccentricity: Scalar, omega: Scalar) -> tuple[Array, Array]:
+def unbalance_force(tau: Scalar, mass: Scalar, eccentricity: Scalar, omega: Scalar) -> tuple[Scalar, Scalar]:
     """M e omega^2 (cos tau, sin tau) [N], with mass [kg], eccentricity [m], speed [rad/s]."""
     amplitude = mass * eccentricity * omega**2
     cosine, sine = cos_sin(tau)

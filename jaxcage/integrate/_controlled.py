@@ -9,7 +9,7 @@ damps away what it does not resolve, which leaves the state of a lane right and 
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -34,6 +34,14 @@ EASY = 512
 Rungs = FixedSteps | AdaptiveSteps
 Attempt = Callable[[Rungs, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
 """The revolution of those lanes that are marked by the i-th rung of a solver."""
+
+
+class Pieces(NamedTuple):
+    """What is integrated."""
+
+    field: AbstractField
+    system: AbstractForcedSystem
+    scale: State
 
 
 class ControlledSteps(AbstractMethod):
@@ -64,7 +72,7 @@ class ControlledSteps(AbstractMethod):
         parts: Int[Array, ""] | int,
     ) -> Stretch:
         """One part, by the first rung whose error is within the part's share of the tolerance, else by the last."""
-        pieces = (field, system, scale)
+        pieces = Pieces(field, system, scale)
         attempt = lambda rungs, i, _: moved_by(run_rung(self, rungs, i, pieces, phase, parts), y, ())
         moved = climb(self, jnp.zeros((), jnp.int32), nowhere(y, ()), scale, attempt, system.harmonics, parts)
         return Stretch(moved.y, moved.peak, result_of(moved.outcome), moved.error)
@@ -81,8 +89,8 @@ class ControlledSteps(AbstractMethod):
         return [first + min(1, n - 1) for first, n in zip(firsts, self.sizes, strict=False) for _ in range(n)]
 
     def lowest(self, harmonics: int) -> Int[Array, ""]:
-        """The first rung of two steps at least to a period of the forcing's highest harmonic: two with fewer would agree
-        on a slower forcing that is not there."""
+        """The first rung of two steps at least to a period of the forcing's highest harmonic: two rungs with fewer
+        would agree on a slower forcing that is not there."""
         coarse = [jnp.sum(r.steps < 2 * harmonics) for r in self.ladder[:1] if isinstance(r, FixedSteps)]
         return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 2).astype(jnp.int32)
 
@@ -93,7 +101,7 @@ class ControlledSteps(AbstractMethod):
 
 
 def run_rung(
-    method: ControlledSteps, rungs: Rungs, i: Int[Array, ""], pieces: tuple, phase: Any = 0.0, parts: Any = 1
+    method: ControlledSteps, rungs: Rungs, i: Int[Array, ""], pieces: Pieces, phase: Any = 0.0, parts: Any = 1
 ) -> Callable[[State], Stretch]:
     """One part by the i-th of `rungs`, with as many times the steps of the ladder's first rung as in a revolution."""
     if isinstance(rungs, AdaptiveSteps):

@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar, State
 from ..models import ESCAPE
-from ._controlled import ControlledSteps, Rungs, climb, nowhere, run_rung
+from ._controlled import ControlledSteps, Pieces, Rungs, climb, nowhere, run_rung
 from ._kernel import KernelSolver, can_be_kernel, steps_through
 from ._method import FixedSteps, Stretch, judge
 from ._moved import Moved, Tangents, moved_by
@@ -37,7 +37,7 @@ def revolution(strobe: StrobeMap, y: State, tangents: Tangents, level: Int[Array
     `level` is where a method with several step counts begins.
     """
     if isinstance(strobe.method, ControlledSteps):
-        return _controlled(strobe.method, strobe, y, tangents, level)
+        return _controlled(strobe, y, tangents, level)
     return moved_by(strobe, y, tangents)
 
 
@@ -80,7 +80,7 @@ def _pushed_from_outside(strobe: StrobeMap, y: State, tangents: Tangents, drifts
     return Moved(y, columns, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(seen.error), ())
 
 
-def _controlled(method: ControlledSteps, strobe: StrobeMap, y: State, tangents: Tangents, level: Any) -> Moved:
+def _controlled(strobe: StrobeMap, y: State, tangents: Tangents, level: Any) -> Moved:
     """A lane one revolution on; under `jax.vmap`, lanes that ask for the same rung are packed together."""
     numbers, rest = eqx.partition(strobe, eqx.is_array)
     row, form = jax.tree.flatten(numbers)
@@ -89,20 +89,19 @@ def _controlled(method: ControlledSteps, strobe: StrobeMap, y: State, tangents: 
     @custom_vmap
     def run(row: list[Any], y: Any, tangents: Any, level: Any) -> Moved:
         lane = jax.tree.map(lambda x: x[None], (y, tangents, level))
-        return jax.tree.map(lambda x: x[0], _lanes(method, remake, row, [False] * len(row), *lane))
+        return jax.tree.map(lambda x: x[0], _lanes(remake, row, [False] * len(row), *lane))
 
     @run.def_vmap
     def rule(size: int, batched: Any, row: list[Any], y: Any, tangents: Any, level: Any) -> Any:
         spread = lambda x, is_lanes: x if is_lanes else jnp.broadcast_to(x, (size, *x.shape))
         lanes = jax.tree.map(spread, (y, tangents, level), tuple(batched[1:]))
-        moved = _lanes(method, remake, row, batched[0], *lanes)
+        moved = _lanes(remake, row, batched[0], *lanes)
         return moved, jax.tree.map(lambda _: True, moved)
 
     return run(row, *jax.tree.map(jnp.asarray, (y, tangents, level)))
 
 
 def _lanes(
-    method: ControlledSteps,
     remake: Callable[[Sequence[Array]], StrobeMap],
     row: Sequence[Array],
     own: Sequence[bool],
@@ -110,16 +109,20 @@ def _lanes(
     tangents: tuple[LaneState, ...],
     level: Int[Array, " lanes"],
 ) -> Moved:
+    alike = remake(row)  # of its arrays, those of the method are the same in all lanes
+    method, harmonics = alike.method, alike.system.harmonics
+    assert isinstance(method, ControlledSteps)
+
     def attempt(rungs: Rungs, i: Array, mine: Bool[Array, " lanes"]) -> Moved:
         def one(row: Sequence[Any], y: State, tangents: Tangents) -> Moved:
             strobe = remake(row)
-            return moved_by(run_rung(method, rungs, i, (strobe.field, strobe.system, strobe.scale)), y, tangents)
+            return moved_by(run_rung(method, rungs, i, Pieces(strobe.field, strobe.system, strobe.scale)), y, tangents)
 
         return _packed(one, mine, row, own, y, tangents)
 
     each = [0 if o else None for o in own]
     scale = jax.vmap(lambda row, _: remake(row).scale, in_axes=(each, 0))(list(row), level)
-    return climb(method, level, nowhere(y, tangents), scale, attempt, remake(row).system.harmonics)
+    return climb(method, level, nowhere(y, tangents), scale, attempt, harmonics)
 
 
 def _packed(

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from ._cage import CageModel
 
 
-Vector = tuple[Array, Array]
+Vector = tuple[Scalar, Scalar]
 Rows = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
 
 

@@ -49,6 +49,7 @@ from ._sources import parameter_rows as parameter_rows
 from ._statics import displacements as displacements, statics_table as statics_table
 from ._table import Table as Table, number as number, shown_unit as shown_unit
 from ._zone_tables import (
+    transient_tables as transient_tables,
     zone_document as zone_document,
     zones_document as zones_document,
     zones_table as zones_table,

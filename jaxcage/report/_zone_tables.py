@@ -7,6 +7,7 @@ from ..bearing import PublishedCase
 from ._table import Table, number
 
 
+LIFE = "mean life [revolutions]"
 Span = tuple[float, float | None]
 
 
@@ -36,6 +37,7 @@ def zone_document(zone: Zone) -> dict[str, Any]:
         "width_kind": zone.kind,
         "width_rpm": zone.width_rpm,
         "share": zone.share,
+        "mean_life_revolutions": zone.life,
     }
 
 
@@ -45,7 +47,9 @@ def zones_document(name: str, zones: Zones, published: PublishedCase | None) -> 
         "case": name,
         "resolution_rpm": zones.resolution_rpm,
         "close_below_rpm": zones.close_below_rpm,
+        "horizon": zones.horizon,
         "zones": [zone_document(zone) for zone in zones.zones],
+        "transient": [zone_document(zone) for zone in zones.transient],
         "synchronous": [zone_document(stretch) for stretch in zones.synchronous],
         "published": [
             {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
@@ -67,19 +71,41 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     for span in (spans[k] for k, found in partner.items() if found is None):
         missed = span[0] <= swept[1] and (span[1] is None or span[1] >= swept[0])
         why = "not found" if missed else "not swept"
-        rows.append(("-", why, *4 * ("-",), _published_cell([span])))
+        rows.append(("-", why, *5 * ("-",), _published_cell([span])))
     if not rows:
-        rows = [("none", *6 * ("-",))]
-    title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm"
-    columns = ("zone", "onset", "exit", "width", "mechanism", "share")
+        rows = [("none", *7 * ("-",))]
+    lasting = f", chaos that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
+    title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm{lasting}"
+    columns = ("zone", "onset", "exit", "width", "mechanism", "share", LIFE)
     return Table(title, (*columns, "published"), rows)
+
+
+def transient_tables(name: str, zones: Zones) -> list[Table]:
+    """Zones of chaos that dies out before the horizon, if there are any."""
+    if not zones.transient:
+        return []
+    rows = [(_edge_cell(z.onset), _edge_cell(z.exit), f"{z.share:.0%}", _life_cell(z)) for z in zones.transient]
+    title = f"Transient chaos of {name} [rpm], gone within {zones.horizon} revolutions"
+    return [Table(title, ("from", "to", "share", LIFE), rows)]
 
 
 def _zone_cells(zone: Zone) -> tuple[str, ...]:
     known = [edge.mechanism for edge in (zone.onset, zone.exit) if edge is not None]
     mechanism = " / ".join(dict.fromkeys(known)) or "-"
     width = number(zone.width_rpm, nothing="open")
-    return _edge_cell(zone.onset), _edge_cell(zone.exit), width, mechanism, f"{zone.share:.0%}"
+    return _edge_cell(zone.onset), _edge_cell(zone.exit), width, mechanism, f"{zone.share:.0%}", _life_cell(zone)
+
+
+def _life_cell(zone: Zone) -> str:
+    """Mean lives in revolutions and, at the zone's middle speed, in seconds."""
+    if zone.life is None:
+        return "-"
+    ends = [edge.speed_rpm for edge in (zone.onset, zone.exit) if edge is not None]
+    revolutions = " to ".join(dict.fromkeys(f"{x:.0f}" for x in zone.life))
+    if not ends:
+        return revolutions
+    seconds = " to ".join(dict.fromkeys(f"{x * 60 * len(ends) / sum(ends):.2g}" for x in zone.life))
+    return f"{revolutions} ({seconds} s)"
 
 
 def _edge_cell(edge: Edge | None) -> str:

@@ -60,7 +60,9 @@ def follow(
     if lanes.size:
         seen = run(lanes)
         late[:, lanes] = seen.growth[:, 0]
-        calm[lanes] = calm_at_the_end(np.moveaxis(seen.strobe, -1, 0), scale[lanes], late[:, lanes].T, LIFE_BLOCK)
+        calm[lanes] = calm_at_the_end(
+            np.moveaxis(np.asarray(seen.strobe), -1, 0), scale[lanes], late[:, lanes].T, LIFE_BLOCK
+        )
         failed[lanes] = seen.outcome != 0
     times, horizon = escape_times(np.concatenate([early, late]).T, calm, LIFE_BLOCK, failed=failed)
     begin = discard + growth.shape[0] * block % LIFE_BLOCK

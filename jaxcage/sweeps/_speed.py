@@ -182,7 +182,9 @@ def sweep_designs(
     label = _judged(found).label
     scale = np.concatenate([np.repeat(s.scale, shape[1], axis=0) for s in found])
     onward = lambda lanes: run(late, lanes, chosen, np.asarray(seen.last).T)
-    lanes, later, lasting = follow(label, seen.growth[:, 0], plan.block, discard, scale, late.blocks, onward)
+    lanes, later, lasting = follow(
+        label, np.asarray(seen.growth)[:, 0], plan.block, discard, scale, late.blocks, onward
+    )
     if later is not None:
         seen.last[:, lanes] = later.last
         seen.error[lanes] = np.fmax(seen.error[lanes], later.error)
@@ -205,7 +207,7 @@ def _judged(found: Sequence[Sweep]) -> Judged:
 def _put(seen: Observation, lanes: np.ndarray, new: Observation) -> None:
     """`new` in place of what was seen of `lanes`."""
     for x, late in zip(seen, new, strict=True):
-        x[..., lanes] = late
+        x[..., lanes] = late  # pyright: ignore
 
 
 def assemble(
