@@ -83,7 +83,7 @@ def moved(ours: jc.Sweep, theirs: jc.Sweep) -> tuple[np.ndarray, np.ndarray]:
 def soft() -> list[str]:
     """Case 1a on a soft support: its exponent once was that of the steps."""
     model = jc.replace(jc.case("1a"), **SOFT)
-    found = jc.sweep(model, [jc.rpm(SOFT_RPM)], discard=100, revolutions=100, horizon=0)
+    found = jc.sweep(model, jc.rpm(SOFT_RPM), discard=100, revolutions=100, horizon=0)
     exponents = found.exponents[0, :, 0]
     print(f"\n1a, support of 1e7 N/m, {SOFT_RPM:g} rpm: exponents {exponents.round(4)}, expected {SOFT_EXPONENT}")
     good = np.all(np.abs(exponents - SOFT_EXPONENT) < LEAST)

@@ -1,8 +1,8 @@
 """Labels of the default sweep beside those of 8 times the steps: no speed is chaotic for one and calm for the other.
 
-But for transients: where chaos ends after a time that is as long as a lane is followed, which lanes are still chaotic is
-chance. Such a speed is explained if many perturbed starts leave chaos at the same rate by both, and some have left by
-then and some have not.
+But for transients: where chaos ends after a time that is as long as a lane is followed, which lanes are still chaotic
+is chance. Such a speed is explained if many perturbed starts leave chaos at the same rate by both, and some have left
+by then and some have not.
 """
 
 from collections.abc import Iterator, Sequence
@@ -103,9 +103,8 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
             speeds += ours.speed.size
     print(*every, sep="\n")
     bad = [d for d in every if not d.explained]
-    wrong = (
-        [f"{sum(d.spurious for d in bad)} spurious and {sum(not d.spurious for d in bad)} missed speeds"] if bad else []
-    )
+    spurious = sum(d.spurious for d in bad)
+    wrong = [f"{spurious} spurious and {len(bad) - spurious} missed speeds"] if bad else []
     if len(every) - len(bad) > EXPLAINED * speeds:
         wrong.append(f"{len(every) - len(bad)} of {speeds} speeds had to be explained")
     return wrong

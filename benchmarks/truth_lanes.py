@@ -147,7 +147,7 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
         lanes: list[Lane] = []
         for subject in group:
             new = [lane for part in of_model(subject, 2 if quick else SPEEDS) for lane in part]
-            print(row(subject.name, new), flush=True)
+            print(row(subject.name, new), *[f"  {lane}" for lane in new if lane.off], sep="\n", flush=True)
             lanes += new
         print(row("all", lanes))
         share = sum(lane.label == "inaccurate" for lane in lanes) / len(lanes)

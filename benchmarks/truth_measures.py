@@ -1,7 +1,7 @@
 """What `simulate` and `orbit_measures` say beside 8 times the steps, and beside the reference's time history.
 
-All three begin at one settled state and go on for as long as its orbit takes to close, so that chance has no part in it.
-The reference's samples go through `orbit_measures` like ours: compared is the motion, not the formulas.
+All three begin at one settled state and go on for as long as its orbit takes to close, so that chance has no part in
+it. The reference's samples go through `orbit_measures` like ours: compared is the motion, not the formulas.
 """
 
 import dataclasses
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.analysis import CLOSING_TOLERANCE
+from jaxcage.analysis._labels import CLOSING_TOLERANCE
 from tests import reference
 
 from .truth_exponents import settled
@@ -21,8 +21,8 @@ from .truth_sweeps import fine, pair
 
 
 OFF = {"force": 1e-2, "whirl": 1e-3, "film": 1e-3, "closure": 1e-3}
-"""Differences beyond which a measure is wrong: of the peak contact force relative to the larger of it and the film's, of
-the whirl ratio, and of film and closure in clearances."""
+"""Differences beyond which a measure is wrong: of the peak contact force relative to the larger of it and the film's,
+of the whirl ratio, and of film and closure in clearances."""
 FEWEST = 2
 """Revolutions."""
 BUDGET = 1e6
@@ -55,11 +55,10 @@ def by_reference(model: jc.CageModel, run: jc.Trajectory, revolutions: int) -> N
     """The same of the reference's history from the same state; None where it does not finish."""
     field = reference.field(model, float(run.speed[0]))
     try:
-        exact = reference.sampled(field, run.state[0], revolutions, run.samples, budget=BUDGET)
+        exact = reference.sampled(field, run.state[0], revolutions + 1, run.samples, budget=BUDGET)
     except (reference.TooLong, ValueError, ArithmeticError):
         return None
-    state = np.concatenate([exact.state, run.state[exact.state.shape[0] :]])
-    return numbers(model, dataclasses.replace(run, state=state, peak=exact.peak), revolutions)
+    return numbers(model, dataclasses.replace(run, state=exact.state[:-1], peak=exact.peak), revolutions)
 
 
 def apart(model: jc.CageModel, run: jc.Trajectory, ours: Numbers, theirs: Numbers) -> dict[str, float]:
@@ -75,12 +74,10 @@ def apart(model: jc.CageModel, run: jc.Trajectory, ours: Numbers, theirs: Number
     }
 
 
-def history(
-    model: jc.CageModel, speed: float, state: np.ndarray, revolutions: int, method: Any = None
-) -> jc.Trajectory:
+def history(model: jc.CageModel, speed: float, state: np.ndarray, count: int, method: Any = None) -> jc.Trajectory:
     """From a state, one revolution longer than is measured."""
     start = tuple(float(c) for c in state)
-    return jc.simulate(model, speed, revolutions=revolutions + 1, start=start, method=method)
+    return jc.simulate(model, speed, revolutions=count + 1, start=start, method=method)
 
 
 class Lane(NamedTuple):
@@ -134,8 +131,6 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
             row = "".join(f"{n:13d}" for n in counts) + "".join(f"{x:13.0e}" for x in sizes)
             print(f"{subject.name:44s}{row}", flush=True)
             for x in bad:
-                print(
-                    f"  {x.rpm:.1f} rpm, {x.label}: {x.ours}, beside 8x {x.finer}, beside the reference {x.reference}"
-                )
+                print(f"  {x.rpm:.1f} rpm, {x.label}: {x.ours}, 8x {x.finer}, reference {x.reference}")
             off += len(bad)
     return [f"{off} orbits have a measure that is off"] if off else []
