@@ -44,6 +44,8 @@ def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.
         block_growth=growth,
         peak=np.full((count, 3), 0.5),
         outcome=np.zeros((count, 3), dtype=int),
+        error=np.full((count, 3), 1e-4),
+        doubt=np.zeros((count, 3, 1)),
         scale=np.full((count, 4), 1e-4),
         discard=300,
         revolutions=300,

@@ -83,6 +83,8 @@ def found() -> SynchronousOrbits:
         block_growth=np.zeros((*shape, 1, 0)),
         peak=np.zeros(shape),
         outcome=np.zeros(shape, dtype=int),
+        error=np.zeros(shape),
+        doubt=np.zeros((*shape, 0)),
         scale=np.ones((3, 4)),
         discard=0,
         revolutions=8,

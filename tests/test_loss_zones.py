@@ -48,6 +48,8 @@ def simulations(rpm, synchronous):
         block_growth=np.zeros((count, 1, 1, 0)),
         peak=np.zeros((count, 1)),
         outcome=np.zeros((count, 1), dtype=int),
+        error=np.zeros((count, 1)),
+        doubt=np.zeros((count, 1, 0)),
         scale=np.ones((count, 2)),
         discard=0,
         revolutions=8,
