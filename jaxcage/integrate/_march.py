@@ -168,6 +168,15 @@ class Tangent:
     """For each direction, which of the fixed numbers have a tangent."""
 
     @property
+    def late(self) -> tuple[bool, ...]:
+        """Which of the numbers, in a row, are tangents."""
+        moved, _, fixed = self.sizes
+        of_step = getattr(self.step, "late", (False,) * sum(self.sizes))
+        y, seen, x = self.sizes.split(of_step)
+        whole = self.whole
+        return (*y, *(True,) * (whole.moved - moved), *seen, *x, *(True,) * (whole.fixed - fixed))
+
+    @property
     def whole(self) -> Sizes:
         """Sizes with the tangents counted in."""
         moved, watched, fixed = self.sizes
@@ -356,7 +365,7 @@ def _loops(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
     most = 1 if isinstance(step, Tangent) else min(TOGETHER, largest) // _operations(step, sizes)
     together = max(d for d in range(1, multiple + 1) if multiple % d == 0 and (d == 1 or d <= most))
     program = program_of(Several(step, together) if together > 1 else step, sizes)
-    parts = pieces(program, largest)
+    parts = pieces(program, largest, getattr(step, "late", ()))
 
     def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
         known = dict(zip(program.jaxpr.invars, ((i * together).astype(float), *row, *fixed), strict=True))

@@ -118,10 +118,29 @@ def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     return kept[::-1]
 
 
-def pieces(program: Program, largest: int) -> list[Any]:
-    """A program in parts of at most so many operations: what one part makes and a later one reads is a result of it."""
+def _at_once(equations: Sequence[Any], late: set[Any]) -> list[Any]:
+    """The equations in another order: what follows from `late` arguments as soon as the rest that it needs is known.
+
+    Differentiation puts all tangents behind all values; cut there, a thousand numbers go from one kernel to the next.
+    """
+    place: dict[Any, int] = dict.fromkeys(late, 0)
+    for k, e in enumerate(equations):
+        after = [place[v] for v in _read(e) if v in place]
+        tangent = any(v in late for v in _read(e))
+        late |= set(e.outvars) if tangent else set()
+        place.update(dict.fromkeys(e.outvars, max(after) if tangent else k))
+    return sorted(equations, key=lambda e: place[e.outvars[0]])
+
+
+def pieces(program: Program, largest: int, late: Sequence[bool] = ()) -> list[Any]:
+    """A program in parts of at most so many operations: what one part makes and a later one reads is a result of it.
+
+    `late` is which of its arguments behind the first are tangents.
+    """
     jaxpr, parts = program.jaxpr, []
     count = max(1, -(-len(jaxpr.eqns) // largest))
+    if count > 1:
+        jaxpr = jaxpr.replace(eqns=_at_once(jaxpr.eqns, set(itertools.compress(jaxpr.invars[1:], late))))
     cuts = [len(jaxpr.eqns) * k // count for k in range(count + 1)]
     for first, last in itertools.pairwise(cuts):
         part, rest = jaxpr.eqns[first:last], jaxpr.eqns[last:]
