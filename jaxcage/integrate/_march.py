@@ -38,9 +38,8 @@ two emitters for CPUs, its default, cuts larger kernels into functions that comp
 without end. A larger step is several kernels."""
 SHARED = 12000
 """Operations of a step with several directions, at most; else each direction is a lane with values of its own."""
-WHOLE, GROWTH = 2800, 2.5
-"""Operations of a derivative of second or higher order by whole steps, at most, and how many times as many it has as
-what is differentiated."""
+WHOLE = 2800
+"""Operations of a step differentiated more than once, at most; else it is differentiated as the parts it is made of."""
 TOGETHER = 4500
 """As many operations are put into one kernel, of several steps, since between kernels all numbers are copied. With
 tangents two steps in one kernel measure slower than one."""
@@ -263,7 +262,7 @@ def _in_parts(how: How) -> tuple[How, Parts]:
     """What is to be differentiated: the march, or, where that is large and has a derivative in it already, that of the
     parts of its steps. Compiled in a fraction of the time; with fewer derivatives whole steps run faster."""
     parts = _parts(how.step, how.sizes) if isinstance(how.step, Tangent) else None
-    if parts is None or GROWTH * _operations(how.step, how.sizes) < WHOLE:
+    if parts is None or 2 * _about(how.step, how.sizes) < WHOLE:
         return how, Parts(1, 1, how.sizes.moved)
     step, sizes, parts = parts
     return How(step, sizes, how.multiple), parts
@@ -298,10 +297,17 @@ def _operations(step: Step, sizes: Sizes) -> int:
     return len(program_of(step, sizes).jaxpr.eqns)
 
 
+def _about(step: Any, sizes: Sizes) -> int:
+    """The same, at most, without tracing derivatives: a direction is no more work than the value."""
+    if not isinstance(step, Tangent):
+        return _operations(step, sizes)
+    return _about(step.step, step.sizes) * (1 + len(step.known))
+
+
 def _share(tangent: Tangent) -> bool:
     """Whether all directions of a step are computed together."""
     first = not isinstance(tangent.step, Tangent)  # of higher derivatives a single direction is enough for a kernel
-    return first and len(tangent.known) <= DIRECTIONS and _operations(tangent, tangent.whole) <= SHARED
+    return first and len(tangent.known) <= DIRECTIONS and _about(tangent, tangent.whole) <= SHARED
 
 
 def is_elementary(step: Step, sizes: Sizes) -> bool:

@@ -51,21 +51,28 @@ class Program(NamedTuple):
 def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
     """What a step computes; with `rules`, functions that have a derivative of their own stay calls: to be
     differentiated, for which a program is traced much faster than the code that it came from."""
-    trace: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _trace
-    return trace(step, sizes, rules)
+    write_out: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _written_out
+    return write_out(step, sizes, rules)
 
 
-def _trace(step: Step, sizes: Sizes, rules: bool) -> Program:
+def _arguments(sizes: Sizes) -> list[Any]:
+    return [jax.ShapeDtypeStruct((), float)] * (1 + sum(sizes))
+
+
+def _trace(step: Step, sizes: Sizes) -> Any:
     """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
 
     def flat(i: Any, *x: Any) -> tuple[Any, ...]:
         moved, watched = step(i, *sizes.split(x))
         return tuple(jnp.asarray(c, dtype=float) for c in (*moved, *watched))
 
-    number = jax.ShapeDtypeStruct((), float)
-    traced = jax.make_jaxpr(flat)(*[number] * (1 + sum(sizes)))
+    return jax.make_jaxpr(flat)(*_arguments(sizes))
+
+
+def _written_out(step: Step, sizes: Sizes, rules: bool) -> Program:
+    traced = _traced(step, sizes) if dataclasses.is_dataclass(step) else _trace(step, sizes)
     once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={}, rules=rules)
-    traced = jax.make_jaxpr(once)(*[number] * (1 + sum(sizes)))
+    traced = jax.make_jaxpr(once)(*_arguments(sizes))
     jaxpr = traced.jaxpr
     equations = _needed(jaxpr.eqns, jaxpr.outvars)
     jaxpr = jaxpr.replace(eqns=equations)
@@ -73,7 +80,8 @@ def _trace(step: Step, sizes: Sizes, rules: bool) -> Program:
     return Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
 
 
-_kept = functools.lru_cache(maxsize=128)(_trace)
+_traced = functools.lru_cache(maxsize=128)(_trace)
+_kept = functools.lru_cache(maxsize=128)(_written_out)
 
 
 def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any], rules: bool) -> list[Any]:
