@@ -160,7 +160,8 @@ def kernel_step(
     structure, numbers = Structure.of((field, *watching))
     step = KernelStep(solver, structure)
     if structure.plain and all(jnp.ndim(x) == 0 for x in numbers):
-        dimension = len(scale)
-        if is_elementary(step, Sizes(dimension, len(step.watched(dimension)), 2 + len(numbers))):
+        dimension, part = len(scale), step.stage or step  # of several parts one says it for all
+        moved = dimension * (step.stage.copies if step.stage else 1)
+        if is_elementary(part, Sizes(moved, len(step.watched(dimension)), 2 + len(numbers))):
             return step, numbers
     return dataclasses.replace(step, whole=False), numbers

@@ -36,7 +36,7 @@ LARGEST = {False: 2800, True: 12000}
 """Operations of a kernel, at most: where XLA's own options hold, and where those of `compiled` do. The newer of XLA's
 two emitters for CPUs, its default, cuts larger kernels into functions that compute shared terms again and again,
 without end. A larger step is several kernels."""
-SHARED = 12000
+SHARED = 16000
 """Operations of a step with several directions, at most; else each direction is a lane with values of its own."""
 WHOLE = 2800
 """Operations of a step differentiated more than once, at most; else it is differentiated as the parts it is made of."""
@@ -299,9 +299,10 @@ def _operations(step: Step, sizes: Sizes) -> int:
 
 def _about(step: Any, sizes: Sizes) -> int:
     """The same, at most, without tracing derivatives: a direction is no more work than the value."""
-    if not isinstance(step, Tangent):
-        return _operations(step, sizes)
-    return _about(step.step, step.sizes) * (1 + len(step.known))
+    if isinstance(step, Tangent):
+        return _about(step.step, step.sizes) * (1 + len(step.known))
+    part, sizes, parts = _parts(step, sizes) or (step, sizes, Parts(1, 1, 1))
+    return _operations(part, sizes) * parts.count
 
 
 def _share(tangent: Tangent) -> bool:
@@ -326,7 +327,7 @@ def _in_order() -> bool:
     """Whether the backend reduces a window of one element as body(init, element): a reduction leaves the order free."""
     with jax.ensure_compile_time_eval():
         first, second = jnp.asarray([5.0, 7.0]), jnp.asarray([1.0, 2.0])
-        got = _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), (jnp.asarray(2.0),), (first, second))
+        got = _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), 2, (jnp.asarray(2.0),), (first, second))
         return bool(jnp.all(got[0] == 2 - 3 * first) & jnp.all(got[1] == 2 * second))
 
 
@@ -344,10 +345,9 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
 
 
 def _lanewise(
-    f: Callable[[Numbers, Numbers], Sequence[Any]], shared: Sequence[Array], lanes: Sequence[Array]
+    f: Callable[[Numbers, Numbers], Sequence[Any]], results: int, shared: Sequence[Array], lanes: Sequence[Array]
 ) -> tuple[Array, ...]:
-    """f(shared, lane) in every lane by one reduction: shared scalars, arrays of one axis."""
-    results = len(jax.eval_shape(f, tuple(shared), tuple(x[0] for x in lanes)))
+    """The results of f(shared, lane) in every lane by one reduction: shared scalars, arrays of one axis."""
     width = max(len(shared), len(lanes), results)  # as many results as operands
     operands = [*lanes, *[lanes[0]] * (width - len(lanes))]
     inits = [*shared, *[jnp.zeros(())] * (width - len(shared))]
@@ -395,7 +395,7 @@ def _piece(part: Any, consts: Sequence[Any], given: Sequence[Array], like: Array
         x = [known[i].astype(v.aval.dtype) for i, v in enumerate(part.invars)]
         return [y.astype(float) for y in eval_jaxpr(part, consts, *x)]
 
-    return _lanewise(kernel, [given[i] for i in alike], [given[i] for i in own] or [like])
+    return _lanewise(kernel, len(part.outvars), [given[i] for i in alike], [given[i] for i in own] or [like])
 
 
 def _kernel_on_gpu(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
