@@ -28,9 +28,9 @@ from jaxcage.integrate import (
 )
 from jaxcage.integrate._device import march_on_device
 from jaxcage.integrate._kernel import kernel_step
-from jaxcage.integrate._march import Tangent, is_elementary
+from jaxcage.integrate._march import Tangent, is_elementary, march_p
 from jaxcage.integrate._method import TERM
-from jaxcage.integrate._program import Sizes, program_of
+from jaxcage.integrate._program import Sizes, pieces, program_of
 from jaxcage.models._field import _columns
 from jaxcage.orbits._implicit import differentiated
 from jaxcage.orbits._orbit import OrbitEquations
@@ -125,11 +125,10 @@ def test_lanes_may_have_counts_of_their_own():
     np.testing.assert_allclose(got, np.stack(expected), rtol=1e-12)
 
 
-@pytest.mark.parametrize("largest", [None, 0])
+@pytest.mark.parametrize("largest", [2800, 5])
 def test_lanes_with_counts_of_their_own_are_differentiated(largest, monkeypatch):
-    """As kernels, and left to XLA."""
-    if largest is not None:
-        monkeypatch.setattr(_march, "LARGEST", {False: largest, True: largest})
+    """As one kernel, and as several."""
+    monkeypatch.setattr(_march, "LARGEST", {False: largest, True: largest})
     counts = jnp.array([4, 12])
     got = jax.vmap(lambda n: jax.jacfwd(lambda z: by_march(z, n)[0])(LANES[3]))(counts)
     expected = [jax.jacfwd(lambda z, n=n: by_loop(z, int(n))[0])(LANES[3]) for n in counts]
@@ -170,6 +169,146 @@ def test_a_caught_tracer_cannot_be_in_the_loop():
 
     jax.make_jaxpr(outer)(1.0)
     assert seen == [False]
+
+
+# --- steps in several kernels, and in parts -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("largest", [1, 2, 3, 5, 100])
+def test_a_step_is_what_its_pieces_are_one_after_the_other(largest, monkeypatch):
+    """Numbers of every type go from one kernel to the next; a result may be an argument, or the same in every lane."""
+
+    def step(i, moved, watched, fixed):
+        (x, y, _), (a,) = moved, fixed
+        above, whole = x > a, jnp.floor(y * 3).astype(jnp.int32)
+        new = jnp.where(above, jnp.sin(x), x * a) + whole.astype(float)
+        return (new, x, 2.0), (jnp.where(above, 1.0, watched[0] + i),)
+
+    def go(x, count=3):
+        return jnp.stack([c for row in march(step, count, (x, x - 1, x), (0.0,), (0.4,)) for c in row])
+
+    def expected(x):
+        moved, watched = (x, x - 1, x), (0.0,)
+        for i in range(3):
+            moved, watched = step(jnp.asarray(float(i)), tuple(map(jnp.asarray, moved)), watched, (0.4,))
+        return jnp.stack([jnp.asarray(c) for c in (*moved, *watched)])
+
+    monkeypatch.setattr(_march, "LARGEST", {False: largest, True: largest})
+    monkeypatch.setattr(_march, "TOGETHER", 0)
+    lanes = jnp.linspace(-2, 3, 9)
+    np.testing.assert_allclose(jax.jit(jax.vmap(go))(lanes), jax.vmap(expected)(lanes), rtol=1e-14)
+
+
+@pytest.mark.parametrize("solver, largest, most", [(ClassicalRK4(), 500, 120), slow(Rodas4(), 12000, 600)])
+def test_pieces_hold_no_more_than_they_may_and_exchange_few_numbers(solver, largest, most):
+    """XLA has no kernels of more than 1000 results; Rodas4 differentiated twice, cut behind its values, has 1805."""
+    step, numbers = kernel_step(solver, MODEL.at_speed(1200.0), MODEL, MODEL.scale(1200.0))
+    sizes = Sizes(4, len(step.watched(4)), 2 + len(numbers))
+    tangent = Tangent(step, sizes, ((False,) * sizes.fixed,) * 4)
+    if isinstance(solver, Rodas4):
+        tangent = Tangent(tangent, tangent.whole, ((False, False, *(True,) * 22, *(False,) * (len(numbers) - 22)),))
+    program = program_of(tangent, tangent.whole)
+    parts = pieces(program, largest, tangent.late)
+    assert sum(len(p.eqns) for p in parts) == len(program.jaxpr.eqns) > largest
+    assert max(len(p.eqns) for p in parts) <= largest
+    assert max(len(p.outvars) for p in parts) < most
+
+
+def duffing(tau, q, v, speed):
+    (x,), (u,) = q, v
+    return (-0.2 * u + x - x**3 + 0.3 * jnp.cos(tau),)
+
+
+def on_a_line(kind, solver, by_loop):
+    """The state after a few steps from a point on a line through states and numbers of the field, as a function of s;
+    by `march`, or by the same steps left to XLA and to its differentiation."""
+    system, state, speed = MODEL, STATES[2], SPEEDS[2]
+    if kind == "duffing":
+        system, state, speed = jc.ForcedOscillator(duffing, coordinates=1), np.array([0.7, -0.3]), 1.1
+    if kind == "elastic rib":
+        rib = jc.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=1e14)
+        system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.RigidRib))
+        state = np.concatenate([STATES[2][:2], [1e-6, -2e-6], STATES[2][2:], [1e-3, 0.0]])
+    scale = system.scale(jnp.asarray(speed))
+    field = system.at_speed(jnp.asarray(speed))
+    few = len(jax.tree.leaves(eqx.filter(field, eqx.is_inexact_array)))
+    step, numbers = kernel_step(solver, field, system, scale)
+    assert step.whole
+
+    def image(s, count=5):
+        y = tuple(c + 0.1 * s * (-1) ** i * z for i, (c, z) in enumerate(zip(state, scale, strict=True)))
+        moving = [x * (1 + 0.3 * s) if i < few else x for i, x in enumerate(numbers)]
+        given = (y, step.watched(len(y)), (jnp.asarray(0.3), jnp.asarray(2 * np.pi / 200), *moving))
+        new, seen = _march._plain(step, count, *given) if by_loop else march(step, count, *given)
+        return jnp.stack(new) / jnp.stack(scale), jnp.stack(seen)
+
+    return image
+
+
+def derivative(f, order):
+    for _ in range(order):
+        f = functools.partial(lambda f, s: jax.jvp(lambda s: f(s), (s,), (1.0,))[1], f)
+    return f
+
+
+@pytest.mark.parametrize(
+    "kind, solver, order",
+    [
+        *(("duffing", "rk4", order) for order in (1, 2, 3)),
+        slow("duffing", "tsit5", 3),
+        slow("cage", "rk4", 2),
+        slow("cage", "rk4", 3),
+        slow("elastic rib", "rk4", 2),
+    ],
+)
+def test_derivatives_by_parts_of_steps(kind, solver, order, monkeypatch):
+    """Beyond the first, a quarter of a Runge-Kutta step at a time; against whole steps without the primitive."""
+    monkeypatch.setattr(_march, "WHOLE", 0)
+    chosen = method(solver, steps=8).solver
+    got, expected = (derivative(first(on_a_line(kind, chosen, by_loop)), order) for by_loop in (False, True))
+    lanes = jnp.array([0.0, 0.2, -0.3])
+    found, right = (np.asarray(jax.jit(jax.vmap(f))(lanes)) for f in (got, expected))
+    assert np.abs(right).max() > 1e-3
+    np.testing.assert_allclose(found, right, rtol=0, atol=1e-10 * np.abs(right).max())
+
+
+def test_parts_and_whole_steps_are_chosen_by_size(monkeypatch):
+    """A Duffing oscillator differentiated twice is small; the cage is not."""
+    counted = []
+    counts = lambda *x, how, bind=march_p.bind: (counted.append(how), bind(*x, how=how))[1]
+    monkeypatch.setattr(march_p, "bind", counts)
+    for kind, stages in (("duffing", 1), ("cage", 4)):
+        jax.eval_shape(derivative(first(on_a_line(kind, ClassicalRK4(), False)), 2), 0.1)
+        last = counted[-1]
+        assert isinstance(last.step.step, Tangent)
+        assert last.sizes.moved == {1: 8, 4: 3 * 16}[stages]
+
+
+@pytest.mark.parametrize("name", ["rk4", "tsit5"])
+def test_a_loop_of_stages_watches_what_a_loop_of_steps_does(name):
+    solver, speed = method(name, steps=8).solver, SPEEDS[2]
+    step, numbers = kernel_step(solver, MODEL.at_speed(speed), MODEL, MODEL.scale(speed))
+    y, fixed = tuple(STATES[2]), (0.2, 0.02, *numbers)
+    stage = step.stage
+    assert stage is not None
+    new, seen = march(step, 20, y, step.watched(4), fixed)
+    by_stages, also_seen = march(stage, 20 * stage.count, y * stage.copies, step.watched(4), fixed)
+    np.testing.assert_allclose(by_stages, new * stage.copies, rtol=1e-11)
+    np.testing.assert_allclose(also_seen, seen, rtol=1e-8)
+    assert seen[0] > 0.9 and seen[1] > 1e-6
+
+
+def test_lanes_with_counts_of_their_own_are_differentiated_by_parts(monkeypatch):
+    monkeypatch.setattr(_march, "WHOLE", 0)
+    image = on_a_line("duffing", ClassicalRK4(), False)
+    second = lambda n: derivative(lambda s: image(s, n)[0], 2)(0.1)
+    counts = jnp.array([0, 3, 7])
+    got = jax.jit(jax.vmap(second))(counts)
+    expected = [
+        derivative(lambda s, n=n: on_a_line("duffing", ClassicalRK4(), True)(s, n)[0], 2)(0.1) for n in (0, 3, 7)
+    ]
+    np.testing.assert_allclose(got, np.stack(expected), rtol=0, atol=1e-10)
+    assert np.abs(got[2]).max() > 1e-3
 
 
 # --- lanes against one lane alone, step by step by the solver -------------------------------------------------------
