@@ -23,6 +23,7 @@ from .._types import Scalar
 from ..integrate import StrobeMap
 from ._newton import DampedNewton, NewtonState
 from ._problem import frozen
+from ._steps import GIVEN_UP, Counts, following
 
 
 class AbstractEquations(eqx.Module):
@@ -39,6 +40,18 @@ class AbstractEquations(eqx.Module):
     @abc.abstractmethod
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
         """The equations, their derivative, and what else is wanted at the root."""
+
+    @abc.abstractmethod
+    def by_steps(self, steps: Int[Array, ""] | int) -> "AbstractEquations":
+        """The same equations by another number of steps."""
+
+    @abc.abstractmethod
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
+
+        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
+        or of NumPy.
+        """
 
 
 def differentiated(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
@@ -59,6 +72,11 @@ class Found(eqx.Module):
     iterations: Int[Array, ""]
     newton: NewtonState
     aux: Any
+    steps: Int[Array, ""]
+    """Steps per revolution."""
+    error: Float[Array, ""]
+    """Distance to the root by half as many (see `AbstractEquations.apart`), infinite where none was found; NaN where
+    that was not looked at."""
 
 
 TOLERANCE = 1e-9
@@ -86,30 +104,63 @@ def solve(
     solver = DampedNewton(tolerance, tolerance, at_root=at_root)
     got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
-    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1])
+    steps = jnp.zeros((), jnp.int32)
+    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1], steps, jnp.asarray(jnp.nan))
+
+
+def settled(
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+) -> tuple[Float[Array, " n"], Found]:
+    """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
+
+    **Returns:** the root by the last number of steps, and `Found`.
+    """
+    once = lambda steps, u: solve(equations.by_steps(steps), given, u, at_root=at_root)
+
+    def unsettled(carry: tuple) -> Bool[Array, ""]:
+        _, found, over, lost = carry
+        return (found.steps == 0) | ((found.steps < counts.last) & ~(over <= counts.tolerance) & ~lost)
+
+    def turn(carry: tuple) -> tuple:
+        u, before, *_ = carry
+        steps = following(before.steps, counts)
+        v, found = once(steps, jnp.where(before.converged, u, guess))
+        error, over = equations.apart(v - u, before.newton.jacobian, found.newton.jacobian)
+        both, alone = before.converged & found.converged, before.steps == 0
+        error = jnp.where(both, error, jnp.where(alone, jnp.nan, jnp.inf))
+        lost = ~found.converged & ~before.converged & (steps >= GIVEN_UP)
+        known = eqx.tree_at(lambda f: (f.steps, f.error), found, (steps.astype(jnp.int32), error))
+        return v, known, jnp.where(both, over, jnp.inf), lost
+
+    nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), eqx.filter_eval_shape(once, counts.last, guess)[1])
+    u, found, *_ = jax.lax.while_loop(unsettled, turn, (guess, nothing, jnp.asarray(jnp.inf), jnp.array(False)))
+    return u, found
 
 
 def implicit_root(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40, at_root: bool = False
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
-    """u with residual(u, prepare(u, given)) = 0, differentiable with respect to `given` only.
+    """u with residual(u, prepare(u, given)) = 0 by as many steps as it needs (see `settled`), differentiable with
+    respect to `given` only.
 
-    **Returns:** u, NaN where Newton's method did not get there, and `Found` (see `solve`).
+    **Returns:** u, NaN where Newton's method did not get there, and `Found`.
     """
-    settings = (max_steps, TOLERANCE, at_root)
-    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), settings=settings)
+    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), counts=counts, at_root=at_root)
     return jnp.where(found.converged, u, jnp.nan), found
 
 
 @eqx.filter_custom_jvp
-def _root(given: Any, *, equations: AbstractEquations, guess: Array, settings: tuple) -> Any:
-    return solve(equations, given, guess, *settings)
+def _root(given: Any, *, equations: AbstractEquations, guess: Array, counts: Counts, at_root: bool) -> Any:
+    return settled(equations, given, guess, counts, at_root)
 
 
 @_root.def_jvp
-def _root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, settings: tuple) -> Any:
+def _root_jvp(
+    primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, counts: Counts, at_root: bool
+) -> Any:
     (given,), (given_dot,) = primals, tangents
-    u, found = _root(given, equations=equations, guess=guess, settings=settings)
+    u, found = _root(given, equations=equations, guess=guess, counts=counts, at_root=at_root)
+    equations = equations.by_steps(found.steps)
     row = lambda v, g: numbers_of(equations.prepare(v, g))[0]
     _, remake = numbers_of(equations.prepare(u, given))
     k, k_dot = eqx.filter_jvp(lambda g: row(u, g), (given,), (given_dot,))
