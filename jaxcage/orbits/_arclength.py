@@ -175,9 +175,7 @@ def measured(curves: Curves, points: Corrected) -> Corrected:
     return points._replace(error=np.where(lost, np.inf, error), over=np.where(lost, np.inf, over))
 
 
-def settle_on(
-    curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0, allowed: float = 1.0
-) -> Corrected:
+def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0, allowed: float = 1.0) -> Corrected:
     """Points of many curves on planes across them, by as many steps as each needs.
 
     **Arguments:** as for `correct`; the numbers of steps to begin with; how large `over` may be.

@@ -413,8 +413,8 @@ def locate(
     size = lambda p: abs(p.u[-1]) if p.u[-1] else 1.0
     while True:
         sure = [p is not None and e <= POINT * size(p) * chooses for p, e in zip(found, error, strict=True)]
-        again = np.flatnonzero(~np.array(sure) & (steps < most))
-        if not again.size:
+        again = np.flatnonzero(~np.array(sure) & (steps < most)).tolist()
+        if not again:
             break
         steps[again] = np.minimum(2 * steps[again], most)
         kinds = [wanted[i][3] for i in again]
@@ -438,9 +438,9 @@ def _zeros(
     signal = lambda i, points: signals(follower, points)[kinds[i]]
     pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
     there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
-    kept = np.flatnonzero(there)
+    kept = np.flatnonzero(there).tolist()
     found: list[Corrected | None] = [None] * len(ends)
-    if kept.size:
+    if kept:
         of_kept = lambda i, points: signal(kept[i], points)
         some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept])
         for i, p in zip(kept, some, strict=True):

@@ -5,7 +5,6 @@ are treated at a time.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import jax
 import numpy as np

@@ -23,7 +23,7 @@ from .._types import Scalar
 from ..integrate import StrobeMap
 from ._newton import DampedNewton, NewtonState
 from ._problem import frozen
-from ._steps import GIVEN_UP, Counts, following
+from ._steps import GIVEN_UP, Counts
 
 
 class AbstractEquations(eqx.Module):
@@ -90,8 +90,9 @@ def solve(
     max_steps: int = 40,
     tolerance: Scalar = TOLERANCE,
     at_root: bool = False,
+    skip: Any = False,
 ) -> tuple[Float[Array, " n"], Found]:
-    """Newton's method from `guess`.
+    """Newton's method from `guess`; not a step of it in lanes that `skip` it.
 
     **Returns:** the root and `Found`: its Newton state is that of the last point before the root or, if `at_root`, of
     the root, for one evaluation more.
@@ -102,7 +103,8 @@ def solve(
         return r, (jacobian, aux)
 
     solver = DampedNewton(tolerance, tolerance, at_root=at_root)
-    got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
+    options = {"skip": skip}
+    got = optx.root_find(fn, solver, guess, given, options, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
     steps = jnp.zeros((), jnp.int32)
     return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1], steps, jnp.asarray(jnp.nan))
@@ -115,25 +117,25 @@ def settled(
 
     **Returns:** the root by the last number of steps, and `Found`.
     """
-    once = lambda steps, u: solve(equations.by_steps(steps), given, u, at_root=at_root)
-
-    def unsettled(carry: tuple) -> Bool[Array, ""]:
-        _, found, over, lost = carry
-        return (found.steps == 0) | ((found.steps < counts.last) & ~(over <= counts.tolerance) & ~lost)
+    once = lambda steps, u, skip: solve(equations.by_steps(steps), given, u, at_root=at_root, skip=skip)
 
     def turn(carry: tuple) -> tuple:
-        u, before, *_ = carry
-        steps = following(before.steps, counts)
-        v, found = once(steps, jnp.where(before.converged, u, guess))
+        i, u, before, done = carry
+        steps = counts.rung(i)  # the same in all lanes: numbers of their own would make them pass every step
+        v, found = once(steps, jnp.where(before.converged, u, guess), done)
+        both = before.converged & found.converged
         error, over = equations.apart(v - u, before.newton.jacobian, found.newton.jacobian)
-        both, alone = before.converged & found.converged, before.steps == 0
-        error = jnp.where(both, error, jnp.where(alone, jnp.nan, jnp.inf))
+        error = jnp.where(both, error, jnp.where(i == 0, jnp.nan, jnp.inf))
+        settled = both & (over <= counts.tolerance)
         lost = ~found.converged & ~before.converged & (steps >= GIVEN_UP)
-        known = eqx.tree_at(lambda f: (f.steps, f.error), found, (steps.astype(jnp.int32), error))
-        return v, known, jnp.where(both, over, jnp.inf), lost
+        found = eqx.tree_at(lambda f: (f.steps, f.error), found, (steps.astype(jnp.int32), error))
+        kept = jax.tree.map(lambda old, new: jnp.where(done, old, new), (u, before), (v, found))
+        return i + 1, *kept, done | settled | lost
 
-    nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), eqx.filter_eval_shape(once, counts.last, guess)[1])
-    u, found, *_ = jax.lax.while_loop(unsettled, turn, (guess, nothing, jnp.asarray(jnp.inf), jnp.array(False)))
+    shapes = eqx.filter_eval_shape(once, counts.last, guess, False)[1]
+    nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
+    start = jnp.zeros((), jnp.int32), guess, nothing, jnp.array(False)
+    _, u, found, _ = jax.lax.while_loop(lambda carry: carry[0] < counts.rungs, turn, start)
     return u, found
 
 

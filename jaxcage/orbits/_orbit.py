@@ -10,12 +10,12 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, compiled, strobe_map, takes_tangents
+from ..integrate import AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map, takes_tangents
 from ..models import AbstractForcedSystem
 from ._implicit import AbstractEquations, by_columns, differentiated, implicit_root, numbers_of
 from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
-from ._steps import ENOUGH, IMAGE, SLOPE, Counts, by_steps, following, from_steps, that_serves
+from ._steps import ENOUGH, IMAGE, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
 Period = Literal["driven", "free"]
@@ -93,7 +93,7 @@ class Orbit(eqx.Module):
     """log|det M| less the integral of the field's divergence over the orbit, which it must equal; both not below what
     rounding resolves of the smallest multiplier, so that orbits with strong damping are judged by the others."""
     steps: Int[Array, ""]
-    """Steps per revolution."""
+    """Steps per revolution; 1 where the method has no such number."""
     error: Float[Array, ""]
     """Largest component of the change of P at the orbit against half as many steps, in units of the system's scale;
     infinite where there is no orbit by these, NaN where the method has no number of steps."""
@@ -101,6 +101,13 @@ class Orbit(eqx.Module):
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
     self_excited: bool = eqx.field(static=True)
+    solver: Any = eqx.field(static=True)
+    """What takes these steps, or the whole method where it chooses them itself."""
+
+    @property
+    def method(self) -> AbstractMethod:
+        """The method by which it is an orbit, with its steps."""
+        return self.solver if isinstance(self.solver, AbstractMethod) else FixedSteps(self.solver, self.steps)
 
     @property
     def period(self) -> Array:
@@ -160,25 +167,22 @@ def _resolved(m: Float[Array, "dim dim"]) -> Float[Array, ""]:
     return jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
 
 
-def settle(
-    problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts
-) -> Float[Array, " dim"]:
+def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts) -> Float[Array, " dim"]:
     """State after `revolutions` from `start` and, while that is not at rest, after as many again by twice the steps."""
     given = frozen(given)
     scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
-    last = jnp.minimum(counts.last, ENOUGH)
+    counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
 
-    def turn(carry: tuple) -> tuple:
-        steps, y, _ = carry
-        steps = following(steps, counts)
-        strobe = strobe_map(given.system, given.speed, by_steps(problem, steps).method)
+    def turn(i: Array, carry: tuple) -> tuple:
+        y, done = carry
+        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.rung(i)).method)
         begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
-        row = tuple(begin[i] for i in range(start.size))
-        z = jnp.stack(jax.lax.fori_loop(0, revolutions, lambda _, y: strobe(y).y, row))
-        return steps, z, jnp.max(jnp.abs(z - y) / scale)
+        row = tuple(begin[k] for k in range(start.size))
+        spin = jnp.where(done, 0, revolutions)
+        z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
+        return z, done | (jnp.max(jnp.abs(z - y) / scale) < AT_REST * counts.tolerance)
 
-    moving = lambda carry: (carry[0] < last) & ~(carry[2] < AT_REST * counts.tolerance)
-    return jax.lax.while_loop(moving, turn, (jnp.zeros_like(counts.first), start, jnp.asarray(jnp.inf)))[1]
+    return jax.lax.fori_loop(0, counts.rungs, turn, (start, jnp.array(False)))[0]
 
 
 @compiled
@@ -221,6 +225,7 @@ def _find(
         iterations=found.iterations,
         periods=frame.periods,
         self_excited=problem.free_speed,
+        solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
     )
 
 
@@ -246,8 +251,9 @@ def periodic_orbit(
     - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, where that is not
         stable, by Rodas4 (which only without `jit` and `vmap`).
 
-    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and `vmap`. State, speed and multipliers
-    have derivatives of every order with respect to `system` and `speed`, through the equation P(z) = z.
+    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and
+    `vmap`. State, speed and multipliers have derivatives of every order with respect to `system` and `speed`, through
+    the equation P(z) = z.
     """
     require_x64()
     free = is_free(period)

@@ -267,7 +267,6 @@ def _find_point(
         fixed = OrbitProblem(problem.method, problem.dimension, problem.free_speed, ())
         u1, found = settled(OrbitEquations(fixed, frame), Given(system, here), u0, counts)
         u0 = jnp.where(found.converged, u1, u0)
-        counts = from_steps(counts, jnp.where(found.converged, found.steps, 0))
     u0 = jnp.append(u0, at / unit)
     strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, frozen(given), frame)
     _, monodromy = ReturnMap(strobe, frame).with_monodromy(u0[: problem.dimension])

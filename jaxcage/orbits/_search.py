@@ -191,9 +191,7 @@ def _distinct(points: Sequence[SpecialPoint]) -> tuple[SpecialPoint, ...]:
     kept: list[SpecialPoint] = []
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
         apart = lambda q: max(1e-6 * p.value, p.error + q.error) if p.error + q.error >= 0 else 1e-6 * p.value
-        same = lambda q: (
-            q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)
-        )
+        same = lambda q: q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)
         if not any(same(q) for q in kept[-6:]):
             kept.append(p)
     return tuple(kept)

@@ -41,6 +41,15 @@ class Counts(NamedTuple):
     tolerance: Float[Array, ""]
     """How far apart two results may be, in units of what is allowed; 0 where the last number was asked for."""
 
+    @property
+    def rungs(self) -> Int[Array, ""]:
+        """How many numbers there are."""
+        return 1 + jnp.ceil(jnp.log2(self.last / self.first) - 1e-9).astype(int)
+
+    def rung(self, i: Any) -> Int[Array, ""]:
+        """The i-th of them."""
+        return jnp.minimum(self.first * 2**i, self.last)
+
 
 def counted(
     method: AbstractMethod | None, most: int = MOST, solver: str = "rk4", first: int = FIRST
@@ -65,14 +74,9 @@ def _counts(first: int, last: int, tolerance: float) -> Counts:
     return Counts(jnp.asarray(first), jnp.asarray(last), jnp.asarray(tolerance))
 
 
-def following(tried: Any, counts: Counts) -> Any:
-    """The number of steps after `tried`, which is 0 before the first."""
-    return jnp.where(tried == 0, counts.first, jnp.minimum(2 * tried, counts.last))
-
-
 def from_steps(counts: Counts, steps: Any) -> Counts:
     """The numbers to try where `steps` were right nearby: half as many first, so that the error is known."""
-    if steps is None:
+    if steps is None or isinstance(steps, Tracer):
         return counts
     first = jnp.clip(steps // 2, counts.first, counts.last)
     return counts._replace(first=jnp.where(counts.tolerance > 0, first, counts.first))
