@@ -94,7 +94,7 @@ _correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0,
 _correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None, None)))
 
 
-def take(tree: Any, lanes: np.ndarray) -> Any:
+def take(tree: Any, lanes: Any) -> Any:
     """Chosen lanes of a tree whose arrays have the lanes first, by NumPy: JAX takes a millisecond for each array."""
     return jax.tree.map(lambda x: np.asarray(x)[lanes] if eqx.is_array(x) else x, tree)
 
@@ -125,7 +125,7 @@ class Curves(NamedTuple):
     own_given: bool = False
     """Whether the lanes come first in what is given too; else it is the same for all."""
 
-    def take(self, lanes: np.ndarray) -> "Curves":
+    def take(self, lanes: Any) -> "Curves":
         """Some of them."""
         mine = take(self.given, lanes) if self.own_given else self.given
         return self._replace(equations=take(self.equations, lanes), given=mine)
@@ -201,7 +201,7 @@ class Steps:
 
     first: float = 0.02
     longest: float = 0.1
-    shortest: float = 1e-5
+    shortest: float = 1e-7
     most: int = 400
     turn: float = 0.95
     """Smallest cosine of the angle between neighbouring tangents."""

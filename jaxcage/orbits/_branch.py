@@ -435,7 +435,7 @@ def _zeros(
     if other.size:
         redone = correct(curves.take(lanes[other]), both.u[other], both.tangent[other], steps[lanes[other]])
         both = put(both, other, redone)
-    signal = lambda i, points: signals(follower, points)[kinds[i]]
+    signal = lambda i, points: signals(follower, points)[str(kinds[i])]
     pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
     there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
     kept = np.flatnonzero(there).tolist()

@@ -106,7 +106,7 @@ def solve(
     options = {"skip": skip}
     got = optx.root_find(fn, solver, guess, given, options, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
-    steps = jnp.zeros((), jnp.int32)
+    steps = jnp.zeros((), int)
     return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1], steps, jnp.asarray(jnp.nan))
 
 
@@ -128,13 +128,13 @@ def settled(
         error = jnp.where(both, error, jnp.where(i == 0, jnp.nan, jnp.inf))
         settled = both & (over <= counts.tolerance)
         lost = ~found.converged & ~before.converged & (steps >= GIVEN_UP)
-        found = eqx.tree_at(lambda f: (f.steps, f.error), found, (steps.astype(jnp.int32), error))
+        found = eqx.tree_at(lambda f: (f.steps, f.error), found, (steps.astype(int), error))
         kept = jax.tree.map(lambda old, new: jnp.where(done, old, new), (u, before), (v, found))
         return i + 1, *kept, done | settled | lost
 
     shapes = eqx.filter_eval_shape(once, counts.last, guess, False)[1]
     nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
-    start = jnp.zeros((), jnp.int32), guess, nothing, jnp.array(False)
+    start = jnp.zeros((), int), guess, nothing, jnp.array(False)
     _, u, found, _ = jax.lax.while_loop(lambda carry: carry[0] < counts.rungs, turn, start)
     return u, found
 

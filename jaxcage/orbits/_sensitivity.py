@@ -230,9 +230,9 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
-    The point is located by Newton's method first, and again by twice the steps until it stays where it is. One expansion
-    of the return map to second order serves that, every kind of bifurcation and all parameters; `bifurcation` gives the
-    same derivatives, and higher ones.
+    The point is located by Newton's method first, and again by twice the steps until it stays where it is. One
+    expansion of the return map to second order serves that, every kind of bifurcation and all parameters; `bifurcation`
+    gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 

@@ -44,7 +44,7 @@ class Counts(NamedTuple):
     @property
     def rungs(self) -> Int[Array, ""]:
         """How many numbers there are."""
-        return 1 + jnp.ceil(jnp.log2(self.last / self.first) - 1e-9).astype(int)
+        return 1 + jnp.ceil(jnp.log2(self.last.astype(float) / self.first.astype(float)) - 1e-9).astype(int)
 
     def rung(self, i: Any) -> Int[Array, ""]:
         """The i-th of them."""
@@ -67,18 +67,18 @@ def counted(
 
 
 def _open(method: FixedSteps) -> FixedSteps:
-    return FixedSteps(method.solver, jnp.asarray(1))
+    return FixedSteps(method.solver, jnp.asarray(1, int))
 
 
 def _counts(first: int, last: int, tolerance: float) -> Counts:
-    return Counts(jnp.asarray(first), jnp.asarray(last), jnp.asarray(tolerance))
+    return Counts(jnp.asarray(first, int), jnp.asarray(last, int), jnp.asarray(tolerance))
 
 
 def from_steps(counts: Counts, steps: Any) -> Counts:
     """The numbers to try where `steps` were right nearby: half as many first, so that the error is known."""
     if steps is None or isinstance(steps, Tracer):
         return counts
-    first = jnp.clip(steps // 2, counts.first, counts.last)
+    first = jnp.clip(jnp.asarray(steps, int) // 2, counts.first, counts.last)
     return counts._replace(first=jnp.where(counts.tolerance > 0, first, counts.first))
 
 
@@ -90,7 +90,7 @@ def by_steps(problem: Problem, steps: Any) -> Problem:
     method = problem.method  # pyright: ignore[reportAttributeAccessIssue]
     if not isinstance(method, FixedSteps):
         return problem
-    return eqx.tree_at(lambda p: p.method.steps, problem, jnp.asarray(steps))
+    return eqx.tree_at(lambda p: p.method.steps, problem, jnp.asarray(steps, int))
 
 
 def that_serves(find: Callable[[AbstractMethod, Counts], Any], method: AbstractMethod | None, most: int = MOST) -> Any:
