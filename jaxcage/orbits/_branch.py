@@ -26,6 +26,8 @@ from ._steps import MOST_OF_A_POINT, POINT, SETTLED, STIFF_FIRST, Counts, counte
 
 Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
+WIDER = (0, 1, 3)
+"""How many orbits further out a bifurcation is looked for that is not between the two at which it was seen."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -405,10 +407,26 @@ def locate(
     if not wanted:
         return []
     curves = follower.curves(frame, [lane for lane, *_ in wanted])
-    ends = [take(points, np.array([k, k + 1])) for _, points, k, _ in wanted]
+    kinds = [kind for *_, kind in wanted]
     chooses, most = curves.chooses, MOST_OF_A_POINT if curves.chooses else int(curves.counts.last)
-    steps = np.array([e.steps.max() for e in ends]) if chooses else np.full(len(wanted), int(curves.counts.first))
-    found = _zeros(follower, curves, ends, [kind for *_, kind in wanted], steps)
+    steps = np.full(len(wanted), int(curves.counts.first))
+    if chooses:
+        steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
+
+    def at(lanes: list[int]) -> list[Corrected | None]:
+        """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
+        placed: list[Corrected | None] = [None] * len(lanes)
+        for beyond in WIDER:
+            left = [j for j, p in enumerate(placed) if p is None]
+            some = [lanes[j] for j in left]
+            if some:
+                rows = [(wanted[i][1], wanted[i][2]) for i in some]
+                ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
+                for j, p in zip(left, _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])):
+                    placed[j] = p
+        return placed
+
+    found = at(list(range(len(wanted))))
     error = np.full(len(wanted), np.inf if most > 1 else np.nan)
     size = lambda p: abs(p.u[-1]) if p.u[-1] else 1.0
     while True:
@@ -417,9 +435,7 @@ def locate(
         if not again:
             break
         steps[again] = np.minimum(2 * steps[again], most)
-        kinds = [wanted[i][3] for i in again]
-        finer = _zeros(follower, curves.take(again), [ends[i] for i in again], kinds, steps[again])
-        for i, p in zip(again, finer, strict=True):
+        for i, p in zip(again, at(again), strict=True):
             before, found[i] = found[i], p if p is not None else found[i]
             error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
