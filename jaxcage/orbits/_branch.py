@@ -96,15 +96,15 @@ class Branch:
     """States at phase 0 [SI]."""
     multipliers: Complex[np.ndarray, "points dim"]
     stable: Bool[np.ndarray, " points"]
-    steps: Int[np.ndarray, " points"]
-    """Steps per revolution."""
-    error: Float[np.ndarray, " points"]
-    """Of each orbit (see `Orbit.error`)."""
     special: tuple[SpecialPoint, ...]
     """Bifurcations, in order along the branch."""
     periods: int
     ended: tuple[str, str]
     """Why the branch ends where it begins and where it ends."""
+    steps: Int[np.ndarray, " points"]
+    """Steps per revolution."""
+    error: Float[np.ndarray, " points"]
+    """Of each orbit (see `Orbit.error`)."""
 
     @property
     def speed_rpm(self) -> Float[np.ndarray, " points"]:
@@ -428,7 +428,7 @@ def locate(
 
     found = at(list(range(len(wanted))))
     error = np.full(len(wanted), np.inf if most > 1 else np.nan)
-    size = lambda p: abs(p.u[-1]) if p.u[-1] else 1.0
+    size = lambda p: max(abs(p.u[-1]), 1.0)
     while True:
         sure = [p is not None and e <= POINT * size(p) * chooses for p, e in zip(found, error, strict=True)]
         again = np.flatnonzero(~np.array(sure) & (steps < most)).tolist()
@@ -496,7 +496,7 @@ def _branch(
         # Of several between two points, the outer ones only are next to orbits whose stability is known.
         edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)
-        lost = float("nan") if error > SETTLED * abs(at) else 1.0
+        lost = float("nan") if error > SETTLED * max(abs(at), follower.unit) else 1.0
         special.append(
             SpecialPoint(
                 kind=kind,

@@ -50,13 +50,13 @@ class Curve:
     multipliers: Complex[np.ndarray, "points dim"]
     genuine: Bool[np.ndarray, " points"]
     """False where a curve of torus bifurcations has gone on, beyond a resonance, as neutral saddles."""
-    steps: Int[np.ndarray, " points"]
-    """Steps per revolution."""
-    error: Float[np.ndarray, " points"]
-    """Distance in x, or in y in the same share of its range, to the curve by half the steps [SI]."""
     special: tuple[CodimensionTwo, ...]
     ended: tuple[str, str]
     name: str = ""
+    steps: Int[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=int))
+    """Steps per revolution."""
+    error: Float[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0))
+    """Distance in x, or in y in the same share of its range, to the curve by half the steps [SI]."""
 
     def __str__(self) -> str:
         head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}, {self.x_value.size} points"

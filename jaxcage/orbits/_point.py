@@ -275,7 +275,7 @@ def _find_point(
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, frame, left, right, kind)
-    u, found = implicit_root(equations, given, u0, counts)
+    u, found = implicit_root(equations, given, u0, counts, at_root=True)
     return _describe(equations, u, found, given)
 
 
@@ -289,7 +289,7 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     value = problem.values(u, frame)[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
     error = found.error * frame.units[0]
-    moving = error > SETTLED * jnp.where(value == 0, 1.0, jnp.abs(value))
+    moving = error > SETTLED * jnp.maximum(jnp.abs(value), 10 * frame.units[0])
     tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(frozen(u[problem.equations])), 10.0) < TANGENTIAL
     kept = jnp.where(moving, 4, jnp.where(tangential, 3, 0))
     outcome = jnp.where(found.converged, jnp.where(matches, kept, 2), 1)

@@ -4,6 +4,7 @@ The variational equations are integrated with the state, with steps short enough
 A fold is no crossing in speed: orbits are given by one component of the state, and the speed is found with the others.
 """
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -56,14 +57,18 @@ def orbit(make: Make, z: np.ndarray, speed: float, fixed: int | None = None) -> 
 
 
 def bifurcation(make: Make, kind: str, state: np.ndarray, speed: float, reach: float = 1e-5) -> float:
-    """Speed [rad/s] of the fold or period doubling near `state` (SI) at `speed`, by the secant method.
+    """Speed [rad/s] of the fold, period doubling or torus bifurcation near `state` (SI) at `speed`, by the secant method.
 
     `reach` is the first step, of the fixed component over the clearance or of the speed, relative.
     """
     z = np.asarray(state) / make(speed).scale
     fixed = 0 if kind == "fold" else None
     shift = -1.0 if kind == "fold" else 1.0
-    test = lambda m: float(np.linalg.det(m + shift * np.eye(m.shape[0])))
+
+    def test(m: np.ndarray) -> float:
+        if kind != "torus":
+            return float(np.linalg.det(m + shift * np.eye(m.shape[0])))
+        return float(np.prod([a * b - 1 for a, b in itertools.combinations(np.linalg.eigvals(m), 2)]).real)
 
     def moved(z: np.ndarray, speed: float, by: float) -> tuple[np.ndarray, float]:
         return (z + by * np.eye(z.size)[0], speed) if kind == "fold" else (z, speed * (1 + by))
