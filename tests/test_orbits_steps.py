@@ -120,7 +120,7 @@ def test_steps_that_are_asked_for_are_kept():
 
 
 def test_choice_is_made_inside_jit_and_in_each_lane():
-    free, touching = 2.5, 0.6
+    free, touching = 2.5, 1.1
     plain = [jc.periodic_orbit(stop(), w) for w in (free, touching)]
     assert plain[0].steps < plain[1].steps
     lanes = jax.vmap(lambda w: jc.periodic_orbit(stop(), w))(jnp.array([free, touching]))
@@ -176,7 +176,8 @@ def test_bifurcation_of_a_branch_that_does_not_settle_is_no_edge():
     branch = jc.branch(stop(), jc.periodic_orbit(stop(), 2.5, method=coarse), lower=0.5, upper=3.0, method=coarse)
     lost = [p for p in branch.special if p.status == "not converged"]
     assert lost and all(np.isnan(p.value) and p.error > 2e-4 for p in lost)
-    found = SynchronousOrbits((branch,), (), None, 0, 0.0, 1e9)  # pyright: ignore[reportArgumentType]
+    swept = jc.sweep(stop(), np.array([1.0]), discard=4, revolutions=4, blocks=1, keep=4, exponents=0)
+    found = SynchronousOrbits((branch,), (), swept, 0, 0.0, 1e9)
     assert found.unsettled == len(lost)
     assert not any(np.isnan(p.value) for p in found.points)
 
