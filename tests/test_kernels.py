@@ -203,7 +203,7 @@ def test_a_step_is_what_its_pieces_are_one_after_the_other(largest, monkeypatch)
 def test_pieces_hold_no_more_than_they_may_and_exchange_few_numbers(solver, largest, most):
     """XLA has no kernels of more than 1000 results; Rodas4 differentiated twice, cut behind its values, has 1805."""
     step, numbers = kernel_step(solver, MODEL.at_speed(1200.0), MODEL, MODEL.scale(1200.0))
-    sizes = Sizes(4, len(step.watched(4)), 2 + len(numbers))
+    sizes = Sizes(4, len(step.watched(0.0)), 3 + len(numbers))
     tangent = Tangent(step, sizes, ((False,) * sizes.fixed,) * 4)
     if isinstance(solver, Rodas4):
         tangent = Tangent(tangent, tangent.whole, ((False, False, *(True,) * 22, *(False,) * (len(numbers) - 22)),))
@@ -238,7 +238,8 @@ def on_a_line(kind, solver, by_loop):
     def image(s, count=5):
         y = tuple(c + 0.1 * s * (-1) ** i * z for i, (c, z) in enumerate(zip(state, scale, strict=True)))
         moving = [x * (1 + 0.3 * s) if i < few else x for i, x in enumerate(numbers)]
-        given = (y, step.watched(len(y)), (jnp.asarray(0.3), jnp.asarray(2 * np.pi / 200), *moving))
+        clock = (jnp.asarray(0.3), jnp.asarray(2 * np.pi / 200), jnp.asarray(9.0))
+        given = (y, step.watched(0.3), (*clock, *moving))
         if by_loop:
             new, seen, fixed = given
             for i in range(count):
@@ -293,14 +294,14 @@ def test_parts_and_whole_steps_are_chosen_by_size(monkeypatch):
 def test_a_loop_of_stages_watches_what_a_loop_of_steps_does(name):
     solver, speed = method(name, steps=8).solver, SPEEDS[2]
     step, numbers = kernel_step(solver, MODEL.at_speed(speed), MODEL, MODEL.scale(speed))
-    y, fixed = tuple(STATES[2]), (0.2, 0.02, *numbers)
+    y, fixed = tuple(STATES[2]), (0.2, 0.02, 9.0, *numbers)
     stage = step.stage
     assert stage is not None
-    new, seen = march(step, 20, y, step.watched(4), fixed)
-    by_stages, also_seen = march(stage, 20 * stage.count, y * stage.copies, step.watched(4), fixed)
+    new, seen = march(step, 20, y, step.watched(0.2), fixed)
+    by_stages, also_seen = march(stage, 20 * stage.count, y * stage.copies, step.watched(0.2), fixed)
     np.testing.assert_allclose(by_stages, new * stage.copies, rtol=1e-11)
     np.testing.assert_allclose(also_seen, seen, rtol=1e-8)
-    assert seen[0] > 0.9 and seen[1] > 1e-6
+    assert seen[0] > 0.9 and 0.2 < seen[1] < 0.2 + 20 * 0.02 * 1.001  # shortened near the land
 
 
 def test_lanes_with_counts_of_their_own_are_differentiated_by_parts(monkeypatch):
@@ -539,26 +540,27 @@ def test_a_lane_takes_the_rung_that_it_needs(attractor):
 def test_what_no_rung_can_is_inaccurate(attractor):
     """It is neither a failure nor a label, and lanes beside it are as they would be without it."""
     speeds, states = attractor
-    chosen = controlled(2e-7, [("rk4", 64), ("rk4", 128)])
+    chosen = controlled(1e-4, [("rk4", 64), ("rk4", 128)])
     got = one_revolution(speeds, states, chosen)
     lost = got.outcome == OUTCOMES.index("inaccurate")
     assert 0 < np.sum(lost) < lost.size and np.all(lost | (got.outcome == 0))
     assert np.all((got.label == "inaccurate") == lost)
-    assert np.all(got.error[lost] > 2e-7) and np.all(got.error[~lost] <= 2e-7)
+    assert np.all(got.error[lost] > 1e-4) and np.all(got.error[~lost] <= 1e-4)
     some = np.flatnonzero(~np.any(lost, axis=1))
     alone = one_revolution(speeds[some], states[some], chosen)
     np.testing.assert_allclose(alone.last, got.last[some], rtol=1e-12)
 
 
 def test_an_exponent_that_is_the_damping_of_the_steps_is_found_out():
-    """A light spring, 2000 oscillations a revolution: L-stable steps damp them, an exponent of -0.01 is the truth."""
-    light = lambda tau, q, v, speed: (-0.02 * v[0] - 4e6 * (q[0] - jnp.cos(tau)),)
-    system = jc.ForcedOscillator(light, coordinates=1, scale=(1.0, 1.0), starts=((1.0, 0.0),))
+    """A light spring, 100 oscillations a revolution, whose exponent is -0.01 * 2 pi: L-stable steps damp them away."""
+    light = lambda tau, q, v, speed: (-0.02 * v[0] - 1e4 * (q[0] - jnp.cos(tau)),)
+    system = jc.ForcedOscillator(light, coordinates=1, scale=(1.0, 100.0), starts=((1.0, 0.0),))
     run = lambda chosen: raw_sweep(system, 1.0, discard=0, revolutions=10, blocks=2, keep=1, method=chosen)
-    fixed = run(method("rodas4", steps=1024))
+    fixed = run(method("rodas4", steps=256))
     assert fixed.exponents[0, 0, 0] < -1 and fixed.standard_error[0, 0, 0] > 1  # wrong, and known to be
-    stiff = controlled(1e-2, [("rodas4", 256 << i) for i in range(4)])
-    assert run(stiff).label[0, 0] == "inaccurate"
+    assert run(controlled(1e-2, [("rodas4", 64 << i) for i in range(3)])).label[0, 0] == "inaccurate"
+    right = run(controlled())
+    assert abs(right.exponents[0, 0, 0] + 0.02 * np.pi) < 3 * right.standard_error[0, 0, 0] < 0.1
 
 
 def test_steps_are_shortened_where_the_cage_touches_the_land(attractor):

@@ -91,7 +91,9 @@ class ControlledSteps(AbstractMethod):
     def lowest(self, harmonics: int) -> Int[Array, ""]:
         """The first rung of two steps at least to a period of the forcing's highest harmonic: two rungs with fewer
         would agree on a slower forcing that is not there."""
-        coarse = [jnp.sum(r.steps < 2 * harmonics, dtype=jnp.int32) for r in self.ladder[:1] if isinstance(r, FixedSteps)]
+        coarse = [
+            jnp.sum(r.steps < 2 * harmonics, dtype=jnp.int32) for r in self.ladder[:1] if isinstance(r, FixedSteps)
+        ]
         return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 2)
 
     def __str__(self) -> str:

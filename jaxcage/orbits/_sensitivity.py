@@ -28,7 +28,7 @@ from ._lens import SPEED
 from ._point import TANGENTIAL, BifurcationPoint, Singular, critical_rate
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
-from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, by_steps, counted, from_steps
+from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 
 
 PER_RPM = np.pi / 30
@@ -167,6 +167,10 @@ class _Edge(NamedTuple):
         return float(self.problem.values(self.u, self.frame)[0])
 
     @property
+    def residual(self) -> Array:
+        return self.unfolding.residual
+
+    @property
     def status(self) -> str:
         if not self.found:
             return "no such point"
@@ -175,7 +179,10 @@ class _Edge(NamedTuple):
 
 def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
     """The edge near `point`, solved for again by twice the steps until it stays where it is."""
-    chosen, counts = counted(method, MOST_OF_A_POINT)
+    return that_serves(lambda chosen, counts: _settled(system, point, chosen, counts), method, MOST_OF_A_POINT)
+
+
+def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod, counts: Counts) -> _Edge:
     problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
     first, last, tolerance = (float(c) for c in from_steps(counts, int(point.steps) or None))
     speed, state = jnp.asarray(point.speed, dtype=float), jnp.asarray(point.state)

@@ -59,8 +59,7 @@ def orbit(make: Make, z: np.ndarray, speed: float, fixed: int | None = None) -> 
 def bifurcation(make: Make, kind: str, state: np.ndarray, speed: float, reach: float = 1e-5) -> float:
     """Speed [rad/s] of the fold, period doubling or torus bifurcation near `state` (SI) at `speed`.
 
-    By the secant method; `reach` is its first step: of the fixed component over the clearance, or of the speed,
-    relative.
+    By the secant method, from a first step of `reach` of the fixed component over the clearance or of the speed.
     """
     z = np.asarray(state) / make(speed).scale
     fixed = 0 if kind == "fold" else None
