@@ -1,5 +1,7 @@
 """Ready-made objects and tools for the tests."""
 
+import functools
+
 import equinox as eqx
 import jax.numpy as jnp
 import pint
@@ -9,6 +11,9 @@ from jaxcage._parameters import get, parameter_info, parameter_paths
 
 
 UNITS = pint.UnitRegistry()
+raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
+"""Lanes as they run, none confirmed or followed further."""
+raw_sweeps = functools.partial(jc.sweep_designs, confirm=False, horizon=0)
 
 
 def unit_exponents(unit: str) -> dict[str, float]:

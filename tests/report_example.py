@@ -22,12 +22,19 @@ PER_RPM = np.pi / 30
 VERSIONS = {"method": "by hand", "version_jaxcage": "0.1.0", "version_jax": "0.10.1"}
 
 
+def settled(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Steps and errors of orbits."""
+    return np.full(points.shape, 512), np.full(points.shape, 1e-7)
+
+
 def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> SpecialPoint:
     """A bifurcation of a 4-dimensional system."""
     others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
     mu = np.array([critical, *others, 0.1], dtype=complex)
     state = np.array([1e-5, 2e-5, 0.1, 0.2])
-    return SpecialPoint(kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge)
+    return SpecialPoint(
+        kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge, steps=1024, error=1e-4 * PER_RPM
+    )
 
 
 def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.Sweep:
@@ -44,6 +51,8 @@ def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.
         block_growth=growth,
         peak=np.full((count, 3), 0.5),
         outcome=np.zeros((count, 3), dtype=int),
+        error=np.full((count, 3), 1e-4),
+        doubt=np.zeros((count, 3, 1)),
         scale=np.full((count, 4), 1e-4),
         discard=300,
         revolutions=300,
@@ -66,7 +75,7 @@ def orbits(sweep: jc.Sweep) -> SynchronousOrbits:
         [turning, turning.conjugate(), 0.3 * np.ones((101, 2))], axis=1
     )
     speed = rpm * PER_RPM
-    branch = Branch("speed", speed, speed, state, mu, stable, special, 1, ("range", "range"))
+    branch = Branch("speed", speed, speed, state, mu, stable, special, 1, ("range", "range"), *settled(rpm))
     stretches = (
         Stretch(None, special[0], 2500.0, 7000.0, 0, 0, 40, 20),
         Stretch(special[1], special[2], 12000.0, 20000.0, 0, 0, 90, 50),

@@ -48,7 +48,18 @@ def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = Tru
     others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
     multipliers = np.array([critical, *others, 0.1], dtype=complex)
     state = np.array([1e-5, 2e-5, 0.1, 0.2])
-    return SpecialPoint(kind, rpm * PER_RPM, rpm * PER_RPM, state, multipliers, np.zeros(4), index, edge)
+    return SpecialPoint(
+        kind,
+        rpm * PER_RPM,
+        rpm * PER_RPM,
+        state,
+        multipliers,
+        np.zeros(4),
+        index,
+        edge,
+        steps=1024,
+        error=1e-4 * PER_RPM,
+    )
 
 
 def branch(rpm: np.ndarray, stable: np.ndarray, *special: SpecialPoint, height: float = 2e-5) -> Branch:
@@ -56,7 +67,9 @@ def branch(rpm: np.ndarray, stable: np.ndarray, *special: SpecialPoint, height: 
     size = np.where(stable, 0.5, 1.5)[:, None]
     mu = size * np.array([1.0, 0.5, 0.4, 0.1], dtype=complex)
     speed = rpm * PER_RPM
-    return Branch("speed", speed, speed, state, mu, stable, special, 1, ("range", "range"))
+    return Branch(
+        "speed", speed, speed, state, mu, stable, special, 1, ("range", "range"), np.full(rpm.size, 512), 0 * rpm
+    )
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +96,8 @@ def found() -> SynchronousOrbits:
         block_growth=np.zeros((*shape, 1, 0)),
         peak=np.zeros(shape),
         outcome=np.zeros(shape, dtype=int),
+        error=np.zeros(shape),
+        doubt=np.zeros((*shape, 0)),
         scale=np.ones((3, 4)),
         discard=0,
         revolutions=8,
@@ -126,18 +141,19 @@ def test_tables_of_a_search(found: SynchronousOrbits):
     zones = loss_table("1a", found, loss, PUBLISHED_CASES["1a"])
     assert zones.rows[0] == (
         "1",
-        "7000.00",
+        "7000.00 ± 0.0001",
         "fold",
-        "12000.00",
+        "12000.00 ± 0.0001",
         "period-doubling",
         "5000.00",
         "9100 to 12000",
     )
-    assert zones.rows[1] == ("2", "20000.00", "torus", "past range", "-", "open", "25500 and up")
+    assert zones.rows[1] == ("2", "20000.00 ± 0.0001", "torus", "past range", "-", "open", "25500 and up")
     edges = edge_table("1a", found, loss)
-    assert edges.rows[0] == ("7000.000", "fold", "1.0000", "0.00", "0", "zone 1 onset")
+    assert edges.rows[0] == ("7000.000", "0.0001", "fold", "1.0000", "0.00", "0", "zone 1 onset")
     assert edges.rows[2] == (
         "20000.000",
+        "0.0001",
         "torus",
         "-0.4161 ± 0.9093i",
         "114.59",
@@ -172,7 +188,7 @@ def edge(name: str, rpm: float, status: str = "converged", **elasticity: float) 
     change = dict.fromkeys(value, 0.0) | elasticity
     slope = {n: e * rpm / value[n] if e else 0.0 for n, e in change.items()}
     residual = {"mass": 1e-12, "length": -3e-12, "time": 0.0}
-    return Sensitivity(name, "fold", rpm, slope, change, residual, 1e-3, status)
+    return Sensitivity(name, "fold", rpm, slope, change, residual, 1e-3, status, error_rpm=2e-3)
 
 
 def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_move():
@@ -182,7 +198,7 @@ def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_mo
     assert [row[0] for row in table.rows] == ["guidance_gap", "eccentricity", "cage_mass", "gravity"]
     assert table.rows[0] == ("guidance_gap", "0.00045", "m", "+1.55556e+06", "+0.100000")
     assert table.rows[1][3:] == ("+0", "0")
-    assert table.title.startswith("Zone 1 onset of 1a: 7000.000 rpm, fold; ")
+    assert table.title.startswith("Zone 1 onset of 1a: 7000.000 ± 0.002 rpm, fold; ")
     assert f"; {len(jc.parameters(model)) - 4} other parameters do not move it" in table.title
 
 
@@ -263,7 +279,7 @@ def test_gradient_command(
     assert is_png(got["figure"])
     assert main(["gradient", "1a", "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
-    assert out.index("Zone 1 width of 1a: 5000.000 rpm") < out.index("Zone 1 onset of 1a: 7000.000 rpm")
+    assert out.index("Zone 1 width of 1a: 5000.000 ± 0.004") < out.index("Zone 1 onset of 1a: 7000.000 ± 0.002")
     assert "Left out: zone 2 onset, fold (no such point)." in out
     assert "Zone 2 onset of 1a" not in out
 
@@ -430,7 +446,13 @@ def test_edges_whose_orbit_touches_the_land_are_named():
     for name, (rpm, scaled) in (("zone 1 exit", CLEAR), ("zone 2 onset", TOUCHES)):
         speed = rpm * np.pi / 30
         state = np.array(scaled) * [float(c) for c in model.scale(speed)]
-        edges[name] = SpecialPoint("torus", speed, speed, state, np.ones(4, dtype=complex), np.zeros(4), 0, True)
+        ones, zeros = np.ones(4, dtype=complex), np.zeros(4)
+        edges[name] = SpecialPoint(
+            "torus", speed, speed, state, ones, zeros, 0, True, steps=8192, error=0.3 * np.pi / 30
+        )
     (sentence,) = contact_notes(model, edges, method)
-    assert sentence.startswith("Zone 2 onset: its orbit touches the land (eps 0.977, contact from 0.97)")
+    assert sentence.startswith(
+        "Zone 2 onset: its orbit touches the land (eps 0.977, contact from 0.97); by half of its "
+    )
+    assert sentence.endswith(" 8192 steps it is 0.3 rpm away")
     assert touching(model, edges, method)["zone 2 onset"] == pytest.approx(0.97666, abs=2e-4)

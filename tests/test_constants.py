@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
@@ -39,7 +40,7 @@ def test_an_unknown_set_gets_a_sentence():
 
 
 def chaotic_share(model, grid):
-    return np.mean(jc.sweep(model, grid, discard=150, revolutions=100).chaotic_share > 0)
+    return np.mean(raw_sweep(model, grid, discard=150, revolutions=100).chaotic_share > 0)
 
 
 def test_identified_constants_let_the_gap_act():

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import raw_sweep, raw_sweeps
 from report_example import point
 
 import jaxcage as jc
@@ -73,8 +74,8 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     ),
     "strobe_map": lambda m: jc.strobe_map(OSCILLATOR, 1.0),
     "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere"),
-    "sweep": lambda m: jc.sweep(OSCILLATOR, SPEEDS),
-    "sweep_designs": lambda m: jc.sweep_designs([OSCILLATOR], SPEEDS),
+    "sweep": lambda m: raw_sweep(OSCILLATOR, SPEEDS),
+    "sweep_designs": lambda m: raw_sweeps([OSCILLATOR], SPEEDS),
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
     "waterfall": lambda m: jc.waterfall(OSCILLATOR, SPEEDS),
 }
@@ -223,7 +224,7 @@ def test_a_short_sweep_says_so_and_a_long_one_does_not():
     system = jc.ForcedOscillator(ueda, coordinates=1)
     lengths = {"discard": 20, "method": jc.method("rk4", steps=64), "keep": 8}
     single, long = (
-        jc.sweep(system, np.array([1.0]), revolutions=n, blocks=blocks, **lengths)
+        raw_sweep(system, np.array([1.0]), revolutions=n, blocks=blocks, **lengths)
         for n, blocks in ((100, 1), (400, 20))
     )
     assert np.all(long.label == "chaotic") and not np.any(long.too_short)
@@ -241,7 +242,7 @@ def test_short_studies_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 def test_adaptive_steps_tell_how_far_the_cage_went():
     """Not only where it ended: it bounces off the rib within the revolution."""
-    run = lambda method: jc.sweep(
+    run = lambda method: raw_sweep(
         jc.case("1a"),
         float(jc.rpm(9000.0)),
         starts=[(0.0, 0.0, 3.0, 0.0)],

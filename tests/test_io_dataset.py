@@ -43,6 +43,8 @@ def sweep_of(speeds: int = 5, starts: int = 3) -> jc.Sweep:
         block_growth=growth,
         peak=np.where(outcome == 0, 0.7, np.nan),
         outcome=outcome,
+        error=np.full((speeds, starts), 1e-4),
+        doubt=np.full((speeds, starts, 1), 1e-3),
         scale=np.broadcast_to(np.array([4.5e-4, 4.5e-4, 0.4, 0.4]), (speeds, 4)).copy(),
         discard=30,
         revolutions=100,

@@ -32,6 +32,8 @@ def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
         block_growth=growth,
         peak=np.full((n, starts), 0.5),
         outcome=outcome,
+        error=np.zeros((n, starts)),
+        doubt=np.zeros((n, starts, 1)),
         scale=np.ones((n, 2)),
         discard=10,
         revolutions=100,
@@ -67,12 +69,12 @@ def test_period_nine_and_nan_do_not_close():
     ],
 )
 def test_labels_by_exponent_and_error(exponent: float, error: float, expected: str):
-    got = label_lanes(np.array([False]), np.array([0]), np.array([exponent]), np.array([error]))
+    got = label_lanes(np.array([0]), np.array([0]), np.array([exponent]), np.array([error]))
     assert got[0] == expected
 
 
 def test_failure_comes_first_and_closing_before_chaos():
-    label = label_lanes(np.array([True, False]), np.array([1, 2]), np.array([0.5, 0.5]), np.zeros(2))
+    label = label_lanes(np.array([1, 0]), np.array([1, 2]), np.array([0.5, 0.5]), np.zeros(2))
     assert list(label) == ["failed", "periodic-2"]
 
 

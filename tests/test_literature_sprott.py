@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.validation._literature import LORENZ, LORENZ_DIMENSION, ROESSLER, Number
@@ -25,7 +26,7 @@ def roessler(tau, y, speed):
 
 def spectrum(rates, speed, centre, steps, revolutions, discard=50, starts=64):
     cloud = np.asarray(centre) + np.random.default_rng(1).uniform(-1, 1, (starts, 3))
-    found = jc.sweep(
+    found = raw_sweep(
         jc.ForcedSystem(rates, dimension=3),
         np.array([speed]),
         starts=[tuple(map(float, s)) for s in cloud],

@@ -19,7 +19,18 @@ CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0}
 def special(rpm, kind="fold"):
     pair = [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5]
     speed = rpm * PER_RPM
-    return SpecialPoint(kind, speed, speed, np.zeros(2), np.array(pair, dtype=complex), np.zeros(2), 0, True)
+    return SpecialPoint(
+        kind,
+        speed,
+        speed,
+        np.zeros(2),
+        np.array(pair, dtype=complex),
+        np.zeros(2),
+        0,
+        True,
+        steps=1024,
+        error=1e-4 * PER_RPM,
+    )
 
 
 def stretch(lower, upper, family=0, met=10, first=None, open_below=False, open_above=False, kinds=("fold", "torus")):
@@ -48,6 +59,8 @@ def simulations(rpm, synchronous):
         block_growth=np.zeros((count, 1, 1, 0)),
         peak=np.zeros((count, 1)),
         outcome=np.zeros((count, 1), dtype=int),
+        error=np.zeros((count, 1)),
+        doubt=np.zeros((count, 1, 0)),
         scale=np.ones((count, 2)),
         discard=0,
         revolutions=8,

@@ -1,5 +1,6 @@
 """Figures show what they should: points, limits, units, zones at the right speeds."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -147,17 +148,8 @@ def test_sweep_figure_has_both_panels_on_one_axis_and_no_clash():
 
 def test_sweep_of_one_speed_can_be_drawn():
     sweep = sweep_of(speeds=5)
-    one = jc.Sweep(
-        sweep.speed[1:2],
-        sweep.strobe[1:2],
-        sweep.last[1:2],
-        sweep.block_growth[1:2],
-        sweep.peak[1:2],
-        sweep.outcome[1:2],
-        sweep.scale[1:2],
-        30,
-        100,
-    )
+    parts = {f.name: getattr(sweep, f.name) for f in dataclasses.fields(sweep)}
+    one = jc.Sweep(**{name: x[1:2] if isinstance(x, np.ndarray) else x for name, x in parts.items()})
     figure = sweep_figure(one, zones(one))
     np.testing.assert_allclose(spans(figure.axes[0]), [(8050, 8150)])  # open on both sides
 

@@ -32,14 +32,18 @@ CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0, "branch
 def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> SpecialPoint:
     mu = np.array([CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5, 0.2, 0.1], dtype=complex)
     state = np.array([0.0, y, 0.0, 0.0])
-    return SpecialPoint(kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge)
+    return SpecialPoint(
+        kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge, steps=1024, error=1e-4 * PER_RPM
+    )
 
 
 def branch_of(rpm: np.ndarray, y: np.ndarray, stable: np.ndarray, points=(), periods: int = 1, mu=None) -> Branch:
     """A branch on which only the vertical displacement [m] is not zero."""
     state = np.stack([0 * y, y, 0 * y, 0 * y], axis=1)
     mu = np.full(state.shape, 0.5 + 0j) if mu is None else mu
-    return Branch("speed", rpm * PER_RPM, rpm * PER_RPM, state, mu, stable, tuple(points), periods, ("range", "range"))
+    ended, steps = ("range", "range"), np.full(rpm.size, 512)
+    speed = rpm * PER_RPM
+    return Branch("speed", speed, speed, state, mu, stable, tuple(points), periods, ended, steps, 0.0 * rpm)
 
 
 def s_rpm(t: np.ndarray | float) -> np.ndarray | float:
@@ -169,7 +173,7 @@ def test_places_are_moved_apart_no_more_than_needed():
 @pytest.mark.parametrize("parameter", ["guidance_gap", None])
 def test_branches_must_be_over_speed(parameter: str | None):
     b = s_curve()
-    other = Branch("guidance_gap", b.value, b.speed, b.state, b.multipliers, b.stable, (), 1, b.ended)
+    other = Branch("guidance_gap", b.value, b.speed, b.state, b.multipliers, b.stable, (), 1, b.ended, b.steps, b.error)
     with pytest.raises(ValueError, match="guidance_gap was given" if parameter else "no branch was given"):
         branch_diagram([b, other] if parameter else [])
 

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.forces import (
@@ -333,7 +334,7 @@ def test_simulation_and_sweep_of_narrow_lands_are_those_of_the_short_film(tmp_pa
     scale = np.array([float(c) for c in model.scale(jnp.asarray(900.0))])
     np.testing.assert_allclose(states[0] / scale, states[1] / scale, atol=1e-5)
     speeds = jc.rpm(8000, 9000, 2)
-    found = jc.sweep(model, speeds, discard=0, revolutions=2, blocks=1, exponents=1, keep=1, method=method)
+    found = raw_sweep(model, speeds, discard=0, revolutions=2, blocks=1, exponents=1, keep=1, method=method)
     assert np.all(found.outcome == 0)
     np.testing.assert_allclose(found.last[1, 0] / scale, states[1][2] / scale, atol=1e-9)
     assert np.ptp(found.exponents) > 0.01

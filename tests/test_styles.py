@@ -173,6 +173,8 @@ def test_failed_lanes_are_seen_on_dark_paper():
         block_growth=np.full((3, 1, 2, 1), np.nan),
         peak=one,
         outcome=one.astype(int),
+        error=one,
+        doubt=one[..., None],
         scale=np.ones((3, 4)),
         discard=1,
         revolutions=8,

@@ -1,8 +1,11 @@
 """Sweeps: results do not depend on how lanes are spread, carried states show hysteresis, ramps follow their speed."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.models import FirstOrderField
@@ -25,47 +28,83 @@ def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
     speeds = np.linspace(1.0, 2.0, 150)
     options = {"discard": 5, "revolutions": 20, "blocks": 4, "keep": 8, "method": FAST}
     starts = [(0.1, 0.0), (1.0, 0.5)]
-    whole = jc.sweep(HARDENING, speeds, starts=starts, **options)
-    pieces = [jc.sweep(HARDENING, speeds[i::2], starts=starts, **options) for i in (0, 1)]
+    whole = raw_sweep(HARDENING, speeds, starts=starts, **options)
+    pieces = [raw_sweep(HARDENING, speeds[i::2], starts=starts, **options) for i in (0, 1)]
     for i, piece in enumerate(pieces):
         assert np.array_equal(whole.strobe[i::2], piece.strobe)
         assert np.array_equal(whole.block_growth[i::2], piece.block_growth)
 
 
 def test_kept_states_are_the_last_ones_in_order():
-    long = jc.sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=20, method=FAST)
-    short = jc.sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=7, method=FAST)
+    long = raw_sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=20, method=FAST)
+    short = raw_sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=7, method=FAST)
     assert np.array_equal(short.strobe, long.strobe[:, :, -7:])
     assert np.array_equal(long.last, long.strobe[:, :, -1])
-    one = jc.sweep(HARDENING, np.array([1.5]), discard=22, revolutions=1, blocks=1, exponents=0, method=FAST)
+    one = raw_sweep(HARDENING, np.array([1.5]), discard=22, revolutions=1, blocks=1, exponents=0, method=FAST)
     assert np.allclose(one.last, long.last, rtol=0, atol=1e-13)
 
 
-def test_chaos_must_persist_if_asked():
-    """Lanes found chaotic are judged again after more revolutions, all others stay as they were."""
+@pytest.fixture(scope="module")
+def followed():
+    """Ueda's oscillator, whose chaos is an attractor at some speeds and a transient at others."""
     ueda = lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),)
     system = jc.ForcedOscillator(ueda, coordinates=1)
-    speeds, length = np.linspace(0.9, 1.2, 60), {"revolutions": 60, "blocks": 6, "keep": 16, "method": FAST}
-    soon, late = (jc.sweep(system, speeds, discard=n, **length) for n in (20, 400))
-    found = jc.sweep(system, speeds, discard=20, persist=400, **length)
-    chaotic = soon.label == "chaotic"
-    assert np.array_equal(found.label, np.where(chaotic, late.label, soon.label))
-    for name in ("last", "peak", "block_growth", "strobe"):
-        a, b, c = (getattr(x, name) for x in (found, soon, late))
-        there = chaotic.reshape(chaotic.shape + (1,) * (a.ndim - 2))
-        assert np.array_equal(a, np.where(there, c, b)), name
-    assert 0 < np.sum(chaotic & (found.label != "chaotic")) < np.sum(chaotic)  # transients and attractors both
-    assert "20 + 60 revolutions, chaos that outlasts 400" in str(found)
-    with pytest.raises(ValueError, match="`persist` must be 0 or above the 20 revolutions discarded, but is 5"):
-        jc.sweep(system, speeds, discard=20, persist=5, **length)
-    for few in ({"exponents": 0}, {"blocks": 1}):  # no lane could be called chaotic
-        with pytest.raises(ValueError, match="`persist` needs an exponent and its error"):
-            jc.sweep(system, speeds, discard=20, persist=400, **(length | few))
+    return jc.sweep(system, np.linspace(0.9, 1.2, 60), discard=30, revolutions=60, blocks=6, horizon=700, method=FAST)
+
+
+def test_chaos_is_followed_to_the_horizon(followed):
+    """What is called a transient is calm at the end, what is called chaotic is not."""
+    label, escape = followed.label, followed.escape
+    assert set(np.unique(label)) >= {"chaotic", "transient"}
+    assert np.all(np.isinf(escape[label == "chaotic"]))
+    assert np.all(np.isfinite(escape[label == "transient"]))
+    assert np.all((escape[label == "transient"] > 30) & (escape[label == "transient"] <= followed.horizon))
+    assert followed.horizon >= 700 and "chaos followed to" in str(followed)
+    late = raw_sweep(
+        jc.ForcedOscillator(lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),), coordinates=1),
+        followed.speed,
+        starts=followed.last,
+        discard=0,
+        revolutions=60,
+        blocks=6,
+        method=FAST,
+    )
+    assert np.mean(late.label[label == "chaotic"] == "chaotic") > 0.9  # a few more escape later
+    assert np.all(late.label[label == "transient"] != "chaotic")
+
+
+def test_survival_counts_the_lanes_at_a_speed_and_next_to_it(followed):
+    i = int(np.flatnonzero(np.any(followed.label == "transient", axis=1))[0])
+    near = followed.escape[max(i - 1, 0) : i + 2]
+    found = followed.survival(i)
+    assert found.lanes == near.size
+    assert found.escapes == np.sum(np.isfinite(near) & (near > 30))
+    assert np.all(followed.restless[followed.lasting])
+    with pytest.raises(ValueError, match="`horizon`"):
+        dataclasses.replace(followed, escape=None).survival(0)
+
+
+def test_labels_are_confirmed_by_finer_steps(followed):
+    """Steps too coarse for Ueda's oscillator: what they call chaotic is corrected, and it is said how often."""
+    first = followed.confirmed[0]
+    assert 0 < first.lanes <= followed.outcome.size and first.changed + first.moved <= first.lanes
+    coarse = jc.method("rk4", steps=16)
+    system = jc.ForcedOscillator(
+        lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),), coordinates=1
+    )
+    length = {"discard": 200, "revolutions": 60, "blocks": 6}
+    rough, sure = (
+        jc.sweep(system, followed.speed, confirm=c, horizon=0, method=coarse, **length) for c in (False, True)
+    )
+    assert not rough.confirmed and sure.confirmed[0].changed > 0
+    where = rough.label != sure.label
+    assert sure.confirmed[0].changed >= np.sum(where) > 0
+    assert np.all(sure.error[where] < rough.error[where])
 
 
 def test_number_of_exponents_does_not_change_the_first():
     a, b = (
-        jc.sweep(
+        raw_sweep(
             HARDENING,
             np.array([1.2, 1.5]),
             discard=20,
@@ -104,7 +143,7 @@ def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():
 
 def test_simulation_and_sweep_agree():
     run = jc.simulate(HARDENING, 1.3, revolutions=3, samples=4, start=(0.2, 0.1), method=FAST)
-    swept = jc.sweep(
+    swept = raw_sweep(
         HARDENING, np.array([1.3]), starts=[(0.2, 0.1)], discard=0, revolutions=3, blocks=1, keep=3, method=FAST
     )
     assert np.allclose(run.state[4::4], swept.strobe[0, 0, :2], rtol=0, atol=1e-13)
@@ -131,7 +170,7 @@ def test_simulation_and_sweep_agree():
 def test_impossible_requests_are_refused(change: dict, words: str):
     request = {"speeds": np.array([1.0]), "discard": 1, "revolutions": 10, "blocks": 2, "method": FAST} | change
     with pytest.raises(ValueError, match=words):
-        jc.sweep(HARDENING, request.pop("speeds"), **request)
+        raw_sweep(HARDENING, request.pop("speeds"), **request)
 
 
 @pytest.mark.parametrize(
@@ -197,10 +236,10 @@ def test_the_peak_of_a_ramp_counts_its_start():
 
 @pytest.mark.parametrize("discard", [0, 3])
 def test_the_peak_of_a_sweep_counts_the_state_it_is_observed_from(discard: int):
-    found = jc.sweep(Decay(), np.array([1.0]), discard=discard, revolutions=2, exponents=0, blocks=1, method=FAST)
+    found = raw_sweep(Decay(), np.array([1.0]), discard=discard, revolutions=2, exponents=0, blocks=1, method=FAST)
     np.testing.assert_allclose(found.peak, 0.8 * FALL**discard, rtol=1e-6)
 
 
 def test_a_lane_that_never_started_has_no_peak():
-    found = jc.sweep(Decay(), np.array([1.0]), starts=[(1.5,)], discard=1, revolutions=1, exponents=0, blocks=1)
+    found = raw_sweep(Decay(), np.array([1.0]), starts=[(1.5,)], discard=1, revolutions=1, exponents=0, blocks=1)
     assert found.failed.all() and np.isnan(found.peak).all()

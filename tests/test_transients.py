@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.stats
+from helpers import raw_sweep, raw_sweeps
 
 import jaxcage as jc
 from jaxcage.analysis import (
@@ -544,7 +545,7 @@ def lives(forces, starts, steps, revolutions) -> list[Survival]:
     method = jc.method("rk4", steps=steps)
     length = dict(discard=0, revolutions=revolutions, blocks=revolutions // BLOCK)
     found = []
-    for s in jc.sweep_designs([ueda(f) for f in forces], 1.0, starts=starts, method=method, **length):
+    for s in raw_sweeps([ueda(f) for f in forces], 1.0, starts=starts, method=method, **length):
         growth = s.block_growth[0, :, :, 0]
         calm_end = calm_at_the_end(s.strobe[0], s.scale, growth, BLOCK)
         times, horizon = escape_times(growth, calm_end, BLOCK, failed=s.failed[0])
@@ -557,7 +558,7 @@ def chaotic_starts():
     """States on the chaotic attractor before the crisis; elsewhere lanes end on a periodic orbit beside it."""
     starts = [tuple(map(float, s)) for s in np.random.default_rng(1).uniform((-2, -4), (4, 8), (260, 2))]
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rk4", steps=128))
-    s = jc.sweep(ueda(13.3), 1.0, starts=starts, **length)
+    s = raw_sweep(ueda(13.3), 1.0, starts=starts, **length)
     shares = coexisting(s.label[0])
     assert set(shares) == {"chaotic", "periodic-1"} and 0.3 < shares["chaotic"].share < 0.6
     return [tuple(map(float, y)) for y in s.last[0][s.label[0] == "chaotic"][:80]]

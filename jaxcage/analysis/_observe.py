@@ -55,7 +55,7 @@ class Observation(NamedTuple):
     peak: Float[Array | np.ndarray, "*lanes"]  # largest excursion (for a cage: eps) while observed
     outcome: Int[Array | np.ndarray, "*lanes"]
     error: Float[Array | np.ndarray, "*lanes"]  # largest error of a revolution from the start on, in units of the scale
-    doubt: Float[Array | np.ndarray, "exponents *lanes"]  # change of the mean growth with half as many steps
+    doubt: Float[Array | np.ndarray, " exponents *lanes"]  # change of the mean growth with half as many steps
 
 
 class Lane(NamedTuple):

@@ -12,10 +12,18 @@ from ..integrate import OUTCOMES, AbstractMethod
 from ..io import write_columns
 from ..orbits import LossZones, SynchronousOrbits, loss_zones, synchronous_orbits
 from ..plotting import multiplier_circle, new_figure, orbit_diagram_with_branches
-from ..report import coexisting_notes, contact_notes, edge_table, loss_table, orbits_document, stretch_table
+from ..report import (
+    coexisting_notes,
+    contact_notes,
+    edge_table,
+    loss_table,
+    orbits_document,
+    stretch_table,
+    unsettled_notes,
+)
 from ._console import progress_in_stages
 from ._errors import ComputationError, require_at_least, require_range
-from ._inputs import Subject, angular_speed, asks_for_a_method, integration, output_folder, save_figure, subject
+from ._inputs import Subject, angular_speed, orbit_integration, output_folder, save_figure, subject
 from ._options import BifurcationsOptions, SearchOptions
 from ._report import Report
 
@@ -27,7 +35,7 @@ class Searched:
     subject: Subject
     found: SynchronousOrbits
     loss: LossZones
-    method: AbstractMethod
+    method: AbstractMethod | None
     folder: Path
     seconds: float
 
@@ -44,7 +52,7 @@ def search_case(options: SearchOptions, about: Subject | None = None) -> Searche
     is loaded already.
     """
     check_search(options)
-    chosen = integration(options)
+    chosen = orbit_integration(options)
     about = subject(options) if about is None else about
     folder = output_folder(options)
     began = time.perf_counter()
@@ -55,7 +63,7 @@ def search_case(options: SearchOptions, about: Subject | None = None) -> Searche
             angular_speed(options.last),
             count=options.count,
             discard=options.discard,
-            method=chosen if asks_for_a_method(options) else None,  # None: the sweep has a default of its own
+            method=chosen,
             progress=bar,
         )
     seconds = time.perf_counter() - began
@@ -105,6 +113,7 @@ def _notes(searched: Searched, files: dict[str, str]) -> list[str]:
     return [
         *coexisting_notes(searched.loss),
         *contact_notes(searched.subject.model, searched.loss.edges, searched.method),
+        *unsettled_notes(found),
         f"Further bifurcations, on unstable parts: {inner} (listed by --json)",
         f"Settled orbits that are on no branch: {found.missed}",
         f"Time: {searched.seconds:.1f} s",

@@ -7,6 +7,7 @@ from .._parameters import parameter_info, parameters
 from ..models import CageModel
 from ..orbits import Sensitivity, sensitivities, width
 from ..plotting import elasticity_bars, new_figure
+from ..report import error_cell
 from ._bifurcations import Searched, require_edges, search_case
 from ._console import progress
 from ._errors import ComputationError
@@ -58,6 +59,8 @@ def gradient_document(name: str, edges: dict[str, Sensitivity], wide: Sensitivit
             "name": edge.name,
             "kind": edge.kind,
             "speed_rpm": edge.value_rpm,
+            "error_rpm": edge.error_rpm,
+            "steps": edge.steps,
             "trusted": edge.trusted,
             "status": edge.status,
             "transversality": edge.transversality,
@@ -70,6 +73,7 @@ def gradient_document(name: str, edges: dict[str, Sensitivity], wide: Sensitivit
         "name": wide.name,
         "kind": wide.kind,
         "value_rpm": wide.value_rpm,
+        "error_rpm": wide.error_rpm,
         "derivative": wide.derivative,
         "elasticity": wide.elasticity,
     }
@@ -88,7 +92,8 @@ def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Tab
         (n, f"{float(value[n]):.6g}", unit_cell(info[n].unit), f"{slope[n]:+.6g}", elasticity_cell(change[n]))
         for n in order
     ]
-    title = f"{sensitivity.name.capitalize()} of {name}: {sensitivity.value_rpm:.3f} rpm, {sensitivity.kind}"
+    at = f"{sensitivity.value_rpm:.3f} ± {error_cell(sensitivity.error_rpm)} rpm"
+    title = f"{sensitivity.name.capitalize()} of {name}: {at}, {sensitivity.kind}"
     still = len(slope) - len(moving)
     columns = ("parameter", "value", "unit", "rpm per unit", "elasticity")
     return Table(title + (f"; {still} other parameters do not move it" if still else ""), columns, rows)

@@ -71,6 +71,11 @@ def integration(options: IntegrationOptions) -> AbstractMethod:
         raise UsageError(_as_options(str(error))) from error
 
 
+def orbit_integration(options: IntegrationOptions) -> AbstractMethod | None:
+    """The same for orbits, which take as many steps as they need (None) unless the options ask for something else."""
+    return integration(options) if asks_for_a_method(options) else None
+
+
 def sweep_integration(options: IntegrationOptions) -> AbstractMethod:
     """The same for sweeps, whose steps are controlled unless the options ask for something else."""
     return integration(options) if asks_for_a_method(options) else controlled()

@@ -129,7 +129,7 @@ def _limit(option: str, text: str, unit: str) -> float:
         raise UsageError(f"Option {option} {error}.") from error
 
 
-def _exponents(options: MapOptions, model: CageModel, y: Axis, method: AbstractMethod, say: Say) -> Exponents:
+def _exponents(options: MapOptions, model: CageModel, y: Axis, method: AbstractMethod | None, say: Say) -> Exponents:
     return largest_exponents(
         model,
         rpm(options.first, options.last, options.columns),

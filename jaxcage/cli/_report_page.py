@@ -26,7 +26,7 @@ from ..report import (
 from ..sweeps import rpm
 from ._console import progress_in_stages
 from ._errors import ComputationError, UsageError, require_at_least, require_blocks, require_range
-from ._inputs import integration, output_folder, subject, sweep_integration
+from ._inputs import orbit_integration, output_folder, subject, sweep_integration
 from ._options import ReportOptions
 from ._report import Report, Table
 
@@ -45,7 +45,7 @@ def run(options: ReportOptions) -> Report:
         raise UsageError(f"Option --operating {error}") from error
     if options.operating and not operating:
         raise UsageError(f"Option --operating must hold a speed, but '{options.operating}' was given.")
-    chosen, orbits = sweep_integration(options), integration(options)
+    chosen, orbits = sweep_integration(options), orbit_integration(options)
     about, folder = subject(options), output_folder(options)
     began = time.perf_counter()
     with progress_in_stages(f"report on {about.name}") as bar, _failing():

@@ -13,9 +13,18 @@ from ..orbits import (
     loss_zones,
     synchronous_orbits,
 )
-from ..report import contact_notes, edge_slopes, loss_table, zone_document, zones_document, zones_table
+from ..report import (
+    contact_notes,
+    edge_slopes,
+    error_cell,
+    loss_table,
+    unsettled_notes,
+    zone_document,
+    zones_document,
+    zones_table,
+)
 from ._console import progress_in_stages
-from ._inputs import Subject, integration
+from ._inputs import Subject, orbit_integration
 from ._options import ZonesOptions
 from ._report import Report, Table, number
 from ._sweep import failed_lanes, sweep_case
@@ -27,7 +36,7 @@ SHOWN = ("guidance_gap", "eccentricity")
 def run(options: ZonesOptions) -> Report:
     """Carry out `jaxcage zones`."""
     swept = sweep_case(options)
-    about, chosen = swept.subject, integration(options)
+    about, chosen = swept.subject, orbit_integration(options)
     began = time.perf_counter()
     with progress_in_stages(f"synchronous orbits of {about.name}") as bar:
         speeds = swept.sweep.speed
@@ -51,7 +60,7 @@ def run(options: ZonesOptions) -> Report:
         *([_gradient_table(about, slopes)] if slopes else []),
         zones_table(about.name, explained.zones, about.published, swept.range_rpm),
     ]
-    notes = [*_notes(explained), *contact_notes(about.model, loss.edges, chosen)]
+    notes = [*_notes(explained), *contact_notes(about.model, loss.edges, chosen), *unsettled_notes(found)]
     return Report(document, tables, [*notes, f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])
 
 
@@ -60,6 +69,9 @@ def _slopes_document(slopes: Sensitivity | None) -> dict[str, Any] | None:
         return None
     return {
         "trusted": slopes.trusted,
+        "status": slopes.status,
+        "error_rpm": slopes.error_rpm,
+        "steps": slopes.steps,
         "transversality": slopes.transversality,
         "derivative": slopes.derivative,
         "elasticity": slopes.elasticity,
@@ -92,10 +104,17 @@ def _cascade_rpm(cascade: Cascade) -> list[float]:
 def _gradient_table(about: Subject, slopes: dict[str, Sensitivity]) -> Table:
     """Elasticities: relative change of an edge per relative change of the parameter."""
     rows = [
-        (name, s.kind, number(s.value_rpm, 2), *(f"{s.elasticity[n]:+.4f}" for n in SHOWN), s.status)
+        (
+            name,
+            s.kind,
+            number(s.value_rpm, 2),
+            error_cell(s.error_rpm),
+            *(f"{s.elasticity[n]:+.4f}" for n in SHOWN),
+            s.status,
+        )
         for name, s in slopes.items()
     ]
-    columns = ("edge", "by", "speed [rpm]", *(n.replace("_", " ") for n in SHOWN), "status")
+    columns = ("edge", "by", "speed [rpm]", "±", *(n.replace("_", " ") for n in SHOWN), "status")
     return Table(f"Elasticities of the exact edges of {about.name}", columns, rows)
 
 

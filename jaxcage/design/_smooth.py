@@ -63,14 +63,14 @@ def regular_motion(
 
     def value(model: CageModel) -> Array:
         orbit = periodic_orbit(model, speed, guess=guess, method=method)
-        tau, motion = _revolution(model, speed, orbit.state, samples, method)
+        tau, motion = _revolution(model, speed, orbit.state, samples, orbit.method)
         return jnp.where(orbit.converged, MEASURES[measure](model, speed, tau, motion), jnp.nan)
 
     return Smooth(value)
 
 
 def _revolution(
-    model: CageModel, speed: float, state: Array, samples: int, method: AbstractMethod | None
+    model: CageModel, speed: float, state: Array, samples: int, method: AbstractMethod
 ) -> tuple[Float[Array, " n"], Float[Array, "n 4"]]:
     """Phases and relative motion (x, y, x', y') over a revolution."""
     strobe = strobe_map(model, speed, method)

@@ -56,7 +56,7 @@ class TrackedEdges:
         """**Arguments:** the cases; what is unknown; for each edge its case and the bifurcation that it is, as found
         with the unknowns at `place`."""
         self.systems, self.unknowns, self.cases, self.method = systems, tuple(unknowns), tuple(cases), method
-        last = [Located(str(p.kind), float(p.speed), np.asarray(p.state), int(p.periods)) for p in points]
+        last = [Located(str(p.kind), float(p.speed), np.asarray(p.state), int(p.periods), int(p.steps)) for p in points]
         self._anchors = [_Anchor(np.asarray(place, dtype=float), last, np.zeros((len(points), len(self.unknowns))))]
         self._solved: list[str] = []
         self._known: dict[bytes, Edges] = {}
@@ -86,7 +86,7 @@ class TrackedEdges:
         )
         if np.all(np.isfinite(edges.rpm)):
             last = [
-                now._replace(speed=s.value_rpm * np.pi / 30, state=s.state)
+                now._replace(speed=s.value_rpm * np.pi / 30, state=s.state, steps=s.steps)
                 for now, s in zip(near.last, found, strict=True)
             ]
             self._anchors.append(_Anchor(place, last, edges.slope))
@@ -112,7 +112,7 @@ class TrackedEdges:
         half = self._follow(case, last, slope, start, middle, halvings - 1)
         if not np.isfinite(half.value_rpm):
             return found
-        nearer = last._replace(speed=half.value_rpm * np.pi / 30, state=half.state)
+        nearer = last._replace(speed=half.value_rpm * np.pi / 30, state=half.state, steps=half.steps)
         return self._follow(
             case, nearer, slope_in_place(self.unknowns, half.derivative, middle), middle, place, halvings - 1
         )

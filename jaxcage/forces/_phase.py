@@ -42,7 +42,7 @@ def _polynomial(coefficients: tuple[float, ...], z: Scalar) -> Scalar:
 def cos_sin(tau: Scalar) -> tuple[Scalar, Scalar]:
     """Cosine and sine of tau [rad], to a unit in the last place of 1 for |tau| < 1e5."""
     tau = jnp.asarray(tau, dtype=float)
-    quarters = jnp.round(tau * (2 / jnp.pi))
+    quarters = jnp.floor(tau * (2 / jnp.pi) + 0.5)
     r = (tau - quarters * QUARTER[0]) - quarters * QUARTER[1]
     z = r * r
     s = r + r * z * _polynomial(SINE, z)

@@ -3,13 +3,13 @@
 | module         | responsibility                                                                     |
 |----------------|------------------------------------------------------------------------------------|
 | `_rosenbrock`  | structured L-stable Rosenbrock methods as diffrax solvers                          |
-| `_explicit`    | the classical Runge-Kutta method as a diffrax solver                               |
+| `_explicit`    | the classical Runge-Kutta method as a diffrax solver; stages of explicit methods   |
 | `_newmark`     | the paper's Newmark-beta as a diffrax solver                                       |
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
 | `_controlled`  | as many steps as a revolution needs, and its error                                 |
 | `_march`       | many steps of a scalar function as a primitive: lanes, tangents, one compiled loop |
 | `_program`     | a scalar function traced: its elementary operations                                |
-| `_kernel`      | a step of a method as such a function                                              |
+| `_kernel`      | a step of a method, or one of its stages, as such a function                       |
 | `_device`      | a march as one kernel on a GPU                                                     |
 | `_strobe`      | the strobe map that everything uses                                                |
 | `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |

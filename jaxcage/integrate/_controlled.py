@@ -91,8 +91,10 @@ class ControlledSteps(AbstractMethod):
     def lowest(self, harmonics: int) -> Int[Array, ""]:
         """The first rung of two steps at least to a period of the forcing's highest harmonic: two rungs with fewer
         would agree on a slower forcing that is not there."""
-        coarse = [jnp.sum(r.steps < 2 * harmonics) for r in self.ladder[:1] if isinstance(r, FixedSteps)]
-        return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 2).astype(jnp.int32)
+        coarse = [
+            jnp.sum(r.steps < 2 * harmonics, dtype=jnp.int32) for r in self.ladder[:1] if isinstance(r, FixedSteps)
+        ]
+        return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 2)
 
     def __str__(self) -> str:
         of = lambda r: f"{type(r.solver).__name__} {', '.join(map(str, r.steps.tolist()))}"  # pyright: ignore
@@ -159,7 +161,7 @@ def climb(
         first += size
     _, moved, done = carry
     bad = ~done & jnp.isfinite(method.tolerance) & ((parts == 1) | (moved.error > method.tolerance))
-    floor = jnp.maximum(jnp.asarray(method.floors)[moved.level], lowest + 1)
+    floor = jnp.maximum(jnp.asarray(method.floors, jnp.int32)[moved.level], lowest + 1)
     easy = (moved.error * EASY <= method.tolerance) & (moved.level > floor)
     return moved._replace(
         outcome=jnp.where(bad & (moved.outcome == 0), INACCURATE, moved.outcome),
@@ -194,7 +196,7 @@ def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> Con
     """Of solvers with their step counts."""
     counts = [steps for _, each in rungs for steps in each]
     multiple = math.gcd(*counts, 4) if all(isinstance(c, int) for c in counts) else 1
-    fixed = tuple(FixedSteps(solver, jnp.asarray(each)) for solver, each in rungs)
+    fixed = tuple(FixedSteps(solver, jnp.asarray(each, jnp.int32)) for solver, each in rungs)
     return ControlledSteps(fixed, jnp.asarray(float(tolerance)), multiple)
 
 

@@ -186,7 +186,9 @@ def kernel_step(
     structure, numbers = Structure.of((field, *watching))
     step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
     if structure.plain and all(jnp.ndim(x) == 0 for x in numbers):
-        if is_elementary(step, Sizes(len(scale), len(step.watched(0.0)), 3 + len(numbers))):
+        part = step.stage or step  # of several parts one says it for all
+        moved = len(scale) * (step.stage.copies if step.stage else 1)
+        if is_elementary(part, Sizes(moved, len(step.watched(0.0)), 3 + len(numbers))):
             return step, numbers
     return dataclasses.replace(step, whole=False), numbers
 

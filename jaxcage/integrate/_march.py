@@ -11,6 +11,10 @@ element, `f(init, x)` in every lane, with the numbers that all lanes share as `i
 the whole of `f`, computes each term once, takes what depends on shared numbers alone out of the loop and runs along the
 lanes. Rodas4 on the cage is compiled in a third of the time and runs four times as fast as by fusions.
 
+A step that is too large for XLA is several kernels. Derivatives of second and higher order go by the parts that a step
+is made of, the stages of an explicit method: a quarter of a Runge-Kutta step is compiled in a fraction of the time, and
+by XLA's own options, within `jit` and `grad`. With fewer derivatives a loop over whole steps is four times as fast.
+
 Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits._implicit.by_columns`).
 """
 
@@ -36,11 +40,10 @@ LARGEST = {False: 2800, True: 12000}
 """Operations of a kernel, at most: where XLA's own options hold, and where those of `compiled` do. The newer of XLA's
 two emitters for CPUs, its default, cuts larger kernels into functions that compute shared terms again and again,
 without end. A larger step is several kernels."""
-SHARED = 12000
+SHARED = 16000
 """Operations of a step with several directions, at most; else each direction is a lane with values of its own."""
-WHOLE, GROWTH = 2800, 2.5
-"""Operations of a derivative of second or higher order by whole steps, at most, and how many times as many it has as
-what is differentiated."""
+WHOLE = 2800
+"""Operations of a step differentiated more than once, at most; else it is differentiated as the parts it is made of."""
 TOGETHER = 4500
 """As many operations are put into one kernel, of several steps, since between kernels all numbers are copied. With
 tangents two steps in one kernel measure slower than one."""
@@ -168,6 +171,15 @@ class Tangent:
     """For each direction, which of the fixed numbers have a tangent."""
 
     @property
+    def late(self) -> tuple[bool, ...]:
+        """Which of the numbers, in a row, are tangents."""
+        moved, _, fixed = self.sizes
+        of_step = getattr(self.step, "late", (False,) * sum(self.sizes))
+        y, seen, x = self.sizes.split(of_step)
+        whole = self.whole
+        return (*y, *(True,) * (whole.moved - moved), *seen, *x, *(True,) * (whole.fixed - fixed))
+
+    @property
     def whole(self) -> Sizes:
         """Sizes with the tangents counted in."""
         moved, watched, fixed = self.sizes
@@ -235,9 +247,9 @@ def _limited(step: Any) -> Any:
 
 
 class Parts(NamedTuple):
-    """A step as `count` parts, each a step that moves `copies` times as many numbers, `size` of them at a time."""
+    """A step as a number of parts, each a step that moves `copies` times the numbers, `size` of them at a time."""
 
-    count: int
+    number: int
     copies: int
     size: int
 
@@ -254,7 +266,7 @@ def _in_parts(how: How) -> tuple[How, Parts]:
     """What is to be differentiated: the march, or, where that is large and has a derivative in it already, that of the
     parts of its steps. Compiled in a fraction of the time; with fewer derivatives whole steps run faster."""
     parts = _parts(how.step, how.sizes) if isinstance(how.step, Tangent) else None
-    if parts is None or GROWTH * _operations(how.step, how.sizes) < WHOLE:
+    if parts is None or 2 * _about(how.step, how.sizes) < WHOLE:
         return how, Parts(1, 1, how.sizes.moved)
     step, sizes, parts = parts
     return How(step, sizes, how.multiple), parts
@@ -269,7 +281,7 @@ def _parts(step: Any, sizes: Sizes) -> tuple[Any, Sizes, Parts] | None:
             return None
         part, inner, parts = found
         if isinstance(step, Limited):
-            return Limited(part, parts.count), _one_more(inner), parts
+            return Limited(part, parts.number), _one_more(inner), parts
         part = Tangent(part, inner, step.known)
         return part, part.whole, parts
     stage = getattr(step, "stage", None)
@@ -289,10 +301,18 @@ def _operations(step: Step, sizes: Sizes) -> int:
     return len(program_of(step, sizes).jaxpr.eqns)
 
 
+def _about(step: Any, sizes: Sizes) -> int:
+    """The same, at most, without tracing derivatives: a direction is no more work than the value."""
+    if isinstance(step, Tangent):
+        return _about(step.step, step.sizes) * (1 + len(step.known))
+    part, sizes, parts = _parts(step, sizes) or (step, sizes, Parts(1, 1, 1))
+    return _operations(part, sizes) * parts.number
+
+
 def _share(tangent: Tangent) -> bool:
     """Whether all directions of a step are computed together."""
     first = not isinstance(tangent.step, Tangent)  # of higher derivatives a single direction is enough for a kernel
-    return first and len(tangent.known) <= DIRECTIONS and _operations(tangent, tangent.whole) <= SHARED
+    return first and len(tangent.known) <= DIRECTIONS and _about(tangent, tangent.whole) <= SHARED
 
 
 def is_elementary(step: Step, sizes: Sizes) -> bool:
@@ -311,7 +331,7 @@ def _in_order() -> bool:
     """Whether the backend reduces a window of one element as body(init, element): a reduction leaves the order free."""
     with jax.ensure_compile_time_eval():
         first, second = jnp.asarray([5.0, 7.0]), jnp.asarray([1.0, 2.0])
-        got = _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), (jnp.asarray(2.0),), (first, second))
+        got = _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), 2, (jnp.asarray(2.0),), (first, second))
         return bool(jnp.all(got[0] == 2 - 3 * first) & jnp.all(got[1] == 2 * second))
 
 
@@ -329,10 +349,9 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
 
 
 def _lanewise(
-    f: Callable[[Numbers, Numbers], Sequence[Any]], shared: Sequence[Array], lanes: Sequence[Array]
+    f: Callable[[Numbers, Numbers], Sequence[Any]], results: int, shared: Sequence[Array], lanes: Sequence[Array]
 ) -> tuple[Array, ...]:
-    """f(shared, lane) in every lane by one reduction: shared scalars, arrays of one axis."""
-    results = len(jax.eval_shape(f, tuple(shared), tuple(x[0] for x in lanes)))
+    """The results of f(shared, lane) in every lane by one reduction: shared scalars, arrays of one axis."""
     width = max(len(shared), len(lanes), results)  # as many results as operands
     operands = [*lanes, *[lanes[0]] * (width - len(lanes))]
     inits = [*shared, *[jnp.zeros(())] * (width - len(shared))]
@@ -356,7 +375,7 @@ def _loops(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
     most = 1 if isinstance(step, Tangent) else min(TOGETHER, largest) // _operations(step, sizes)
     together = max(d for d in range(1, multiple + 1) if multiple % d == 0 and (d == 1 or d <= most))
     program = program_of(Several(step, together) if together > 1 else step, sizes)
-    parts = pieces(program, largest)
+    parts = pieces(program, largest, getattr(step, "late", ()))
 
     def body(i: Array, row: tuple[Array, ...]) -> tuple[Array, ...]:
         known = dict(zip(program.jaxpr.invars, ((i * together).astype(float), *row, *fixed), strict=True))
@@ -380,7 +399,7 @@ def _piece(part: Any, consts: Sequence[Any], given: Sequence[Array], like: Array
         x = [known[i].astype(v.aval.dtype) for i, v in enumerate(part.invars)]
         return [y.astype(float) for y in eval_jaxpr(part, consts, *x)]
 
-    return _lanewise(kernel, [given[i] for i in alike], [given[i] for i in own] or [like])
+    return _lanewise(kernel, len(part.outvars), [given[i] for i in alike], [given[i] for i in own] or [like])
 
 
 def _kernel_on_gpu(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
@@ -476,8 +495,8 @@ def _jvp(primals: Sequence[Any], tangents: Sequence[Any], *, how: How) -> Any:
     along = Tangent(step, sizes, (known,))
     drifts = [d for d, k in zip(fixed_dot, known, strict=True) if k]
     begun = [*parts.begun(moved), *parts.begun(pushed)]
-    shared = How(along, along.whole, multiple * parts.count)
-    out = march_p.bind(count * parts.count, *begun, *watched, *fixed, *drifts, how=shared)
+    shared = How(along, along.whole, multiple * parts.number)
+    out = march_p.bind(count * parts.number, *begun, *watched, *fixed, *drifts, how=shared)
     values, slopes, seen = out[: sizes.moved], out[sizes.moved : 2 * sizes.moved], out[2 * sizes.moved :]
     none = [ad.Zero(jax.typeof(x).to_tangent_aval()) for x in seen]
     return [*parts.ended(values), *seen], [*parts.ended(slopes), *none]

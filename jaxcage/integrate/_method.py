@@ -154,7 +154,7 @@ class FixedSteps(AbstractMethod):
     """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
 
     solver: dfx.AbstractSolver
-    steps: int | Int[Array, ""]
+    steps: int | Int[Array, "*rungs"]
     """An array where one program is to serve all numbers of steps."""
 
     def __check_init__(self):

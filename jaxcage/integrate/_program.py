@@ -51,21 +51,28 @@ class Program(NamedTuple):
 def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
     """What a step computes; with `rules`, functions that have a derivative of their own stay calls: to be
     differentiated, for which a program is traced much faster than the code that it came from."""
-    trace: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _trace
-    return trace(step, sizes, rules)
+    write_out: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _written_out
+    return write_out(step, sizes, rules)
 
 
-def _trace(step: Step, sizes: Sizes, rules: bool) -> Program:
+def _arguments(sizes: Sizes) -> list[Any]:
+    return [jax.ShapeDtypeStruct((), float)] * (1 + sum(sizes))
+
+
+def _trace(step: Step, sizes: Sizes) -> Any:
     """The step as a function (number, moved, watched, fixed) -> (moved, watched) of scalars in a row."""
 
     def flat(i: Any, *x: Any) -> tuple[Any, ...]:
         moved, watched = step(i, *sizes.split(x))
         return tuple(jnp.asarray(c, dtype=float) for c in (*moved, *watched))
 
-    number = jax.ShapeDtypeStruct((), float)
-    traced = jax.make_jaxpr(flat)(*[number] * (1 + sum(sizes)))
+    return jax.make_jaxpr(flat)(*_arguments(sizes))
+
+
+def _written_out(step: Step, sizes: Sizes, rules: bool) -> Program:
+    traced = _traced(step, sizes) if dataclasses.is_dataclass(step) else _trace(step, sizes)
     once = functools.partial(_inlined, traced.jaxpr, traced.consts, seen={}, rules=rules)
-    traced = jax.make_jaxpr(once)(*[number] * (1 + sum(sizes)))
+    traced = jax.make_jaxpr(once)(*_arguments(sizes))
     jaxpr = traced.jaxpr
     equations = _needed(jaxpr.eqns, jaxpr.outvars)
     jaxpr = jaxpr.replace(eqns=equations)
@@ -73,7 +80,8 @@ def _trace(step: Step, sizes: Sizes, rules: bool) -> Program:
     return Program(jaxpr, traced.consts, [i for i, v in enumerate(jaxpr.invars) if v in read])
 
 
-_kept = functools.lru_cache(maxsize=128)(_trace)
+_traced = functools.lru_cache(maxsize=128)(_trace)
+_kept = functools.lru_cache(maxsize=128)(_written_out)
 
 
 def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any], rules: bool) -> list[Any]:
@@ -118,10 +126,29 @@ def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     return kept[::-1]
 
 
-def pieces(program: Program, largest: int) -> list[Any]:
-    """A program in parts of at most so many operations: what one part makes and a later one reads is a result of it."""
+def _at_once(equations: Sequence[Any], late: set[Any]) -> list[Any]:
+    """The equations in another order: what follows from `late` arguments as soon as the rest that it needs is known.
+
+    Differentiation puts all tangents behind all values; cut there, a thousand numbers go from one kernel to the next.
+    """
+    place: dict[Any, int] = dict.fromkeys(late, 0)
+    for k, e in enumerate(equations):
+        after = [place[v] for v in _read(e) if v in place]
+        tangent = any(v in late for v in _read(e))
+        late |= set(e.outvars) if tangent else set()
+        place.update(dict.fromkeys(e.outvars, max(after) if tangent else k))
+    return sorted(equations, key=lambda e: place[e.outvars[0]])
+
+
+def pieces(program: Program, largest: int, late: Sequence[bool] = ()) -> list[Any]:
+    """A program in parts of at most so many operations: what one part makes and a later one reads is a result of it.
+
+    `late` is which of its arguments behind the first are tangents.
+    """
     jaxpr, parts = program.jaxpr, []
     count = max(1, -(-len(jaxpr.eqns) // largest))
+    if count > 1:
+        jaxpr = jaxpr.replace(eqns=_at_once(jaxpr.eqns, set(itertools.compress(jaxpr.invars[1:], late))))
     cuts = [len(jaxpr.eqns) * k // count for k in range(count + 1)]
     for first, last in itertools.pairwise(cuts):
         part, rest = jaxpr.eqns[first:last], jaxpr.eqns[last:]

@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 from ..integrate import compiled
 from ..sweeps import cores
 from ._implicit import TOLERANCE, AbstractEquations, solve
+from ._steps import GIVEN_UP, Counts
 
 
 LANES = (8, 32)
@@ -27,6 +28,9 @@ they share the processor's instructions."""
 FOLLOWING = 1e-7
 """Newton's last step while following, in the unknowns' units: points are then good to about its square."""
 CORRECTIONS = 8
+LOOSE, COARSER = 10.0, 100.0
+"""While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
+half as many steps do."""
 
 
 class OnPlane(AbstractEquations):
@@ -48,6 +52,12 @@ class OnPlane(AbstractEquations):
         off = jnp.dot(self.normal, u - self.at)
         return jnp.append(r, off), jnp.concatenate([jacobian, self.normal[None]]), aux
 
+    def by_steps(self, steps: Any) -> "OnPlane":
+        return OnPlane(self.curve.by_steps(steps), self.at, self.normal)
+
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        return self.curve.apart(moved, coarse[..., :-1, :], fine[..., :-1, :])
+
 
 class Corrected(NamedTuple):
     """Points of curves, NumPy arrays with the lanes first: unknowns (n), tangent (n), Jacobian (m x n), and so on."""
@@ -59,26 +69,45 @@ class Corrected(NamedTuple):
     converged: Any
     iterations: Any
     aux: Any
+    steps: Any
+    """Steps per revolution."""
+    error: Any
+    """Distance to what half the steps give, and the same over what is allowed (see `AbstractEquations.apart`)."""
+    over: Any
 
 
-def _correct(curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array) -> Corrected:
-    u, found = solve(OnPlane(curve, at, normal), given, at, CORRECTIONS, tolerance)
+def _correct(
+    curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array
+) -> Corrected:
+    u, found = solve(OnPlane(curve, at, normal).by_steps(steps), given, at, CORRECTIONS, tolerance)
     jacobian = found.newton.jacobian[:-1]
     whole = jnp.concatenate([jacobian, normal[None]])
     tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
     tangent = tangent / jnp.linalg.norm(tangent)
     fine = found.converged & jnp.all(jnp.isfinite(u)) & jnp.all(jnp.isfinite(tangent))
-    return Corrected(u, tangent, jacobian, fine, found.iterations, found.aux)
+    unknown = jnp.full(2, jnp.nan)
+    return Corrected(u, tangent, jacobian, fine, found.iterations, found.aux, steps, *unknown)
 
 
 _axes = eqx.if_array(0)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None)))
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None)))
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None, None)))
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None, None)))
 
 
-def take(tree: Any, lanes: np.ndarray) -> Any:
+def take(tree: Any, lanes: Any) -> Any:
     """Chosen lanes of a tree whose arrays have the lanes first, by NumPy: JAX takes a millisecond for each array."""
     return jax.tree.map(lambda x: np.asarray(x)[lanes] if eqx.is_array(x) else x, tree)
+
+
+def put(tree: Any, lanes: np.ndarray, new: Any) -> Any:
+    """The tree with `new` in these lanes."""
+
+    def placed(x: Any, y: Any) -> np.ndarray:
+        whole = np.array(x)
+        whole[lanes] = y
+        return whole
+
+    return jax.tree.map(placed, tree, new)
 
 
 def stack(tree: Any, lanes: int) -> Any:
@@ -86,32 +115,84 @@ def stack(tree: Any, lanes: int) -> Any:
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (lanes, *x.shape)) if eqx.is_array(x) else x, tree)
 
 
+class Curves(NamedTuple):
+    """Many curves of one kind, and the numbers of steps that may be tried."""
+
+    equations: AbstractEquations
+    """Their arrays with the lanes first."""
+    given: Any
+    counts: Counts
+    own_given: bool = False
+    """Whether the lanes come first in what is given too; else it is the same for all."""
+
+    def take(self, lanes: Any) -> "Curves":
+        """Some of them."""
+        mine = take(self.given, lanes) if self.own_given else self.given
+        return self._replace(equations=take(self.equations, lanes), given=mine)
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the steps follow from their error."""
+        return float(self.counts.tolerance) > 0
+
+
 def correct(
-    curves: AbstractEquations,
-    given: Any,
-    at: np.ndarray,
-    normal: np.ndarray,
-    own_given: bool = False,
-    tolerance: float = TOLERANCE,
+    curves: Curves, at: np.ndarray, normal: np.ndarray, steps: np.ndarray, tolerance: float = TOLERANCE
 ) -> Corrected:
     """Points of many curves on planes across them.
 
-    **Arguments:** curves, their arrays with the lanes first; what is given, shared or, if `own_given`, with the lanes
-    first; points of the planes and their normals.
+    **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step.
     """
-    lanes = at.shape[0]
-    run = _correct_own if own_given else _correct_shared
-    size = LANES[lanes > LANES[0]]
-    padded = lambda first: np.minimum(np.arange(first, first + size), lanes - 1)
-    mine = lambda chosen: take(given, chosen) if own_given else given
-    got = lambda k: run(take(curves, k), mine(k), jnp.asarray(at[k]), jnp.asarray(normal[k]), jnp.asarray(tolerance))
-    part = lambda first: jax.tree.map(lambda x: np.asarray(x)[: lanes - first], got(padded(first)))
-    firsts = range(0, lanes, size)
-    if len(firsts) == 1:
-        return part(0)
-    with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
-        parts = list(pool.map(part, firsts))
-    return jax.tree.map(lambda *x: np.concatenate(x), *parts)
+    run = _correct_own if curves.own_given else _correct_shared
+    chunks = []
+    for count in np.unique(steps):  # lanes by as many steps run together
+        mine = np.flatnonzero(steps == count)
+        size = LANES[mine.size > LANES[0]]
+        chunks += [mine[np.minimum(np.arange(i, i + size), mine.size - 1)] for i in range(0, mine.size, size)]
+
+    def part(k: np.ndarray) -> Corrected:
+        some = curves.take(k)
+        numbers = (jnp.asarray(x) for x in (at[k], normal[k], tolerance, steps[k[0]]))
+        return jax.tree.map(np.asarray, run(some.equations, some.given, *numbers))
+
+    if len(chunks) == 1:
+        parts = [part(chunks[0])]
+    else:
+        with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
+            parts = list(pool.map(part, chunks))
+    _, where = np.unique(np.concatenate(chunks), return_index=True)
+    return jax.tree.map(lambda *x: np.concatenate(x)[where], *parts)
+
+
+def measured(curves: Curves, points: Corrected) -> Corrected:
+    """The points with their errors: by one step of Newton's method with half the steps."""
+    if int(curves.counts.last) == 1:
+        return points
+    half = correct(curves, points.u, points.tangent, (points.steps + 1) // 2, np.inf)
+    with np.errstate(invalid="ignore"):
+        error, over = curves.equations.apart(points.u - half.u, half.jacobian, points.jacobian)
+    lost = ~(half.converged & points.converged)
+    return points._replace(error=np.where(lost, np.inf, error), over=np.where(lost, np.inf, over))
+
+
+def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0, allowed: float = 1.0) -> Corrected:
+    """Points of many curves on planes across them, by as many steps as each needs.
+
+    **Arguments:** as for `correct`; the numbers of steps to begin with; how large `over` may be.
+    """
+    first = int(curves.counts.first if curves.chooses else curves.counts.last)
+    count = np.maximum(np.broadcast_to(steps, at.shape[0]), first)
+    found = measured(curves, correct(curves, at, normal, count))
+    while curves.chooses:
+        given_up = ~found.converged & (found.steps >= GIVEN_UP)
+        again = np.flatnonzero(~(found.over <= allowed) & ~given_up & (found.steps < int(curves.counts.last)))
+        if not again.size:
+            break
+        begin = np.where(found.converged[again, None], found.u[again], at[again])
+        some = curves.take(again)
+        finer = correct(some, begin, normal[again], 2 * found.steps[again])
+        found = put(found, again, measured(some, finer))
+    return found
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,12 +201,14 @@ class Steps:
 
     first: float = 0.02
     longest: float = 0.1
-    shortest: float = 1e-5
+    shortest: float = 1e-7
     most: int = 400
     turn: float = 0.95
     """Smallest cosine of the angle between neighbouring tangents."""
     bend: float = 0.3
     """Largest correction, over the step's length: more, and Newton's method may have gone to another curve."""
+    swing: float = 0.5
+    """Largest change of the equations' derivative, over its size and one: more, and folds may have been passed over."""
 
     def __post_init__(self):
         if not 0 < self.shortest <= self.first <= self.longest:
@@ -156,52 +239,71 @@ def _closed(points: list[Corrected]) -> bool:
 
 
 def follow(
-    curves: AbstractEquations,
-    given: Any,
+    curves: Curves,
     start: Corrected,
     *,
     steps: Steps,
     inside: Callable[[np.ndarray], np.ndarray],
     stop: Callable[[int, list[Corrected]], bool] = lambda lane, points: False,
     update: Callable[[AbstractEquations, Corrected, np.ndarray], AbstractEquations] | None = None,
-    own_given: bool = False,
 ) -> list[Trace]:
     """Follow many curves from their first points, each in the direction of its tangent.
 
+    The error of each point is measured. Where it is too large the revolutions get twice as many steps, the last point
+    is solved for again by these, and the step along the curve is repeated; where it is small they get half as many.
+
     **Arguments:**
 
-    - `curves`, `given`, `own_given`: as for `correct`.
+    - `curves`: as for `correct`.
     - `start`: first points, the lanes first.
     - `inside`: tells for unknowns, the lanes first, whether they are within the range; a curve ends with its
         first point outside.
     - `stop`: called with a lane and its points after each step.
-    - `update`: new curves from the last points of the lanes given, e.g. with fresh borders.
+    - `update`: new equations from the last points of the lanes given, e.g. with fresh borders.
 
     **Returns:** a `Trace` per lane.
     """
     lanes = start.u.shape[0]
     points = [[take(start, np.array(i))] for i in range(lanes)]
-    length = np.full(lanes, steps.first)
+    length, count = np.full(lanes, steps.first), np.array(start.steps)
+    least, most = int(curves.counts.first), int(curves.counts.last)
     ended = np.where(start.converged, "", "stuck").astype(object)
+
+    def go_over(lanes: np.ndarray) -> None:
+        """Solve for the last points again, by the steps that hold now."""
+        last = [points[i][-1] for i in lanes]
+        u, tangent = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent"))
+        again = correct(curves.take(lanes), u, tangent, count[lanes])
+        for k, i in enumerate(lanes):
+            if again.converged[k]:
+                points[i][-1] = take(again, np.array(k))._replace(error=points[i][-1].error, over=points[i][-1].over)
+
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
         last = [points[i][-1] for i in index]
-        u, tangent = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent"))
-        mine = take(given, index) if own_given else given
+        u, tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent", "jacobian"))
+        some = curves.take(index)
         ahead = u + length[index, None] * tangent
-        got = correct(take(curves, index), mine, ahead, tangent, own_given, FOLLOWING)
+        got = measured(some, correct(some, ahead, tangent, count[index], FOLLOWING))
         straight = np.sum(got.tangent * tangent, axis=1) > steps.turn
         near = np.linalg.norm(got.u - ahead, axis=1) < steps.bend * length[index]
-        good = got.converged & straight & near
-        if update is not None and np.any(good):
-            curves = update(curves, take(got, good), index[good])
+        largest = lambda m: np.max(np.abs(m), axis=(1, 2))
+        smooth = largest(got.jacobian - before) < steps.swing * (1 + largest(before))
+        good = got.converged & straight & near & smooth
+        finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)
         for k, i in enumerate(index):
+            may = curves.chooses and count[i] < most
+            if may and got.converged[k] and got.over[k] > LOOSE:
+                finer[i] = True
+                continue
             if not good[k]:
                 length[i] /= 2
                 if length[i] < steps.shortest:
-                    ended[i] = "stuck"
+                    finer[i], length[i] = may, steps.first
+                    ended[i] = "" if may else "stuck"
                 continue
             points[i].append(take(got, np.array(k)))
+            coarser[i] = curves.chooses and count[i] > least and got.over[k] < LOOSE / COARSER
             quick = got.iterations[k] <= 4
             length[i] = min(steps.longest, length[i] * (1.5 if quick else 0.8))
             if not inside(got.u[k][None])[0]:
@@ -212,4 +314,10 @@ def follow(
                 ended[i] = "closed"
             elif len(points[i]) > steps.most:
                 ended[i] = "steps"
+        accepted = good & ~finer[index]
+        if update is not None and np.any(accepted):
+            curves = curves._replace(equations=update(curves.equations, take(got, accepted), index[accepted]))
+        count = np.where(finer, 2 * count, np.where(coarser, count // 2, count))
+        if np.any(finer | coarser):
+            go_over(np.flatnonzero(finer | coarser))
     return [Trace(jax.tree.map(lambda *x: np.stack(x), *p), str(e)) for p, e in zip(points, ended, strict=True)]

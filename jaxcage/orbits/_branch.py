@@ -8,23 +8,26 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float
+from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, method as make_method
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, Trace, correct, follow, stack, take
+from ._arclength import LOOSE, Corrected, Curves, Steps, Trace, correct, follow, put, settle_on, stack, take
 from ._illinois import zeros
 from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._orbit import OrbitEquations, guess_state, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import matches, null_vectors, singular_matrix, test_functions
+from ._steps import MOST_OF_A_POINT, POINT, SETTLED, STIFF_FIRST, Counts, counted
 
 
 Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
+WIDER = (0, 1, 3)
+"""How many orbits further out a bifurcation is looked for that is not between the two at which it was seen."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,7 +37,7 @@ class SpecialPoint:
     kind: str
     """`period-doubling`, `torus`, `fold` or `branch-point`."""
     value: float
-    """Value of the parameter [SI]."""
+    """Value of the parameter [SI]; NaN where it did not settle."""
     speed: float
     """Speed [rad/s]."""
     state: Float[np.ndarray, " dim"]
@@ -49,11 +52,25 @@ class SpecialPoint:
     parameter: str = SPEED
     periods: int = 1
     """Revolutions after which the orbit closes."""
+    steps: int = 0
+    """Steps per revolution; 0 where they are not known."""
+    error: float = float("nan")
+    """Distance of the value to that by half the steps [SI]; infinite where these do not find it."""
 
     @property
     def speed_rpm(self) -> float:
         """Speed in revolutions per minute."""
         return self.speed * 30 / np.pi
+
+    @property
+    def error_rpm(self) -> float:
+        """Error of a speed in revolutions per minute."""
+        return self.error * 30 / np.pi
+
+    @property
+    def status(self) -> str:
+        """`converged`, or `not converged` where it is elsewhere by half the steps."""
+        return "converged" if np.isfinite(self.value) else "not converged"
 
     @property
     def critical(self) -> complex:
@@ -84,6 +101,10 @@ class Branch:
     periods: int
     ended: tuple[str, str]
     """Why the branch ends where it begins and where it ends."""
+    steps: Int[np.ndarray, " points"]
+    """Steps per revolution."""
+    error: Float[np.ndarray, " points"]
+    """Of each orbit (see `Orbit.error`)."""
 
     @property
     def speed_rpm(self) -> Float[np.ndarray, " points"]:
@@ -95,7 +116,10 @@ class Branch:
             f"Branch of period-{self.periods} orbits: {self.value.size} points, {self.parameter} from "
             f"{self.value.min():.6g} to {self.value.max():.6g}, {np.mean(self.stable):.0%} stable"
         )
-        rows = [f"  {p.kind:<16} {p.parameter} = {p.value:.8g}, multiplier {p.critical:.4f}" for p in self.special]
+        rows = [
+            f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
+            for p in self.special
+        ]
         return "\n".join([head, *rows])
 
     _repr_html_ = notebook_html
@@ -105,6 +129,7 @@ class Follower(eqx.Module):
     """What all lanes of one continuation share."""
 
     problem: OrbitProblem
+    counts: Counts
     given: Given
     lower: float
     upper: float
@@ -115,6 +140,11 @@ class Follower(eqx.Module):
     def of(self, lanes: Any) -> Given:
         """What is given in these lanes."""
         return take(self.given, np.asarray(lanes)) if self.designs else self.given
+
+    def curves(self, frame: Frame, lanes: Any) -> Curves:
+        """The branches of these lanes."""
+        equations = stack(OrbitEquations(self.problem, frame), len(lanes))
+        return Curves(equations, self.of(lanes), self.counts, self.designs)
 
     @property
     def parameter(self) -> Parameter:
@@ -211,7 +241,7 @@ def branches(
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
     single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)
-    follower = Follower(single.problem, given, lower, upper, single.unit, True)
+    follower = Follower(single.problem, single.counts, given, lower, upper, single.unit, True)
     return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
 
 
@@ -224,22 +254,31 @@ def make_follower(
     period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Follower:
-    chosen = make_method() if method is None else method
+    chosen, counts = counted(method)
     problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
-    return Follower(problem, Given(system, jnp.asarray(speed, dtype=float)), lower, upper, (upper - lower) / 20)
+    given = Given(system, jnp.asarray(speed, dtype=float))
+    return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
 
 
-def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> tuple[Any, Corrected]:
-    """Orbits near (state, value of the parameter), the parameter kept.
-
-    **Returns:** equations and points, the lanes first.
-    """
-    lanes, free = len(starts), follower.problem.free_speed
-    curves = stack(OrbitEquations(follower.problem, frame), lanes)
+def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> Corrected:
+    """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
+    free = follower.problem.free_speed
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return curves, correct(curves, follower.of(np.arange(lanes)), u, normal, follower.designs)
+    return settle_on(follower.curves(frame, range(len(starts))), u, normal, allowed=LOOSE)
+
+
+def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
+    """The follower itself or, where it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
+    if not follower.counts.tolerance > 0:
+        return follower
+    frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
+    (u,) = seeds(follower, frame, [start]).jacobian
+    if np.all(np.isfinite(u)):
+        return follower
+    chosen, counts = counted(None, solver="rodas4", first=STIFF_FIRST)
+    return eqx.tree_at(lambda f: (f.problem.method, f.counts), follower, (chosen, counts))
 
 
 def turned(points: Corrected, sign: Any) -> Corrected:
@@ -255,8 +294,9 @@ def follow_both_ways(
     A lane that comes upon what another has followed ends there: one branch may come in two parts. With `patience`, a
     lane also ends after so many unstable orbits in a row: there is no end to how such a branch can wind.
     """
+    follower = stable_steps(follower, starts[0], periods)
     frame = follower.frame(jnp.asarray(starts[0][0]), starts[0][1], periods)
-    curves, first = seeds(follower, frame, starts)
+    first = seeds(follower, frame, starts)
     count = len(starts)
     lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
     taken = ~first.converged
@@ -279,15 +319,7 @@ def follow_both_ways(
         return bool(others) and passes(*step, np.stack(others))
 
     both = turned(take(first, lanes), sign)
-    traces = follow(
-        take(curves, lanes),
-        follower.of(lanes),
-        both,
-        steps=steps,
-        inside=follower.inside,
-        stop=stop,
-        own_given=follower.designs,
-    )
+    traces = follow(follower.curves(frame, lanes), both, steps=steps, inside=follower.inside, stop=stop)
     kept = [i for i in range(count) if not taken[i]]
     found = describe(follower, frame, [_joined(follower, traces[i], traces[i + count]) for i in kept], kept)
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
@@ -328,7 +360,7 @@ def describe(
     branches = []
     for i, (points, ended) in enumerate(traces):
         mine = [(k, kind, p) for (j, k, kind), p in zip(found, located, strict=True) if j == i and p is not None]
-        along = lambda k, p: float(np.dot(p.u - points.u[k], points.u[k + 1] - points.u[k]))
+        along = lambda k, p: float(np.dot(p[0].u - points.u[k], points.u[k + 1] - points.u[k]))
         mine.sort(key=lambda found: (found[0], along(found[0], found[2])))
         branches.append(_branch(follower, frame, points, ended, mine))
     return branches
@@ -368,15 +400,68 @@ def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
 
 def locate(
     follower: Follower, frame: Frame, wanted: Sequence[tuple[int, Corrected, int, str]]
-) -> list[Corrected | None]:
-    """Where the test functions of (lane, points, index, kind) vanish; None where that could not be found."""
+) -> list[tuple[Corrected, float] | None]:
+    """Where the test functions of (lane, points, index, kind) vanish, and the distance [SI] to the place by half the
+    steps; None where that could not be found.
+    """
     if not wanted:
         return []
-    curves = stack(OrbitEquations(follower.problem, frame), len(wanted))
-    ends = [take(points, np.array([k, k + 1])) for _, points, k, _ in wanted]
-    given = follower.of([lane for lane, *_ in wanted])
-    signal = lambda i, points: signals(follower, points)[wanted[i][3]]
-    return zeros(curves, given, ends, signal, follower.designs)
+    curves = follower.curves(frame, [lane for lane, *_ in wanted])
+    kinds = [kind for *_, kind in wanted]
+    chooses, most = curves.chooses, MOST_OF_A_POINT if curves.chooses else int(curves.counts.last)
+    steps = np.full(len(wanted), int(curves.counts.first))
+    if chooses:
+        steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
+
+    def at(lanes: list[int]) -> list[Corrected | None]:
+        """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
+        placed: list[Corrected | None] = [None] * len(lanes)
+        for beyond in WIDER:
+            left = [j for j, p in enumerate(placed) if p is None]
+            some = [lanes[j] for j in left]
+            if some:
+                rows = [(wanted[i][1], wanted[i][2]) for i in some]
+                ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
+                for j, p in zip(left, _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])):
+                    placed[j] = p
+        return placed
+
+    found = at(list(range(len(wanted))))
+    error = np.full(len(wanted), np.inf if most > 1 else np.nan)
+    size = lambda p: max(abs(p.u[-1]), 1.0)
+    while True:
+        sure = [p is not None and e <= POINT * size(p) * chooses for p, e in zip(found, error, strict=True)]
+        again = np.flatnonzero(~np.array(sure) & (steps < most)).tolist()
+        if not again:
+            break
+        steps[again] = np.minimum(2 * steps[again], most)
+        for i, p in zip(again, at(again), strict=True):
+            before, found[i] = found[i], p if p is not None else found[i]
+            error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
+    return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
+
+
+def _zeros(
+    follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray
+) -> list[Corrected | None]:
+    """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
+    both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
+    lanes = np.repeat(np.arange(len(ends)), 2)
+    other = np.flatnonzero(both.steps != steps[lanes])
+    if other.size:
+        redone = correct(curves.take(lanes[other]), both.u[other], both.tangent[other], steps[lanes[other]])
+        both = put(both, other, redone)
+    signal = lambda i, points: signals(follower, points)[str(kinds[i])]
+    pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
+    there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
+    kept = np.flatnonzero(there).tolist()
+    found: list[Corrected | None] = [None] * len(ends)
+    if kept:
+        of_kept = lambda i, points: signal(kept[i], points)
+        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept])
+        for i, p in zip(kept, some, strict=True):
+            found[i] = p
+    return found
 
 
 def _branch(
@@ -384,7 +469,7 @@ def _branch(
     frame: Frame,
     points: Corrected,
     ended: tuple[str, str],
-    located: Sequence[tuple[int, str, Corrected]],
+    located: Sequence[tuple[int, str, tuple[Corrected, float]]],
 ) -> Branch:
     problem, free = follower.problem, follower.problem.free_speed
     multipliers = eigenvalues(follower.monodromy(points))
@@ -400,9 +485,9 @@ def _branch(
         return np.asarray(found)
 
     special = []
-    located = [found for found in located if matches(found[1], eigenvalues(follower.monodromy(found[2])))]
+    located = [found for found in located if matches(found[1], eigenvalues(follower.monodromy(found[2][0])))]
     before = [k for k, _, _ in located]
-    for i, (k, kind, p) in enumerate(located):
+    for i, (k, kind, (p, error)) in enumerate(located):
         mu = eigenvalues(follower.monodromy(p))
         direction = np.zeros(n)
         if kind != "torus":
@@ -411,9 +496,21 @@ def _branch(
         # Of several between two points, the outer ones only are next to orbits whose stability is known.
         edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)
+        lost = float("nan") if error > SETTLED * max(abs(at), follower.unit) else 1.0
         special.append(
             SpecialPoint(
-                kind, at, float(speed(p.u)), p.u[:n] * scale, mu, direction * scale, k, edge, name, int(frame.periods)
+                kind=kind,
+                value=at * lost,
+                speed=float(speed(p.u)) * lost,
+                state=p.u[:n] * scale,
+                multipliers=mu,
+                direction=direction * scale,
+                index=k,
+                edge=edge,
+                parameter=name,
+                periods=int(frame.periods),
+                steps=int(p.steps),
+                error=error,
             )
         )
     return Branch(
@@ -423,6 +520,8 @@ def _branch(
         state=points.u[:, :n] * scale,
         multipliers=multipliers,
         stable=stable,
+        steps=points.steps,
+        error=points.error,
         special=tuple(special),
         periods=int(frame.periods),
         ended=ended,

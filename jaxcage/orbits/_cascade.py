@@ -10,7 +10,7 @@ from .._checks import require_x64
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, correct, follow, stack
+from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
 from ._branch import (
     Branch,
     Follower,
@@ -20,7 +20,6 @@ from ._branch import (
     make_follower,
 )
 from ._lens import SPEED, Parameter
-from ._orbit import OrbitEquations
 from ._point import BifurcationPoint
 from ._singularity import test_functions
 
@@ -38,7 +37,8 @@ class Cascade:
     limit: float
     """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
     error: float
-    """Distance of the last two extrapolations; infinite with fewer than three points."""
+    """Distance of the last two extrapolations, with the errors of the last two points in it; infinite with fewer than
+    three points."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -52,7 +52,10 @@ class Cascade:
         return tuple((d[:-1] / d[1:]).tolist())
 
     def __str__(self) -> str:
-        rows = [f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g}" for p in self.points]
+        rows = [
+            f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g} +- {float(p.error):.1g}"
+            for p in self.points
+        ]
         return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}"])
 
     _repr_html_ = notebook_html
@@ -97,7 +100,7 @@ def doubled_branch(
     at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
-    curves = stack(OrbitEquations(follower.problem, frame), 1)
+    curves = follower.curves(frame, [0])
     scale = np.asarray(frame.scale)
     free = [1.0] if follower.problem.free_speed else []
     u = np.array([[*(np.asarray(point.state) / scale), *free, at / follower.unit]])
@@ -105,14 +108,14 @@ def doubled_branch(
     across[0, : scale.size] = np.asarray(point.direction) / scale
     across /= np.linalg.norm(across)
     while amplitude > SMALLEST_AMPLITUDE:
-        start = correct(curves, follower.given, u + amplitude * across, across)
+        start = settle_on(curves, u + amplitude * across, across, int(point.steps), LOOSE)
         if start.converged[0] and _doubling(follower, start)[0] > 0 and abs(start.u[0, -1] - u[0, -1]) < 1.0:
             break
         amplitude /= 4
     else:
         raise ValueError(f"Argument `point` must be a period doubling, but no doubled branch begins at {at:g}.")
     stop = lambda lane, points: until_doubling and bool(_doubling(follower, points[-1]) < 0)
-    (trace,) = follow(curves, follower.given, start, steps=steps, inside=follower.inside, stop=stop)
+    (trace,) = follow(curves, start, steps=steps, inside=follower.inside, stop=stop)
     (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])
     return found
 
@@ -159,9 +162,11 @@ def cascade(
             )
         except ValueError:
             break
-        following = [p for p in doubled.special if p.kind == "period-doubling"]
+        following = [p for p in doubled.special if p.kind == "period-doubling" and p.status == "converged"]
         if not following:
             break
         points.append(following[0])
         amplitude /= 2
-    return Cascade(tuple(points), *extrapolated(tuple(float(p.value) for p in points)))
+    limit, error = extrapolated(tuple(float(p.value) for p in points))
+    located = sum(w * float(np.nan_to_num(p.error)) for w, p in zip((1 + 1 / (FEIGENBAUM - 1), 0.3), points[::-1]))
+    return Cascade(tuple(points), limit, error + located)

@@ -8,15 +8,16 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._types import Scalar
-from ..integrate import AbstractMethod, compiled, method as make_method, strobe_map
+from ..integrate import AbstractMethod, compiled, strobe_map
 from ..models import AbstractForcedSystem
 from ._orbit import Orbit, periodic_orbit
 
 
 SPREAD = 0.6
 """Random starts are spread over this share of the system's scale in every direction."""
-SAME = 1e-6
-"""Orbits are the same within this distance, in units of the system's scale."""
+SAME = 1e-4
+"""Orbits are the same within this distance, in units of the system's scale: an orbit that hardly attracts moves by a
+hundred times the error of its map."""
 
 
 def coexisting_orbits(
@@ -39,14 +40,13 @@ def coexisting_orbits(
     require_x64()
     if count < 1:
         raise ValueError(f"Argument `count` must be at least 1, but {count} was given.")
-    chosen = make_method() if method is None else method
     scale = np.array([float(c) for c in system.scale(speed)])
     own = np.array([[float(c) for c in y] for y in system.starts(speed)])
     random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
     starts = jnp.asarray(np.concatenate([own, random]))
-    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=chosen)
+    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
     found = jax.vmap(find)(starts)
-    images = _images(system, speed, chosen, periods, found.state) / scale
+    images = _images(system, speed, periods, found) / scale
     kept: list[int] = []
     for i in np.flatnonzero(np.asarray(found.converged)):
         shorter = any(_near(images[i, 0], images[i, j]) for j in range(1, periods))
@@ -61,16 +61,16 @@ def _near(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def _images(
-    system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod, periods: int, states: Array
+    system: AbstractForcedSystem, speed: Scalar, periods: int, found: Orbit
 ) -> Float[np.ndarray, "orbits periods dim"]:
     """All strobe states of each orbit [SI]."""
-    strobe = strobe_map(system, jnp.asarray(speed, dtype=float), method)
 
-    def step(y: Array) -> Array:
+    def step(orbit: Orbit, y: Array) -> Array:
+        strobe = strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)
         return jnp.stack(strobe(tuple(y[i] for i in range(y.size))).y)
 
     advance = compiled(jax.vmap(step))
-    rows = [states]
+    rows = [found.state]
     for _ in range(periods - 1):
-        rows.append(advance(rows[-1]))
+        rows.append(advance(found, rows[-1]))
     return np.stack([np.asarray(r) for r in rows], axis=1)

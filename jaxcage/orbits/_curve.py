@@ -7,13 +7,13 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int
 
 from .._checks import require_x64
 from .._notebook import notebook_html
-from ..integrate import AbstractMethod, method as make_method
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, correct, follow, stack, take
+from ._arclength import LOOSE, Corrected, Curves, Steps, follow, settle_on, stack, take
 from ._branch import SpecialPoint, eigenvalues, turned
 from ._illinois import zeros
 from ._lens import SPEED, value as value_of
@@ -21,6 +21,7 @@ from ._orbit import is_free
 from ._point import BifurcationPoint, PointEquations, critical_matrix
 from ._problem import Given, OrbitProblem, ReturnMap, make_frame
 from ._singularity import Kind, null_vectors
+from ._steps import ENOUGH, Counts, by_steps, counted
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,6 +53,10 @@ class Curve:
     special: tuple[CodimensionTwo, ...]
     ended: tuple[str, str]
     name: str = ""
+    steps: Int[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=int))
+    """Steps per revolution."""
+    error: Float[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0))
+    """Distance in x, or in y in the same share of its range, to the curve by half the steps [SI]."""
 
     def __str__(self) -> str:
         head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}, {self.x_value.size} points"
@@ -93,17 +98,15 @@ def curve(
         raise ValueError(f"Argument `point` must be a period-doubling, torus or fold, but it is a {point.kind}.")
     if not (lower < upper and x_lower < x_upper):
         raise ValueError("Arguments `lower` and `upper`, `x_lower` and `x_upper` must be in ascending order.")
-    chosen = make_method() if method is None else method
-    tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), is_free(period), chosen)
-    start, equations = tracer.start(point)
+    tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), is_free(period), method)
+    start, curves = tracer.start(point)
     if not bool(start.converged[0]):
         raise ValueError(
             f"Argument `point` must be a {point.kind} of the system, but Newton's method finds none there."
         )
     both = turned(take(start, np.zeros(2, dtype=int)), np.array([1.0, -1.0]))
     up, down = follow(
-        take(equations, np.zeros(2, dtype=int)),
-        tracer.given,
+        curves.take(np.zeros(2, dtype=int)),
         both,
         steps=steps,
         inside=tracer.inside,
@@ -123,6 +126,8 @@ def curve(
         multipliers=multipliers,
         genuine=np.array([point.kind != "torus" or abs(_pair(mu)[1]) <= 1 for mu in multipliers]),
         special=tuple(special),
+        steps=np.concatenate([back.steps, up.points.steps]),
+        error=np.concatenate([back.error, up.points.error]) * tracer.units[0],
         ended=(down.ended, up.ended),
         name=name,
     )
@@ -132,6 +137,7 @@ class _Tracer(eqx.Module):
     """What both directions of a curve share."""
 
     problem: OrbitProblem
+    counts: Counts
     given: Given
     kind: Kind = eqx.field(static=True)
     units: tuple[float, float]
@@ -141,11 +147,12 @@ class _Tracer(eqx.Module):
 
     @classmethod
     def at(cls, system, point, names, lower, upper, free, method) -> "_Tracer":
-        problem = OrbitProblem(method, system.dimension, free, names)
+        chosen, counts = counted(method)
+        problem = OrbitProblem(chosen, system.dimension, free, names)
         given = Given(system, jnp.asarray(point.speed, dtype=float))
         units = tuple((b - a) / 20 for a, b in zip(lower, upper, strict=True))
         frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), point.periods)
-        return cls(problem, given, point.kind, units, lower, upper, frame)
+        return cls(problem, counts, given, point.kind, units, lower, upper, frame)
 
     @property
     def scale(self) -> Any:
@@ -155,20 +162,25 @@ class _Tracer(eqx.Module):
         values = u[..., -2:] * np.asarray(self.units)
         return np.all((values > np.asarray(self.lower)) & (values < np.asarray(self.upper)), axis=-1)
 
-    def start(self, point: Any) -> tuple[Corrected, PointEquations]:
-        """The point itself, with `y` kept, and the equations of the curve; one lane."""
+    def start(self, point: Any) -> tuple[Corrected, Curves]:
+        """The point itself, with `y` kept, and the curve; one lane."""
         values = [float(value_of(self.given.system, self.given.speed, p)) for p in self.problem.parameters]
         values[0] = float(point.value)
         free = [1.0] if self.problem.free_speed else []
         z = np.asarray(point.state) / np.asarray(self.scale)
         u = np.array([*z, *free, *(v / w for v, w in zip(values, self.units, strict=True))])
-        strobe = self.problem.prepare(jnp.asarray(u), self.given, self.frame)
-        _, monodromy, _ = ReturnMap(strobe, self.frame).pushed(jnp.asarray(z))
+        steps = int(point.steps) or min(int(self.counts.last), ENOUGH)
+        strobe = by_steps(self.problem, steps).prepare(jnp.asarray(u), self.given, self.frame)
+        _, monodromy = ReturnMap(strobe, self.frame).pushed(jnp.asarray(z))
         a = critical_matrix(self.problem, self.kind, strobe, jnp.asarray(z), monodromy, self.frame)
         equations = stack(PointEquations(self.problem, self.frame, *null_vectors(a), self.kind), 1)
         normal = np.zeros((1, u.size))
         normal[0, -1] = 1.0
-        return correct(equations, self.given, u[None], normal), equations
+        curves = self.curves(equations)
+        return settle_on(curves, u[None], normal, steps // 2, LOOSE), curves
+
+    def curves(self, equations: Any) -> Curves:
+        return Curves(equations, self.given, self.counts)
 
     def special(self, points: Corrected) -> list[CodimensionTwo]:
         """Codimension-2 points between the points of one direction, located."""
@@ -180,7 +192,8 @@ class _Tracer(eqx.Module):
         borders = take(points, np.array([k for _, k in wanted]))
         base = stack(PointEquations(self.problem, self.frame, jnp.zeros(1), jnp.zeros(1), self.kind), len(wanted))
         curves = _fresh_borders(base, borders, np.arange(len(wanted)))
-        located = zeros(curves, self.given, ends, lambda i, p: self.signals(p)[wanted[i][0]])
+        steps = np.array([e.steps.max() for e in ends])
+        located = zeros(self.curves(curves), ends, lambda i, p: self.signals(p)[wanted[i][0]], steps)
         found = []
         for (kind, _), p in zip(wanted, located, strict=True):
             if p is not None and _real(kind, self.kind, eigenvalues(p.aux.monodromy)):

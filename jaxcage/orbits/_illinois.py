@@ -5,13 +5,11 @@ are treated at a time.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import jax
 import numpy as np
 
-from ._arclength import Corrected, correct, take
-from ._implicit import AbstractEquations
+from ._arclength import Corrected, Curves, correct, take
 
 
 MOST = 40
@@ -23,19 +21,16 @@ bracketed this closely, and interpolated."""
 
 
 def zeros(
-    curves: AbstractEquations,
-    given: Any,
-    ends: Sequence[Corrected],
-    signal: Callable[[int, Corrected], np.ndarray],
-    own_given: bool = False,
+    curves: Curves, ends: Sequence[Corrected], signal: Callable[[int, Corrected], np.ndarray], steps: np.ndarray
 ) -> list[Corrected | None]:
     """Points at which `signal` vanishes.
 
     **Arguments:**
 
-    - `curves`, `given`, `own_given`: as for `correct`, one curve per pair of ends.
+    - `curves`: as for `correct`, one curve per pair of ends.
     - `ends`: pairs of neighbouring points, between which the signal changes sign.
     - `signal`: values for the lane's number and some points of its curve.
+    - `steps`: per revolution.
 
     **Returns:** a point per pair, None where the curve was lost.
     """
@@ -57,8 +52,7 @@ def zeros(
         aimed = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
         share = np.clip(aimed + aside, low, high)
         at = u0[index] + share[index, None] * chord[index]
-        mine = take(given, index) if own_given else given
-        got = correct(take(curves, index), mine, at, normal[index], own_given)
+        got = correct(curves.take(index), at, normal[index], steps[index])
         for k, i in enumerate(index):
             if not got.converged[k]:
                 near = (high[i] - low[i]) * length[i] < 4 * ASIDE

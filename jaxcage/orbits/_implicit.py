@@ -23,6 +23,7 @@ from .._types import Scalar
 from ..integrate import StrobeMap
 from ._newton import DampedNewton, NewtonState
 from ._problem import frozen
+from ._steps import GIVEN_UP, Counts
 
 
 class AbstractEquations(eqx.Module):
@@ -39,6 +40,18 @@ class AbstractEquations(eqx.Module):
     @abc.abstractmethod
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
         """The equations, their derivative, and what else is wanted at the root."""
+
+    @abc.abstractmethod
+    def by_steps(self, steps: Int[Array, ""] | int) -> "AbstractEquations":
+        """The same equations by another number of steps."""
+
+    @abc.abstractmethod
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
+
+        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
+        or of NumPy.
+        """
 
 
 def differentiated(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
@@ -59,6 +72,11 @@ class Found(eqx.Module):
     iterations: Int[Array, ""]
     newton: NewtonState
     aux: Any
+    steps: Int[Array, ""]
+    """Steps per revolution."""
+    error: Float[Array, ""]
+    """Distance to the root by half as many (see `AbstractEquations.apart`), infinite where none was found; NaN where
+    that was not looked at."""
 
 
 TOLERANCE = 1e-9
@@ -72,8 +90,9 @@ def solve(
     max_steps: int = 40,
     tolerance: Scalar = TOLERANCE,
     at_root: bool = False,
+    skip: Any = False,
 ) -> tuple[Float[Array, " n"], Found]:
-    """Newton's method from `guess`.
+    """Newton's method from `guess`; not a step of it in lanes that `skip` it.
 
     **Returns:** the root and `Found`: its Newton state is that of the last point before the root or, if `at_root`, of
     the root, for one evaluation more.
@@ -84,32 +103,66 @@ def solve(
         return r, (jacobian, aux)
 
     solver = DampedNewton(tolerance, tolerance, at_root=at_root)
-    got = optx.root_find(fn, solver, guess, given, has_aux=True, max_steps=max_steps, throw=False)
+    options = {"skip": skip}
+    got = optx.root_find(fn, solver, guess, given, options, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful
-    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1])
+    steps = jnp.zeros((), int)
+    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1], steps, jnp.asarray(jnp.nan))
+
+
+def settled(
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+) -> tuple[Float[Array, " n"], Found]:
+    """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
+
+    **Returns:** the root by the last number of steps, and `Found`.
+    """
+    once = lambda steps, u, skip: solve(equations.by_steps(steps), given, u, at_root=at_root, skip=skip)
+
+    def turn(carry: tuple) -> tuple:
+        i, u, before, done = carry
+        steps = counts.rung(i)  # the same in all lanes: numbers of their own would make them pass every step
+        v, found = once(steps, jnp.where(before.converged, u, guess), done)
+        both = before.converged & found.converged
+        error, over = equations.apart(v - u, before.newton.jacobian, found.newton.jacobian)
+        error = jnp.where(both, error, jnp.where(i == 0, jnp.nan, jnp.inf))
+        settled = both & (over <= counts.tolerance)
+        lost = ~found.converged & ~before.converged & (steps >= GIVEN_UP)
+        found = eqx.tree_at(lambda f: (f.steps, f.error), found, (steps.astype(int), error))
+        kept = jax.tree.map(lambda old, new: jnp.where(done, old, new), (u, before), (v, found))
+        return i + 1, *kept, done | settled | lost
+
+    shapes = eqx.filter_eval_shape(once, counts.last, guess, False)[1]
+    nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
+    start = jnp.zeros((), int), guess, nothing, jnp.array(False)
+    _, u, found, _ = jax.lax.while_loop(lambda carry: carry[0] < counts.rungs, turn, start)
+    return u, found
 
 
 def implicit_root(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], max_steps: int = 40, at_root: bool = False
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
-    """u with residual(u, prepare(u, given)) = 0, differentiable with respect to `given` only.
+    """u with residual(u, prepare(u, given)) = 0 by as many steps as it needs (see `settled`), differentiable with
+    respect to `given` only.
 
-    **Returns:** u, NaN where Newton's method did not get there, and `Found` (see `solve`).
+    **Returns:** u, NaN where Newton's method did not get there, and `Found`.
     """
-    settings = (max_steps, TOLERANCE, at_root)
-    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), settings=settings)
+    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), counts=counts, at_root=at_root)
     return jnp.where(found.converged, u, jnp.nan), found
 
 
 @eqx.filter_custom_jvp
-def _root(given: Any, *, equations: AbstractEquations, guess: Array, settings: tuple) -> Any:
-    return solve(equations, given, guess, *settings)
+def _root(given: Any, *, equations: AbstractEquations, guess: Array, counts: Counts, at_root: bool) -> Any:
+    return settled(equations, given, guess, counts, at_root)
 
 
 @_root.def_jvp
-def _root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, settings: tuple) -> Any:
+def _root_jvp(
+    primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, counts: Counts, at_root: bool
+) -> Any:
     (given,), (given_dot,) = primals, tangents
-    u, found = _root(given, equations=equations, guess=guess, settings=settings)
+    u, found = _root(given, equations=equations, guess=guess, counts=counts, at_root=at_root)
+    equations = equations.by_steps(found.steps)
     row = lambda v, g: numbers_of(equations.prepare(v, g))[0]
     _, remake = numbers_of(equations.prepare(u, given))
     k, k_dot = eqx.filter_jvp(lambda g: row(u, g), (given,), (given_dot,))

@@ -22,10 +22,6 @@ from ._branch import SpecialPoint
 from ._search import Stretch, SynchronousOrbits
 
 
-LOCATED_RPM = 1e-3
-"""Uncertainty given to located edges: they are exact for the equations as integrated, whose error is of this order."""
-
-
 @dataclasses.dataclass(frozen=True)
 class LossZones:
     """Synchronous-loss zones of a speed range."""
@@ -135,4 +131,4 @@ def _share(found: SynchronousOrbits, onset: SpecialPoint | None, leaves: Special
 
 
 def _edge(point: SpecialPoint | None) -> Edge | None:
-    return None if point is None else Edge(point.speed_rpm, LOCATED_RPM, "synchronous-loss", point.kind, "located")
+    return None if point is None else Edge(point.speed_rpm, point.error_rpm, "synchronous-loss", point.kind, "located")

@@ -10,7 +10,6 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._branch import SpecialPoint
 from ._cascade import Cascade, cascade
-from ._loss import LOCATED_RPM
 from ._search import SynchronousOrbits
 
 
@@ -58,7 +57,7 @@ def _source(
     ends = [s.upper if calm < 0 else s.lower for s in found.stretches]
     points = [p for p in ends if p is not None]
     away = lambda p: abs(p.speed_rpm - edge.speed_rpm)
-    here = [p for p in points if away(p) <= edge.uncertainty_rpm]
+    here = [p for p in points if away(p) <= edge.uncertainty_rpm + np.nan_to_num(p.error_rpm)]
     if here:
         return min(here, key=away)
     beyond = lambda p: 0 < calm * (p.speed_rpm - edge.speed_rpm) <= CASCADE_REACH_RPM
@@ -83,5 +82,5 @@ def _taken(edge: Edge, source: SpecialPoint | Cascade) -> Edge:
     if isinstance(source, Cascade):
         per_rpm = 30 / np.pi
         limit, error = source.limit * per_rpm, source.error * per_rpm
-        return Edge(limit, max(error, LOCATED_RPM), edge.kind, "period-doubling", "cascade")
-    return Edge(source.speed_rpm, LOCATED_RPM, edge.kind, source.kind, "located")
+        return Edge(limit, error, edge.kind, "period-doubling", "cascade")
+    return Edge(source.speed_rpm, source.error_rpm, edge.kind, source.kind, "located")

@@ -14,11 +14,12 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._parameters import get, parameter_paths
-from ..integrate import AbstractMethod, compiled, method as make_method
+from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
 from ._lens import SPEED
-from ._problem import Given, OrbitProblem, make_frame
+from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._sensitivity import _expand, _Expansion, _pull_back
+from ._steps import GIVEN_UP, SLOPE, by_steps, counted
 
 
 NEWTON, CLOSED, NEARBY = 20, 1e-10, 3.0
@@ -34,6 +35,10 @@ class LeadingMultiplier(NamedTuple):
     """d|mu| / d parameter [SI]."""
     state: Float[np.ndarray, " dim"]
     """Of the orbit at phase 0 [SI]."""
+    error: float = float("nan")
+    """Distance of the size to that by half the steps, infinite where these find no orbit."""
+    steps: int = 0
+    """Steps per revolution."""
 
 
 class _Moved(NamedTuple):
@@ -76,23 +81,44 @@ def leading_multiplier(
     **Returns:** `LeadingMultiplier`. Where two multipliers are equal in size, of one of them.
     """
     require_x64()
-    problem = OrbitProblem(make_method() if method is None else method, system.dimension, False, (SPEED,))
+    chosen, counts = counted(method)
+    problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
     at, state = jnp.asarray(speed, dtype=float), jnp.asarray(guess, dtype=float)
-    given, n = Given(system, at), system.dimension
+    given = Given(system, at)
     frame = make_frame(problem, given, state, at, 0.1 * at[None], periods)
-    u = first = jnp.append(state / frame.scale, 10.0)
+    first = jnp.append(state / frame.scale, 10.0)
+    before, steps = None, int(counts.first)
+    while True:
+        found = _by_newton(by_steps(problem, steps), given, frame, first if before is None else before[0])
+        if found is None:
+            error = np.inf
+        else:
+            error = np.inf if before is None else abs(float(found[1].size - before[1].size))
+        if steps >= int(counts.last) or error <= SLOPE * float(counts.tolerance):
+            break
+        if found is None and steps >= GIVEN_UP:
+            break
+        before, steps = found, min(2 * steps, int(counts.last))
     paths = parameter_paths(system)
+    if found is None:
+        nan = float("nan")
+        return LeadingMultiplier(nan, dict.fromkeys(paths, nan), np.full(system.dimension, nan), error, steps)
+    u, moved = found
+    pulled = _pull_back(by_steps(problem, steps), given, frame, u, moved.weight)
+    slope = {name: float(get(pulled, path)) for name, path in paths.items()}
+    return LeadingMultiplier(float(moved.size), slope, np.asarray(problem.state(u, frame)), error, steps)
+
+
+def _by_newton(problem: OrbitProblem, given: Given, frame: Frame, first: Array) -> tuple[Array, _Moved] | None:
+    """The orbit near the unknowns `first`, and its largest multiplier."""
+    n, u = problem.dimension, first
     for _ in range(NEWTON):
         around = _expand(problem, given, frame, u)
         step = jnp.linalg.solve(around.image_slope[:, :n] - jnp.eye(n), around.image - u[:n])
         size = float(jnp.max(jnp.abs(step)))
         if not size < NEARBY or float(jnp.max(jnp.abs(u - first))) > NEARBY:
-            break
+            return None
         if size < CLOSED:
-            moved = _moved(n, around)
-            pulled = _pull_back(problem, given, frame, u, moved.weight)
-            slope = {name: float(get(pulled, path)) for name, path in paths.items()}
-            return LeadingMultiplier(float(moved.size), slope, np.asarray(problem.state(u, frame)))
+            return u, _moved(n, around)
         u = u.at[:n].add(-step)
-    nan = float("nan")
-    return LeadingMultiplier(nan, dict.fromkeys(paths, nan), np.full(n, nan))
+    return None

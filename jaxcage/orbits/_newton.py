@@ -45,10 +45,10 @@ class DampedNewton(optx.AbstractRootFinder):
     at_root: bool = False
 
     def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> NewtonState:
-        del fn, args, options, aux_struct, tags
-        n = y.size
+        del fn, args, aux_struct, tags
+        n, done = y.size, jnp.asarray(options.get("skip", False))
         full = lambda *shape: jnp.full(shape, jnp.inf)
-        return NewtonState(y, full(n, n), full(n), jnp.full(f_struct.shape, jnp.inf), jnp.ones(()), jnp.array(False))
+        return NewtonState(y, full(n, n), full(n), jnp.full(f_struct.shape, jnp.inf), jnp.ones(()), done)
 
     def step(self, fn: Any, y: Any, args: Any, options: Any, state: NewtonState, tags: Any) -> Any:
         del options, tags

@@ -10,15 +10,18 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method, strobe_map
+from ..integrate import AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem
 from ._implicit import AbstractEquations, by_columns, implicit_root, numbers_of
 from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
+from ._steps import ENOUGH, IMAGE, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
 Period = Literal["driven", "free"]
 ROUNDING = 1e-13
+AT_REST = 1e-3
+"""A simulation has led to an orbit where it moves by less, in units of the system's scale."""
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 
@@ -41,12 +44,22 @@ class OrbitEquations(AbstractEquations):
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
         problem, frame, n = self.problem, self.frame, self.problem.dimension
         drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
-        image, columns, _ = ReturnMap(self.prepare(u, given), frame).pushed(u[:n], drifts)
+        image, columns = ReturnMap(self.prepare(u, given), frame).pushed(u[:n], drifts)
         r = problem.orbit_residual(u[:n], image, frame)
         jacobian = columns - jnp.eye(n, u.size)
         if problem.free_speed:
             jacobian = jnp.concatenate([jacobian, jnp.zeros((1, u.size)).at[0, :n].set(frame.phase_direction)])
         return r, jacobian, None
+
+    def by_steps(self, steps: Any) -> "OrbitEquations":
+        return OrbitEquations(by_steps(self.problem, steps), self.frame)
+
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """By the change of the map, and of its derivative over its own size."""
+        n = self.problem.dimension
+        image = abs(fine @ moved[..., None])[..., 0].max(-1)
+        size = lambda m: abs(m[..., :n, :n]).max((-2, -1))
+        return image, image / IMAGE + size(fine - coarse) / (1 + size(fine)) / SLOPE
 
 
 class _Monodromy(eqx.Module):
@@ -77,10 +90,22 @@ class Orbit(eqx.Module):
     liouville: Float[Array, ""]
     """log|det M| less the integral of the field's divergence over the orbit, which it must equal; both not below what
     rounding resolves of the smallest multiplier, so that orbits with strong damping are judged by the others."""
+    steps: Int[Array, ""]
+    """Steps per revolution; 1 where the method has no such number."""
+    error: Float[Array, ""]
+    """Largest component of the change of P at the orbit against half as many steps, in units of the system's scale;
+    infinite where there is no orbit by these, NaN where the method has no number of steps."""
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
     self_excited: bool = eqx.field(static=True)
+    solver: Any = eqx.field(static=True)
+    """What takes these steps, or the whole method where it chooses them itself."""
+
+    @property
+    def method(self) -> AbstractMethod:
+        """The method by which it is an orbit, with its steps."""
+        return self.solver if isinstance(self.solver, AbstractMethod) else FixedSteps(self.solver, self.steps)
 
     @property
     def period(self) -> Array:
@@ -111,7 +136,8 @@ class Orbit(eqx.Module):
             f"Period-{int(self.periods)} orbit at {float(self.speed) * 30 / jnp.pi:.1f} rpm, {what}\n"
             f"  state       {', '.join(f'{float(c):.6g}' for c in self.state)}\n"
             f"  multipliers {mu}\n"
-            f"  residual {float(self.residual):.1e}, Liouville {float(self.liouville):.1e}, {self.status}"
+            f"  residual {float(self.residual):.1e}, Liouville {float(self.liouville):.1e}, {self.status}\n"
+            f"  {int(self.steps)} steps per revolution, map to {float(self.error):.1e} of the scale"
         )
 
     _repr_html_ = notebook_html
@@ -139,25 +165,43 @@ def _resolved(m: Float[Array, "dim dim"]) -> Float[Array, ""]:
     return jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
 
 
-def settle(
-    system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod, start: Array, revolutions: Any
-) -> Float[Array, " dim"]:
-    """State after `revolutions` from `start`."""
-    strobe = strobe_map(system, speed, method)
-    y = tuple(start[i] for i in range(start.size))
-    return jnp.stack(jax.lax.fori_loop(0, revolutions, lambda _, y: strobe(y).y, y))
+def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts) -> Float[Array, " dim"]:
+    """State after `revolutions` from `start` and, while that is not at rest, after as many again by twice the steps."""
+    given = frozen(given)
+    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
+    counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
+
+    def turn(i: Array, carry: tuple) -> tuple:
+        y, done = carry
+        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.rung(i)).method)
+        begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
+        row = tuple(begin[k] for k in range(start.size))
+        spin = jnp.where(done, 0, revolutions)
+        z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
+        return z, done | (jnp.max(jnp.abs(z - y) / scale) < AT_REST * counts.tolerance)
+
+    return jax.lax.fori_loop(0, counts.rungs, turn, (start, jnp.array(False)))[0]
 
 
 @compiled
-def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, periods: Any, revolutions: Any) -> Orbit:
+def _find(
+    problem: OrbitProblem,
+    counts: Counts,
+    spinning: Counts,
+    given: Given,
+    guess: Array,
+    speed: Scalar,
+    periods: Any,
+    revolutions: Any,
+) -> Orbit:
     if revolutions is not None:
-        guess = settle(frozen(given.system), jax.lax.stop_gradient(speed), problem.method, guess, revolutions)
+        guess = settle(problem, Given(given.system, speed), guess, revolutions, spinning)
     frame = make_frame(problem, given, guess, speed, jnp.ones(0), periods)
     u0 = guess / frame.scale
     if problem.free_speed:
         u0 = jnp.append(u0, 1.0)
-    u, found = implicit_root(OrbitEquations(problem, frame), given, u0, at_root=True)
-    n = problem.dimension
+    u, found = implicit_root(OrbitEquations(problem, frame), given, u0, counts, at_root=True)
+    n, problem = problem.dimension, by_steps(problem, found.steps)
     strobe, z = problem.prepare(u, given, frame), u[:n]
     at_root = frozen(found.newton)  # image and derivative of the map are those of Newton's last evaluation
     known = jnp.where(found.converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
@@ -173,10 +217,13 @@ def _find(problem: OrbitProblem, given: Given, guess: Array, speed: Scalar, peri
         monodromy=monodromy,
         residual=jnp.max(jnp.abs(at_root.residual[:n])),
         liouville=jnp.maximum(jnp.linalg.slogdet(frozen(monodromy))[1], floor) - jnp.maximum(expected, floor),
+        steps=found.steps,
+        error=found.error,
         converged=found.converged,
         iterations=found.iterations,
         periods=frame.periods,
         self_excited=problem.free_speed,
+        solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
     )
 
 
@@ -199,21 +246,31 @@ def periodic_orbit(
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
     - `revolutions`: simulate so many before Newton takes over; by default 200 without a guess and none with one.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
-    - `method`: integration method, by default the library's own.
+    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, where that is not
+        stable, by Rodas4 (which only without `jit` and `vmap`).
 
-    **Returns:** `Orbit`; it does not raise if there is none. Works under `jit` and `vmap`. State, speed and multipliers
-    have derivatives of every order with respect to `system` and `speed`, through the equation P(z) = z.
+    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and
+    `vmap`. State, speed and multipliers have derivatives of every order with respect to `system` and `speed`, through
+    the equation P(z) = z.
     """
     require_x64()
-    chosen = make_method() if method is None else method
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), ())
+    free = is_free(period)
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)
+    once = revolutions is not None  # and no more than asked for
     if revolutions is None and guess is None:
         revolutions = 200
     spin = None if revolutions is None else jnp.asarray(revolutions)
     first = guess.speed if isinstance(guess, Orbit) and period == "free" else given.speed
-    return _find(problem, given, start, first, jnp.asarray(periods), spin)
+
+    def find(method: AbstractMethod, counts: Counts) -> Orbit:
+        problem = OrbitProblem(method, system.dimension, free, ())
+        counts = from_steps(counts, getattr(guess, "steps", None))
+        enough = jnp.minimum(counts.last, ENOUGH)
+        spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
+        return _find(problem, counts, spinning, given, start, first, jnp.asarray(periods), spin)
+
+    return that_serves(find, method)
 
 
 def is_free(period: str) -> bool:

@@ -9,19 +9,21 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, compiled, method as make_method
+from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
-from ._implicit import AbstractEquations, Found, differentiated, implicit_root, solve
+from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._orbit import OrbitEquations, guess_state, is_free, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
+from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 
 
-POINT_OUTCOMES = ("converged", "no such point", "other kind", "tangential")
+POINT_OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged")
 """How a search for a bifurcation point ended, in the order of the codes: converged; Newton's method found no point;
 it found one at which the multipliers are not those of the kind asked for (a neutral saddle instead of a torus
-bifurcation); or one at which the multiplier hardly crosses, so that its place is not a function of the design."""
+bifurcation); or one at which the multiplier hardly crosses, so that its place is not a function of the design; or one
+that is elsewhere by half the steps."""
 
 TANGENTIAL = 1e-2
 """A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
@@ -55,7 +57,7 @@ class PointEquations(AbstractEquations):
         strobe, drift = prepared
         n, m = self.problem.dimension, self.problem.equations
         z = u[:n]
-        image, columns, _ = ReturnMap(strobe, self.frame).pushed(z, [] if drift is None else [drift])
+        image, columns = ReturnMap(strobe, self.frame).pushed(z, [] if drift is None else [drift])
         monodromy = columns[:, :n]
         closing = self.problem.orbit_residual(z, image, self.frame)
         g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
@@ -66,6 +68,15 @@ class PointEquations(AbstractEquations):
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
         return differentiated(self, u, given)
+
+    def by_steps(self, steps: Any) -> "PointEquations":
+        return eqx.tree_at(lambda e: e.problem, self, by_steps(self.problem, steps))
+
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """By the change of the parameters, a unit of which is a tenth of their size."""
+        m = self.problem.equations
+        shift = abs(moved[..., m : m + len(self.problem.parameters)]).max(-1)
+        return shift, shift / (10 * POINT)
 
     @property
     def borders(self) -> tuple[Array, Array]:
@@ -93,6 +104,10 @@ class BifurcationPoint(eqx.Module):
 
     value: Float[Array, ""]
     """Value of the parameter [SI]; differentiable."""
+    error: Float[Array, ""]
+    """Distance of the value to that by half the steps [SI]; NaN where the method has no number of steps."""
+    steps: Int[Array, ""]
+    """Steps per revolution."""
     speed: Float[Array, ""]
     """Speed [rad/s]; differentiable."""
     state: Float[Array, " dim"]
@@ -121,6 +136,11 @@ class BifurcationPoint(eqx.Module):
         return self.speed * 30 / jnp.pi
 
     @property
+    def error_rpm(self) -> Float[Array, ""]:
+        """Error of a speed in revolutions per minute."""
+        return self.error * 30 / jnp.pi
+
+    @property
     def converged(self) -> Bool[Array, ""]:
         """Whether a point of the kind asked for was found."""
         return (self.outcome == 0) | (self.outcome == 3)
@@ -139,8 +159,10 @@ class BifurcationPoint(eqx.Module):
         if not bool(self.converged):
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e})"
         angle = f", angle {float(self.angle) * 180 / jnp.pi:.2f} deg" if self.kind == "torus" else ""
+        error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         return (
-            f"{self.kind} at {float(self.speed_rpm):.3f} rpm, {self.parameter} = {float(self.value):.9g}{angle}\n"
+            f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
+            f"+- {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
             f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
         )
 
@@ -179,14 +201,18 @@ def bifurcation(
     require_x64()
     if kind not in get_args(Kind):
         raise ValueError(f"Argument `kind` must be one of {', '.join(KINDS)}, but '{kind}' was given.")
-    chosen = make_method() if method is None else method
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
+    free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
-    periods = getattr(guess, "periods", 1) if periods is None else periods
-    return _find_point(
-        problem, given, cast(Kind, kind), start, jnp.asarray(first, dtype=float), at, jnp.asarray(periods), spin
-    )
+    periods = jnp.asarray(getattr(guess, "periods", 1) if periods is None else periods)
+
+    def find(method: AbstractMethod, counts: Counts) -> BifurcationPoint:
+        problem = OrbitProblem(method, system.dimension, free, (parameter,))
+        counts = from_steps(counts, getattr(guess, "steps", None))
+        begin = jnp.asarray(first, dtype=float)
+        return _find_point(problem, counts, given, cast(Kind, kind), start, begin, at, periods, spin)
+
+    return that_serves(find, method, MOST_OF_A_POINT)
 
 
 def _read_guess(
@@ -215,6 +241,7 @@ def _read_guess(
 @compiled
 def _find_point(
     problem: OrbitProblem,
+    counts: Counts,
     given: Given,
     kind: Kind,
     start: Array,
@@ -227,24 +254,24 @@ def _find_point(
     unit = frozen(jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at)))
     system, here = with_value(frozen(given.system), frozen(speed), parameter, at)
     if spin:
-        start = settle(system, here, problem.method, start, 200)
+        start = settle(problem, Given(system, here), start, 200, counts)
     frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
     u0 = start / frame.scale
     if problem.free_speed:
         u0 = jnp.append(u0, 1.0)
     if spin:  # on the orbit itself, if there is one here
         fixed = OrbitProblem(problem.method, problem.dimension, problem.free_speed, ())
-        u1, found = solve(OrbitEquations(fixed, frame), Given(system, here), u0)
+        u1, found = settled(OrbitEquations(fixed, frame), Given(system, here), u0, counts)
         u0 = jnp.where(found.converged, u1, u0)
     u0 = jnp.append(u0, at / unit)
-    strobe = problem.prepare(u0, frozen(given), frame)
-    _, monodromy, _ = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
+    strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, frozen(given), frame)
+    _, monodromy = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
     a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, frame, left, right, kind)
-    u, found = implicit_root(equations, given, u0)
+    u, found = implicit_root(equations, given, u0, counts, at_root=True)
     return _describe(equations, u, found, given)
 
 
@@ -257,14 +284,19 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     rate = critical_rate(kind, problem.equations, frozen(found.newton.jacobian), known, frozen(equations.borders))
     value = problem.values(u, frame)[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
+    error = found.error * frame.units[0]
+    moving = error > SETTLED * jnp.maximum(jnp.abs(value), 10 * frame.units[0])
     tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(frozen(u[problem.equations])), 10.0) < TANGENTIAL
-    outcome = jnp.where(found.converged, jnp.where(matches, jnp.where(tangential, 3, 0), 2), 1)
-    keep = lambda x: jnp.where((outcome == 0) | (outcome == 3), x, jnp.nan)
+    kept = jnp.where(moving, 4, jnp.where(tangential, 3, 0))
+    outcome = jnp.where(found.converged, jnp.where(matches, kept, 2), 1)
+    keep = lambda x: x * jnp.where((outcome == 0) | (outcome == 3), 1.0, jnp.nan)  # its derivative is NaN too
     direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
     length = jnp.linalg.norm(direction)
     (parameter,) = problem.parameters
     return BifurcationPoint(
         value=keep(value),
+        error=frozen(error),
+        steps=found.steps,
         speed=keep(jnp.asarray(problem.speed(u, given, frame), dtype=float)),
         state=keep(problem.state(u, frame)),
         multipliers=jnp.where(found.converged, multipliers, jnp.nan),

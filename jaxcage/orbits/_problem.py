@@ -69,23 +69,23 @@ class ReturnMap(eqx.Module):
         y = jax.lax.fori_loop(0, self.frame.periods, lambda _, y: self.strobe(y).y, y)
         return jnp.stack(y) / scale
 
-    def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array, Array]:
+    def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
         """The image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each drift
-        of the field's numbers (in a column each); the sum of the error estimates, in units of the system's scale."""
+        of the field's numbers (in a column each)."""
         scale, n = self.frame.scale, z.size
         zero = jnp.zeros(())
         basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
-        start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)), zero)
+        start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
         along = [*[None] * n, *drifts]
 
         def once(_: Array, carry: tuple) -> tuple:
-            y, tangents, error = carry
+            y, tangents = carry
             moved = pushed(self.strobe, y, tangents, along)
-            return moved.y, moved.tangents, error + moved.error
+            return moved.y, moved.tangents
 
-        y, tangents, error = jax.lax.fori_loop(0, self.frame.periods, once, start)
+        y, tangents = jax.lax.fori_loop(0, self.frame.periods, once, start)
         columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
-        return jnp.stack(y) / scale, columns / scale[:, None], error
+        return jnp.stack(y) / scale, columns / scale[:, None]
 
 
 class OrbitProblem(eqx.Module):

@@ -28,6 +28,7 @@ from ._branch import (
     is_stable,
     make_follower,
     seeds,
+    stable_steps,
 )
 from ._lens import SPEED
 
@@ -94,6 +95,11 @@ class SynchronousOrbits:
         """All bifurcations on all branches, by speed."""
         return _distinct([p for b in self.branches for p in b.special])
 
+    @property
+    def unsettled(self) -> int:
+        """How many bifurcations are elsewhere, or nowhere, by half the steps: none of them is in `points`."""
+        return sum(p.status != "converged" for b in self.branches for p in b.special)
+
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
         """Orbits at `speed` [rad/s]: branch, whether stable, state [SI], multipliers; to the accuracy of the steps."""
         found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
@@ -141,7 +147,7 @@ class _Piece(NamedTuple):
 def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
     """The stable parts of a branch over speed, cut to the limits [rpm]."""
     found = []
-    edges = {p.index: p for p in branch.special if p.edge}
+    edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
     change = np.flatnonzero(np.diff(branch.stable.astype(int)))
     bounds = [-1, *change.tolist(), branch.value.size - 1]
     for first, last in zip(bounds[:-1], bounds[1:], strict=True):
@@ -183,10 +189,9 @@ def _merged(pieces: Sequence[_Piece], scale: Callable[[float], np.ndarray]) -> l
 def _distinct(points: Sequence[SpecialPoint]) -> tuple[SpecialPoint, ...]:
     """Points by speed, those met twice taken once."""
     kept: list[SpecialPoint] = []
-    for p in sorted(points, key=lambda p: p.value):
-        same = lambda q: (
-            q.kind == p.kind and abs(q.value - p.value) < 1e-6 * p.value and np.allclose(q.state, p.state, 1e-3)
-        )
+    for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
+        apart = lambda q: max(1e-6 * p.value, p.error + q.error) if p.error + q.error >= 0 else 1e-6 * p.value
+        same = lambda q: q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)
         if not any(same(q) for q in kept[-6:]):
             kept.append(p)
     return tuple(kept)
@@ -226,6 +231,10 @@ def synchronous_orbits(
             progress=lambda done, of: say("simulations", done, of),
         )
     follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
+    met = _met(settled)
+    if met:
+        middle = met[len(met) // 2]
+        follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])), 1)
     orbits = waiting = _stable_orbits(follower, settled)
     branches: list[Branch] = []
     for turn in range(ROUNDS):
@@ -257,14 +266,19 @@ class _Settled(NamedTuple):
     start: int
 
 
+def _met(settled: Sweep) -> list[list[int]]:
+    """Speed and start of the simulations that settled on a synchronous orbit."""
+    return np.argwhere(settled.label == "periodic-1").tolist()
+
+
 def _stable_orbits(follower: Follower, settled: Sweep) -> list[_Settled]:
     """Stable orbits on which simulations settled, by speed, corrected by Newton's method."""
-    lanes = np.argwhere(settled.label == "periodic-1").tolist()
+    lanes = _met(settled)
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
     frame = follower.frame(jnp.asarray(met[0][0]), met[0][1], 1)
-    _, points = seeds(follower, frame, met)
+    points = seeds(follower, frame, met)
     good = points.converged.copy()
     good[good] = is_stable(eigenvalues(follower.monodromy(take(points, good))), follower.problem.free_speed)
     states = points.u[:, :-1] * np.asarray(frame.scale)

@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..integrate import AbstractMethod, compiled, method as make_method
+from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
 from ._branch import SpecialPoint
 from ._cascade import FEIGENBAUM, Cascade
@@ -28,11 +28,12 @@ from ._lens import SPEED
 from ._point import TANGENTIAL, BifurcationPoint, Singular, critical_rate
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
+from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 
 
 PER_RPM = np.pi / 30
 POLISHING = 6
-POLISHED, SETTLED, NEARBY = 1e-11, 1e-7, 0.5
+POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
 """Newton's steps end below the first, must be below the second, and may lead no further than the third, in units of the
 system's scale and of a tenth of the speed."""
 
@@ -46,6 +47,8 @@ class Located(NamedTuple):
     state: Float[np.ndarray, " dim"]
     """State of the orbit at phase 0 [SI]."""
     periods: int = 1
+    steps: int = 0
+    """Steps per revolution that were right nearby; 0 where they are not known."""
 
 
 Point: TypeAlias = SpecialPoint | BifurcationPoint | Located
@@ -69,6 +72,10 @@ class Sensitivity:
     status: str
     state: Float[np.ndarray, " dim"] | None = None
     """State of the orbit at phase 0 [SI]; of a width or limit None."""
+    error_rpm: float = float("nan")
+    """Distance of the value to that by half the steps."""
+    steps: int = 0
+    """Steps per revolution; of a width or limit 0."""
 
     @property
     def trusted(self) -> bool:
@@ -78,7 +85,8 @@ class Sensitivity:
     def __str__(self) -> str:
         order = sorted(self.elasticity, key=lambda n: -abs(self.elasticity[n]))
         rows = [f"  {n:<28} {self.elasticity[n]:+.6f}" for n in order if self.elasticity[n] != 0.0]
-        return "\n".join([f"{self.name}: {self.kind} at {self.value_rpm:.3f} rpm, elasticities", *rows])
+        at = f"{self.kind} at {self.value_rpm:.3f} +- {self.error_rpm:.1g} rpm"
+        return "\n".join([f"{self.name}: {at}, elasticities", *rows])
 
     _repr_html_ = notebook_html
 
@@ -101,7 +109,7 @@ def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, "
     k, remake = numbers_of(problem.prepare(u, given, frame))
 
     def both(x: Array) -> tuple[Any, Any]:
-        image, monodromy, _ = ReturnMap(remake(x[n:]), frame).pushed(x[:n])
+        image, monodromy = ReturnMap(remake(x[n:]), frame).pushed(x[:n])
         return (image, monodromy), (image, monodromy)
 
     slopes, values = jax.jacfwd(both, has_aux=True)(jnp.concatenate([u[:n], k]))
@@ -142,7 +150,7 @@ def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
 
 
 class _Edge(NamedTuple):
-    """An edge located to rounding."""
+    """An edge located to rounding, by some number of steps."""
 
     problem: OrbitProblem
     given: Given
@@ -150,20 +158,54 @@ class _Edge(NamedTuple):
     u: Array
     unfolding: _Unfolding
     found: bool
+    error: float = float("nan")
+    """Distance of the speed to that by half the steps [rad/s]."""
+    steps: int = 0
 
     @property
     def speed(self) -> float:
         return float(self.problem.values(self.u, self.frame)[0])
 
+    @property
+    def residual(self) -> Array:
+        return self.unfolding.residual
 
-def _located(system: AbstractForcedSystem, point: Point, method: Any) -> _Edge:
-    kind: Any = point.kind
-    chosen = make_method() if method is None else method
+    @property
+    def status(self) -> str:
+        if not self.found:
+            return "no such point"
+        return "not converged" if self.error > SETTLED * self.speed else "converged"
+
+
+def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
+    """The edge near `point`, solved for again by twice the steps until it stays where it is."""
+    return that_serves(lambda chosen, counts: _settled(system, point, chosen, counts), method, MOST_OF_A_POINT)
+
+
+def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod, counts: Counts) -> _Edge:
     problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
+    first, last, tolerance = (float(c) for c in from_steps(counts, int(point.steps) or None))
     speed, state = jnp.asarray(point.speed, dtype=float), jnp.asarray(point.state)
     given = Given(system, speed)
     frame = make_frame(problem, given, state, speed, 0.1 * speed[None], point.periods)
-    u = first = jnp.append(state / frame.scale, 10.0)
+    begin = jnp.append(state / frame.scale, 10.0)
+    before, steps = None, int(first)
+    while True:
+        near = begin if before is None or not before.found else before.u
+        edge = _polished(by_steps(problem, steps), given, frame, point.kind, near)
+        if before is not None:
+            both = before.found and edge.found
+            edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
+        edge = edge._replace(steps=steps)
+        lost = not edge.found and steps >= GIVEN_UP and not (before is not None and before.found)
+        if edge.error <= POINT * edge.speed * tolerance or steps >= last or lost:
+            return edge
+        before, steps = edge, min(2 * steps, int(last))
+
+
+def _polished(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, first: Array) -> _Edge:
+    """The edge near the unknowns `first`, by the steps of the problem."""
+    u = first
     unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, frame, u))
     here = unfold(u)
     for _ in range(POLISHING):
@@ -174,16 +216,17 @@ def _located(system: AbstractForcedSystem, point: Point, method: Any) -> _Edge:
         u = u - step
         here = unfold(u)
     size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
-    return _Edge(problem, given, frame, u, here, bool(size < SETTLED))
+    return _Edge(problem, given, frame, u, here, bool(size < SETTLED_TO))
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
-    """Speed [rad/s] of the edge near `point`, located to rounding; NaN if Newton's method does not find it."""
+    """Speed [rad/s] of the edge near `point`; NaN if Newton's method does not find it, or elsewhere by half the
+    steps."""
     require_x64()
     if point.kind == "branch-point":
         raise ValueError("Argument `point` must be a period-doubling, torus or fold, but it is a branch-point.")
     edge = _located(system, point, method)
-    return edge.speed if edge.found else float("nan")
+    return edge.speed if edge.status == "converged" else float("nan")
 
 
 def sensitivity(
@@ -194,19 +237,21 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
-    The point is located to rounding by Newton's method first. One expansion of the return map to second order serves
-    that, every kind of bifurcation and all parameters; `bifurcation` gives the same derivatives, and higher ones.
+    The point is located by Newton's method first, and again by twice the steps until it stays where it is. One
+    expansion of the return map to second order serves that, every kind of bifurcation and all parameters; `bifurcation`
+    gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
-    **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again, and for a branch point.
+    **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again, or elsewhere by half the steps,
+    and for a branch point.
     """
     require_x64()
     if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design
         return _nowhere(system, point.kind, name)
     edge = _located(system, point, method)
-    if not edge.found:
-        return _nowhere(system, point.kind, name)
+    if edge.status != "converged":
+        return _nowhere(system, point.kind, name, edge.status, edge.error / PER_RPM)
     unit, here, speed = float(edge.frame.units[0]), edge.unfolding, edge.speed
     adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(edge.u.size).at[-1].set(1.0))
     weight = -(adjoint @ here.of_numbers) * unit
@@ -224,14 +269,23 @@ def sensitivity(
         transversality=rate,
         status="tangential" if abs(rate * speed) < TANGENTIAL else "converged",
         state=np.asarray(edge.problem.state(edge.u, edge.frame)),
+        error_rpm=edge.error / PER_RPM,
+        steps=edge.steps,
     )
 
 
-def _nowhere(system: AbstractForcedSystem, kind: str, name: str) -> Sensitivity:
-    """What is known of an edge that was not found again."""
+def _nowhere(
+    system: AbstractForcedSystem,
+    kind: str,
+    name: str,
+    status: str = "no such point",
+    error_rpm: float = float("nan"),
+) -> Sensitivity:
+    """What is known of an edge that was not found again, or elsewhere."""
     nan = float("nan")
     row = dict.fromkeys(parameter_paths(system), nan)
-    return Sensitivity(name, kind, nan, row, row, dict.fromkeys(("mass", "length", "time"), nan), nan, "no such point")
+    broken: dict[str, float] = dict.fromkeys(("mass", "length", "time"), nan)
+    return Sensitivity(name, kind, nan, row, row, broken, nan, status, error_rpm=error_rpm)
 
 
 def _homogeneity(system: AbstractForcedSystem, elasticity: Mapping[str, float]) -> dict[str, float]:
@@ -280,4 +334,5 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
         homogeneity={b: weighted([s.homogeneity[b] for _, s in parts]) for b in first.homogeneity},
         transversality=min(abs(s.transversality) for _, s in parts),
         status=next((s.status for _, s in parts if not s.trusted), "converged"),
+        error_rpm=sum(abs(w) * s.error_rpm for w, s in parts),
     )

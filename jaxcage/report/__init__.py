@@ -38,10 +38,12 @@ from ._operating import (
 from ._orbit_tables import (
     coexisting_notes as coexisting_notes,
     edge_table as edge_table,
+    error_cell as error_cell,
     loss_table as loss_table,
     multiplier_cell as multiplier_cell,
     orbits_document as orbits_document,
     stretch_table as stretch_table,
+    unsettled_notes as unsettled_notes,
 )
 from ._page import Judged as Judged, judge as judge, page as page
 from ._slopes import edge_slopes as edge_slopes

@@ -88,7 +88,7 @@ def examine(
     revolutions: int,
     blocks: int,
     sweep_method: AbstractMethod | None,
-    orbit_method: AbstractMethod,
+    orbit_method: AbstractMethod | None,
     quick: bool = False,
     progress: Progress | None = None,
 ) -> Findings:
@@ -135,7 +135,7 @@ def examine(
     with timed("map"):
         chart = _map(model, loss, speeds, orbit_method, sweep_method, quick, say)
     shared = load_distribution(model.bearing, model.load) if float(model.load) > 0 else None
-    about = f"{orbit_method}"
+    about = "as many as each orbit needs" if orbit_method is None else f"{orbit_method}"
     return Findings(name, model, published, swept, found, loss, explained, slopes, chart, shared, quick, about, seconds)
 
 
@@ -143,7 +143,7 @@ def _map(
     model: CageModel,
     loss: LossZones,
     speeds: np.ndarray,
-    orbit_method: AbstractMethod,
+    orbit_method: AbstractMethod | None,
     sweep_method: AbstractMethod | None,
     quick: bool,
     say: Progress,

@@ -46,7 +46,7 @@ class Axis:
 
 
 def follow_edges(
-    model: CageModel, edges: Mapping[str, SpecialPoint], x: Axis, y: Axis, method: AbstractMethod, say: Say
+    model: CageModel, edges: Mapping[str, SpecialPoint], x: Axis, y: Axis, method: AbstractMethod | None, say: Say
 ) -> tuple[list[Curve], dict[str, str]]:
     """A curve through each named edge, and why where there is none."""
     curves, refused = [], {}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis import Zone
+from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, SpecialPoint, Stretch, SynchronousOrbits
 from ._table import Table, number
@@ -32,6 +32,8 @@ def point_document(point: SpecialPoint, branch: int | None) -> dict[str, Any]:
     return {
         "kind": point.kind,
         "speed_rpm": point.speed_rpm,
+        "error_rpm": point.error_rpm,
+        "steps": point.steps,
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
         "edge": point.edge,
@@ -97,6 +99,7 @@ def orbits_document(
             for i, (onset, exit_) in enumerate(published_zones(published), start=1)
         ],
         "missed": found.missed,
+        "unsettled": found.unsettled,
     }
 
 
@@ -130,8 +133,13 @@ def loss_table(name: str, found: SynchronousOrbits, loss: LossZones, published: 
 def _zone_cells(zone: Zone) -> list[str]:
     cells = []
     for edge in (zone.onset, zone.exit):
-        cells += ["past range", "-"] if edge is None else [number(edge.speed_rpm, 2), edge.mechanism]
+        cells += ["past range", "-"] if edge is None else [edge_cell(edge), edge.mechanism]
     return [*cells, number(zone.width_rpm, 2, nothing="open")]
+
+
+def edge_cell(edge: Edge) -> str:
+    """A located edge with its error."""
+    return f"{number(edge.speed_rpm, 2)} ± {error_cell(edge.uncertainty_rpm)}"
 
 
 def _span_cell(span: Span) -> str:
@@ -154,6 +162,7 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
     rows = [
         (
             number(p.speed_rpm, 3),
+            error_cell(p.error_rpm),
             p.kind,
             multiplier_cell(p),
             number(angle_deg(p), 2),
@@ -162,8 +171,19 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
         )
         for p in found.edges
     ]
-    columns = ("speed [rpm]", "kind", "multiplier", "angle [°]", "branch", "edge of")
-    return Table(f"Ends of the stable synchronous orbits of {name}", columns, rows or [("none", *5 * ("-",))])
+    columns = ("speed [rpm]", "±", "kind", "multiplier", "angle [°]", "branch", "edge of")
+    return Table(f"Ends of the stable synchronous orbits of {name}", columns, rows or [("none", *6 * ("-",))])
+
+
+def error_cell(error_rpm: float) -> str:
+    """The error of a speed; `-` where the method has no number of steps that could be halved."""
+    return "-" if math.isnan(error_rpm) else f"{error_rpm:.1g}"
+
+
+def unsettled_notes(found: SynchronousOrbits) -> list[str]:
+    """Bifurcations that were left out."""
+    count = found.unsettled
+    return [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
 
 
 def multiplier_cell(point: SpecialPoint) -> str:

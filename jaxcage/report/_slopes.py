@@ -6,7 +6,7 @@ from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivi
 
 
 def edge_slopes(
-    model: CageModel, loss: LossZones, explained: Explained, method: AbstractMethod
+    model: CageModel, loss: LossZones, explained: Explained, method: AbstractMethod | None
 ) -> dict[str, Sensitivity]:
     """Sensitivities of the synchronous-loss edges, and of chaotic edges that coincide with something exact."""
     slopes = sensitivities(model, loss.edges, method)

@@ -48,9 +48,9 @@ def doubtful(label: Shaped[np.ndarray, "*systems speeds starts"]) -> Int[np.ndar
 
 
 def confirm(
-    lanes: Int[np.ndarray, " lanes"],
+    lanes: Int[np.ndarray, " some"],
     judged: Judged,
-    again: Callable[[Int[np.ndarray, " lanes"], int], Judged],
+    again: Callable[[Int[np.ndarray, " some"], int], Judged],
 ) -> tuple[Confirmation, ...]:
     """Run `lanes` again with finer and finer steps, as long as what they are called changes.
 

@@ -29,7 +29,7 @@ def blocks_to(horizon: int, after: int) -> int:
     return -(-max(horizon - after, 0) // LIFE_BLOCK) + CONFIRM
 
 
-def unsettled(label: Shaped[np.ndarray, " lanes"]) -> Int[np.ndarray, " lanes"]:
+def unsettled(label: Shaped[np.ndarray, " lanes"]) -> Int[np.ndarray, " some"]:
     """Lanes that must be followed: chaotic ones, and those of which nothing is known."""
     return np.flatnonzero(np.isin(label, ("chaotic", "undecided")))
 
@@ -41,8 +41,8 @@ def follow(
     discard: int,
     scale: Float[np.ndarray, "lanes dim"],
     blocks: int,
-    run: Callable[[Int[np.ndarray, " lanes"]], Observation],
-) -> tuple[Int[np.ndarray, " lanes"], Observation | None, Lasting]:
+    run: Callable[[Int[np.ndarray, " some"]], Observation],
+) -> tuple[Int[np.ndarray, " some"], Observation | None, Lasting]:
     """Follow the lanes that are not settled.
 
     **Arguments:** labels; growth of the largest exponent in the observed blocks of so many revolutions, after those

@@ -7,6 +7,7 @@
 | `_pulses`     | the impact of a roller on a bar, and the train of all of them                |
 | `_field`      | the equations of motion of a dictionary of numbers, cage alone or with a rib |
 | `_integrate`  | revolutions and the growth of a tangent vector                               |
+| `_shooting`   | orbits and bifurcations by Newton's method                                   |
 | `_random`     | random legal models by seed                                                  |
 
 Formulas come from the physics page and, where that leaves a detail open, from the package's docstrings; none of its
@@ -35,4 +36,5 @@ from ._random import (
     random_speeds as random_speeds,
     random_state as random_state,
 )
+from ._shooting import bifurcation as bifurcation
 from ._statics import half_angle as half_angle, hunt_crossley_number as hunt_crossley_number, viscosity as viscosity

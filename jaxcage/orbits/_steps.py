@@ -1,0 +1,104 @@
+"""How many steps a revolution of an orbit takes: doubled until the orbit by half as many is the same.
+
+The map of equal steps is as smooth as the field, so that roots and derivatives are exact for it; how far it is from
+the true one is seen by solving again with twice the steps, from the orbit known. An orbit that stays off the land needs
+256 to 1024 steps; where it touches, the smoothed onset of the contact is to be resolved, and takes 4096 to 16384.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax.core import Tracer
+from jaxtyping import Array, Float, Int
+
+from ..integrate import AbstractMethod, FixedSteps, method as make_method
+
+
+FIRST, MOST = 256, 16384
+MOST_OF_A_POINT = 2 * MOST
+"""A bifurcation point by 16384 steps is confirmed by twice as many."""
+ENOUGH = 4096
+"""Most steps of what only leads to an orbit."""
+GIVEN_UP = 2048
+"""Where so many steps find nothing, as many again are not tried."""
+IMAGE, SLOPE = 1e-6, 1e-3
+"""Largest change of the map, in units of the system's scale, and of its derivative, of its size and one, between an
+orbit's steps and half as many."""
+POINT = 1e-7
+"""The same for the place of a bifurcation, relative."""
+SETTLED = 2e-4
+"""A point whose place changes by more, relative, is not known."""
+STIFF_FIRST = 512
+
+
+class Counts(NamedTuple):
+    """The numbers of steps to try, each twice the one before."""
+
+    first: Int[Array, ""]
+    last: Int[Array, ""]
+    tolerance: Float[Array, ""]
+    """How far apart two results may be, in units of what is allowed; 0 where the last number was asked for."""
+
+    @property
+    def rungs(self) -> Int[Array, ""]:
+        """How many numbers there are."""
+        return 1 + jnp.ceil(jnp.log2(self.last.astype(float) / self.first.astype(float)) - 1e-9).astype(int)
+
+    def rung(self, i: Any) -> Int[Array, ""]:
+        """The i-th of them."""
+        return jnp.minimum(self.first * 2**i, self.last)
+
+
+def counted(
+    method: AbstractMethod | None, most: int = MOST, solver: str = "rk4", first: int = FIRST
+) -> tuple[AbstractMethod, Counts]:
+    """A method with its number of steps left open, and the numbers to try: those of the method and half as many, or,
+    without a method, as many as are needed."""
+    if method is None:
+        chosen = make_method(solver)
+        assert isinstance(chosen, FixedSteps)
+        return _open(chosen), _counts(first, most, 1.0)
+    if not isinstance(method, FixedSteps):
+        return method, _counts(1, 1, 0.0)
+    steps = method.steps if isinstance(method.steps, int) else 0
+    return (_open(method), _counts(max(steps // 2, 1), steps, 0.0)) if steps else (method, _counts(1, 1, 0.0))
+
+
+def _open(method: FixedSteps) -> FixedSteps:
+    return FixedSteps(method.solver, jnp.asarray(1, int))
+
+
+def _counts(first: int, last: int, tolerance: float) -> Counts:
+    return Counts(jnp.asarray(first, int), jnp.asarray(last, int), jnp.asarray(tolerance))
+
+
+def from_steps(counts: Counts, steps: Any) -> Counts:
+    """The numbers to try where `steps` were right nearby: half as many first, so that the error is known."""
+    if steps is None or isinstance(steps, Tracer):
+        return counts
+    first = jnp.clip(jnp.asarray(steps, int) // 2, counts.first, counts.last)
+    return counts._replace(first=jnp.where(counts.tolerance > 0, first, counts.first))
+
+
+Problem = TypeVar("Problem", bound=eqx.Module)
+
+
+def by_steps(problem: Problem, steps: Any) -> Problem:
+    """A problem by so many steps a revolution; as it is where its method has no such number."""
+    method = problem.method  # pyright: ignore[reportAttributeAccessIssue]
+    if not isinstance(method, FixedSteps):
+        return problem
+    return eqx.tree_at(lambda p: p.method.steps, problem, jnp.asarray(steps, int))
+
+
+def that_serves(find: Callable[[AbstractMethod, Counts], Any], method: AbstractMethod | None, most: int = MOST) -> Any:
+    """What `find` finds by a method; without one by Runge-Kutta or, where that is not stable, by Rodas4.
+
+    Which one is a matter of compilation: inside `jit` and `vmap` it is Runge-Kutta.
+    """
+    found = find(*counted(method, most))
+    if method is not None or isinstance(found.residual, Tracer) or bool(jnp.all(jnp.isfinite(found.residual))):
+        return found
+    return find(*counted(None, most, "rodas4", STIFF_FIRST))

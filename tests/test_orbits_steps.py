@@ -1,0 +1,205 @@
+"""Orbits, branches and bifurcations take as many steps as they need, and say how far half as many put them."""
+
+import re
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import reference
+from reference import bifurcation as shooting
+
+import jaxcage as jc
+from jaxcage.integrate import FixedSteps, strobe_map
+from jaxcage.io import load_model, write_template
+from jaxcage.orbits import Located, SynchronousOrbits, edge_speed, sensitivity
+from jaxcage.validation._literature import DUFFING_DOUBLINGS
+
+
+RPM = np.pi / 30
+AT_1A = (1.469298462e-04, -1.9758642656e-04, 6.4051751356e-01, 2.655842859e-01)
+AT_3A = (2.2547097488e-04, -2.0012129425e-04, 5.2115206118e-01, 4.6798404478e-01)
+TOUCHING = {
+    "1a zone 2 onset": (jc.case("1a"), Located("fold", 18686.338 * RPM, np.array(AT_1A))),
+    "3a zone 2 onset": (jc.case("3a"), Located("torus", 19133.235 * RPM, np.array(AT_3A))),
+}
+
+
+class Stop(eqx.Module):
+    """x'' = -k x - d x' + f cos(tau), and a stop that sets in over `width` at x = 1."""
+
+    f: jax.Array
+    width: jax.Array
+    k: jax.Array
+    d: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        over = (x - 1) / self.width
+        push = 200.0 * self.width * (over + jnp.sqrt(1 + over**2)) / 2
+        return (-self.k * x - self.d * u - push + self.f * jnp.cos(tau),)
+
+
+def stop(f=0.3):
+    numbers = {"f": f, "width": 2e-3, "k": 1.0, "d": 0.1}
+    return jc.ForcedOscillator(Stop(**{n: jnp.asarray(x) for n, x in numbers.items()}), coordinates=1)
+
+
+class Duffing(eqx.Module):
+    g: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-0.3 * u + x - x**3 + self.g * jnp.cos(tau),)
+
+
+def duffing(g=0.26):
+    return jc.ForcedOscillator(Duffing(jnp.asarray(g)), coordinates=1)
+
+
+def image(model, orbit, steps):
+    """A revolution on by so many steps, over the scale."""
+    strobe = strobe_map(model, orbit.speed, FixedSteps(orbit.solver, steps))
+    return np.array(strobe(tuple(orbit.state)).y) / np.array([float(c) for c in model.scale(orbit.speed)])
+
+
+def test_error_of_an_orbit_bounds_what_four_times_the_steps_change():
+    stiff = jc.replace(jc.case("1a"), stiffness_x=1e7, stiffness_y=1e7)
+    steps = []
+    for model, rpm, guess in ((jc.case("1a"), 13000, None), (jc.case("3a"), 19133, AT_3A), (stiff, 600, None)):
+        orbit = jc.periodic_orbit(model, rpm * RPM, guess=guess)
+        steps.append(int(orbit.steps))
+        assert orbit.status == "converged" and 0 < orbit.error < 1e-6
+        assert np.max(np.abs(image(model, orbit, steps[-1]) - image(model, orbit, 4 * steps[-1]))) < orbit.error
+        finer = jc.periodic_orbit(model, rpm * RPM, guess=orbit, method=FixedSteps(orbit.solver, 4 * steps[-1]))
+        np.testing.assert_allclose(np.sort(abs(orbit.multipliers)), np.sort(abs(finer.multipliers)), atol=1e-3)
+        assert f"{steps[-1]} steps per revolution" in str(orbit)
+    assert steps[0] <= 512 and min(steps[1:]) >= 4096
+
+
+def test_orbit_of_a_light_cage_that_few_steps_lose(tmp_path: Path):
+    """Eighteen rollers 7x7 in a bearing 50 by 80: equal steps that are too few throw the cage out."""
+    path = write_template(str(tmp_path / "spindle.toml"))
+    changed = {
+        "guidance_gap": '"0.25 mm"',
+        "load": '"800 N"',
+        "clearance_reading": '"radial"',
+        "unbalance": '"physical"',
+        "cage_mass": '"30 g"',
+        "outside_diameter": '"80 mm"',
+        "width": '"16 mm"',
+        "n_rollers": "18",
+        "roller_diameter": '"7 mm"',
+        "roller_length": '"7 mm"',
+        "rib_diameter": '"68 mm"',
+        "inner_raceway_diameter": '"58 mm"',
+    }
+    text = Path(path).read_text()
+    for name, value in changed.items():
+        text = re.sub(rf"^(# )?{name} = \S+( [^\s#]+)?", f"{name} = {value}", text, count=1, flags=re.M)
+    Path(path).write_text(text)
+    model = load_model(path)
+    assert not jc.periodic_orbit(model, 9000 * RPM, method=jc.method("rk4", steps=1024)).converged
+    orbit = jc.periodic_orbit(model, 9000 * RPM)
+    assert orbit.stable and orbit.error < 1e-6
+    theirs = reference.revolutions(reference.field(model, 9000 * RPM), np.array(orbit.state)).strobe[1]
+    assert np.max(np.abs(theirs - orbit.state) / np.array(model.scale(9000 * RPM))) < 1e-6
+
+
+def test_steps_that_are_asked_for_are_kept():
+    orbit = jc.periodic_orbit(stop(), 0.6, method=jc.method("rk4", steps=300))
+    assert orbit.steps == 300 and orbit.error > 0
+    half = jc.periodic_orbit(stop(), 0.6, guess=orbit, method=jc.method("rk4", steps=150))
+    jacobian = orbit.monodromy - jnp.eye(2)
+    scale = np.array(stop().scale(0.6))
+    assert orbit.error == pytest.approx(np.max(np.abs(jacobian @ ((orbit.state - half.state) / scale))), rel=1e-6)
+    own = jc.periodic_orbit(stop(), 0.6, method=jc.method("tsit5", tolerance=1e-8))
+    assert own.converged and np.isnan(own.error)
+
+
+def test_choice_is_made_inside_jit_and_in_each_lane():
+    free, touching = 2.5, 1.1
+    plain = [jc.periodic_orbit(stop(), w) for w in (free, touching)]
+    assert plain[0].steps < plain[1].steps
+    lanes = jax.vmap(lambda w: jc.periodic_orbit(stop(), w))(jnp.array([free, touching]))
+    jitted = jax.jit(lambda w: jc.periodic_orbit(stop(), w))
+    for i, w in enumerate((free, touching)):
+        assert lanes.steps[i] == plain[i].steps == jitted(w).steps
+        np.testing.assert_allclose(lanes.state[i], plain[i].state, rtol=1e-9)
+    slope = jax.jacfwd(lambda f: jc.periodic_orbit(stop(f), touching, guess=plain[1]).state)(0.3)
+    ends = [jc.periodic_orbit(stop(0.3 + h), touching, guess=plain[1]).state for h in (1e-6, -1e-6)]
+    np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-6, rtol=1e-5)
+
+
+def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to_it():
+    inside, exact = DUFFING_DOUBLINGS[1]
+    orbit = jc.periodic_orbit(duffing(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
+    find = lambda speed, **k: jc.bifurcation(duffing(inside), "period-doubling", orbit, "g", speed=speed, **k)
+    point = find(1.2)
+    assert point.status == "converged"
+    assert 0 < point.error < 1e-7 * point.value
+    assert abs(point.value - exact.value) < point.error + exact.tolerance
+    steps = int(point.steps)
+    fixed = jax.grad(lambda w: find(w, method=jc.method("rk4", steps=steps)).value)(1.2)
+    assert jax.grad(lambda w: find(w).value)(1.2) == pytest.approx(float(fixed), rel=1e-9)
+
+
+def test_bifurcation_that_half_the_steps_move_is_not_converged():
+    inside, _ = DUFFING_DOUBLINGS[1]
+    orbit = jc.periodic_orbit(duffing(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
+    coarse = jc.method("rk4", steps=24)
+    find = lambda w: jc.bifurcation(duffing(inside), "period-doubling", orbit, "g", speed=w, method=coarse)
+    point = find(1.2)
+    assert point.status == "not converged" and not point.converged
+    assert np.isnan(point.value) and point.error > 2e-4 * inside
+    assert np.isnan(jax.grad(lambda w: find(w).value)(1.2))
+
+
+def test_branch_takes_more_steps_where_the_stop_is_touched():
+    branch = jc.branch(stop(), jc.periodic_orbit(stop(), 2.5), lower=0.5, upper=3.0)
+    highest = np.array([np.max(np.abs(s)) for s in branch.state])
+    assert branch.steps.min() <= 512 and branch.steps.max() >= 2048
+    assert np.all(branch.error < 1e-5) and highest.size > 20
+    points = [p for p in branch.special if p.status == "converged"]
+    assert points and len(points) == len(branch.special)
+    for p in points:
+        fixed = FixedSteps(jc.method("rk4").solver, 4 * p.steps)
+        finer = jc.bifurcation(stop(), p.kind, p, method=fixed)
+        assert abs(finer.value - p.value) < p.error + 1e-8
+
+
+def test_bifurcation_of_a_branch_that_does_not_settle_is_no_edge():
+    """By 32 steps against 16."""
+    coarse = jc.method("rk4", steps=32)
+    branch = jc.branch(stop(), jc.periodic_orbit(stop(), 2.5, method=coarse), lower=0.5, upper=3.0, method=coarse)
+    lost = [p for p in branch.special if p.status == "not converged"]
+    assert lost and all(np.isnan(p.value) and p.error > 2e-4 for p in lost)
+    swept = jc.sweep(stop(), np.array([1.0]), discard=4, revolutions=4, blocks=1, keep=4, exponents=0)
+    found = SynchronousOrbits((branch,), (), swept, 0, 0.0, 1e9)
+    assert found.unsettled == len(lost)
+    assert not any(np.isnan(p.value) for p in found.points)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edge", TOUCHING)
+def test_edges_with_contact_by_two_solvers_and_by_shooting(edge):
+    """To 20 ppm is asked for; the land sets in over 2e-7 m, and all three resolve that."""
+    model, point = TOUCHING[edge]
+    ours = sensitivity(model, point)
+    rodas4 = edge_speed(model, point, jc.method("rodas4", steps=16384)) / RPM
+    given = reference.numbers_of(model)
+    make = lambda speed: reference.Field(given, speed)
+    theirs = shooting(make, point.kind, point.state, ours.value_rpm * RPM) / RPM
+    assert ours.status == "converged" and ours.error_rpm < 20e-6 * ours.value_rpm
+    assert abs(ours.value_rpm - theirs) < ours.error_rpm
+    assert abs(rodas4 - theirs) < 1e-3
+
+
+def test_error_of_an_edge_holds_the_value_at_four_times_the_steps():
+    for model, point in TOUCHING.values():
+        edge = sensitivity(model, point)
+        finer = edge_speed(model, point, jc.method("rk4", steps=4 * edge.steps)) / RPM
+        assert edge.trusted and 0 < edge.error_rpm < 20e-6 * edge.value_rpm
+        assert abs(finer - edge.value_rpm) < edge.error_rpm
