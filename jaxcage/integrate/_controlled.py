@@ -32,6 +32,9 @@ TURN = 0.5
 FALL = 16.0
 """What the difference of two rungs is never below, however well they agree: so many times less than that of the two
 before them. Fourth order makes it 16; where it falls faster two rungs agree by accident, as when both miss a contact."""
+SLOW = 4.0
+"""Where the difference of two rungs is not so many times below that of the two before them, the law jumps on the way
+(the film's at its centre), and the error is that of first order: so many times the difference."""
 EASY = 512
 """A lane whose error is so many times below the tolerance begins the next revolution one rung lower."""
 
@@ -159,7 +162,7 @@ def climb(
             tried = attempt(rungs, lowest - first, mine)
             height = rung - begin
             apart = jnp.where(height == 0, jnp.inf, _apart(tried.y, before.y, scale))
-            error = apart if method.before == 1 else jnp.maximum(apart, gap / FALL)
+            error = apart if method.before == 1 else _error(apart, gap)
             fine = (tried.outcome == 0) & (error <= method.tolerance / parts) & (height >= method.before)
             if tried.tangents:
                 fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= turn
@@ -178,6 +181,11 @@ def climb(
         outcome=jnp.where(bad & (moved.outcome == 0), INACCURATE, moved.outcome),
         level=jnp.where(easy, moved.level - 1, moved.level),
     )
+
+
+def _error(apart: Any, gap: Any) -> Any:
+    """Of a rung, from its difference to the one before it, and the difference of that to the one before."""
+    return jnp.maximum(jnp.where(SLOW * apart > gap, SLOW * apart, apart), gap / FALL)
 
 
 def _apart(y: tuple[Any, ...], other: tuple[Any, ...], scale: tuple[Any, ...]) -> Any:
