@@ -27,6 +27,7 @@ SECTIONS: dict[str, Section] = {
     "labels": truth_labels.report,
     "exponents": truth_exponents.report,
     "measures": truth_measures.report,
+    # Orbits and edges: one more section of the same kind.
 }
 
 

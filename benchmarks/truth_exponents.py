@@ -55,7 +55,7 @@ def beside(model: jc.CageModel, rpm: float, state: np.ndarray, count: int = REVO
     """The growth from a state by the package and by the reference; None where this does not finish."""
     speed = float(jc.rpm(rpm))
     options = dict(discard=0, revolutions=count, blocks=count, confirm=False, horizon=0)
-    ours = jc.sweep(model, [speed], starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
+    ours = jc.sweep(model, speed, starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
     along = [float(c) for c in _start_tangents(state.size, 1)[0]]
     try:
         theirs = reference.growth(reference.field(model, speed), state, count, direction=along, budget=BUDGET)

@@ -64,7 +64,7 @@ def escapes(subject: Subject, speed: float, method: Any = None) -> Any:
     """`Survival` of perturbed starts to the length of a default sweep."""
     length = LENGTH - SETTLED
     options = dict(discard=SETTLED, revolutions=length, blocks=length // LIFE_BLOCK, confirm=False, horizon=LENGTH + 1)
-    found = jc.sweep(subject.model, [speed], starts=perturbed(subject, speed), method=method, **options)  # pyright: ignore
+    found = jc.sweep(subject.model, speed, starts=perturbed(subject, speed), method=method, **options)  # pyright: ignore
     assert found.escape is not None
     times = np.maximum(found.escape.ravel() - SETTLED, 0.0)
     return survival(times, length, block=LIFE_BLOCK)
