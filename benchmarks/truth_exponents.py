@@ -5,7 +5,7 @@ depends on how long one looks.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,14 +51,14 @@ class Beside(NamedTuple):
         return not self.apart <= max(LEAST, self.stated)
 
 
-def beside(model: jc.CageModel, rpm: float, state: np.ndarray, count: int = REVOLUTIONS) -> Beside | None:
+def beside(model: jc.CageModel, rpm: float, state: np.ndarray, method: Any = None) -> Beside | None:
     """The growth from a state by the package and by the reference; None where this does not finish."""
     speed = float(jc.rpm(rpm))
-    options = dict(discard=0, revolutions=count, blocks=count, confirm=False, horizon=0)
+    options = dict(discard=0, revolutions=REVOLUTIONS, blocks=REVOLUTIONS, method=method, confirm=False, horizon=0)
     ours = jc.sweep(model, speed, starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
     along = [float(c) for c in _start_tangents(state.size, 1)[0]]
     try:
-        theirs = reference.growth(reference.field(model, speed), state, count, direction=along, budget=BUDGET)
+        theirs = reference.growth(reference.field(model, speed), state, REVOLUTIONS, direction=along, budget=BUDGET)
     except (reference.TooLong, ValueError, ArithmeticError):
         return None
     return Beside(rpm, ours.block_growth[0, 0, :, 0], theirs, float(abs(ours.doubt[0, 0, 0])))
