@@ -47,7 +47,8 @@ def obtain(commands: Sequence[str], done: Outcomes, table: Sequence[Shown], forc
             print(f"running {command}", flush=True)
             in_place = {name for s in table if command in s.commands for name in s.in_place}
             found = run(command, sorted(in_place), root)
-            print(f"  {found.record['seconds']} s" if found else f"  failed: see {folder_of(command, root)}", flush=True)
+            said = f"{found.record['seconds']} s" if found else f"failed: see {folder_of(command, root)}"
+            print(f"  {said}", flush=True)
         done[command] = found
     return all(done[command] for command in commands)
 

@@ -69,13 +69,18 @@ def kept(command: str, tree: str, root: pathlib.Path = ROOT) -> Run | None:
 def run(command: str, in_place: Sequence[str] = (), root: pathlib.Path = ROOT) -> Run | None:
     """Run a command; None if it fails.
 
-    **Arguments:** the command; files that it leaves in the checkout: they are moved to where its output is kept, and what
-    was there before comes back.
+    **Arguments:** the command; files that it leaves in the checkout: they are moved to where its output is kept, and
+    what was there before comes back.
     """
     folder, tree = folder_of(command, root), fingerprint(root)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    record = {"command": command, "tree": tree, "commit": commit(root), "date": str(datetime.date.today())}
+    record: dict[str, Any] = {
+        "command": command,
+        "tree": tree,
+        "commit": commit(root),
+        "date": str(datetime.date.today()),
+    }
     program, *words = shlex.split(command)
     ours = program == "jaxcage"
     if ours:

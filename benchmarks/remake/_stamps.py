@@ -18,10 +18,10 @@ from ._shown import Shown
 
 
 CHANGES = {
-    "46df402": "sweeps then took one of a few fixed step counts",
-    "7b86501": "labels were not confirmed and chaos not followed to a horizon",
+    "46df402": "steps are refined until they agree and shortened near the land",
+    "7b86501": "sweeps confirm labels and follow chaos to a horizon",
 }
-"""Commits since which numbers are other ones, and what was before them."""
+"""Commits since which numbers are other ones, and what they changed."""
 KEY, CELL = "jaxcage", "stamp"
 
 
@@ -86,8 +86,8 @@ def words(shown: Shown, found: Stamp | None, tree: str, root: pathlib.Path = ROO
     if found.tree == tree:
         return f"Made at commit {found.commit}, {found.date}, by {by}{hand}{what}."
     why = [text for change, text in CHANGES.items() if _lacks(found.commit, change, root)]
-    since = f": {', '.join(why)}" if why else ""
-    return f"Not yet made again by {by} since commit {found.commit}, {found.date}{since}."
+    since = f" Since then {', '.join(why)}." if why else ""
+    return f"Not yet made again by {by} since commit {found.commit}, {found.date}{what}.{since}"
 
 
 def _lacks(commit: str, change: str, root: pathlib.Path) -> bool:
@@ -126,7 +126,8 @@ def write(shown: Shown, content: str, found: Stamp | None, tree: str, root: path
     if shown.page.endswith(".ipynb"):
         path.write_text(_stamped(json.loads(content), data, line), encoding="utf-8")
         return
-    block = f"<!-- made: {shown.name} -->\n{content}\n\n<!-- stamp {json.dumps(data)} -->\n<sub>{line}</sub>\n<!-- end -->"
+    small = f"<!-- stamp {json.dumps(data)} -->\n<sub>{line}</sub>"
+    block = f"<!-- made: {shown.name} -->\n{content}\n\n{small}\n<!-- end -->"
     text = block + "\n" if shown.whole else _block(shown.name).sub(lambda _: block, path.read_text(encoding="utf-8"))
     path.write_text(text, encoding="utf-8")
 
