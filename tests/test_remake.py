@@ -79,7 +79,7 @@ def test_a_block_is_made_stamped_and_not_made_twice(checkout: pathlib.Path, caps
 
 
 def test_what_was_run_is_kept(checkout: pathlib.Path):
-    """A page that was lost is made again without a run; a change of the package asks for one, that of a page does not."""
+    """A page that was lost is made again without a run; one is run when the package changes, not a page."""
     page = (checkout / "page.md").read_text()
     remake(checkout)
     (checkout / "page.md").write_text("New. " + page)
