@@ -8,7 +8,18 @@ import pytest
 
 from benchmarks.remake import _stamps as stamps
 from benchmarks.remake.__main__ import main
-from benchmarks.remake._excerpts import fenced, printed, tables
+from benchmarks.remake._excerpts import (
+    EDGES,
+    against_paper,
+    both_kinds,
+    case_fits,
+    fenced,
+    lasting,
+    printed,
+    readings,
+    speed,
+    tables,
+)
 from benchmarks.remake._runs import ROOT, Run, fingerprint, folder_of
 from benchmarks.remake._shown import SHOWN, Shown
 
@@ -162,6 +173,54 @@ def test_tables_are_taken_by_their_titles(tmp_path: pathlib.Path):
     text = "Lanes: 3\nlabel\n\nChaotic zones of 1a\n1  2\n\nTransient chaos of 1a\n3  4\n\nTime: 1 s\n"
     made = tables("Chaotic zones of", "Transient chaos of")([Run(text, {}, tmp_path, {})])
     assert made == fenced("Chaotic zones of 1a\n1  2\n\nTransient chaos of 1a\n3  4")
+
+
+def document(**of: object) -> Run:
+    return Run("", of, ROOT / "benchmarks", {})
+
+
+def test_edges_of_the_reproduction():
+    edge = lambda kind, name, ours: {
+        "case": "1a", "edge": name, "kind": kind, "published_rpm": 100.0, "ours_rpm": ours,
+        "error_percent": None if ours is None else ours - 100.0,
+    }  # fmt: skip
+    of_kind = lambda kind, values: [edge(kind, n, v) for n, v in zip(EDGES, values, strict=True)]
+    found = of_kind("chaotic", (98.0, 105.5, None)) + of_kind("synchronous-loss", (101.0, None, 90.0))
+    run = document(edges=found)
+    assert against_paper([run]).splitlines()[2] == "| 1a | 100 / 98 (-2.0 %) | 100 / 106 (+5.5 %) | 100 / none |"
+    assert [row.split() for row in both_kinds([run]).splitlines()[2:5]] == [
+        "1a zone 1 onset 100 98 -2.0 % 101 +1.0 %".split(),
+        "1a zone 1 exit 100 106 +5.5 % none".split(),
+        "1a zone 2 onset 100 none 90 -10.0 %".split(),
+    ]
+
+
+def test_readings_of_the_reproduction():
+    one = {"case": "1a", "question": "film", "answer": "none", "chaotic_share": 0.88, "zones": 1}
+    own = one | {"question": "as the cases have it", "answer": "-"}
+    edges = {"zone 1 onset": 6750.0, "zone 1 exit": None}
+    rows = readings([document(readings=[r | {"edges": edges} for r in (own, one, one | {"case": "1b"})])]).splitlines()
+    assert len(rows) == 5 and rows[2].startswith("as the cases have it  ")
+    assert rows[3].split() == "film: none 88 % 1 6750 - -".split()
+
+
+def test_what_lasts_of_zone_1():
+    """The zone that shares most speeds with the published one, without a horizon and with it."""
+    published = [{"onset_rpm": 9100.0, "exit_rpm": 12000.0}]
+    zone = lambda a, b: {"onset_rpm": a, "exit_rpm": b}
+    of = dict(case="1a", discard=300, speeds=10, starts=3, published=published)
+    first = document(**of, horizon=0, zones=[zone(6950.0, 12450.0), zone(23950.0, None)], labels={"chaotic": 12})
+    second = document(**of, horizon=3000, zones=[zone(None, 4000.0), zone(9550.0, None)], labels={"chaotic": 9})
+    head, row = lasting([first, second]).splitlines()[1:3]
+    assert head.split() == "case zone 1 published after 300 revolutions after 3000 chaotic lanes".split()
+    assert row.split() == "1a 9100 to 12000 6950 to 12450 9550 to past range 40 -> 30 %".split()
+
+
+def test_fits_of_each_case_and_the_row_of_the_speed_table():
+    text = "1a: zone 1 onset +6.0 %, zone 1 exit none, zone 2 onset -4.9 %; 4 zones\n"
+    assert case_fits([Run(text, {}, ROOT, {})]).splitlines()[2].split() == "1a +6.0 % none -4.9 % 4".split()
+    head, _, row = speed([document()]).splitlines()
+    assert head.split(" | ")[0] == "| jaxcage sweep" and len(re.findall(r"\d", row)) > 5
 
 
 def test_what_a_document_says_of_resolution_and_horizon():

@@ -84,7 +84,7 @@ def readings(runs: Sequence[Run]) -> str:
     number = lambda x: "-" if x is None else f"{x:.0f}"
     body = [
         (
-            f"{r['question']}: {r['answer']}",
+            f"{r['question']}: {r['answer']}".removesuffix(": -"),
             f"{100 * r['chaotic_share']:.0f} %",
             str(r["zones"]),
             *(number(r["edges"].get(e)) for e in EDGES),
