@@ -226,7 +226,8 @@ def test_fits_of_each_case_and_the_row_of_the_speed_table():
 def test_what_a_document_says_of_resolution_and_horizon():
     document = {"speeds": 251, "starts": 3, "resolution_rpm": 100.0, "horizon": 3000, "error": 8.4e-4, "zones": []}
     assert stamps.about(document) == (
-        "251 speeds, 3 starts, resolution 100 rpm, chaos followed to 3000, error of a revolution at most 8e-04"
+        "251 speeds, 3 starts, resolution 100 rpm, chaos followed to 3000 revolutions, "
+        "error of a revolution at most 8e-04"
     )
 
 

@@ -46,7 +46,7 @@ def about(document: Mapping[str, Any]) -> str:
         "resolution_rpm": "resolution {:g} rpm",
         "discard": "{} revolutions discarded",
         "revolutions": "{} observed",
-        "horizon": "chaos followed to {}",
+        "horizon": "chaos followed to {} revolutions",
         "error": "error of a revolution at most {:.0e}",
     }
     return ", ".join(text.format(document[key]) for key, text in words.items() if document.get(key))
