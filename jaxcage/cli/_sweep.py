@@ -113,8 +113,8 @@ def run(options: SweepOptions) -> Report:
         "failed": failed_lanes(found),
         "beyond_clearance": int(np.sum(found.peak > 1)),
         "too_short": int(np.sum(found.too_short)),
+        **extent(found),
         "confirmed": [each._asdict() for each in found.confirmed],
-        "error": float(np.max(found.error[~found.failed])),
         "seconds": round(swept.seconds, 2),
         **figures,
         "data": swept.data,
@@ -122,6 +122,13 @@ def run(options: SweepOptions) -> Report:
     zone_table = zones_table(about.name, edges, about.published, swept.range_rpm)
     tables = [_label_table(found, counts), zone_table, *transient_tables(about.name, edges)]
     return Report(document, tables, _notes(document))
+
+
+def extent(found: Sweep) -> dict[str, Any]:
+    """What was swept, how long, and the largest error of a revolution [system's scale], for programs."""
+    speeds, starts = found.outcome.shape
+    length = {"discard": found.discard, "revolutions": found.revolutions}
+    return {"speeds": speeds, "starts": starts, **length, "error": float(np.max(found.error[~found.failed]))}
 
 
 def _zoom(swept: Swept, edges: Zones) -> dict[str, str]:

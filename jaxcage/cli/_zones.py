@@ -27,7 +27,7 @@ from ._console import progress_in_stages
 from ._inputs import Subject, orbit_integration
 from ._options import ZonesOptions
 from ._report import Report, Table, number
-from ._sweep import failed_lanes, sweep_case
+from ._sweep import extent, failed_lanes, sweep_case
 
 
 SHOWN = ("guidance_gap", "eccentricity")
@@ -50,7 +50,7 @@ def run(options: ZonesOptions) -> Report:
     document["synchronous_loss"] = [_loss_document(i, loss, slopes) for i in range(len(loss.zones))]
     for i, zone in enumerate(document["zones"], start=1):
         zone |= _source_documents(i, explained, slopes)
-    document |= {
+    document |= extent(swept.sweep) | {
         "failed": failed_lanes(swept.sweep),
         "seconds": round(swept.seconds + time.perf_counter() - began, 2),
         "data": swept.data,
