@@ -25,7 +25,6 @@ from ._errors import (
 )
 from ._inputs import (
     Subject,
-    integration,
     output_folder,
     samples_per_revolution,
     save_figure,
@@ -151,7 +150,7 @@ def _waterfall(swept: Swept, options: SweepOptions) -> dict[str, str]:
     if options.waterfall == 0:
         return {}
     speeds = np.linspace(swept.sweep.speed[0], swept.sweep.speed[-1], options.waterfall)
-    chosen = integration(options)
+    chosen = sweep_integration(options)
     samples = samples_per_revolution(chosen, 64)
     found = waterfall(swept.subject.model, speeds, component=1, samples=samples, method=chosen)
     figure = new_figure(9.0, 5.0)

@@ -18,6 +18,7 @@ from ..report import (
     edge_slopes,
     error_cell,
     loss_table,
+    transient_tables,
     unsettled_notes,
     zone_document,
     zones_document,
@@ -59,6 +60,7 @@ def run(options: ZonesOptions) -> Report:
         loss_table(about.name, found, loss, about.published),
         *([_gradient_table(about, slopes)] if slopes else []),
         zones_table(about.name, explained.zones, about.published, swept.range_rpm),
+        *transient_tables(about.name, explained.zones),
     ]
     notes = [*_notes(explained), *contact_notes(about.model, loss.edges, chosen), *unsettled_notes(found)]
     return Report(document, tables, [*notes, f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])
