@@ -21,7 +21,7 @@ from jaxcage.report import zones_table
 
 
 TINY = ["--first", "12000", "--last", "13000", "--count", "3", "--discard", "20", "--revolutions"]
-TINY += ["20", "--solver", "rodas4", "--steps", "64"]
+TINY += ["20", "--horizon", "0", "--solver", "rodas4", "--steps", "64"]
 PNG = b"\x89PNG\r\n"
 
 
@@ -247,7 +247,20 @@ def test_as_a_module_from_a_shell(tmp_path: Path):
 
 
 def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    tiny = ["--first", "9000", "--last", "13000", "--count", "5", "--discard", "20", "--revolutions", "20"]
+    tiny = [
+        "--first",
+        "9000",
+        "--last",
+        "13000",
+        "--count",
+        "5",
+        "--discard",
+        "20",
+        "--revolutions",
+        "20",
+        "--horizon",
+        "0",
+    ]
     found = document(
         capsys, "sweep", "1a", *tiny, "--solver", "rodas4", "--steps", "64", "--waterfall", "3", "--out", str(tmp_path)
     )
