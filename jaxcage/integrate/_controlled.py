@@ -2,8 +2,9 @@
 
 The error of a revolution is how far its end moves when it is run with half as many steps: an honest number for every
 solver, stiff or not, with contacts that switch on the way or without. A solver of order p is nearer to the truth than
-that by a factor of 2^p - 1 where the motion is smooth. The leading tangent vector is compared too: an L-stable method
-damps away what it does not resolve, which leaves the state of a lane right and its exponent wrong.
+that by a factor of 2^p - 1 where the motion is smooth. Two runs may agree by accident, and a third one with a quarter
+of the steps shows it. The leading tangent vector is compared too: an L-stable method damps away what it does not
+resolve, which leaves the state of a lane right and its exponent wrong.
 """
 
 import itertools
@@ -28,6 +29,12 @@ DEFAULT_ERROR = 1e-3
 DEFAULT_LADDER = (*(("rk4", 64 << i) for i in range(8)), *(("rodas4", 512 << i) for i in range(6)))
 TURN = 0.5
 """Largest difference that half as many steps may make to the leading tangent vector, relative to its length."""
+FALL = 16.0
+"""What the difference of two rungs is never below, however well they agree: so many times less than that of the two
+before them. Fourth order makes it 16; where it falls faster two rungs agree by accident, as when both miss a contact."""
+SLOW = 4.0
+"""Where the difference of two rungs is not so many times below that of the two before them, the law jumps on the way
+(the film's at its centre), and the error is that of first order: so many times the difference."""
 EASY = 512
 """A lane whose error is so many times below the tolerance begins the next revolution one rung lower."""
 
@@ -84,9 +91,14 @@ class ControlledSteps(AbstractMethod):
 
     @property
     def floors(self) -> list[int]:
-        """For each rung, the lowest one of its own solver that can be compared with one of that solver too."""
+        """For each rung, the lowest one of its own solver that can be judged by that solver too."""
         firsts = [0, *itertools.accumulate(self.sizes)]
-        return [first + min(1, n - 1) for first, n in zip(firsts, self.sizes, strict=False) for _ in range(n)]
+        return [first + min(self.before, n - 1) for first, n in zip(firsts, self.sizes, strict=False) for _ in range(n)]
+
+    @property
+    def before(self) -> int:
+        """Rungs below the one that is taken, by which it is judged: two, unless there are but two in all."""
+        return min(2, sum(self.sizes) - 1)
 
     def lowest(self, harmonics: int) -> Int[Array, ""]:
         """The first rung of two steps at least to a period of the forcing's highest harmonic: two rungs with fewer
@@ -94,7 +106,7 @@ class ControlledSteps(AbstractMethod):
         coarse = [
             jnp.sum(r.steps < 2 * harmonics, dtype=jnp.int32) for r in self.ladder[:1] if isinstance(r, FixedSteps)
         ]
-        return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 2)
+        return jnp.minimum(sum(coarse, jnp.zeros((), jnp.int32)), sum(self.sizes) - 1 - self.before)
 
     def __str__(self) -> str:
         of = lambda r: f"{type(r.solver).__name__} {', '.join(map(str, r.steps.tolist()))}"  # pyright: ignore
@@ -131,42 +143,49 @@ def climb(
     harmonics: int = 1,
     parts: Any = 1,
 ) -> Moved:
-    """Lanes, or one without an axis, by the first rung whose error is small enough, beginning just below `level`."""
+    """Lanes, or one without an axis, by the first rung whose error is small enough, beginning two below `level`."""
     lowest = method.lowest(harmonics)
-    begin = jnp.maximum(level - 1, lowest)
-    carry = (begin, start, jnp.zeros(begin.shape, bool))
+    begin = jnp.maximum(level - method.before, lowest)
+    carry = (begin, start, jnp.zeros(begin.shape, bool), start.error)
     turn = jnp.where(jnp.isfinite(method.tolerance), TURN, jnp.inf)
     first = 0
     for rungs, size in zip(method.ladder, method.sizes, strict=True):
 
         def asked(carry: tuple, end: int = first + size) -> Any:
-            rung, _, done = carry
+            rung, _, done, _ = carry
             return jnp.any(~done & (rung < end))
 
         def once(carry: tuple, rungs: Rungs = rungs, first: int = first) -> tuple:
-            rung, before, done = carry
+            rung, before, done, gap = carry
             lowest = jnp.min(jnp.where(done, sum(method.sizes), rung))
             mine = ~done & (rung == lowest)
             tried = attempt(rungs, lowest - first, mine)
-            alone = rung == begin
-            error = jnp.where(alone, jnp.inf, _apart(tried.y, before.y, scale))
-            fine = (tried.outcome == 0) & (error <= method.tolerance / parts) & ~alone
+            height = rung - begin
+            apart = jnp.where(height == 0, jnp.inf, _apart(tried.y, before.y, scale))
+            error = apart if method.before == 1 else _error(apart, gap)
+            fine = (tried.outcome == 0) & (error <= method.tolerance / parts) & (height >= method.before)
             if tried.tangents:
                 fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= turn
             tried = tried._replace(error=error, half=before.tangents, level=rung)
             now = jax.tree.map(lambda a, b: jnp.where(mine, a, b), tried, before)
-            return jnp.where(mine & ~fine, rung + 1, rung), now, done | (mine & fine)
+            gap = jnp.where(mine, apart, gap)
+            return jnp.where(mine & ~fine, rung + 1, rung), now, done | (mine & fine), gap
 
         carry = jax.lax.while_loop(asked, once, carry)
         first += size
-    _, moved, done = carry
+    _, moved, done, _ = carry
     bad = ~done & jnp.isfinite(method.tolerance) & ((parts == 1) | (moved.error > method.tolerance))
-    floor = jnp.maximum(jnp.asarray(method.floors, jnp.int32)[moved.level], lowest + 1)
+    floor = jnp.maximum(jnp.asarray(method.floors, jnp.int32)[moved.level], lowest + method.before)
     easy = (moved.error * EASY <= method.tolerance) & (moved.level > floor)
     return moved._replace(
         outcome=jnp.where(bad & (moved.outcome == 0), INACCURATE, moved.outcome),
         level=jnp.where(easy, moved.level - 1, moved.level),
     )
+
+
+def _error(apart: Any, gap: Any) -> Any:
+    """Of a rung, from its difference to the one before it, and the difference of that to the one before."""
+    return jnp.maximum(jnp.where(SLOW * apart > gap, SLOW * apart, apart), gap / FALL)
 
 
 def _apart(y: tuple[Any, ...], other: tuple[Any, ...], scale: tuple[Any, ...]) -> Any:

@@ -56,12 +56,17 @@ def _counted(f: Callable, budget: float) -> tuple[Callable, list[int]]:
 
 
 def _one(
-    field: Field, f: Callable, z: np.ndarray, method: str, tolerance: float, steps: int
+    field: Field,
+    f: Callable,
+    z: np.ndarray,
+    method: str,
+    tolerance: float,
+    steps: int,
+    span: tuple[float, float] = (0.0, REVOLUTION),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Phases and states at every step of one revolution; states over the scale, a tangent perhaps behind them."""
-    done = solve_ivp(
-        f, (0.0, REVOLUTION), z, method=method, rtol=tolerance, atol=0.1 * tolerance, max_step=REVOLUTION / steps
-    )
+    """Phases and states at every step of one revolution, or of a part of it; states over the scale, a tangent perhaps
+    behind them."""
+    done = solve_ivp(f, span, z, method=method, rtol=tolerance, atol=0.1 * tolerance, max_step=REVOLUTION / steps)
     if not done.success or not np.all(np.isfinite(done.y)):
         if np.max(field.excursion(done.y[: field.scale.size] * field.scale[:, None])) > ESCAPE:
             raise Outside(f"{method} left at tau = {done.t[-1]:g}: {done.message}")
@@ -84,6 +89,18 @@ def _largest(field: Field, tau: np.ndarray, y: np.ndarray) -> float:
     return float(np.sqrt(max(np.max(eps) ** 2, np.max(between, initial=0.0))))
 
 
+def _scaled(field: Field) -> Callable:
+    """The field of states over the scale."""
+    unit = field.scale
+
+    def scaled(tau: float, z: np.ndarray) -> np.ndarray:
+        rate = np.array(field(tau, (z * unit).tolist())) / unit
+        # A trial step far outside can ask for the root of a negative film: the integrator then has to shorten it.
+        return np.full(unit.size, np.nan) if np.iscomplexobj(rate) else rate
+
+    return scaled
+
+
 def revolutions(
     field: Field,
     state: Sequence[float] | np.ndarray,
@@ -102,13 +119,7 @@ def revolutions(
     **Raises:** `TooLong`; `ValueError` or `ArithmeticError` where the integrator gives up.
     """
     unit = field.scale
-
-    def scaled(tau: float, z: np.ndarray) -> np.ndarray:
-        rate = np.array(field(tau, (z * unit).tolist())) / unit
-        # A trial step far outside can ask for the root of a negative film: the integrator then has to shorten it.
-        return np.full(unit.size, np.nan) if np.iscomplexobj(rate) else rate
-
-    f, used = _counted(scaled, budget)
+    f, used = _counted(_scaled(field), budget)
     z = np.asarray(state, dtype=float) / unit
     strobe, peak = [z * unit], []
     for _ in range(count):
@@ -117,6 +128,33 @@ def revolutions(
         strobe.append(z * unit)
         peak.append(_largest(field, tau, y * unit[:, None]))
     return Revolutions(np.array(strobe), np.array(peak), used[0])
+
+
+class Samples(NamedTuple):
+    """A time history."""
+
+    state: np.ndarray
+    """States at equally spaced phases, the first at phase 0, and one at the very end, in SI units."""
+    peak: float
+    """Largest eccentricity ratio."""
+
+
+def sampled(
+    field: Field, state: Sequence[float] | np.ndarray, count: int, samples: int, budget: float = math.inf
+) -> Samples:
+    """`count` revolutions from phase 0 with so many samples in each.
+
+    **Raises:** as `revolutions`.
+    """
+    unit, edges = field.scale, np.linspace(0.0, REVOLUTION, samples + 1)
+    f, _ = _counted(_scaled(field), budget)
+    z = np.asarray(state, dtype=float) / unit
+    found, peak = [z * unit], 0.0
+    for span in [*zip(edges[:-1], edges[1:], strict=True)] * count:
+        tau, y = _one(field, f, z, "DOP853", TOLERANCE, STEPS, span)
+        z, peak = y[:, -1], max(peak, _largest(field, tau, y * unit[:, None]))
+        found.append(z * unit)
+    return Samples(np.array(found), peak)
 
 
 def growth(
@@ -164,7 +202,7 @@ class Confirmed(NamedTuple):
     peak: float
     """Largest eccentricity ratio."""
     spread: float
-    """Largest difference of a coordinate at a strobe, in clearances."""
+    """Largest difference of a state at a strobe, over the scale."""
 
 
 PAIR = (("LSODA", 1e-11), ("DOP853", 1e-11), ("Radau", 1e-10))
@@ -189,6 +227,6 @@ def confirmed(field: Field, state: Sequence[float] | np.ndarray, count: int = 1,
             raise Outside("Two integrators say that the cage leaves.")
         if len(found) == 2:
             first, second = found
-            apart = np.abs(first.strobe - second.strobe)[:, : field.coordinates] / field.clearance
+            apart = np.abs(first.strobe - second.strobe) / field.scale
             return Confirmed(first.strobe, float(np.max(first.peak)), float(np.max(apart)))
     raise TooLong(f"No two integrators finish {count} revolutions within {budget:g} evaluations.")

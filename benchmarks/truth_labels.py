@@ -1,0 +1,110 @@
+"""Labels of the default sweep beside those of 8 times the steps: no speed is chaotic for one and calm for the other.
+
+But for transients: where chaos ends after a time that is as long as a lane is followed, which lanes are still chaotic
+is chance. Such a speed is explained if many perturbed starts leave chaos at the same rate by both, and some have left
+by then and some have not.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import jaxcage as jc
+from jaxcage.analysis import LIFE_BLOCK, Comparison, compare, survival
+
+from .truth_models import Subject, by_kind
+from .truth_sweeps import fine, pair
+
+
+STARTS = 2
+"""A speed is chaotic if as many starts are."""
+PERTURBED = 36
+"""Starts from which the escape rate is measured, where two labels differ."""
+SPREAD = 0.02
+"""How far they are from the model's own [scale]."""
+SETTLED, LENGTH = 60, 600
+"""Revolutions after which escapes count, and those of a default sweep."""
+EXPLAINED = 0.05
+"""Largest share of the speeds that may be explained so."""
+
+
+class Doubted(NamedTuple):
+    """A speed that is chaotic by one of the two alone."""
+
+    subject: Subject
+    speed: float
+    """[rad/s]."""
+    spurious: bool
+    """Chaotic by the default; else by the finer steps."""
+    rates: Comparison
+    """Escape rates of perturbed starts by both."""
+
+    @property
+    def explained(self) -> bool:
+        """A transient of one rate, seen while some lanes have left it."""
+        return self.rates.agree and self.rates.resolved
+
+    def __str__(self) -> str:
+        what = "spurious" if self.spurious else "missed"
+        why = "explained" if self.explained else "NOT explained"
+        text = str(self.rates).replace("\n", "\n    ")
+        return f"{self.subject.kind} {self.subject.name}, {self.speed * 30 / np.pi:.1f} rpm, {what}, {why}:\n    {text}"
+
+
+def perturbed(subject: Subject, speed: float) -> np.ndarray:
+    """States about the model's own starts in turn, shape (1, starts, dimension)."""
+    own = np.array([[float(c) for c in y] for y in subject.model.starts(speed)])
+    scale = np.array([float(c) for c in subject.model.scale(speed)])
+    drawn = np.random.default_rng(subject.seed).normal(scale=SPREAD, size=(PERTURBED, own.shape[1]))
+    return (np.resize(own, drawn.shape) + drawn * scale)[None]
+
+
+def escapes(subject: Subject, speed: float, method: Any = None) -> Any:
+    """`Survival` of perturbed starts to the length of a default sweep."""
+    length = LENGTH - SETTLED
+    options = dict(discard=SETTLED, revolutions=length, blocks=length // LIFE_BLOCK, confirm=False, horizon=LENGTH + 1)
+    found = jc.sweep(subject.model, [speed], starts=perturbed(subject, speed), method=method, **options)  # pyright: ignore
+    assert found.escape is not None
+    times = np.maximum(found.escape.ravel() - SETTLED, 0.0)
+    return survival(times, length, block=LIFE_BLOCK)
+
+
+def doubted(subject: Subject, quick: bool) -> Iterator[Doubted]:
+    """Speeds that are chaotic by one of the two alone."""
+    count = [np.sum(s.label == "chaotic", axis=1) for s in pair(subject, quick)]
+    for spurious, (here, there) in ((True, count), (False, count[::-1])):
+        for i in np.flatnonzero((here >= STARTS) & (there == 0)):
+            speed = float(subject.grid(count[0].size)[i])
+            rates = compare(escapes(subject, speed), escapes(subject, speed, fine()))
+            yield Doubted(subject, speed, spurious, rates)
+
+
+HEAD = f"{'':44s}" + "".join(
+    f"{x:>10s}" for x in ("speeds", "lanes", "chaotic", "by 8x", "differ", "inacc.", "failed", "doubted", "explained")
+)
+
+
+def report(found: Sequence[Subject], quick: bool) -> list[str]:
+    """labels of default sweeps beside those by 8 times the steps"""
+    every: list[Doubted] = []
+    speeds = 0
+    for kind, group in by_kind(found).items():
+        print(f"\nLabels, {kind}\n{HEAD}", flush=True)
+        for subject in group:
+            ours, theirs = pair(subject, quick)
+            new = list(doubted(subject, quick))
+            chaos = [int(np.sum(s.label == "chaotic")) for s in (ours, theirs)]
+            beside = [int(np.sum(ours.label == name)) for name in ("inaccurate", "failed")]
+            differ = int(np.sum((ours.label != theirs.label) & ~ours.failed & ~theirs.failed))
+            row = (ours.speed.size, ours.label.size, *chaos, differ, *beside, len(new), sum(d.explained for d in new))
+            print(f"{subject.name:44s}" + "".join(f"{x:10d}" for x in row), flush=True)
+            every += new
+            speeds += ours.speed.size
+    print(*every, sep="\n")
+    bad = [d for d in every if not d.explained]
+    spurious = sum(d.spurious for d in bad)
+    wrong = [f"{spurious} spurious and {len(bad) - spurious} missed speeds"] if bad else []
+    if len(every) - len(bad) > EXPLAINED * speeds:
+        wrong.append(f"{len(every) - len(bad)} of {speeds} speeds had to be explained")
+    return wrong

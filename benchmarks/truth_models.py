@@ -1,0 +1,68 @@
+"""What the sections of `benchmarks.truth` look at: the six cases, and random models by seed."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+import jaxcage as jc
+from jaxcage.models import CageModel
+from tests import reference
+
+
+CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
+KINDS = ("cases", "narrow", "wide")
+LOWEST, HIGHEST = 300.0, 60000.0
+"""Speeds of the cases and of wide models [rpm]."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Subject:
+    """A model, and which speeds are its own. Each is itself and no other, so that results can be kept for it."""
+
+    name: str
+    kind: str
+    seed: int
+    model: CageModel
+
+    def speeds(self, count: int) -> np.ndarray:
+        """Ascending random speeds [rad/s]."""
+        if self.kind == "cases":
+            return random_case_speeds(self.seed, count)
+        return reference.random_speeds(self.seed, count, self.kind == "wide")
+
+    def grid(self, count: int) -> np.ndarray:
+        """Speeds [rad/s] with equal ratios, from end to end."""
+        low, high = reference.SPEEDS[self.kind == "wide"]
+        return np.geomspace(low, high, count) * math.pi / 30
+
+
+def random_case_speeds(seed: int, count: int) -> np.ndarray:
+    """Logarithmically spread over all speeds [rad/s]."""
+    drawn = np.random.default_rng([seed, 2]).uniform(math.log(LOWEST), math.log(HIGHEST), count)
+    return np.sort(np.exp(drawn)) * math.pi / 30
+
+
+def described(seed: int, model: CageModel) -> str:
+    """What a model is made of."""
+    given = reference.numbers_of(model)
+    rib = ", elastic rib" if given["rib"]["kind"] == "elastic" else ""
+    supply = ", supply" if given["film"]["supply_pressure"] else ""
+    return f"{seed:3d} {given['film']['model']}{supply}, {given['impact']['kind']}{rib}"
+
+
+def subjects(kinds: Sequence[str], seeds: Sequence[int], cases: Sequence[str] = CASES) -> Iterator[Subject]:
+    """The cases, then narrow models, then wide ones."""
+    if "cases" in kinds:
+        yield from (Subject(f"case {name}", "cases", i, jc.case(name)) for i, name in enumerate(cases))
+    for kind in KINDS[1:]:
+        for seed in seeds if kind in kinds else ():
+            model = reference.random_model(seed, kind == "wide")
+            yield Subject(described(seed, model), kind, seed, model)
+
+
+def by_kind(found: Sequence[Subject]) -> dict[str, list[Subject]]:
+    """In the order of `KINDS`, those that there are."""
+    groups = {kind: [s for s in found if s.kind == kind] for kind in KINDS}
+    return {kind: group for kind, group in groups.items() if group}

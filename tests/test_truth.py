@@ -1,0 +1,125 @@
+"""What the default method says is so: labels and exponents that were those of the steps once, and errors as stated.
+
+Every sweep of case 1a and of what differs from it in its numbers runs by the same compiled programs.
+"""
+
+import dataclasses
+import tomllib
+
+import numpy as np
+import pytest
+import reference
+
+import jaxcage as jc
+from benchmarks import truth, truth_exponents
+from jaxcage.integrate._controlled import DEFAULT_ERROR
+from jaxcage.io import model_from, template
+
+
+MODEL = jc.case("1a")
+SHORT = dict(discard=20, revolutions=20, confirm=False, horizon=0)
+
+
+def replaced(**numbers) -> jc.CageModel:
+    return jc.replace(MODEL, **numbers)
+
+
+def assert_closes(model, sweep, i, j):
+    """The state in which a periodic lane ends returns by the reference, too."""
+    period = int(sweep.label[i, j].partition("-")[2])
+    field = reference.field(model, float(sweep.speed[i]))
+    back = reference.revolutions(field, sweep.last[i, j], period).strobe[-1]
+    np.testing.assert_allclose(back / field.scale, sweep.last[i, j] / field.scale, rtol=0, atol=DEFAULT_ERROR)
+
+
+def test_an_orbit_that_fixed_steps_called_chaotic_is_periodic():
+    found = jc.sweep(MODEL, jc.rpm(18200, 18400, 3), horizon=0)
+    assert set(found.label.ravel()) <= {"periodic-2", "periodic-4"}
+    assert np.all(np.abs(found.exponents + 0.07) < 0.05)
+    assert_closes(MODEL, found, 1, 0)
+
+
+def test_a_stiff_land_is_periodic():
+    model = replaced(stiffness=5e9)
+    found = jc.sweep(model, jc.rpm(18000), horizon=0)
+    assert found.label.tolist() == [["periodic-2"] * 3]
+    assert_closes(model, found, 0, 0)
+
+
+def test_a_stiff_land_that_is_touched_early_is_periodic_or_not_known():
+    model = replaced(stiffness=1e10, onset=0.6)
+    found = jc.sweep(model, jc.rpm(6000), horizon=0)
+    assert set(found.label.ravel()) <= {"periodic-1", "periodic-3", "inaccurate"}
+    third = found.label == "periodic-3"
+    assert found.exponents[third, 0] == pytest.approx(-0.040, abs=5e-3)
+    for j in np.flatnonzero(~found.failed[0]):
+        assert_closes(model, found, 0, j)
+
+
+def test_an_exponent_on_a_soft_support_is_that_of_the_motion():
+    model = jc.replace(MODEL, **truth_exponents.SOFT)
+    found = jc.sweep(model, jc.rpm(600), discard=100, revolutions=100, horizon=0)
+    assert found.exponents == pytest.approx(truth_exponents.SOFT_EXPONENT, abs=0.01)
+    beside = truth_exponents.beside(model, 600.0, found.last[0, 0])
+    assert beside is not None and beside.theirs[0] != pytest.approx(beside.theirs[1], abs=0.01)
+    assert beside.ours == pytest.approx(beside.theirs, abs=1e-3)
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
+    finished = 0
+    for seed in range(3):
+        drawn = reference.random_model(seed, wide)
+        same = [n for n in jc.parameters(MODEL) if n in jc.parameters(drawn)]
+        model = jc.replace(MODEL, **{n: jc.parameters(drawn)[n] for n in same})
+        found = jc.sweep(model, reference.random_speeds(seed, 3, wide), **SHORT)
+        error = found.error[~found.failed]
+        assert np.all(error > 0) and np.all(error <= DEFAULT_ERROR)
+        assert np.all(np.isnan(found.last[found.failed])) and np.all(found.label[found.failed] != "chaotic")
+        finished += error.size
+    assert finished >= 18
+
+
+def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
+    designs = [MODEL, replaced(stiffness=1e16, onset=0.3), replaced(eccentricity=2e-5)]
+    speeds = jc.rpm(9000, 15000, 2)
+    starts = [(0.6 * float(MODEL.clearance), 0.0, 0.0, 0.0)]
+    beside = jc.sweep_designs(designs, speeds, starts=starts, **SHORT)
+    assert not np.any(np.isin(beside[1].label, ("chaotic", "undecided", "quasi-periodic")))
+    alone = jc.sweep_designs([designs[0], designs[2], designs[2]], speeds, starts=starts, **SHORT)
+    for here, there in ((beside[0], alone[0]), (beside[2], alone[2])):
+        for name in ("strobe", "block_growth", "outcome", "error", "peak"):
+            assert np.array_equal(getattr(here, name), getattr(there, name)), name
+
+
+def test_the_section_of_lanes_finds_nothing_wrong():
+    assert truth.main(["--quick", "--lanes", "--kinds", "cases"]) == []
+
+
+@pytest.mark.slow
+def test_no_section_finds_anything_wrong():
+    assert truth.main(["--quick"]) == []
+
+
+def spindle() -> jc.CageModel:
+    """A bearing of one's own, as from the template of `jaxcage init` with a few lines changed."""
+    given = tomllib.loads(template())
+    given |= dict(guidance_gap="0.25 mm", clearance_reading="radial", unbalance="physical", load="800 N")
+    lengths = dict(bore=50, outside_diameter=80, width=16, roller_diameter=7, roller_length=7, rib_diameter=70)
+    given["bearing"] |= {name: f"{size} mm" for name, size in lengths.items()}
+    given["bearing"] |= dict(inner_raceway_diameter="58 mm", n_rollers=18)
+    return model_from(given)
+
+
+def test_forces_of_a_bearing_of_ones_own_are_those_of_the_reference():
+    model = spindle()
+    settled = jc.simulate(model, jc.rpm(9000), revolutions=1, discard=60)
+    start = tuple(float(c) for c in settled.state[0])
+    run = jc.simulate(model, jc.rpm(9000), revolutions=2, start=start)
+    exact = reference.sampled(reference.field(model, float(jc.rpm(9000))), run.state[0], 2, run.samples)
+    ours = jc.orbit_measures(model, run)
+    theirs = jc.orbit_measures(model, dataclasses.replace(run, state=exact.state[:-1], peak=exact.peak))
+    assert theirs.peak_contact_force > 10
+    assert ours.peak_contact_force == pytest.approx(theirs.peak_contact_force, rel=1e-2)
+    assert ours.largest_eps == pytest.approx(theirs.largest_eps, abs=run.error)
+    assert ours.whirl_ratio == pytest.approx(theirs.whirl_ratio, abs=1e-4)
