@@ -30,8 +30,8 @@ DEFAULT_LADDER = (*(("rk4", 64 << i) for i in range(8)), *(("rodas4", 512 << i) 
 TURN = 0.5
 """Largest difference that half as many steps may make to the leading tangent vector, relative to its length."""
 FALL = 16.0
-"""What the difference of two rungs is taken for at least, however well they agree: so many times less than that of the
-two before them. Fourth order makes it 16; where it falls faster, they agree by accident, as when both miss a contact."""
+"""What the difference of two rungs is taken for at least, however well they agree: so many times less than that of
+the two before them. Fourth order makes it 16; where it falls faster, both may have missed a contact."""
 SLOW = 4.0
 """Where the difference of two rungs is not so many times below that of the two before them, the law jumps on the way
 (the film's at its centre), and the error is that of first order: so many times the difference."""
