@@ -1,5 +1,6 @@
 """Ready-made objects and tools for the tests."""
 
+import dataclasses
 import functools
 
 import equinox as eqx
@@ -38,6 +39,18 @@ def elastic(model: jc.CageModel, mass: float = 1.0, stiffness: float = 5e7, damp
 def roller_pass(model: jc.CageModel) -> jc.CageModel:
     """The model with impacts roller by roller."""
     return jc.replace(model, impact=jc.RollerPassImpact(jc.PocketImpact()))
+
+
+class EvenSteps(jc.CageModel):
+    """A cage whose steps are as long near the land as elsewhere."""
+
+    def abrupt(self, y, rate):
+        return None
+
+
+def even(model: jc.CageModel) -> jc.CageModel:
+    """The model by steps of one length."""
+    return EvenSteps(**{field.name: getattr(model, field.name) for field in dataclasses.fields(model)})
 
 
 def unforced(model: jc.CageModel) -> jc.CageModel:

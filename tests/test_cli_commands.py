@@ -21,7 +21,7 @@ from jaxcage.report import zones_table
 
 
 TINY = ["--first", "12000", "--last", "13000", "--count", "3", "--discard", "20", "--revolutions"]
-TINY += ["20", "--solver", "rodas4", "--steps", "64"]
+TINY += ["20", "--horizon", "0", "--solver", "rodas4", "--steps", "64"]
 PNG = b"\x89PNG\r\n"
 
 
@@ -44,6 +44,7 @@ ZONE_KEYS = {
     "exit_rpm",
     "onset_uncertainty_rpm",
     "exit_uncertainty_rpm",
+    "mean_life_revolutions",
     "mechanism",
     "onset_mechanism",
     "exit_mechanism",
@@ -130,7 +131,7 @@ def test_simulation_that_fails_says_so(capsys: pytest.CaptureFixture[str], tmp_p
     assert main(["simulate", "1a", *arguments]) == 1
     out, err = capsys.readouterr()
     assert out == ""
-    assert "The simulation at 2500 rpm failed (outside)" in err
+    assert "The simulation at 2500 rpm failed (outside)" in err or "failed (not_finite)" in err
     assert not any(tmp_path.iterdir())
 
 
@@ -247,7 +248,20 @@ def test_as_a_module_from_a_shell(tmp_path: Path):
 
 
 def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    tiny = ["--first", "9000", "--last", "13000", "--count", "5", "--discard", "20", "--revolutions", "20"]
+    tiny = [
+        "--first",
+        "9000",
+        "--last",
+        "13000",
+        "--count",
+        "5",
+        "--discard",
+        "20",
+        "--revolutions",
+        "20",
+        "--horizon",
+        "0",
+    ]
     found = document(
         capsys, "sweep", "1a", *tiny, "--solver", "rodas4", "--steps", "64", "--waterfall", "3", "--out", str(tmp_path)
     )

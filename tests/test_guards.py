@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import raw_sweep, raw_sweeps
+from helpers import even, raw_sweep, raw_sweeps
 from report_example import point
 
 import jaxcage as jc
@@ -84,7 +84,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
 OTHERS = {
     # settings, objectives and distributions: nothing is computed yet
     *("keep_compiled_programs", "enable_x64", "rpm", "method", "controlled", "uniform", "rayleigh"),
-    *("chaotic_share", "chaotic_width", "cost", "regular_motion", "zone_width"),
+    *("chaotic_share", "chaotic_width", "cost", "regular_motion", "survival", "zone_width"),
     # parameters by name, tables
     *("parameter_info", "parameters", "replace", "nu2310", "published_case", "vg", "open_study"),
     # of what was found before, with its numbers
@@ -151,7 +151,7 @@ def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageMode
     """With steps too large by far for the contact: a lane is refused, or tells how far out the farthest of its steps
     was, which is compared with here for four of them at a time.
     """
-    strobe = jc.strobe_map(model, jc.rpm(9000.0), jc.method(solver, steps=steps))
+    strobe = jc.strobe_map(even(model), jc.rpm(9000.0), jc.method(solver, steps=steps))
 
     def one(y: Any, i: Any) -> Any:
         y = strobe.part(y, i, steps).y
@@ -206,7 +206,7 @@ def test_with_fine_steps_the_rib_turns_a_thrown_cage_back(model: jc.CageModel):
     ],
 )
 def test_labels_that_rest_on_too_few_revolutions(label: str, exponent: float, error: float, short: bool):
-    period, lost = np.array([int(label == "periodic-1")]), np.array([label == "failed"])
+    period, lost = np.array([int(label == "periodic-1")]), np.array([int(label == "failed")])
     assert label_lanes(lost, period, np.array([exponent]), np.array([error]))[0] == label
     lane = np.array([label]), np.array([exponent]), np.array([error])
     assert too_few_revolutions(*lane, 300)[0] == short

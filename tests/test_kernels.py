@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import raw_sweep, raw_sweeps
+from helpers import even, raw_sweep, raw_sweeps
 
 import jaxcage as jc
 from jaxcage.integrate import (
@@ -320,14 +320,7 @@ def test_lanes_with_counts_of_their_own_are_differentiated_by_parts(monkeypatch)
 # --- lanes against one lane alone, step by step by the solver -------------------------------------------------------
 
 
-class EvenSteps(jc.CageModel):
-    """A cage whose steps are as long near the land as elsewhere."""
-
-    def abrupt(self, y, rate):
-        return None
-
-
-EVEN = EvenSteps(**{field.name: getattr(MODEL, field.name) for field in dataclasses.fields(MODEL)})
+EVEN = even(MODEL)
 
 
 def by_lanes(chosen, directions=()):

@@ -74,6 +74,8 @@ def test_an_orbit_shows_its_multipliers():
         converged=jnp.array(True),
         iterations=jnp.array(3),
         periods=jnp.array(1),
+        steps=jnp.array(512),
+        error=jnp.array(1e-8),
         self_excited=False,
     )
     assert "0.5+0.1j" in orbit._repr_html_() and "8594.4 rpm" in orbit._repr_html_()

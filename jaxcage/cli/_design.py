@@ -14,7 +14,6 @@ import numpy as np
 from .._parameters import parameter_info, parameters
 from ..analysis import Sweep, Zones, zones
 from ..design import AbstractObjective, Optimised, Optimum, Robust, chaotic_width, cost, optimise
-from ..integrate import method
 from ..models import CageModel
 from ..orbits import LossZones
 from ..plotting import design_figure
@@ -31,8 +30,6 @@ from ._vary import read_bounds, read_scatter
 VARY = ("guidance_gap=0.3mm:0.6mm", "eccentricity=5um:60um")
 CHECKED_SPEEDS = 118
 """Every 200 rpm of the usual range."""
-FINE = 768
-"""Steps of the sweep that checks an optimum: twice those that most speeds take otherwise."""
 
 
 def run(options: DesignOptions) -> Report:
@@ -128,13 +125,13 @@ def _kept_search(folder: Path, name: str, options: DesignOptions) -> Path:
 
 
 def check(model: CageModel, options: DesignOptions, count: int = CHECKED_SPEEDS) -> Sweep:
-    """A sweep with starts that the search did not use, and finer steps."""
+    """A sweep with starts that the search did not use, its labels confirmed."""
     rng, c = np.random.default_rng(options.seed + 1), float(model.clearance)
     half = model.dimension // 2
     size = np.array([c] * half + [0.3 * c * angular_speed(options.first)] * half)
     starts = [tuple(float(v) for v in 0.6 * size * rng.uniform(-1, 1, size.size)) for _ in range(3)]
     speeds = rpm(options.first, options.last, count)
-    return sweep(model, speeds, starts=starts, discard=300, revolutions=200, method=method("rk4", steps=FINE))
+    return sweep(model, speeds, starts=starts, discard=300, revolutions=200)
 
 
 def chaotic_rpm(found: Sweep) -> float:

@@ -19,6 +19,7 @@ from ..report import (
     loss_table,
     page,
     read_operating,
+    transient_tables,
     zone_document,
     zones_document,
     zones_table,
@@ -133,6 +134,7 @@ def _tables(findings: Findings, judged: list[Judged]) -> list[Table]:
         *([verdicts] if rows else []),
         loss_table(findings.name, findings.found, findings.loss, findings.published),
         zones_table(findings.name, findings.zones, findings.published, swept),
+        *transient_tables(findings.name, findings.zones),
     ]
 
 

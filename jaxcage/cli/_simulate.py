@@ -10,11 +10,11 @@ from ._console import progress
 from ._errors import ComputationError, require_at_least, require_speed
 from ._inputs import (
     angular_speed,
-    integration,
     output_folder,
     samples_per_revolution,
     save_figure,
     subject,
+    sweep_integration,
 )
 from ._options import SimulateOptions
 from ._report import Report, Table
@@ -25,7 +25,7 @@ def run(options: SimulateOptions) -> Report:
     require_speed("--speed", options.speed)
     require_at_least("--revolutions", options.revolutions, 1)
     require_at_least("--discard", options.discard, 0)
-    chosen, about, folder = integration(options), subject(options), output_folder(options)
+    chosen, about, folder = sweep_integration(options), subject(options), output_folder(options)
     with progress(f"simulate {about.name}"):
         trajectory = simulate(
             about.model,
@@ -54,11 +54,13 @@ def run(options: SimulateOptions) -> Report:
         "revolutions": options.revolutions,
         "outcome": trajectory.outcome,
         "peak": trajectory.peak,
+        "error": trajectory.error,
         "measures": dataclasses.asdict(measures),
         **paths,
     }
     table = Table(title, ("measure", "value", "unit"), _rows(measures))
-    return Report(document, [table], [f"Figure: {paths['figure']}", f"Data: {paths['data']}"])
+    error = f"Error of a revolution: at most {trajectory.error:.0e} of the clearance"
+    return Report(document, [table], [error, f"Figure: {paths['figure']}", f"Data: {paths['data']}"])
 
 
 def _rows(measures: OrbitMeasures) -> list[tuple[str, str, str]]:

@@ -25,7 +25,6 @@ from ._errors import (
 )
 from ._inputs import (
     Subject,
-    integration,
     output_folder,
     samples_per_revolution,
     save_figure,
@@ -113,8 +112,8 @@ def run(options: SweepOptions) -> Report:
         "failed": failed_lanes(found),
         "beyond_clearance": int(np.sum(found.peak > 1)),
         "too_short": int(np.sum(found.too_short)),
+        **extent(found),
         "confirmed": [each._asdict() for each in found.confirmed],
-        "error": float(np.max(found.error[~found.failed])),
         "seconds": round(swept.seconds, 2),
         **figures,
         "data": swept.data,
@@ -122,6 +121,13 @@ def run(options: SweepOptions) -> Report:
     zone_table = zones_table(about.name, edges, about.published, swept.range_rpm)
     tables = [_label_table(found, counts), zone_table, *transient_tables(about.name, edges)]
     return Report(document, tables, _notes(document))
+
+
+def extent(found: Sweep) -> dict[str, Any]:
+    """What was swept, how long, and the largest error of a revolution [system's scale], for programs."""
+    speeds, starts = found.outcome.shape
+    length = {"discard": found.discard, "revolutions": found.revolutions}
+    return {"speeds": speeds, "starts": starts, **length, "error": float(np.max(found.error[~found.failed]))}
 
 
 def _zoom(swept: Swept, edges: Zones) -> dict[str, str]:
@@ -144,7 +150,7 @@ def _waterfall(swept: Swept, options: SweepOptions) -> dict[str, str]:
     if options.waterfall == 0:
         return {}
     speeds = np.linspace(swept.sweep.speed[0], swept.sweep.speed[-1], options.waterfall)
-    chosen = integration(options)
+    chosen = sweep_integration(options)
     samples = samples_per_revolution(chosen, 64)
     found = waterfall(swept.subject.model, speeds, component=1, samples=samples, method=chosen)
     figure = new_figure(9.0, 5.0)

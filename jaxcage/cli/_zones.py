@@ -18,6 +18,7 @@ from ..report import (
     edge_slopes,
     error_cell,
     loss_table,
+    transient_tables,
     unsettled_notes,
     zone_document,
     zones_document,
@@ -27,7 +28,7 @@ from ._console import progress_in_stages
 from ._inputs import Subject, orbit_integration
 from ._options import ZonesOptions
 from ._report import Report, Table, number
-from ._sweep import failed_lanes, sweep_case
+from ._sweep import extent, failed_lanes, sweep_case
 
 
 SHOWN = ("guidance_gap", "eccentricity")
@@ -50,7 +51,7 @@ def run(options: ZonesOptions) -> Report:
     document["synchronous_loss"] = [_loss_document(i, loss, slopes) for i in range(len(loss.zones))]
     for i, zone in enumerate(document["zones"], start=1):
         zone |= _source_documents(i, explained, slopes)
-    document |= {
+    document |= extent(swept.sweep) | {
         "failed": failed_lanes(swept.sweep),
         "seconds": round(swept.seconds + time.perf_counter() - began, 2),
         "data": swept.data,
@@ -59,6 +60,7 @@ def run(options: ZonesOptions) -> Report:
         loss_table(about.name, found, loss, about.published),
         *([_gradient_table(about, slopes)] if slopes else []),
         zones_table(about.name, explained.zones, about.published, swept.range_rpm),
+        *transient_tables(about.name, explained.zones),
     ]
     notes = [*_notes(explained), *contact_notes(about.model, loss.edges, chosen), *unsettled_notes(found)]
     return Report(document, tables, [*notes, f"Time: {document['seconds']:.1f} s", f"Data: {swept.data}"])

@@ -1,6 +1,7 @@
 """Time histories at constant speed and through a speed ramp, both made of parts of the strobe map's revolution."""
 
 import dataclasses
+import math
 
 import equinox as eqx
 import jax
@@ -36,9 +37,9 @@ class Trajectory:
     """Largest excursion of the first sample and at any step after it, between the samples too; for a cage eps."""
     outcome: str
     """`successful`, or the name of what went wrong."""
-    error: float
+    error: float = math.nan
     """Largest error of a revolution, in units of the system's scale (for a cage: clearances): how far the ends of its
-    parts move, in all, with half as many steps."""
+    parts move, in all, with half as many steps. NaN for a trajectory that no integration has made."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " n"]:

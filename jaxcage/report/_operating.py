@@ -83,6 +83,11 @@ def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:
     if at.low_rpm < rpm[0] - 1e-6 or at.high_rpm > rpm[-1] + 1e-6:
         return Verdict("unknown", f"not swept: the sweep goes from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm")
     found = _verdict(at, zones.zones)
+    dying = [z for z in zones.transient if _low(z) <= at.high_rpm and at.low_rpm <= _high(z)]
+    if dying and found.state != "inside":
+        lives = [life * 60 / at.low_rpm for z in dying for life in z.life or ()]
+        often = f", mean life up to {max(lives):.2g} s after each disturbance" if lives else ""
+        return dataclasses.replace(found, state="inside", where=f"in transient chaos{often}")
     beside = (rpm >= at.low_rpm - zones.resolution_rpm) & (rpm <= at.high_rpm + zones.resolution_rpm)
     lost = int(np.sum(sweep.failed[beside]))
     if lost and found.state != "inside":

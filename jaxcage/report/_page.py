@@ -21,7 +21,7 @@ from ._page_tables import at_speeds_table, checks_table, provenance_table, publi
 from ._sources import parameter_rows, shown
 from ._statics import statics_table
 from ._table import Table, number
-from ._zone_tables import zones_table
+from ._zone_tables import transient_tables, zones_table
 
 
 _HERE = Path(__file__).parent
@@ -90,6 +90,7 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
         "resolution": number(swept.resolution_rpm),
         "loss_table": loss_table(name, found, findings.loss, findings.published),
         "zones_table": zones_table(name, findings.zones, findings.published, span),
+        "transient_tables": transient_tables(name, findings.zones),
         "zone_notes": coexisting_notes(findings.loss),
         "edge_table": _named_edges(findings),
         "further_edges": len(found.edges) - len({id(p) for p in findings.loss.edges.values()}),
@@ -167,9 +168,11 @@ def _counted(n: int, what: str) -> str:
 
 
 def calmest(findings: Findings) -> tuple[float, float] | None:
-    """The widest range of the sweep [rpm] outside the zones of both kinds; None if there is none."""
+    """The widest range of the sweep [rpm] outside all zones, transient chaos included; None if there is none."""
     first, last = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
-    taken = sorted(_ends(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones))
+    taken = sorted(
+        _ends(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones, *findings.zones.transient)
+    )
     free, at = [], first
     for low, high in taken:
         free.append((at, low))

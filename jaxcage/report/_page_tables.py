@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._parameters import parameter_info, parameter_paths, parameters
+from ..analysis import Sweep
 from ..orbits import Sensitivity
 from ..reproduction import compare_edges
 from ._findings import Findings
@@ -85,6 +86,8 @@ def checks_table(findings: Findings) -> Table:
     exact = f"{sum(e.basis != 'statistical' for e in edges)} of {len(edges)}" if not findings.quick else "not tried"
     rows = [
         ("simulations that failed", f"{int(np.sum(swept.failed))} of {swept.outcome.size}"),
+        ("labels that changed when confirmed by finer steps", _confirmed(swept) or "none confirmed"),
+        ("largest error of a revolution, of the clearance", f"{np.max(swept.error[~swept.failed], initial=0.0):.0e}"),
         ("simulations that went beyond eps = 1, where surfaces would overlap", str(int(np.sum(swept.peak > 1)))),
         ("simulations of which it is undecided what they do", str(int(np.sum(swept.label == "undecided")))),
         ("settled synchronous orbits that lie on no branch that was followed", str(found.missed)),
@@ -96,6 +99,10 @@ def checks_table(findings: Findings) -> Table:
         rows.append(("gradients against the scaling of units, largest relative residual", f"{worst:.0e}"))
         rows.append(("edges whose gradient is not to be trusted", ", ".join(lost) or "none"))
     return Table("Checks of this report", ("check", "result"), rows)
+
+
+def _confirmed(swept: Sweep) -> str:
+    return ", then ".join(f"{each.changed} of {each.lanes}" for each in swept.confirmed)
 
 
 def published_table(findings: Findings) -> Table | None:
@@ -127,7 +134,7 @@ def provenance_table(findings: Findings) -> Table:
         ("versions", ", ".join([*versions, f"Python {platform.python_version()}"])),
         ("machine", f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"),
         ("sweep", f"{speeds} speeds from {swept.rpm[0]:.0f} to {swept.rpm[-1]:.0f} rpm, {starts} starts"),
-        ("revolutions", f"{swept.discard} left out, {swept.revolutions} observed"),
+        ("revolutions", f"{swept.discard} left out, {swept.revolutions} observed, chaos followed to {swept.horizon}"),
         ("resolution", f"{swept.resolution_rpm:.0f} rpm; windows below {findings.zones.close_below_rpm:g} rpm closed"),
         ("steps of the sweep", " ".join(str(settings.get("method", "")).split())),
         ("steps of orbits", " ".join(findings.orbit_method.split())),

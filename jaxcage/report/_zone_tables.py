@@ -64,20 +64,20 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     """
     spans = published_zones(published)
     partner = {i: _partner(span, zones) for i, span in enumerate(spans)}
-    rows = []
+    rows, followed = [], int(zones.horizon > 0)
     for i, zone in enumerate(zones.zones):
         beside = [spans[k] for k, found in partner.items() if found == i]
-        rows.append((str(i + 1), *_zone_cells(zone), _published_cell(beside)))
+        rows.append((str(i + 1), *_zone_cells(zone), *[_life_cell(zone)][:followed], _published_cell(beside)))
     for span in (spans[k] for k, found in partner.items() if found is None):
         missed = span[0] <= swept[1] and (span[1] is None or span[1] >= swept[0])
         why = "not found" if missed else "not swept"
-        rows.append(("-", why, *5 * ("-",), _published_cell([span])))
+        rows.append(("-", why, *(4 + followed) * ("-",), _published_cell([span])))
     if not rows:
-        rows = [("none", *7 * ("-",))]
+        rows = [("none", *(6 + followed) * ("-",))]
     lasting = f", chaos that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm{lasting}"
-    columns = ("zone", "onset", "exit", "width", "mechanism", "share", LIFE)
-    return Table(title, (*columns, "published"), rows)
+    columns = ("zone", "onset", "exit", "width", "mechanism", "share")
+    return Table(title, (*columns, *[LIFE][:followed], "published"), rows)
 
 
 def transient_tables(name: str, zones: Zones) -> list[Table]:
@@ -93,7 +93,7 @@ def _zone_cells(zone: Zone) -> tuple[str, ...]:
     known = [edge.mechanism for edge in (zone.onset, zone.exit) if edge is not None]
     mechanism = " / ".join(dict.fromkeys(known)) or "-"
     width = number(zone.width_rpm, nothing="open")
-    return _edge_cell(zone.onset), _edge_cell(zone.exit), width, mechanism, f"{zone.share:.0%}", _life_cell(zone)
+    return _edge_cell(zone.onset), _edge_cell(zone.exit), width, mechanism, f"{zone.share:.0%}"
 
 
 def _life_cell(zone: Zone) -> str:

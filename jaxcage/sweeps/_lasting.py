@@ -72,5 +72,5 @@ def follow(
 def _coarse(growth: Float[np.ndarray, "blocks lanes"], block: int) -> Float[np.ndarray, "coarse lanes"]:
     """Mean growth over whole blocks of `LIFE_BLOCK` revolutions, the last ones of those observed."""
     every = np.repeat(growth, block, axis=0)
-    count = every.shape[0] // LIFE_BLOCK
-    return np.mean(every[every.shape[0] - count * LIFE_BLOCK :].reshape(count, LIFE_BLOCK, -1), axis=1)
+    count, lanes = every.shape[0] // LIFE_BLOCK, growth.shape[1]
+    return np.mean(every[every.shape[0] - count * LIFE_BLOCK :].reshape(count, LIFE_BLOCK, lanes), axis=1)

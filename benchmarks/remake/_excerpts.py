@@ -1,0 +1,173 @@
+"""How the output of commands becomes a block of a page."""
+
+import json
+import re
+from collections.abc import Callable, Sequence
+
+from ._runs import Run
+
+
+Excerpt = Callable[[Sequence[Run]], str]
+EDGES = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
+
+
+def fenced(text: str) -> str:
+    """A block of plain text."""
+    return f"```text\n{text.strip()}\n```"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> str:
+    """Rows as plain text, the first column to the left."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    line = lambda row: [f"{row[0]:<{widths[0]}}", *(f"{c:>{w}}" for c, w in zip(row[1:], widths[1:], strict=True))]
+    return fenced("\n".join("  ".join(line(row)).rstrip() for row in rows))
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, *rows)).replace("\n", f"\n|{'---|' * len(head)}\n", 1)
+
+
+def tables(*titles: str) -> Excerpt:
+    """Of one command's output the tables whose titles begin so; the first of them must be there."""
+
+    def made(runs: Sequence[Run]) -> str:
+        found = [part for part in runs[0].text.split("\n\n") if part.startswith(titles)]
+        if not any(part.startswith(titles[0]) for part in found):
+            raise ValueError(f"there is no table '{titles[0]}'")
+        return fenced("\n\n".join(found))
+
+    return made
+
+
+def lines(start: str) -> Excerpt:
+    """Of one command's output the lines that begin so."""
+    return lambda runs: fenced("\n".join(x for x in runs[0].text.splitlines() if x.startswith(start)))
+
+
+def printed(runs: Sequence[Run]) -> str:
+    """All that one command printed."""
+    return fenced(runs[0].text)
+
+
+def page(name: str) -> Excerpt:
+    """A whole file that one command left."""
+    return lambda runs: (runs[0].folder / name).read_text(encoding="utf-8").strip()
+
+
+def _ours(edge: dict, apart: str) -> str:
+    if edge["ours_rpm"] is None:
+        return "none"
+    return f"{edge['ours_rpm']:.0f}{apart.format(edge['error_percent'])}"
+
+
+def against_paper(runs: Sequence[Run]) -> str:
+    """The chaotic edges of `jaxcage reproduce`, a case to a row."""
+    cases: dict[str, list[str]] = {}
+    for edge in (e for e in runs[0].document["edges"] if e["kind"] == "chaotic"):
+        cases.setdefault(edge["case"], []).append(f"{edge['published_rpm']:.0f} / {_ours(edge, ' ({:+.1f} %)')}")
+    return markdown(("case", "zone 1 from", "to", "zone 2 from"), [(name, *row) for name, row in cases.items()])
+
+
+def both_kinds(runs: Sequence[Run]) -> str:
+    """The chaotic and the synchronous-loss edges of `jaxcage reproduce`."""
+    rows: dict[tuple[str, str], list[str]] = {}
+    for edge in runs[0].document["edges"]:
+        begin = [f"{edge['published_rpm']:.0f}"]
+        rows.setdefault((edge["case"], edge["edge"]), begin).append(_ours(edge, " {:+.1f} %"))
+    body = [(*key, *row, *(["none"] * (3 - len(row)))) for key, row in rows.items()]
+    return aligned([("case", "edge", "published", "chaotic", "synchronous loss"), *body])
+
+
+def readings(runs: Sequence[Run]) -> str:
+    """The readings of case 1a that `jaxcage reproduce` tried."""
+    number = lambda x: "-" if x is None else f"{x:.0f}"
+    body = [
+        (
+            f"{r['question']}: {r['answer']}".removesuffix(": -"),
+            f"{100 * r['chaotic_share']:.0f} %",
+            str(r["zones"]),
+            *(number(r["edges"].get(e)) for e in EDGES),
+        )
+        for r in runs[0].document["readings"]
+        if r["case"] == "1a"
+    ]
+    return aligned([("reading", "chaotic", "zones", *EDGES), *body])
+
+
+def lasting(runs: Sequence[Run]) -> str:
+    """Zone 1 of each case without a horizon and with one: sweeps in pairs."""
+    head = ("case", "zone 1 published", "after {} revolutions", "after {}", "chaotic lanes")
+    rows: list[tuple[str, ...]] = []
+    for first, second in zip(runs[::2], runs[1::2], strict=True):
+        a, b = first.document, second.document
+        zone = a["published"][0]
+        share = lambda d: f"{100 * d['labels'].get('chaotic', 0) / (d['speeds'] * d['starts']):.0f}"
+        of = lambda d, z=zone: _widest(d["zones"], z)
+        published = f"{zone['onset_rpm']:.0f} to {zone['exit_rpm']:.0f}"
+        rows.append((a["case"], published, of(a), of(b), f"{share(a)} -> {share(b)} %"))
+        head = (*head[:2], head[2].format(a["discard"]), head[3].format(b["horizon"]), head[4])
+    return aligned([head, *rows])
+
+
+def _widest(zones: Sequence[dict], published: dict) -> str:
+    """The zone that shares most speeds with a published one."""
+    low, high = (lambda z: z["onset_rpm"] or 0.0), (lambda z: z["exit_rpm"] or 1e9)
+    shared = lambda z: min(high(z), high(published)) - max(low(z), low(published))
+    best = max(zones, key=shared, default=None)
+    if best is None or shared(best) <= 0:
+        return "none"
+    ends = [best["onset_rpm"], best["exit_rpm"]]
+    return " to ".join("past range" if x is None else f"{x:.0f}" for x in ends)
+
+
+def case_fits(runs: Sequence[Run]) -> str:
+    """Each case with the constants fitted to it alone, from `identify_nu2310.py --check`."""
+    rows = []
+    for run in runs:
+        name, rest = run.text.strip().split(": ", 1)
+        found = dict(re.findall(r"(zone \d \w+) (none|\S+ %)", rest))
+        rows.append((name, *(found[e] for e in EDGES), rest.split("; ")[1].split()[0]))
+    return aligned([("case fitted alone", *EDGES, "zones"), *rows])
+
+
+RIVALS = {
+    "jaxcage sweep": "jaxcage, default",
+    "diffrax Tsit5": "diffrax Tsit5, vmap",
+    "SciPy LSODA": "SciPy LSODA, numba",
+    "diffrax Kvaerno3": "diffrax Kvaerno3, vmap",
+    "C, Rodas4": "C, rodas4",
+    "C, RK4": "C, rk4",
+}
+
+
+def speed(runs: Sequence[Run]) -> str:
+    """Microseconds of some rivals, from the page of `python -m benchmarks`."""
+    text = (runs[0].folder / "speed.md").read_text(encoding="utf-8").split("\n## ")[1]
+    rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in text.splitlines() if row.startswith("| ")]
+    us = {row[0].removesuffix(" (below)"): row[rows[0].index("us")] for row in rows[1:]}
+    short = lambda x: x if float(x) < 10 else f"{float(x):.0f}"
+    return markdown(tuple(RIVALS), [[short(us[name]) for name in RIVALS.values()]])
+
+
+def said(notebook: str) -> str:
+    """All that the cells of a notebook printed."""
+    outputs = [output for cell in json.loads(notebook)["cells"] for output in cell.get("outputs", ())]
+    return "".join("".join(output.get("text", ())) for output in outputs)
+
+
+SEARCHES = {
+    "gradient, from the best scout": "gradient, from the best of the scouts",
+    "gradient, from the design": "gradient, from the given design",
+    "differential evolution": "differential evolution (scipy, 400 designs)",
+    "CMA-ES": "CMA-ES from the given design (400 designs)",
+}
+
+
+def searches(runs: Sequence[Run]) -> str:
+    """What each search of `optimise_gap_and_balance` reached."""
+    text = said((runs[0].folder / "optimise_gap_and_balance.ipynb").read_text(encoding="utf-8"))
+    found = re.findall(r"^(\S.*?) +best +(\S+) rpm, designs until (\S+) rpm: (\S+)$", text, flags=re.M)
+    best = {name: (value, "-" if count == "None" else count) for name, value, _, count in found}
+    head = ("search", "best objective [rpm]", f"designs until {found[0][2]} rpm")
+    return markdown(head, [(words, *best[name]) for name, words in SEARCHES.items()])

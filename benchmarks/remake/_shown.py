@@ -1,0 +1,99 @@
+"""The one table of everything shown: where it stands, which commands make it, and how."""
+
+import dataclasses
+import pathlib
+from collections.abc import Sequence
+
+from . import _excerpts as ex
+from ._excerpts import Excerpt
+
+
+@dataclasses.dataclass(frozen=True)
+class Shown:
+    """A block of a page between its marks, a whole page, or a notebook.
+
+    Without an excerpt the words of the block stay: it shows a figure, which is in `files`, or holds numbers that
+    someone puts in by hand.
+    """
+
+    name: str
+    page: str
+    """Markdown file or notebook."""
+    commands: Sequence[str]
+    excerpt: Excerpt | None = None
+    whole: bool = False
+    """Whether the block is the whole page."""
+    files: dict[str, str] = dataclasses.field(default_factory=dict)
+    """Other files of the checkout that belong to it, each with where a command run elsewhere leaves it; nothing for one
+    that is left in place."""
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether someone has to put the numbers in."""
+        return self.excerpt is None and not self.files
+
+    @property
+    def in_place(self) -> list[str]:
+        """Files that its commands write in the checkout."""
+        own = [self.page] if self.whole and not self.commands[0].startswith("jaxcage") else []
+        return own + [name for name, left in self.files.items() if not left]
+
+    def answers_to(self, word: str) -> bool:
+        """Whether `word` is its name, or that of its page."""
+        return word in (self.name, self.page, pathlib.Path(self.page).stem.lower())
+
+
+def _figure(name: str, page: str, command: str, file: str) -> Shown:
+    return Shown(name, page, [command], files={f"experiments/{file}": f"out/{file}"})
+
+
+def _whole(name: str, page: str, command: str, left: str) -> Shown:
+    return Shown(name, page, [command], ex.page(left), whole=True)
+
+
+def _notebook(name: str, *figures: str) -> Shown:
+    page, files = f"experiments/{name}.ipynb", {f"experiments/{f}.png": "" for f in (name, *figures)}
+    command = f"python -m jupytext --to ipynb --execute experiments/{name}.py"
+    return Shown(name.replace("_", "-"), page, [command], ex.page(f"{name}.ipynb"), whole=True, files=files)
+
+
+README, GUIDE, REPRODUCTION = "README.md", "docs/guide.md", "docs/reproduction.md"
+CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
+SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
+SPEED = "python -m benchmarks"
+CHAOS = ("Chaotic zones of", "Transient chaos of")
+FIT = "python experiments/identify_nu2310.py --check --cases {0} --begin experiments/case_fits/{0}.json"
+OPTIMISE = _notebook("optimise_gap_and_balance", "gradient_or_not")
+
+SHOWN = (
+    _figure("sweep-1a-figure", README, SWEEP, "sweep_1a.png"),
+    Shown("sweep-1a", README, [SWEEP], ex.tables(*CHAOS)),
+    Shown("zones-1a", README, [ZONES], ex.tables("Elasticities", *CHAOS)),
+    Shown("against-paper", README, [REPRODUCE], ex.against_paper),
+    _figure("reproduce-figure", README, REPRODUCE, "reproduce_7a.png"),
+    _whole("speed-page", "benchmarks/speed.md", SPEED, "speed.md"),
+    Shown("speed", README, [SPEED], ex.speed),
+    Shown("speed-text", README, [SPEED]),
+    Shown("guide-zones-1a", GUIDE, [ZONES], ex.tables("Synchronous-loss", "Elasticities", *CHAOS)),
+    _figure("bifurcations-1a-figure", GUIDE, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
+    Shown("design-1b", GUIDE, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
+    _figure("design-1b-figure", GUIDE, DESIGN, "design_1b.png"),
+    OPTIMISE,
+    Shown("searches", GUIDE, OPTIMISE.commands, ex.searches),
+    Shown("studies-text", GUIDE, ["python -m benchmarks.study"]),
+    _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
+    Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.both_kinds),
+    Shown("case-fits", REPRODUCTION, [FIT.format(c) for c in CASES], ex.case_fits),
+    _figure("reproduction-figure", REPRODUCTION, REPRODUCE, "reproduce_7a.png"),
+    Shown("readings", REPRODUCTION, ["jaxcage reproduce --quick"], ex.readings),
+    Shown("lasting", REPRODUCTION, [f"jaxcage sweep {c}{o}" for c in CASES for o in (" --horizon 0", "")], ex.lasting),
+    Shown("identify", REPRODUCTION, ["python -m benchmarks.identify"], ex.lines("+-")),
+    Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
+    _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),
+    _whole("solvers-page", "benchmarks/solvers.md", "python -m benchmarks.solvers", "solvers.md"),
+    _notebook("orbit_diagrams"),
+    _notebook("gradient_tour"),
+    _notebook("sensitivity_and_tolerances"),
+    _notebook("your_own_bearing"),
+    _notebook("your_own_oscillator"),
+)

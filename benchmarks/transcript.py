@@ -1,0 +1,63 @@
+"""The session of docs/transcript.md: a bearing of one's own, by commands alone: `python -m benchmarks.transcript`."""
+
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+
+
+FILE = "my_bearing.toml"
+VALUES = {
+    "guidance_gap": "0.6 mm",
+    "eccentricity": "30 um",
+    "cage_mass": "0.40 kg",
+    "bore": "60 mm",
+    "outside_diameter": "130 mm",
+    "width": "46 mm",
+    "roller_diameter": "19 mm",
+    "roller_length": "31 mm",
+    "rib_diameter": "109 mm",
+    "inner_raceway_diameter": "77 mm",
+    "pocket_clearance": "0.7 mm",
+    "temperature": "60 degC",
+}
+"""What is edited in the template."""
+
+
+def edit(path: pathlib.Path) -> None:
+    """Put the values in."""
+    text = path.read_text(encoding="utf-8")
+    for name, value in VALUES.items():
+        text, count = re.subn(rf"^{name} = .*$", f'{name} = "{value}"', text, count=1, flags=re.M)
+        if not count:
+            raise ValueError(f"The template has no line that sets `{name}`.")
+    path.write_text(text, encoding="utf-8")
+
+
+def show(command: str, folder: str) -> None:
+    """Run a command of the package and print it with what it says."""
+    words = [sys.executable, "-m", "jaxcage", *shlex.split(command)[1:]]
+    done = subprocess.run(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    print(f"$ {command}\n{done.stdout}", flush=True)
+    done.check_returncode()
+
+
+def main() -> None:
+    """Print the session."""
+    with tempfile.TemporaryDirectory() as folder:
+        show(f"jaxcage init {FILE}", folder)
+        path = pathlib.Path(folder, FILE)
+        edit(path)
+        pattern = "^(guidance|ecc|cage_mass|bore|outside|width|roller_|rib|inner|pocket|temp)"
+        print(f'$ grep -E "{pattern}" {FILE}  # after editing')
+        print("\n".join(x for x in path.read_text(encoding="utf-8").splitlines() if re.match(pattern, x)), end="\n\n")
+        show(f"jaxcage statics {FILE}", folder)
+        show(f"jaxcage sweep {FILE}", folder)
+        show(f"jaxcage design {FILE} --quick --starts 2 --steps 8", folder)
+        show(f"jaxcage report {FILE} --quick --operating '5000-8000 rpm'", folder)
+
+
+if __name__ == "__main__":
+    main()
