@@ -129,8 +129,9 @@ class Sweep:
         """
         if self.escape is None:
             raise ValueError("Argument `horizon` of the sweep must be given for this, but lanes were not followed.")
-        times = self.escape[max(i - 1, 0) : i + 2].ravel() - self.discard
-        return survival(np.maximum(times, 0.0), self.horizon - self.discard, block=LIFE_BLOCK)
+        begin = self.discard + self.revolutions % LIFE_BLOCK  # of whole blocks
+        times = self.escape[max(i - 1, 0) : i + 2].ravel() - begin
+        return survival(np.maximum(times, 0.0), self.horizon - begin, block=LIFE_BLOCK)
 
     @property
     def restless(self) -> Bool[np.ndarray, " speeds"]:

@@ -28,7 +28,8 @@ DEFAULT_ERROR = 1e-3
 """Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
 DEFAULT_LADDER = (*(("rk4", 64 << i) for i in range(8)), *(("rodas4", 512 << i) for i in range(6)))
 TURN = 0.5
-"""Largest difference that half as many steps may make to the leading tangent vector, relative to its length."""
+"""Largest difference that half as many steps may make to the leading tangent vector, relative to its length, at the
+default error."""
 FALL = 16.0
 """What the difference of two rungs is never below, however well they agree: so many times less than that of the two
 before them. By fourth order it is 16; where it falls faster two rungs agree by accident: both may miss a contact."""
@@ -66,6 +67,8 @@ class ControlledSteps(AbstractMethod):
     in all."""
     tolerance: Float[Array, ""]
     """Infinite where the last rung is to be taken whatever its error, which is stated all the same."""
+    turn: Float[Array, ""]
+    """Largest difference that the rung before may make to the leading tangent vector, relative to its length."""
     multiple: int = eqx.field(static=True)
     """What all step counts are multiples of."""
 
@@ -147,7 +150,6 @@ def climb(
     lowest = method.lowest(harmonics)
     begin = jnp.maximum(level - method.before, lowest)
     carry = (begin, start, jnp.zeros(begin.shape, bool), start.error)
-    turn = jnp.where(jnp.isfinite(method.tolerance), TURN, jnp.inf)
     first = 0
     for rungs, size in zip(method.ladder, method.sizes, strict=True):
 
@@ -165,7 +167,7 @@ def climb(
             error = apart if method.before == 1 else _error(apart, gap)
             fine = (tried.outcome == 0) & (error <= method.tolerance / parts) & (height >= method.before)
             if tried.tangents:
-                fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= turn
+                fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= method.turn
             tried = tried._replace(error=error, half=before.tangents, level=rung)
             now = jax.tree.map(lambda a, b: jnp.where(mine, a, b), tried, before)
             gap = jnp.where(mine, apart, gap)
@@ -208,7 +210,7 @@ def stated(method: AbstractMethod) -> ControlledSteps:
     if isinstance(method, FixedSteps):
         return _ladder([(method.solver, [-(-method.steps // 2), method.steps])], math.inf)
     assert isinstance(method, AdaptiveSteps)
-    return ControlledSteps((_with_tolerances(method, 16.0), method), jnp.asarray(math.inf), 1)
+    return ControlledSteps((_with_tolerances(method, 16.0), method), *[jnp.asarray(math.inf)] * 2, 1)
 
 
 def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:
@@ -216,7 +218,8 @@ def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> Con
     counts = [steps for _, each in rungs for steps in each]
     multiple = math.gcd(*counts, 4) if all(isinstance(c, int) for c in counts) else 1
     fixed = tuple(FixedSteps(solver, jnp.asarray(each, jnp.int32)) for solver, each in rungs)
-    return ControlledSteps(fixed, jnp.asarray(float(tolerance)), multiple)
+    turn = TURN if math.isfinite(tolerance) else math.inf
+    return ControlledSteps(fixed, jnp.asarray(float(tolerance)), jnp.asarray(turn), multiple)
 
 
 def _with_tolerances(method: AdaptiveSteps, times: float) -> AdaptiveSteps:
@@ -229,12 +232,13 @@ def finer(method: AbstractMethod, times: int = 1) -> ControlledSteps:
     """`method` with steps at most half as long, `times` over, for what it is to be confirmed by.
 
     Of a controlled method the tolerance is 16 times as small, which a solver of fourth order reaches with twice the
-    steps, and the ladder begins and ends with twice as many.
+    steps, that of its tangent vectors 4 times, and the ladder begins and ends with twice as many.
     """
     rough = stated(method)
     steps, error = 1 << times, 16.0**-times
     each = lambda r: FixedSteps(r.solver, steps * r.steps) if isinstance(r, FixedSteps) else _with_tolerances(r, error)
-    return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance, rough.multiple)
+    turn = math.sqrt(error) * rough.turn
+    return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance, turn, rough.multiple)
 
 
 def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] = DEFAULT_LADDER) -> ControlledSteps:
