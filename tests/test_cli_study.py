@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.cli import _console, _label_map, main
@@ -46,7 +47,8 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     np.testing.assert_allclose(stored["speed"], speeds, rtol=1e-14)
     starts = np.array([[[float(c) for c in y] for y in model.starts(s)[:2]] for s in speeds])
     method = jc.method(steps=64)
-    swept = jc.sweep(model, speeds, starts=starts, discard=10, revolutions=20, blocks=20, keep=16, method=method)
+    length = dict(discard=10, revolutions=20, blocks=20, keep=16)
+    swept = raw_sweep(model, speeds, starts=starts, method=method, **length)
     mine = stored.isel(guidance_gap=1)
     # rounding grows with the exponent: 30 revolutions are short enough
     np.testing.assert_allclose(mine["largest_exponent"], swept.exponents[..., 0], rtol=0, atol=1e-3)
