@@ -141,10 +141,10 @@ class Sweep:
     @property
     def lasting(self) -> Bool[np.ndarray, " speeds"]:
         """Speeds at which chaos lasts: by its mean life beyond the horizon, if lanes were followed to one."""
-        chaotic = np.any(self.label == "chaotic", axis=1)
         if self.escape is None:
-            return chaotic
-        return np.array([c and self.survival(i).mean_life >= self.horizon for i, c in enumerate(chaotic)], dtype=bool)
+            return self.restless
+        lasts = [c and self.survival(i).mean_life >= self.horizon for i, c in enumerate(self.restless)]
+        return np.array(lasts, dtype=bool)
 
     @property
     def too_short(self) -> Shaped[np.ndarray, "speeds starts"]:

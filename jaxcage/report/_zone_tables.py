@@ -85,7 +85,7 @@ def transient_tables(name: str, zones: Zones) -> list[Table]:
     if not zones.transient:
         return []
     rows = [(_edge_cell(z.onset), _edge_cell(z.exit), f"{z.share:.0%}", _life_cell(z)) for z in zones.transient]
-    title = f"Transient chaos of {name} [rpm], gone within {zones.horizon} revolutions"
+    title = f"Transient chaos of {name} [rpm], mean life below {zones.horizon} revolutions"
     return [Table(title, ("from", "to", "share", LIFE), rows)]
 
 
@@ -104,7 +104,7 @@ def _life_cell(zone: Zone) -> str:
     revolutions = " to ".join(dict.fromkeys(f"{x:.0f}" for x in zone.life))
     if not ends:
         return revolutions
-    seconds = " to ".join(dict.fromkeys(f"{x * 60 * len(ends) / sum(ends):.2g}" for x in zone.life))
+    seconds = " to ".join(dict.fromkeys(number(x * 60 * len(ends) / sum(ends), 1) for x in zone.life))
     return f"{revolutions} ({seconds} s)"
 
 
