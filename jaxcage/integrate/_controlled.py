@@ -210,7 +210,8 @@ def stated(method: AbstractMethod) -> ControlledSteps:
     if isinstance(method, FixedSteps):
         return _ladder([(method.solver, [-(-method.steps // 2), method.steps])], math.inf)
     assert isinstance(method, AdaptiveSteps)
-    return ControlledSteps((_with_tolerances(method, 16.0), method), *[jnp.asarray(math.inf)] * 2, 1)
+    any_, ladder = jnp.asarray(math.inf), (_with_tolerances(method, 16.0), method)
+    return ControlledSteps(ladder, any_, any_, 1)
 
 
 def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:
