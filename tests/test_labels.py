@@ -130,9 +130,9 @@ def test_sweep_prints_counts():
 def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     """Escapes of made-up lanes: the mean life at a speed is that of the lanes there and next to it."""
     sweep = made("11###11###11")
-    escape = np.full(sweep.outcome.shape, 10.0)
-    escape[2:5], escape[7:10] = np.inf, 310.0
-    followed = dataclasses.replace(sweep, escape=escape, horizon=3010)
+    escape = np.full(sweep.outcome.shape, 20.0)
+    escape[2:5], escape[7:10] = np.inf, 320.0
+    followed = dataclasses.replace(sweep, escape=escape, horizon=3020)
     assert followed.label[3, 0] == "chaotic" and followed.label[8, 0] == "transient"
     assert followed.observed_label[8, 0] == "chaotic"
     assert np.array_equal(np.flatnonzero(followed.lasting), [2, 3, 4])
@@ -142,7 +142,11 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     assert lasting.onset.speed_rpm == pytest.approx((followed.rpm[1] + followed.rpm[2]) / 2)
     assert dying.exit.speed_rpm == pytest.approx((followed.rpm[9] + followed.rpm[10]) / 2)
     assert lasting.life == pytest.approx((2 * 3000 / 3, 3 * 3000 / 3))  # bounds: two lanes at the rim, three within
-    n, survived, block = 3, 3 * 270, 30  # three escapes in the block that ends 300 revolutions after the discarded ones
+    n, survived, block = (
+        3,
+        3 * 270,
+        30,
+    )  # three escapes in the block that ends 300 revolutions after the first whole block begins
     assert dying.life[1] == pytest.approx(block / np.log1p(n * block / survived))
-    assert "beyond 3010 revolutions" in str(found) and "Transient chaos" in str(found)
+    assert "beyond 3020 revolutions" in str(found) and "Transient chaos" in str(found)
     assert jc.zones(sweep, close_below_rpm=0.0).transient == ()
