@@ -44,7 +44,7 @@ def roller_pass(model: jc.CageModel) -> jc.CageModel:
 class EvenSteps(jc.CageModel):
     """A cage whose steps are as long near the land as elsewhere."""
 
-    def abrupt(self, y, rate):
+    def abrupt(self, y, rate):  # pyright: ignore[reportIncompatibleMethodOverride]
         return None
 
 

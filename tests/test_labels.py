@@ -147,6 +147,6 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
         3 * 270,
         30,
     )  # three escapes in the block that ends 300 revolutions after the first whole block begins
-    assert dying.life[1] == pytest.approx(block / np.log1p(n * block / survived))
+    assert dying.life is not None and dying.life[1] == pytest.approx(block / np.log1p(n * block / survived))
     assert "beyond 3020 revolutions" in str(found) and "Transient chaos" in str(found)
     assert jc.zones(sweep, close_below_rpm=0.0).transient == ()
