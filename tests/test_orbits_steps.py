@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
+from helpers import even
 from reference import bifurcation as shooting
 
 import jaxcage as jc
@@ -76,7 +77,7 @@ def test_error_of_an_orbit_bounds_what_four_times_the_steps_change():
         finer = jc.periodic_orbit(model, rpm * RPM, guess=orbit, method=FixedSteps(orbit.solver, 4 * steps[-1]))
         np.testing.assert_allclose(np.sort(abs(orbit.multipliers)), np.sort(abs(finer.multipliers)), atol=1e-3)
         assert f"{steps[-1]} steps per revolution" in str(orbit)
-    assert steps[0] <= 512 and min(steps[1:]) >= 4096
+    assert steps[0] <= 512 and min(steps[1:]) >= 1024  # where the land is touched
 
 
 def test_orbit_of_a_light_cage_that_few_steps_lose(tmp_path: Path):
@@ -101,7 +102,8 @@ def test_orbit_of_a_light_cage_that_few_steps_lose(tmp_path: Path):
         text = re.sub(rf"^(# )?{name} = \S+( [^\s#]+)?", f"{name} = {value}", text, count=1, flags=re.M)
     Path(path).write_text(text)
     model = load_model(path)
-    assert not jc.periodic_orbit(model, 9000 * RPM, method=jc.method("rk4", steps=1024)).converged
+    even_steps = jc.periodic_orbit(even(model), 9000 * RPM, method=jc.method("rk4", steps=1024))
+    assert not even_steps.converged  # shortened near the land, as many find it
     orbit = jc.periodic_orbit(model, 9000 * RPM)
     assert orbit.stable and orbit.error < 1e-6
     theirs = reference.revolutions(reference.field(model, 9000 * RPM), np.array(orbit.state)).strobe[1]
