@@ -76,7 +76,7 @@ def test_lanes_are_those_of_a_sweep(whole: Path):
             (jnp.array(damping[i]), jnp.array(CUBICS[j])),
         )
         starts = [tuple(float(c) for c in start) for start in system.starts(1.0)[:2]]
-        swept = jc.sweep(system, SPEEDS, starts=starts, keep=16, **LENGTH)
+        swept = jc.sweep(system, SPEEDS, starts=starts, keep=16, confirm=False, horizon=0, **LENGTH)
         mine = found.isel(sample=i, cubic=j)
         assert np.array_equal(label_names(mine).values, swept.label)
         np.testing.assert_allclose(mine["largest_exponent"], swept.exponents[..., 0], rtol=0, atol=1e-9)
@@ -131,8 +131,8 @@ def test_shards_fill_one_store(whole: Path, tmp_path: Path):
 def test_a_chunk_half_written_is_written_again(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
 ):
-    """The process dies when so many of a chunk's six variables are in place."""
-    store, put, left = tmp_path / "study.zarr", Store.write, [2 * 6 + written]
+    """The process dies when so many of a chunk's seven variables are in place."""
+    store, put, left = tmp_path / "study.zarr", Store.write, [2 * 7 + written]
 
     def write(self: Store, chunk: int, results: dict) -> None:
         for name in sorted(results, key=lambda name: name == "outcome"):
