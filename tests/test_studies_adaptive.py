@@ -141,7 +141,7 @@ def test_map_of_a_system_agrees_with_a_sweep():
     starts = [tuple(float(c) for c in s) for s in make(7.5).starts(1.0)[:2]]
     same, near = 0, 0
     for j in (0, 7):
-        swept = jc.sweep(make(forces[j]), speeds, starts=starts, keep=16, **length)
+        swept = jc.sweep(make(forces[j]), speeds, starts=starts, keep=16, confirm=False, horizon=0, **length)
         known = found.grid.known[:, j]
         mine = np.array(LABELS)[found.label[known, j]]
         periodic = np.char.startswith(swept.label[known], "periodic")

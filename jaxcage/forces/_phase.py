@@ -4,6 +4,8 @@ Where each lane has a phase of its own, as with steps that are shortened near a 
 library for every lane costs more than the rest of the forces; these polynomials run eight lanes to an instruction.
 """
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 
@@ -38,10 +40,13 @@ def _polynomial(coefficients: tuple[float, ...], z: Scalar) -> Scalar:
     return value
 
 
-@jax.custom_jvp
 def cos_sin(tau: Scalar) -> tuple[Scalar, Scalar]:
     """Cosine and sine of tau [rad], to a unit in the last place of 1 for |tau| < 1e5."""
-    tau = jnp.asarray(tau, dtype=float)
+    return _cos_sin(jnp.asarray(tau, dtype=float))
+
+
+@jax.custom_jvp
+def _cos_sin(tau: Any) -> Any:
     quarters = jnp.floor(tau * (2 / jnp.pi) + 0.5)
     r = (tau - quarters * QUARTER[0]) - quarters * QUARTER[1]
     z = r * r
@@ -53,8 +58,8 @@ def cos_sin(tau: Scalar) -> tuple[Scalar, Scalar]:
     return jnp.where((place == 1) | (place == 2), -cosine, cosine), jnp.where(place >= 2, -sine, sine)
 
 
-@cos_sin.defjvp
-def _cos_sin_jvp(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple:
+@_cos_sin.defjvp
+def _cos_sin_jvp(primals: tuple, tangents: tuple) -> tuple:
     (tau,), (rate,) = primals, tangents
-    c, s = cos_sin(tau)
+    c, s = _cos_sin(tau)
     return (c, s), (-s * rate, c * rate)
