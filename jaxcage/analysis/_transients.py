@@ -293,11 +293,11 @@ class Share(NamedTuple):
 
 
 def coexisting(ends: Shaped[np.ndarray, " lanes"]) -> dict[str, Share]:
-    """Share of the starts on each attractor, the most frequent first; lanes that failed are left out.
+    """Share of the starts on each attractor, the most frequent first; lanes that failed or are inaccurate are left out.
 
     **Arguments:** the name of each lane's end: labels, or finer names where several orbits have one label.
     """
-    counts = collections.Counter(str(end) for end in ends.tolist() if end != "failed")
+    counts = collections.Counter(str(end) for end in ends.tolist() if end not in ("failed", "inaccurate"))
     lanes = sum(counts.values())
     shares = {}
     for end, count in counts.most_common():

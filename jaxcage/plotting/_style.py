@@ -59,6 +59,7 @@ KIND_COLOURS = {
     "periodic": BLUE,
     "quasi-periodic": GREEN,
     "chaotic": VERMILION,
+    "transient": ORANGE,
     "undecided": PURPLE,
 }
 """Colour of a strobe point by what its lane does."""

@@ -18,7 +18,7 @@ from ._study import LABELS, PENDING, SPEED, Study, too_short
 
 
 KINDS = ("calm", "chaotic", "failed")
-"""What a point counts as: chaotic if any of its starts is, else failed if any has, else calm."""
+"""What a point counts as: chaotic if any of its starts is, else failed if any has or is inaccurate, else calm."""
 Refine = Literal["chaos", "label", "everything"]
 """Where points are spent: where chaos begins or ends, where any label changes, or everywhere."""
 Stage = Callable[[str, int, int], None]
@@ -74,7 +74,7 @@ class LabelMap:
 def kinds(label: Int[np.ndarray, "*points starts"]) -> Int[np.ndarray, "*points"]:
     """What points count as, from the labels of their starts."""
     chaotic = np.any(label == LABELS.index("chaotic"), axis=-1)
-    failed = np.any(label == LABELS.index("failed"), axis=-1)
+    failed = np.any(np.isin(label, [LABELS.index("failed"), LABELS.index("inaccurate")]), axis=-1)
     return np.where(chaotic, 1, np.where(failed, 2, 0))
 
 

@@ -31,7 +31,7 @@ CLOSING = 16
 FEW, SOME = 256, 1024
 """Lanes to which fewer ones are filled up: each number of lanes may take a program of its own."""
 
-LABELS = ("failed", *(f"periodic-{k}" for k in range(1, 9)), "chaotic", "quasi-periodic", "undecided")
+LABELS = ("failed", *(f"periodic-{k}" for k in range(1, 9)), "chaotic", "quasi-periodic", "undecided", "inaccurate")
 """What a lane does, in the order of the integer codes that a study stores."""
 PENDING = -1
 """Code of a lane that has not been run yet."""
