@@ -130,22 +130,22 @@ def _zones(
     sweep: Sweep, known: np.ndarray, share: np.ndarray, spans: Sequence[tuple[int, int]], kind: str
 ) -> tuple[Zone, ...]:
     edge: Callable[[int, int], Edge | None] = lambda i, step: _edge(sweep.rpm, known, i, step, kind)
-    followed = kind != "synchronous-loss" and sweep.escape is not None
+    restless = sweep.restless if kind != "synchronous-loss" and sweep.escape is not None else None
     return tuple(
         Zone(
             kind,
             edge(a, -1),
             edge(b, 1),
             float(np.nanmean(share[a : b + 1])),
-            _life(sweep, a, b) if followed else None,
+            None if restless is None else _life(sweep, restless, a, b),
         )
         for a, b in spans
     )
 
 
-def _life(sweep: Sweep, first: int, last: int) -> tuple[float, float]:
+def _life(sweep: Sweep, restless: np.ndarray, first: int, last: int) -> tuple[float, float]:
     """Shortest and longest mean life at the speeds of a zone at which there is chaos."""
-    seen = [sweep.survival(i) for i in range(first, last + 1) if sweep.restless[i]]
+    seen = [sweep.survival(i) for i in range(first, last + 1) if restless[i]]
     lives = [s.mean_life if s.escapes else s.lower_bound for s in seen]
     return min(lives), max(lives)
 

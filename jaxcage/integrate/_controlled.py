@@ -1,4 +1,4 @@
-"""As many equal steps as a revolution needs, and how sure its end is.
+"""As many steps as a revolution needs, and how sure its end is.
 
 The error of a revolution is how far its end moves when it is run with half as many steps: an honest number for every
 solver, stiff or not, with contacts that switch on the way or without. A solver of order p is nearer to the truth than
@@ -36,8 +36,9 @@ before them. By fourth order it is 16; where it falls faster two rungs agree by 
 SLOW = 4.0
 """Where the difference of two rungs is not so many times below that of the two before them, the law jumps on the way
 (the film's at its centre), and the error is that of first order: so many times the difference."""
-EASY = 512
-"""A lane whose error is so many times below the tolerance begins the next revolution one rung lower."""
+EASY = 8
+"""A lane whose error is so many times below the tolerance begins the next revolution one rung lower: in vain that
+costs an eighth of the steps of the rung that is taken."""
 
 Rungs = FixedSteps | AdaptiveSteps
 Attempt = Callable[[Rungs, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
@@ -210,8 +211,8 @@ def stated(method: AbstractMethod) -> ControlledSteps:
     if isinstance(method, FixedSteps):
         return _ladder([(method.solver, [-(-method.steps // 2), method.steps])], math.inf)
     assert isinstance(method, AdaptiveSteps)
-    any_, ladder = jnp.asarray(math.inf), (_with_tolerances(method, 16.0), method)
-    return ControlledSteps(ladder, any_, any_, 1)
+    unbounded, ladder = jnp.asarray(math.inf), (_with_tolerances(method, 16.0), method)
+    return ControlledSteps(ladder, unbounded, unbounded, 1)
 
 
 def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from .._types import Scalar, State
-from ..models import AbstractField, AbstractForcedSystem
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem
 from ._explicit import Stages, chosen, explicit_step
 from ._march import is_elementary, march_with_tangents
 from ._program import Numbers, Sizes
@@ -63,6 +63,8 @@ NEARNESS = 0.05
 """Time to a place of abrupt change [rad], at the pace of the moment, at which steps are half as long."""
 FAR = 0.5
 """Time [rad] from which on they are not shortened."""
+SHORTEST = 1 / 1024
+"""Of a step, what is left of it at least."""
 MORE = 8
 """Steps are added by so many parts of a revolution's, until all lanes are through."""
 
@@ -75,6 +77,7 @@ def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end:
     assert near is not None
     distance, speed = near
     short = h * distance / (distance + NEARNESS * jnp.maximum(speed - distance / FAR, 0.0))
+    short = jnp.maximum(short, SHORTEST * h)
     left = jnp.maximum(end - phase, 0.0)
     return jax.lax.stop_gradient(jnp.where(left < 1.0001 * short, left, short))
 
@@ -82,7 +85,7 @@ def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end:
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
-    phase; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
+    phase and the length of the step; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
 
     solver: KernelSolver
     structure: Structure
@@ -228,7 +231,8 @@ def steps_through(
     carry = go((tuple(y), step.watched(phase), tuple(tangents)), count, multiple)
     if step.abrupt:
         more = jnp.maximum(count // MORE, 1)
-        # NaN: the phase of a lane that is lost is undefined, and ends the loop.
-        carry = jax.lax.while_loop(lambda c: c[1][1] < end, lambda c: go(c, more, 1), carry)
+        # A lane that is lost ends the loop: it is far out, or its phase is NaN.
+        through = lambda c: (c[1][1] < end) & (c[1][0] <= ESCAPE)
+        carry = jax.lax.while_loop(through, lambda c: go(c, more, 1), carry)
     y, (peak, *_), after = carry
     return y, peak, tuple(after)

@@ -149,7 +149,7 @@ def _chunk_size(lanes: int) -> int:
 
 def _room(count: int) -> int:
     """The next of a few sizes, so that few programs serve all counts."""
-    return 1 << max(3, (count - 1).bit_length())
+    return 1 << max(5, (count - 1).bit_length())
 
 
 def run_lanes(

@@ -7,11 +7,22 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
-from ..analysis import CONFIRM, LIFE_BLOCK, Observation, calm_at_the_end, escape_times
+from ..analysis import (
+    CONFIRM,
+    LIFE_BLOCK,
+    Observation,
+    Plan,
+    calm_at_the_end,
+    calm_threshold,
+    closing_period,
+    escape_times,
+)
 
 
+STAGE = 12
+"""Blocks after which lanes that have settled are left where they are."""
 CALM = -1.0
 """Growth that stands for that of a lane which has settled on a periodic orbit, and is not followed."""
 
@@ -36,37 +47,54 @@ def unsettled(label: Shaped[np.ndarray, " lanes"]) -> Int[np.ndarray, " some"]:
 
 def follow(
     label: Shaped[np.ndarray, " lanes"],
-    growth: Float[np.ndarray, "blocks lanes"],
-    block: int,
-    discard: int,
+    seen: Observation,
+    plan: Plan,
     scale: Float[np.ndarray, "lanes dim"],
-    blocks: int,
-    run: Callable[[Int[np.ndarray, " some"]], Observation],
-) -> tuple[Int[np.ndarray, " some"], Observation | None, Lasting]:
-    """Follow the lanes that are not settled.
+    horizon: int,
+    run: Callable[[Plan, Int[np.ndarray, " some"], Float[np.ndarray, "some dim"]], Observation],
+) -> Lasting:
+    """Follow the lanes that are not settled, and put where they end in place of what was `seen` of them.
 
-    **Arguments:** labels; growth of the largest exponent in the observed blocks of so many revolutions, after those
-    that were discarded; scale of each lane's state; blocks of `LIFE_BLOCK` to follow; `run(lanes)` follows lanes from
-    where they are.
+    They are run on in stages of `STAGE` blocks; one that has closed on a periodic orbit by the end of a stage, its
+    growth calm for as long as an escape takes to be confirmed, stays there and is not run any further.
 
-    **Returns:** the lanes that were followed, what was seen of them, and when lanes escaped.
+    **Arguments:** labels; what was seen by which plan; scale of each lane's state; horizon [revolutions of the whole
+    run]; `run(plan, lanes, states)` runs lanes on from their states.
     """
-    lanes = unsettled(label)
-    early = _coarse(growth, block)
+    early = _coarse(np.asarray(seen.growth)[:, 0], plan.block)
+    blocks = blocks_to(horizon, plan.discard + plan.block * plan.blocks)
     late = np.full((blocks, label.size), CALM)
     calm = np.ones(label.size, dtype=bool)
-    failed = np.isin(label, ("failed", "inaccurate"))
-    seen = None
-    if lanes.size:
-        seen = run(lanes)
-        late[:, lanes] = seen.growth[:, 0]
-        calm[lanes] = calm_at_the_end(
-            np.moveaxis(np.asarray(seen.strobe), -1, 0), scale[lanes], late[:, lanes].T, LIFE_BLOCK
-        )
-        failed[lanes] = seen.outcome != 0
-    times, horizon = escape_times(np.concatenate([early, late]).T, calm, LIFE_BLOCK, failed=failed)
-    begin = discard + growth.shape[0] * block % LIFE_BLOCK
-    return lanes, seen, Lasting(begin + times, begin + horizon)
+    active = unsettled(label)
+    for first in range(0, blocks, STAGE):
+        if not active.size:
+            break
+        stage = slice(first, min(first + STAGE, blocks))
+        new = run(Plan(0, LIFE_BLOCK, stage.stop - first, plan.keep, 1), active, np.asarray(seen.last).T[active])
+        _put(seen, active, new, label[active] == "undecided")
+        late[stage, active] = new.growth[:, 0]
+        strobe = np.moveaxis(np.asarray(new.strobe), -1, 0)
+        end = late[: stage.stop, active].T
+        calm[active] = calm_at_the_end(strobe, scale[active], end, LIFE_BLOCK)
+        closed = closing_period(strobe, scale[active]) > 0
+        still = np.all(end[:, -CONFIRM:] <= calm_threshold(LIFE_BLOCK), axis=1) & (stage.stop >= CONFIRM)
+        active = active[~(closed & still) & (new.outcome == 0)]
+    failed = np.asarray(seen.outcome) != 0
+    times, end = escape_times(np.concatenate([early, late]).T, calm, LIFE_BLOCK, failed=failed)
+    begin = plan.discard + plan.block * plan.blocks % LIFE_BLOCK
+    return Lasting(begin + times, begin + end)
+
+
+def _put(
+    seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
+) -> None:
+    """Where lanes are later; the strobe states of those that were `open_`, which they may close; NaN where one fails."""
+    seen.last[:, lanes] = new.last
+    seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
+    seen.outcome[lanes] = new.outcome
+    seen.strobe[..., lanes[open_]] = new.strobe[..., open_]
+    lost = lanes[np.asarray(new.outcome) != 0]
+    seen.strobe[..., lost] = seen.growth[..., lost] = np.nan
 
 
 def _coarse(growth: Float[np.ndarray, "blocks lanes"], block: int) -> Float[np.ndarray, "coarse lanes"]:

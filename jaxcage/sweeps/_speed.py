@@ -15,12 +15,12 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._types import State
-from ..analysis import LIFE_BLOCK, Confirmation, Observation, Plan, Sweep
+from ..analysis import Confirmation, Observation, Plan, Sweep
 from ..integrate import AbstractMethod, controlled, finer
 from ..models import AbstractForcedSystem
 from ._confirm import Judged, confirm as confirm_lanes, doubtful
 from ._engine import Progress, run_lanes
-from ._lasting import blocks_to, follow
+from ._lasting import follow
 
 
 def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> Any:
@@ -154,8 +154,9 @@ def sweep_designs(
     lane_start = y0.reshape(-1, dim)
     how = settings_of(chosen)
 
-    def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray = lane_start) -> Observation:
-        return run_lanes(systems, method, plan, lane_speed[lane], y[lane], progress, which[lane])
+    def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray | None = None) -> Observation:
+        begin = lane_start[lane] if y is None else y
+        return run_lanes(systems, method, plan, lane_speed[lane], begin, progress, which[lane])
 
     def each_system(seen: Observation) -> list[Sweep]:
         parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
@@ -178,19 +179,9 @@ def sweep_designs(
         found = each_system(seen)
     if horizon <= discard + revolutions:
         return [dataclasses.replace(s, confirmed=rounds) for s in found]
-    late = Plan(0, LIFE_BLOCK, blocks_to(horizon, discard + revolutions), plan.keep, 1)
     label = _judged(found).label
     scale = np.concatenate([np.repeat(s.scale, shape[1], axis=0) for s in found])
-    onward = lambda lanes: run(late, lanes, chosen, np.asarray(seen.last).T)
-    lanes, later, lasting = follow(
-        label, np.asarray(seen.growth)[:, 0], plan.block, discard, scale, late.blocks, onward
-    )
-    if later is not None:
-        seen.last[:, lanes] = later.last
-        seen.error[lanes] = np.fmax(seen.error[lanes], later.error)
-        seen.outcome[lanes] = later.outcome
-        open_ = label[lanes] == "undecided"
-        seen.strobe[..., lanes[open_]] = later.strobe[..., open_]
+    lasting = follow(label, seen, plan, scale, horizon, lambda plan, lanes, y: run(plan, lanes, chosen, y))
     escapes = np.split(lasting.escape, len(systems))
     return [
         dataclasses.replace(s, escape=e.reshape(shape), horizon=lasting.horizon, confirmed=rounds)
