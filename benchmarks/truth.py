@@ -5,7 +5,7 @@ declared ranges. Finer is 8 times the steps at 16^-3 of the tolerance; the refer
 equations written a second time, integrated by SciPy. Each option is a section; without one all of them are run.
 Nothing is written; what is off is listed, and makes the exit status 1.
 
-`python -m benchmarks.truth [--lanes] [--labels] [--exponents] [--measures] [--models 20] [--seed 0]
+`python -m benchmarks.truth [--lanes] [--labels] [--exponents] [--measures] [--orbits] [--models 20] [--seed 0]
 [--kinds cases narrow wide] [--quick]`
 """
 
@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 
 import jaxcage as jc
 
-from . import truth_exponents, truth_labels, truth_lanes, truth_measures
+from . import truth_exponents, truth_labels, truth_lanes, truth_measures, truth_orbits
 from .truth_models import CASES, KINDS, Subject, subjects
 
 
@@ -27,7 +27,7 @@ SECTIONS: dict[str, Section] = {
     "labels": truth_labels.report,
     "exponents": truth_exponents.report,
     "measures": truth_measures.report,
-    # Orbits and edges: one more section of the same kind.
+    "orbits": truth_orbits.report,
 }
 
 

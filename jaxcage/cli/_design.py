@@ -135,8 +135,8 @@ def check(model: CageModel, options: DesignOptions, count: int = CHECKED_SPEEDS)
 
 
 def chaotic_rpm(found: Sweep) -> float:
-    """Speeds at which any start is chaotic, times their spacing [rpm]."""
-    return float(np.mean(np.any(found.label == "chaotic", axis=1)) * (found.rpm[-1] - found.rpm[0]))
+    """Speeds at which any start is chaotic, for a while at least, times their spacing [rpm]."""
+    return float(np.mean(found.restless) * (found.rpm[-1] - found.rpm[0]))
 
 
 def price(model: CageModel) -> float:

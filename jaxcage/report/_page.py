@@ -133,11 +133,11 @@ _SECTIONS = {
 def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
     swept = findings.sweep
     chaotic, loss = len(findings.zones.zones), len(findings.loss.zones)
-    share = float(np.mean(np.any(swept.label == "chaotic", axis=1)))
+    share = float(np.mean(swept.restless))
     said = [
         f"{_counted(chaotic, 'chaotic zone')} and {_counted(loss, 'zone').lower()} without a stable synchronous orbit. "
         f"At {share:.0%} of the {swept.rpm.size} speeds that were swept some start "
-        f"of {swept.outcome.shape[1]} is chaotic."
+        f"of {swept.outcome.shape[1]} is chaotic, for a while at least."
     ]
     calm = calmest(findings)
     if calm is not None:
