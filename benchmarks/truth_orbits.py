@@ -56,11 +56,10 @@ class Beside(NamedTuple):
 def found_orbits(subject: Subject, quick: bool) -> Iterator[jc.Orbit]:
     """Orbits to which lanes of the default sweep lead, of each speed one, few of them spread over the speeds."""
     sweep, _ = pair(subject, quick)
-    short = np.char.startswith(sweep.label, "periodic") & (np.char.str_len(sweep.label) == len("periodic-1"))
-    period = np.where(
-        short, np.char.replace(np.where(short, sweep.label, "periodic-0"), "periodic-", "").astype(int), 0
-    )
-    good = (period > 0) & (period <= LONGEST)
+    period = np.zeros(sweep.label.shape, dtype=int)
+    for k in range(1, LONGEST + 1):
+        period[sweep.label == f"periodic-{k}"] = k
+    good = period > 0
     speeds = np.flatnonzero(np.any(good, axis=1))
     for i in speeds[:: max(1, -(-speeds.size // SPEEDS))]:
         j = int(np.argmax(good[i]))
@@ -113,9 +112,14 @@ def edge_beside(subject: Subject, point: Any, quick: bool) -> Beside:
     return Beside(name, float(point.error / point.speed), *apart)
 
 
-HEAD = f"{'':44s}" + "".join(
-    f"{x:>10s}" for x in ("orbits", "none", "OFF", "largest", "points", "unknown", "OFF", "largest")
-)
+COLUMNS = ("orbits", "none", "OFF", "largest", "points", "unknown", "OFF", "largest")
+HEAD = f"{'':44s}" + "".join(f"{x:>10s}" for x in COLUMNS)
+
+
+def row(beside: Sequence[Beside], unknown: int) -> str:
+    """How many there are, how many are not known, how many are off, and the largest distance."""
+    apart = np.nanmax([[b.steps, b.reference] for b in beside]) if beside else np.nan
+    return f"{len(beside):10d}{unknown:10d}{sum(b.off for b in beside):10d}{apart:10.0e}"
 
 
 def report(found: Sequence[Subject], quick: bool) -> list[str]:
@@ -132,13 +136,8 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
             points = edges(subject, single[0]) if single else []
             settled = [p for p in points if np.isfinite(p.value)]
             places = [edge_beside(subject, p, quick) for p in settled[:POINTS]]
-            size = lambda rows: np.nanmax([[b.steps, b.reference] for b in rows]) if rows else np.nan
-            counts = (len(known), len(orbits) - len(known), sum(b.off for b in states))
-            text = "".join(f"{n:10d}" for n in counts) + f"{size(states):10.0e}"
-            counts = (len(places), len(points) - len(settled), sum(b.off for b in places))
-            print(
-                f"{subject.name:44s}{text}" + "".join(f"{n:10d}" for n in counts) + f"{size(places):10.0e}", flush=True
-            )
+            text = row(states, len(orbits) - len(known)) + row(places, len(points) - len(settled))
+            print(f"{subject.name:44s}{text}", flush=True)
             print(*[f"  {b}" for b in (*states, *places) if b.off or b in places], sep="\n", flush=True)
             every += states + places
             wide += [b for b in places if max(b.steps, b.stated) > WIDEST]

@@ -85,7 +85,8 @@ def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end:
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
-    phase and the length of the step; fixed the first phase, the step, the phase at the end, and the numbers of (field, system, scale)."""
+    phase and the length of the step; fixed the first phase, the step, the phase at the end, and the numbers of (field,
+    system, scale)."""
 
     solver: KernelSolver
     structure: Structure

@@ -88,7 +88,7 @@ def follow(
 def _put(
     seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
 ) -> None:
-    """Where lanes are later; the strobe states of those that were `open_`, which they may close; NaN where one fails."""
+    """Where lanes are later, NaN where one fails; the strobe states of those that were `open_`, which may close."""
     seen.last[:, lanes] = new.last
     seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
     seen.outcome[lanes] = new.outcome
