@@ -92,11 +92,11 @@ def orbit_beside(subject: Subject, orbit: jc.Orbit) -> Beside:
 
 
 def edges(subject: Subject, orbit: jc.Orbit) -> list[Any]:
-    """Bifurcations in the neighbourhood of an orbit of period one, those with stability on one side first."""
+    """Bifurcations in the neighbourhood of an orbit of period one, those with stability on one side first, the least certain before others."""
     speed = float(orbit.speed)
     found = jc.branch(subject.model, orbit, lower=speed / SPAN, upper=speed * SPAN)
     shootable = [p for p in found.special if p.kind in ("fold", "period-doubling", "torus")]
-    return sorted(shootable, key=lambda p: not p.edge)
+    return sorted(shootable, key=lambda p: (not p.edge, -p.error))
 
 
 def edge_beside(subject: Subject, point: Any, quick: bool) -> Beside:
