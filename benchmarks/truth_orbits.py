@@ -92,7 +92,7 @@ def orbit_beside(subject: Subject, orbit: jc.Orbit) -> Beside:
 
 
 def edges(subject: Subject, orbit: jc.Orbit) -> list[Any]:
-    """Bifurcations in the neighbourhood of an orbit of period one, those with stability on one side first, the least certain before others."""
+    """Bifurcations near an orbit of period one, those with stability on one side first, the least certain of them."""
     speed = float(orbit.speed)
     found = jc.branch(subject.model, orbit, lower=speed / SPAN, upper=speed * SPAN)
     shootable = [p for p in found.special if p.kind in ("fold", "period-doubling", "torus")]
