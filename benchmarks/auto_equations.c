@@ -1,6 +1,6 @@
 /* A forced system for AUTO-07p: the phase is carried along as the limit cycle (cos, sin) of an oscillator.
 
-   LAW is the file with the system's `rates`; numbers.h holds what it needs and START, the parameter where the branch begins. */
+   LAW is the file with the system's `rates`; par[0] is the speed over that at which the branch begins. */
 #include "auto_f2c.h"
 #include LAW
 
@@ -14,7 +14,7 @@ int func(integer ndim, const doublereal *u, const integer *icp, const doublereal
 }
 
 int stpnt(integer ndim, doublereal t, doublereal *u, doublereal *par) {
-    par[0] = START;
+    par[0] = 1;
     return 0;
 }
 

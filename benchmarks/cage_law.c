@@ -5,22 +5,22 @@
 #include <math.h>
 #include "numbers.h"
 
-enum { FILM, CONTACT, HYSTERESIS, ONSET, WIDTH, CENTRE2, SPRING_X, SPRING_Y, CUBIC, DAMPING, CROSS, TURNING, IMPACT, WEIGHT };
+enum {
+    FILM, CONTACT, HYSTERESIS, ONSET, WIDTH, CENTRE2, SPRING_X, SPRING_Y, CUBIC, DAMPING, CROSS, TURNING, IMPACT, WEIGHT
+};
+
+/* The positive part, smooth within `width` of zero. */
+static double plus(double a, double width) {
+    double t = (a + width) / (2 * width);
+    return t <= 0 ? 0 : t >= 1 ? a : 2 * width * t * t * t * t * (t * (t - 3) + 2.5);
+}
 
 /* Film and contact over (x, y): what the land does to the cage. */
 static void land(const double *p, const double *z, double *force) {
-    double x = z[0], y = z[1], u = z[2], v = z[3], width = p[WIDTH];
-    double eps = sqrt(x * x + y * y + p[CENTRE2]), over = eps - p[ONSET], excess = 0, normal = 0;
-    if (over >= width) {
-        excess = over;
-    } else if (over > -width) {
-        double t = (over + width) / (2 * width);
-        excess = 2 * width * t * t * t * t * (t * (t - 3) + 2.5);
-    }
-    if (excess > 0) {
-        double loading = 1 + p[HYSTERESIS] * (x * u + y * v) / eps;
-        normal = p[CONTACT] * pow(excess, 10.0 / 9) * 0.5 * (loading + sqrt(loading * loading + 1e-8));
-    }
+    double x = z[0], y = z[1], u = z[2], v = z[3];
+    double eps = sqrt(x * x + y * y + p[CENTRE2]), excess = plus(eps - p[ONSET], p[WIDTH]), normal = 0;
+    if (excess > 0)
+        normal = p[CONTACT] * pow(excess, 10.0 / 9) * plus(1 + p[HYSTERESIS] * (x * u + y * v) / eps, 1e-4);
     double kept = 1 - excess / eps, nx = kept * x, ny = kept * y, e2 = nx * nx + ny * ny;
     double iso = M_PI_2 / ((1 - e2) * sqrt(1 - e2)), radial = 3 * iso / (1 - e2);
     double skew = 2 / ((1 - e2) * (1 - e2) * sqrt(e2 + p[CENTRE2]));
@@ -31,7 +31,7 @@ static void land(const double *p, const double *z, double *force) {
 }
 
 void rates(double ratio, double cosine, double sine, const double *z, double *f) {
-    static double known, p[WEIGHT + 1];
+    static _Thread_local double known, p[WEIGHT + 1];
     if (ratio != known) {
         for (int i = 0; i <= WEIGHT; i++) p[i] = REFERENCE[i] * pow(ratio, POWERS[i]);
         known = ratio;

@@ -1,8 +1,10 @@
-/* x'' + DAMPING x' - x + x^3 = force cos(phase), phase for time at the drive's frequency: x' = dx/dphase. */
+/* x'' + DAMPING x' + LINEAR x + x^3 = FORCE cos(phase), phase for time: x' = dx/dphase, `ratio` the drive's frequency
+   over UNIT. */
 #include "numbers.h"
 
-void rates(double force, double cosine, double sine, const double *z, double *f) {
+void rates(double ratio, double cosine, double sine, const double *z, double *f) {
+    const double per_w = 1 / (ratio * UNIT);
     (void)sine;
     f[0] = z[1];
-    f[1] = (z[0] - z[0] * z[0] * z[0] + force * cosine) / (SPEED * SPEED) - DAMPING / SPEED * z[1];
+    f[1] = ((FORCE * cosine - LINEAR * z[0] - z[0] * z[0] * z[0]) * per_w - DAMPING * z[1]) * per_w;
 }
