@@ -212,15 +212,13 @@ def page(lines: list[list[str]], notes: list[str]) -> str:
     """The tables as Markdown."""
     from .report import machine  # not above: the other benchmarks switch the cache of programs off
 
-    root = PAGE.parent
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=root, capture_output=True, text=True).stdout
     about = ", ".join(f"{k}: {v}" for k, v in machine(available_cores()).items())
     table = [list(COLUMNS), ["---"] * 2 + ["---:"] + ["---"] + ["---:"] * 4, *lines]
     return "\n".join(
         [
             "# Orbits: one branch by every program",
             "",
-            f"Made by `python -m benchmarks.orbits` at commit {commit.strip() or 'unknown'}. {about}.",
+            f"Made by `python -m benchmarks.orbits`. {about}.",
             "Processor seconds; `off` is the largest distance of the special points from AUTO's at its finest mesh.",
             "",
             *("| " + " | ".join(cells) + " |" for cells in table),
