@@ -117,6 +117,8 @@ def by_collocation(name: str, orbit: np.ndarray) -> Row:
         found = ask("benchmarks.collocation", json.dumps(numbers), limit=PATIENCE)
     except subprocess.TimeoutExpired:
         return Row("jaxcont", absent=f"not done in {PATIENCE:.0f} s")
+    except RuntimeError as error:
+        return Row("jaxcont", absent="out of memory" if "Out of memory" in str(error) else "failed")
     special = tuple((kind, ratio * task.begin) for kind, ratio in found["special"])
     name = f"jaxcont, {DENSE['intervals']} intervals"
     return Row(name, found["points"], special, (), float("nan"), auto.spent() - began)
