@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, PyTree
 
 
@@ -31,7 +32,7 @@ class ParameterInfo:
 
 def _as_leaf(x: Any) -> Any:
     """Python numbers become float64 leaves; arrays, tracers and the placeholders of tree surgery pass."""
-    return jnp.asarray(x, dtype=float) if isinstance(x, int | float) else x
+    return jnp.asarray(np.asarray(x, dtype=float)) if isinstance(x, int | float) else x
 
 
 def parameter(unit: str, lower: float, upper: float, text: str, **kwargs: Any) -> Any:

@@ -91,6 +91,7 @@ SHOWN = (
     Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
     _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),
     _whole("solvers-page", "benchmarks/solvers.md", "python -m benchmarks.solvers", "solvers.md"),
+    _whole("orbits-page", "benchmarks/orbits.md", "python -m benchmarks.orbits", "orbits.md"),
     _notebook("orbit_diagrams"),
     _notebook("gradient_tour"),
     _notebook("sensitivity_and_tolerances"),

@@ -37,8 +37,9 @@ class Bearing(eqx.Module):
         if is_concrete(*sizes) and not np.all(np.diff(np.asarray(sizes, dtype=float)) > 0):
             found = ", ".join(f"{1e3 * float(size):g}" for size in sizes)
             raise ValueError(f"Arguments `{'` < `'.join(names)}` must grow, but are {found} mm.")
-        chord = self.pitch_diameter * np.sin(np.pi / self.n_rollers)
-        if is_concrete(chord, self.roller_diameter) and chord <= self.roller_diameter:
+        across = self.inner_raceway_diameter, self.roller_diameter
+        share = np.sin(np.pi / self.n_rollers)
+        if is_concrete(*across) and np.any(sum(map(np.asarray, across)) * share <= np.asarray(self.roller_diameter)):
             raise ValueError(
                 "Argument `n_rollers` must leave room between the rollers, but "
                 f"{self.n_rollers} rollers overlap on the pitch circle."

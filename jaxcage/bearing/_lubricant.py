@@ -5,8 +5,11 @@ Two of them are not ISO grades and VG is not in Pa s: it is read here as the kin
 mm^2/s at 40 C, so that VG56 has 870 kg/m^3 * 56 mm^2/s = 0.04872 Pa s.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array
 
 from .._parameters import parameter
@@ -61,7 +64,7 @@ class Lubricant(eqx.Module):
 
     def __check_init__(self) -> None:
         first, second = self.temperature_1, self.temperature_2
-        if is_concrete(first, second) and first == second:
+        if is_concrete(first, second) and np.asarray(first) == np.asarray(second):
             raise ValueError(
                 f"Argument `temperature_2` must differ from `temperature_1`, but both are {float(first):g} K."
             )
@@ -94,12 +97,13 @@ def vg(grade: Scalar, temperature: Scalar = CELSIUS_40) -> Lubricant:
 
     **Arguments:** grade [mm^2/s at 40 C], operating temperature [K].
     """
-    grade = require_positive("grade", grade)
+    known = require_positive("grade", grade)
+    given: Any = np.asarray(known) if is_concrete(known) else known  # no programs for what NumPy can do
     return Lubricant(
         density=870.0,
-        viscosity_1=1e-6 * grade,
+        viscosity_1=1e-6 * given,
         temperature_1=CELSIUS_40,
-        viscosity_2=7.54e-6 * (grade / 56.0) ** 0.644,
+        viscosity_2=7.54e-6 * (given / 56.0) ** 0.644,
         temperature_2=CELSIUS_100,
         temperature=temperature,
     )

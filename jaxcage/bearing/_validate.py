@@ -1,5 +1,7 @@
 """Positive numbers at the entry points: `ValueError` where the value is known, else `error_if`."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +16,12 @@ def is_concrete(*values: Scalar | Array) -> bool:
     return not any(isinstance(value, Tracer) for value in values)
 
 
-def _require(array: Array, holds: Array, message: str) -> Array:
+def _known(array: Array) -> Any:
+    """A known value as NumPy's, which compares without a compiled program."""
+    return np.asarray(array) if is_concrete(array) else array
+
+
+def _require(array: Array, holds: Any, message: str) -> Array:
     if isinstance(holds, Tracer):
         return eqx.error_if(array, ~holds, f"{message}.")
     if not np.all(np.asarray(holds)):
@@ -30,10 +37,10 @@ def require_positive(name: str, value: Scalar) -> Array:
     **Raises:** `ValueError` that names the argument; when traced, an error as the computation runs.
     """
     array = jnp.asarray(value, dtype=float)
-    return _require(array, array > 0, f"Argument `{name}` must be positive")
+    return _require(array, _known(array) > 0, f"Argument `{name}` must be positive")
 
 
 def require_not_negative(name: str, value: Scalar) -> Array:
     """`value` as an array, checked to be zero or above (NaN is not). **Raises:** as above."""
     array = jnp.asarray(value, dtype=float)
-    return _require(array, array >= 0, f"Argument `{name}` must not be negative")
+    return _require(array, _known(array) >= 0, f"Argument `{name}` must not be negative")

@@ -8,13 +8,17 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+from .. import __version__
 from .._cache import keep_compiled_programs
 from ._console import FILES_ARE_WHOLE, leave_at_once_when_interrupted, say
 from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
 from ._options import Command, CommonOptions, InitOptions
-from ._report import Report, show
 
+
+if TYPE_CHECKING:
+    from ._report import Report
 
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
 """Options that tyro takes by itself, and what it asserts of them."""
@@ -64,8 +68,10 @@ def _carry_out(options: CommonOptions | InitOptions) -> None:
         raise ComputationError(report.failure)
 
 
-def _print(report: Report, as_json: bool) -> None:
+def _print(report: "Report", as_json: bool) -> None:
     """Show a report; a standard output that takes nothing is said, as a file that cannot be written is."""
+    from ._report import show
+
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not be text
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -80,13 +86,16 @@ def _print(report: Report, as_json: bool) -> None:
 
 
 def _parse(arguments: list[str]) -> CommonOptions | InitOptions | None:
-    """Options, or None if help was asked for and given.
+    """Options, or None if help or the version was asked for and given.
 
     **Raises:** `UsageError`: the boxes in which tyro reports errors are boiled down to one
     sentence.
     """
     import tyro
 
+    if arguments == ["--version"]:
+        print(f"jaxcage {__version__}")
+        return None
     if len(arguments) > 1 and arguments[0].replace("_", "-") in COMPLETION and arguments[1] not in SHELLS:
         raise UsageError(
             f"Option {arguments[0]} must be followed by {', '.join(SHELLS)}, but '{arguments[1]}' was given."

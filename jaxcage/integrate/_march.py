@@ -29,6 +29,7 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer, eval_jaxpr
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
@@ -330,9 +331,10 @@ def is_elementary(step: Step, sizes: Sizes) -> bool:
 def _in_order() -> bool:
     """Whether the backend reduces a window of one element as body(init, element): a reduction leaves the order free."""
     with jax.ensure_compile_time_eval():
-        first, second = jnp.asarray([5.0, 7.0]), jnp.asarray([1.0, 2.0])
-        got = _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), 2, (jnp.asarray(2.0),), (first, second))
-        return bool(jnp.all(got[0] == 2 - 3 * first) & jnp.all(got[1] == 2 * second))
+        first, second = np.array([5.0, 7.0]), np.array([1.0, 2.0])
+        program = jax.jit(lambda s, *x: _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), 2, (s,), x))
+        got = [np.asarray(x) for x in program(np.array(2.0), first, second)]
+        return bool(np.all(got[0] == 2 - 3 * first) and np.all(got[1] == 2 * second))
 
 
 # --- loops ---------------------------------------------------------------------------------------------------------

@@ -112,7 +112,7 @@ def put(tree: Any, lanes: np.ndarray, new: Any) -> Any:
 
 def stack(tree: Any, lanes: int) -> Any:
     """`lanes` copies of a tree."""
-    return jax.tree.map(lambda x: jnp.broadcast_to(x, (lanes, *x.shape)) if eqx.is_array(x) else x, tree)
+    return jax.tree.map(lambda x: np.broadcast_to(x, (lanes, *x.shape)) if eqx.is_array(x) else x, tree)
 
 
 class Curves(NamedTuple):

@@ -29,11 +29,11 @@ def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
 def singular_matrix(kind: Kind, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     """The matrix that is singular at a bifurcation of `kind` of an orbit with monodromy matrix `m`."""
     if kind == "period-doubling":
-        return m + jnp.eye(m.shape[0])
+        return m + np.eye(m.shape[0])
     if kind == "torus":
         c = second_compound(m)
-        return c - jnp.eye(c.shape[0])
-    return m - jnp.eye(m.shape[0])
+        return c - np.eye(c.shape[0])
+    return m - np.eye(m.shape[0])
 
 
 def null_vectors(a: Float[Array, "k k"]) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
