@@ -40,12 +40,15 @@ class RollerPassImpact(eqx.Module):
 
 
 class PulseTrain(NamedTuple):
-    """Force of all roller passes as Fourier coefficients: f = sum over k of a_k cos(k Z tau) + b_k sin(k Z tau) [N]."""
+    """Force of all roller passes as Fourier coefficients: f = sum over k of a_k cos(k Z tau) + b_k sin(k Z tau) [N].
 
-    a_x: Float[Array, " harmonics"]
-    b_x: Float[Array, " harmonics"]
-    a_y: Float[Array, " harmonics"]
-    b_y: Float[Array, " harmonics"]
+    Each is a scalar of its own, as the kernels want them.
+    """
+
+    a_x: tuple[Scalar, ...]
+    b_x: tuple[Scalar, ...]
+    a_y: tuple[Scalar, ...]
+    b_y: tuple[Scalar, ...]
 
 
 def pulse_spectrum(
@@ -94,11 +97,17 @@ def pulse_train(
 
     (a_in, b_in), (a_out, b_out) = shifted(-jnp.pi / 2 - half_angle), shifted(-jnp.pi / 2 + half_angle)
     across, down = jnp.cos(half_angle), -jnp.sin(half_angle)
-    return PulseTrain(across * (a_in - a_out), across * (b_in - b_out), down * (a_in + a_out), down * (b_in + b_out))
+    rows = across * (a_in - a_out), across * (b_in - b_out), down * (a_in + a_out), down * (b_in + b_out)
+    return PulseTrain(*(tuple(jnp.unstack(row)) for row in rows))
 
 
 def pulse_train_force(tau: Scalar, train: PulseTrain, n_rollers: int) -> tuple[Array, Array]:
     """Force of the pulse train at phase tau [N]."""
-    k = jnp.arange(train.a_x.shape[0], dtype=float) * n_rollers
-    c, s = jnp.cos(k * tau), jnp.sin(k * tau)
-    return jnp.sum(train.a_x * c + train.b_x * s), jnp.sum(train.a_y * c + train.b_y * s)
+    first, rise = cos_sin(n_rollers * tau)
+    now, before = (1.0, 0.0), (first, -rise)  # cosine and sine of k Z tau, by the recurrence of Chebyshev
+    x = y = jnp.zeros(())
+    for a_x, b_x, a_y, b_y in zip(*train, strict=True):
+        c, s = now
+        x, y = x + (a_x * c + b_x * s), y + (a_y * c + b_y * s)
+        now, before = (2 * first * c - before[0], 2 * first * s - before[1]), now
+    return x, y
