@@ -391,6 +391,29 @@ def test_crossings_within_one_step_are_in_order(first):
     assert [p.edge for p in branch.special] == [True, False]
 
 
+@pytest.mark.parametrize("kind, block", [("period-doubling", dict(s=(0.1, 0.0002))), ("torus", dict(b=(0.4, 0.3)))])
+def test_two_crossings_of_one_kind_within_a_step(kind, block):
+    """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""
+    places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)
+    a = (-places[0], -places[1]) if kind == "torus" else (-0.3, -0.02)
+    branch = planted_branch(a=a, c=(1.0, 1.0) if kind == "torus" else (0.2, 1.0), **block)
+    assert kinds(branch) == [kind, kind]
+    np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
+    assert np.min(np.diff(branch.value)) < 4e-4 < np.max(np.diff(branch.value))
+    assert np.array_equal(branch.stable, branch.value < places[0])
+
+
+def test_crossing_that_is_not_found_is_said_to_be_unexplained():
+    """Two multipliers are -exp((p - 0.02) T): both cross -1 at once, and their product has no sign there."""
+    branch = planted_branch(a=(-0.3, -0.02), c=(0.2, 1.0), s=(0.1, 0.0))
+    (point,) = branch.special
+    assert point.kind == point.status == "unexplained" and point.edge
+    assert abs(point.value - 0.02) <= point.error < 2e-4
+    assert abs(point.critical + 1) < 1e-3 and "unexplained" in str(branch)
+    away = np.abs(branch.value - 0.02) > 1e-9
+    assert np.array_equal(branch.stable[away], branch.value[away] < 0.02)
+
+
 class VanDerPol(eqx.Module):
     mu: jax.Array
 

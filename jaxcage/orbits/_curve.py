@@ -14,7 +14,8 @@ from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Curves, Steps, follow, settle_on, stack, take
-from ._branch import SpecialPoint, eigenvalues, turned
+from ._branch import SpecialPoint
+from ._follower import eigenvalues, turned
 from ._illinois import zeros
 from ._lens import SPEED, value as value_of
 from ._orbit import is_free

@@ -1,9 +1,13 @@
 """Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
 
+import dataclasses
 from typing import Any, NamedTuple, cast, get_args
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
@@ -11,12 +15,14 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
+from ._follower import make_follower
 from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._orbit import OrbitEquations, guess_state, is_free, settle, sorted_multipliers
+from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
+from ._walk import walk
 
 
 POINT_OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged")
@@ -129,6 +135,8 @@ class BifurcationPoint(eqx.Module):
     periods: Int[Array, ""]
     kind: str = eqx.field(static=True)
     parameter: str = eqx.field(static=True)
+    looked: str = eqx.field(static=True, default="")
+    """Where it was looked for, if Newton's method did not find it from the guess and neither did the branch."""
 
     @property
     def speed_rpm(self) -> Float[Array, ""]:
@@ -157,7 +165,8 @@ class BifurcationPoint(eqx.Module):
 
     def __str__(self) -> str:
         if not bool(self.converged):
-            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e})"
+            looked = f"; {self.looked}" if self.looked else ""
+            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
         angle = f", angle {float(self.angle) * 180 / jnp.pi:.2f} deg" if self.kind == "torus" else ""
         error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         return (
@@ -178,9 +187,12 @@ def bifurcation(
     speed: Scalar | None = None,
     periods: Any = None,
     period: str = "driven",
+    reach: float | int = 0.1,
     method: AbstractMethod | None = None,
 ) -> BifurcationPoint:
     """The bifurcation of `kind` near `guess`, where `parameter` is free.
+
+    Where Newton's method finds none, the branch of orbits through `guess` is followed both ways to the nearest.
 
     **Arguments:**
 
@@ -192,13 +204,18 @@ def bifurcation(
     - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
+    - `reach`: how far the branch is followed, in parts of the parameter's value (of 1 where that is 0); 0 for not at
+        all, as under `jit`, `vmap` and `grad`, where nothing is known of what Newton's method finds.
 
-    **Returns:** `BifurcationPoint`; it does not raise if there is none. Works under `jit` and `vmap`; value, speed and
-    state have derivatives of every order with respect to `system` and `speed`, by the implicit function theorem.
+    **Returns:** `BifurcationPoint`; it does not raise if there is none, but says where it looked. Works under `jit` and
+    `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`, by the implicit
+    function theorem.
 
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
     require_x64()
+    if not reach >= 0:
+        raise ValueError(f"Argument `reach` must be at least 0, but {reach:g} was given.")
     if kind not in get_args(Kind):
         raise ValueError(f"Argument `kind` must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     free = is_free(period)
@@ -206,13 +223,30 @@ def bifurcation(
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     periods = jnp.asarray(getattr(guess, "periods", 1) if periods is None else periods)
 
-    def find(method: AbstractMethod, counts: Counts) -> BifurcationPoint:
+    def find(method: AbstractMethod, counts: Counts, start: Any = start, at: Any = at, spin: bool = spin) -> Any:
         problem = OrbitProblem(method, system.dimension, free, (parameter,))
         counts = from_steps(counts, getattr(guess, "steps", None))
-        begin = jnp.asarray(first, dtype=float)
+        begin = jnp.asarray(at if parameter == SPEED else first, dtype=float)
         return _find_point(problem, counts, given, cast(Kind, kind), start, begin, at, periods, spin)
 
-    return that_serves(find, method, MOST_OF_A_POINT)
+    found = that_serves(find, method, MOST_OF_A_POINT)
+    known = not any(isinstance(x, Tracer) for x in jax.tree.leaves((found, given, start)))
+    if not (known and reach and POINT_OUTCOMES[int(found.outcome)] in ("no such point", "other kind")):
+        return found
+    if spin:
+        here, turning = with_value(system, first, parameter, at)
+        orbit = periodic_orbit(here, turning, int(periods), guess=start, revolutions=200, period=period, method=method)
+        start = orbit.state
+    middle, away = float(at), reach * (abs(float(at)) or 1.0)
+    follower = make_follower(system, given.speed, parameter, middle - away, middle + away, period, method)
+    there, looked = walk(follower, (np.asarray(start), middle), int(periods), kind)
+    if there is not None:
+        near = lambda method, counts: find(method, counts, jnp.asarray(there.state), jnp.asarray(there.value), False)
+        again = that_serves(near, method, MOST_OF_A_POINT)
+        if bool(again.converged):
+            return again
+        looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
+    return dataclasses.replace(found, looked=looked)
 
 
 def _read_guess(

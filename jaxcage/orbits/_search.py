@@ -18,18 +18,8 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..sweeps import sweep
 from ._arclength import Steps, take
-from ._branch import (
-    Branch,
-    Follower,
-    SpecialPoint,
-    Start,
-    eigenvalues,
-    follow_both_ways,
-    is_stable,
-    make_follower,
-    seeds,
-    stable_steps,
-)
+from ._branch import Branch, SpecialPoint, follow_both_ways
+from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
 from ._lens import SPEED
 
 
@@ -98,7 +88,12 @@ class SynchronousOrbits:
     @property
     def unsettled(self) -> int:
         """How many bifurcations are elsewhere, or nowhere, by half the steps: none of them is in `points`."""
-        return sum(p.status != "converged" for b in self.branches for p in b.special)
+        return sum(p.status == "not converged" for b in self.branches for p in b.special)
+
+    @property
+    def unexplained(self) -> tuple[SpecialPoint, ...]:
+        """Where the stability of an orbit changes and no bifurcation is found: none of these is in `points`."""
+        return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
         """Orbits at `speed` [rad/s]: branch, whether stable, state [SI], multipliers; to the accuracy of the steps."""

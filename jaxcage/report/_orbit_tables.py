@@ -100,6 +100,7 @@ def orbits_document(
         ],
         "missed": found.missed,
         "unsettled": found.unsettled,
+        "unexplained": [point_document(p, branch_of(found, p)) for p in found.unexplained],
     }
 
 
@@ -181,9 +182,13 @@ def error_cell(error_rpm: float) -> str:
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
-    """Bifurcations that were left out."""
+    """Bifurcations that were left out, and those that must have been missed."""
     count = found.unsettled
-    return [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
+    notes = [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
+    for p in found.unexplained:
+        place = f"{number(p.speed_rpm, 3)} ± {error_cell(p.error_rpm)} rpm on branch {branch_of(found, p)}"
+        notes.append(f"Unexplained: the stability changes at {place}, and no bifurcation was found there")
+    return notes
 
 
 def multiplier_cell(point: SpecialPoint) -> str:
