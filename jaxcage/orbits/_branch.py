@@ -28,6 +28,7 @@ from ._follower import (
 )
 from ._lens import SPEED, Parameter, value as value_of
 from ._located import UNEXPLAINED, Seen, account
+from ._normal_form import coefficients, criticality
 from ._orbit import guess_state
 from ._problem import Frame, Given
 from ._singularity import null_vectors, singular_matrix
@@ -62,6 +63,16 @@ class SpecialPoint:
     error: float = float("nan")
     """Distance of the value to that by half the steps [SI], infinite where these do not find it; of something
     unexplained how far away it may be."""
+
+    coefficient: float = float("nan")
+    """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
+    (see `_normal_form`), which tells the `criticality`; NaN for others and for self-excited orbits."""
+    coefficient_error: float = float("nan")
+
+    @property
+    def criticality(self) -> str:
+        """`supercritical`, `subcritical` or `unknown`; nothing for other kinds than period doublings and tori."""
+        return criticality(self.kind, self.coefficient, self.coefficient_error)
 
     @property
     def speed_rpm(self) -> float:
@@ -126,6 +137,7 @@ class Branch:
         )
         rows = [
             f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
+            + f", {p.criticality}" * bool(p.criticality)
             for p in self.special
         ]
         return "\n".join([head, *rows])
@@ -281,15 +293,25 @@ def describe(
     lanes: Sequence[int] = (0,),
 ) -> list[Branch]:
     """Branches from their points and lanes, with special points located, all at once."""
-    seen = account(follower, frame, [points for points, _ in traces], lanes)
-    return [_branch(follower, frame, *row, ended) for row, (_, ended) in zip(seen, traces, strict=True)]
+    rows = account(follower, frame, [points for points, _ in traces], lanes)
+    every = [found for _, seen in rows for found in seen]
+    cubic = iter(())
+    if every:
+        lane = [i for i, (_, seen) in zip(lanes, rows, strict=True) for _ in seen]
+        places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(found.point for found in every))
+        kinds = ["" if follower.problem.free_speed else found.kind for found in every]
+        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, follower.problem.dimension))
+    return [
+        _branch(follower, frame, points, [(s, next(cubic).tolist()) for s in seen], ended)
+        for (points, seen), (_, ended) in zip(rows, traces, strict=True)
+    ]
 
 
 def _branch(
     follower: Follower,
     frame: Frame,
     points: Corrected,
-    seen: Sequence[Seen],
+    seen: Sequence[tuple[Seen, list[float]]],
     ended: tuple[str, str],
 ) -> Branch:
     problem, free = follower.problem, follower.problem.free_speed
@@ -306,8 +328,8 @@ def _branch(
         return np.asarray(found)
 
     special = []
-    before = [found.after for found in seen]
-    for i, (k, kind, p, error) in enumerate(seen):
+    before = [found.after for found, _ in seen]
+    for i, ((k, kind, p, error), cubic) in enumerate(seen):
         mu = eigenvalues(follower.monodromy(p))
         direction = np.zeros(n)
         if kind in ("period-doubling", "fold", "branch-point"):
@@ -331,6 +353,8 @@ def _branch(
                 periods=int(frame.periods),
                 steps=int(p.steps),
                 error=error,
+                coefficient=cubic[0],
+                coefficient_error=cubic[1],
             )
         )
     return Branch(

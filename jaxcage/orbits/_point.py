@@ -18,6 +18,7 @@ from ..models import AbstractForcedSystem
 from ._follower import make_follower
 from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
+from ._normal_form import KINDS_WITH_ONE, Coefficient, around, coefficient, critical_vectors, criticality
 from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
@@ -127,6 +128,10 @@ class BifurcationPoint(eqx.Module):
     transversality: Float[Array, ""]
     """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
     p dP/d parameter of the map along the critical direction, with p q = 1."""
+    coefficient: Float[Array, ""]
+    """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
+    (see `_normal_form`), which tells the `criticality`; NaN for others and for self-excited orbits."""
+    coefficient_error: Float[Array, ""]
     direction: Float[Array, " dim"]
     """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
     outcome: Int[Array, ""]
@@ -159,6 +164,11 @@ class BifurcationPoint(eqx.Module):
         return self.outcome == 0
 
     @property
+    def criticality(self) -> str:
+        """`supercritical`, `subcritical` or `unknown`; nothing for a fold or a branch point."""
+        return criticality(self.kind, float(self.coefficient), float(self.coefficient_error))
+
+    @property
     def status(self) -> str:
         """One of `POINT_OUTCOMES`."""
         return POINT_OUTCOMES[int(self.outcome)]
@@ -169,8 +179,9 @@ class BifurcationPoint(eqx.Module):
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
         angle = f", angle {float(self.angle) * 180 / jnp.pi:.2f} deg" if self.kind == "torus" else ""
         error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
+        sort = f"{self.criticality} " if self.criticality else ""
         return (
-            f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
+            f"{sort}{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
             f"+- {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
             f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
         )
@@ -326,6 +337,7 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     keep = lambda x: x * jnp.where((outcome == 0) | (outcome == 3), 1.0, jnp.nan)  # its derivative is NaN too
     direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
     length = jnp.linalg.norm(direction)
+    cubic = _cubic(equations, u, found, given)
     (parameter,) = problem.parameters
     return BifurcationPoint(
         value=keep(value),
@@ -337,6 +349,8 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         angle=keep(jnp.abs(jnp.angle(critical))),
         residual=jnp.max(jnp.abs(frozen(found.newton.residual))),
         transversality=keep(rate / frame.units[0]),
+        coefficient=frozen(keep(cubic.value)),
+        coefficient_error=frozen(keep(cubic.error)),
         direction=keep(direction / jnp.where(length > 0, length, 1.0) * frame.scale),
         outcome=outcome,
         iterations=found.iterations,
@@ -344,6 +358,20 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         kind=kind,
         parameter=parameter if isinstance(parameter, str) else "parameter",
     )
+
+
+def _cubic(equations: PointEquations, u: Array, found: Found, given: Given) -> Coefficient:
+    """The coefficient of the normal form at the root."""
+    problem, frame, kind = equations.problem, equations.frame, equations.kind
+    if kind not in KINDS_WITH_ONE or problem.free_speed:
+        return Coefficient(jnp.asarray(jnp.nan), jnp.asarray(jnp.nan))
+    u, given, m = frozen((u, given, found.aux.monodromy))
+    finite = jnp.all(jnp.isfinite(m))
+    critical = critical_vectors(kind, jnp.where(finite, m, 0.0))
+    strobe = by_steps(problem, found.steps).prepare(jnp.where(finite, u, 1.0), given, frame)
+    z = jnp.where(finite, u[: problem.dimension], 0.0)
+    derivatives = jax.vmap(lambda move: ReturnMap(strobe, frame).pushed(z + move)[1])(around(critical))
+    return coefficient(critical, derivatives)
 
 
 def critical_multiplier(kind: Kind, multipliers: Complex[Array, " dim"]) -> tuple[Array, Array]:

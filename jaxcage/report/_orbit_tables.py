@@ -36,6 +36,7 @@ def point_document(point: SpecialPoint, branch: int | None) -> dict[str, Any]:
         "steps": point.steps,
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
+        "criticality": point.criticality or None,
         "edge": point.edge,
         "branch": branch,
         "state": point.state,
@@ -164,7 +165,7 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
         (
             number(p.speed_rpm, 3),
             error_cell(p.error_rpm),
-            p.kind,
+            f"{p.criticality} {p.kind}".strip(),
             multiplier_cell(p),
             number(angle_deg(p), 2),
             str(branch_of(found, p)),
