@@ -326,9 +326,9 @@ def planted(a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
     return jc.ForcedSystem(Planted(**numbers(p=0.0, a=a, c=c, s=s, b=b)), dimension=4)
 
 
-def planted_branch(speed=1.1, lower=-0.2, upper=0.2, **settings):
+def planted_branch(speed=1.1, lower=-0.2, upper=0.2, how=dict(method=METHOD), **settings):
     start = ((1.0, 0.0, 1.0, 0.0), lower + 0.01)
-    return jc.branch(planted(**settings), start, "p", lower=lower, upper=upper, speed=speed, method=METHOD)
+    return jc.branch(planted(**settings), start, "p", lower=lower, upper=upper, speed=speed, **how)
 
 
 def planted_multipliers(branch, a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
@@ -404,10 +404,15 @@ def test_two_crossings_of_one_kind_within_a_step(kind, block):
     """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""
     places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)
     a = (-places[0], -places[1]) if kind == "torus" else (-0.3, -0.02)
-    branch = planted_branch(a=a, c=(1.0, 1.0) if kind == "torus" else (0.2, 1.0), **block)
+    block |= dict(a=a, c=(1.0, 1.0) if kind == "torus" else (0.2, 1.0))
+    branch = planted_branch(how=dict(steps=jc.Steps(first=0.1, longest=0.4), method=METHOD), **block)
     assert kinds(branch) == [kind, kind]
     np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
     assert np.min(np.diff(branch.value)) < 4e-4 < np.max(np.diff(branch.value))
+    finer = dict(steps=jc.Steps(first=0.05, longest=0.2), method=jc.method("rodas4", steps=512))
+    again = planted_branch(how=finer, **block)
+    assert kinds(again) == kinds(branch) and again.value.size > 1.5 * branch.value.size
+    np.testing.assert_allclose([p.value for p in again.special], places, rtol=0, atol=1e-8)
     if kind == "torus":  # in the second block |z|' = -|z|^3; along q = (1, -i) / sqrt(2), w' = -2 |w|^2 w
         np.testing.assert_allclose(branch.special[1].coefficient, -4 * np.pi / 1.1, rtol=1e-6)
         assert branch.special[1].criticality == "supercritical"

@@ -71,7 +71,7 @@ class SpecialPoint:
 
     @property
     def criticality(self) -> str:
-        """`supercritical`, `subcritical` or `unknown`; nothing for other kinds than period doublings and tori."""
+        """`supercritical`, `subcritical` or, where the coefficient may be zero, `unknown`; nothing without one."""
         return criticality(self.kind, self.coefficient, self.coefficient_error)
 
     @property

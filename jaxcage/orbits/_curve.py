@@ -66,7 +66,7 @@ class Curve:
     error: Float[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     """Distance in x, or in y in the same share of its range, to the curve by half the steps [SI]."""
     criticality: Shaped[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=str))
-    """`supercritical`, `subcritical` or `unknown`; nothing for folds."""
+    """`supercritical`, `subcritical` or `unknown`; nothing without a coefficient."""
 
     def __str__(self) -> str:
         head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}, {self.x_value.size} points"

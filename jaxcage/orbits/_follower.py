@@ -78,13 +78,13 @@ def make_follower(
     return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
 
 
-def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> Corrected:
-    """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
+def seeds(follower: Follower, frame: Frame, starts: Sequence[Start], steps: int = 0) -> Corrected:
+    """Orbits near (state, value of the parameter), the parameter kept, by at least so many steps, the lanes first."""
     free = follower.problem.free_speed
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return settle_on(follower.curves(frame, range(len(starts))), u, normal, allowed=LOOSE)
+    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps, LOOSE)
 
 
 def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:

@@ -37,7 +37,8 @@ class Critical(NamedTuple):
 
 
 class Coefficient(NamedTuple):
-    """The cubic coefficient, and how far those by neighbouring steps are apart; in units of the system's scale."""
+    """The cubic coefficient, and how far it is from those by neighbouring differences and by half the steps of a
+    revolution; in units of the system's scale."""
 
     value: Float[Array, ""]
     error: Float[Array, ""]
@@ -92,10 +93,15 @@ def coefficient(
     return Coefficient(found[best + 1], apart[best])
 
 
+def with_half(fine: Coefficient, coarse: Coefficient) -> Coefficient:
+    """The first, with its distance to the second, by half the steps of a revolution, in its error."""
+    return Coefficient(fine.value, fine.error + abs(fine.value - coarse.value))
+
+
 def criticality(kind: str, value: Any, error: Any) -> str:
     """`supercritical` or `subcritical`; `unknown` where the coefficient is not known from zero, and nothing for a kind
-    that is neither."""
-    if kind not in KINDS_WITH_ONE:
+    that is neither or where there is no coefficient."""
+    if kind not in KINDS_WITH_ONE or not abs(value) >= 0:
         return ""
     if not abs(value) > error:
         return "unknown"
@@ -123,8 +129,11 @@ def coefficients(
         lane, counts = np.repeat(mine, [len(w) for w in ways]), np.cumsum([len(w) for w in ways])
         at = points.u[lane]
         at[:, :n] += np.concatenate(ways)
-        # One step of Newton's method, whose derivative is that at the place itself.
-        moved = correct(curves.take(lane), at, points.tangent[lane], points.steps[lane], ONCE)
-        parts = np.split(np.where(moved.converged[:, None, None], monodromy(moved), np.nan), counts[:-1])
-        found[mine] = [_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)]
+        each = []
+        for count in (points.steps[lane], (points.steps[lane] + 1) // 2):
+            # One step of Newton's method, whose derivative is that at the place itself.
+            moved = correct(curves.take(lane), at, points.tangent[lane], count, ONCE)
+            parts = np.split(np.where(moved.converged[:, None, None], monodromy(moved), np.nan), counts[:-1])
+            each.append([_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
+        found[mine] = [with_half(fine, coarse) for fine, coarse in zip(*each, strict=True)]
     return found

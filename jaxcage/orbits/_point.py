@@ -15,10 +15,11 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
-from ._follower import make_follower
+from ._arclength import LANES, take
+from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._normal_form import KINDS_WITH_ONE, Coefficient, around, coefficient, critical_vectors, criticality
+from ._normal_form import KINDS_WITH_ONE, coefficients, criticality
 from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
@@ -35,6 +36,8 @@ that is elsewhere by half the steps."""
 TANGENTIAL = 1e-2
 """A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
 ON_CIRCLE = 1e-5
+SPUN = 200
+"""Revolutions of the simulation that finds an orbit."""
 
 
 class Singular(NamedTuple):
@@ -130,7 +133,8 @@ class BifurcationPoint(eqx.Module):
     p dP/d parameter of the map along the critical direction, with p q = 1."""
     coefficient: Float[Array, ""]
     """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
-    (see `_normal_form`), which tells the `criticality`; NaN for others and for self-excited orbits."""
+    (see `_normal_form`), which tells the `criticality`; NaN for others, for self-excited orbits and under `jit`,
+    `vmap` and `grad`."""
     coefficient_error: Float[Array, ""]
     direction: Float[Array, " dim"]
     """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
@@ -165,7 +169,7 @@ class BifurcationPoint(eqx.Module):
 
     @property
     def criticality(self) -> str:
-        """`supercritical`, `subcritical` or `unknown`; nothing for a fold or a branch point."""
+        """`supercritical`, `subcritical` or, where the coefficient may be zero, `unknown`; nothing without one."""
         return criticality(self.kind, float(self.coefficient), float(self.coefficient_error))
 
     @property
@@ -234,30 +238,50 @@ def bifurcation(
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     periods = jnp.asarray(getattr(guess, "periods", 1) if periods is None else periods)
 
-    def find(method: AbstractMethod, counts: Counts, start: Any = start, at: Any = at, spin: bool = spin) -> Any:
-        problem = OrbitProblem(method, system.dimension, free, (parameter,))
-        counts = from_steps(counts, getattr(guess, "steps", None))
-        begin = jnp.asarray(at if parameter == SPEED else first, dtype=float)
-        return _find_point(problem, counts, given, cast(Kind, kind), start, begin, at, periods, spin)
+    def find(state: Any, speed: Any, at: Any, spin: bool) -> BifurcationPoint:
+        def by(method: AbstractMethod, counts: Counts) -> BifurcationPoint:
+            problem = OrbitProblem(method, system.dimension, free, (parameter,))
+            counts = from_steps(counts, getattr(guess, "steps", None))
+            begin = jnp.asarray(speed, dtype=float)
+            return _find_point(problem, counts, given, cast(Kind, kind), state, begin, at, periods, spin)
 
-    found = that_serves(find, method, MOST_OF_A_POINT)
-    known = not any(isinstance(x, Tracer) for x in jax.tree.leaves((found, given, start)))
-    if not (known and reach and POINT_OUTCOMES[int(found.outcome)] in ("no such point", "other kind")):
+        return that_serves(by, method, MOST_OF_A_POINT)
+
+    def around(value: float, part: float) -> Follower:
+        away = part * (abs(value) or 1.0)
+        return make_follower(system, given.speed, parameter, value - away, value + away, period, method)
+
+    found = find(start, first, at, spin)
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves((found, given, start))):
         return found
-    if spin:
-        here, turning = with_value(system, first, parameter, at)
-        orbit = periodic_orbit(here, turning, int(periods), guess=start, revolutions=200, period=period, method=method)
-        start = orbit.state
-    middle, away = float(at), reach * (abs(float(at)) or 1.0)
-    follower = make_follower(system, given.speed, parameter, middle - away, middle + away, period, method)
-    there, looked = walk(follower, (np.asarray(start), middle), int(periods), kind)
-    if there is not None:
-        near = lambda method, counts: find(method, counts, jnp.asarray(there.state), jnp.asarray(there.value), False)
-        again = that_serves(near, method, MOST_OF_A_POINT)
-        if bool(again.converged):
-            return again
-        looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
-    return dataclasses.replace(found, looked=looked)
+    if reach and POINT_OUTCOMES[int(found.outcome)] in ("no such point", "other kind"):
+        if spin:
+            here, turning = with_value(system, first, parameter, at)
+            start = periodic_orbit(
+                here, turning, int(periods), guess=start, revolutions=SPUN, period=period, method=method
+            ).state
+        there, looked = walk(around(float(at), float(reach)), (np.asarray(start), float(at)), int(periods), kind)
+        if there is not None:
+            looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
+            again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
+            found = again if bool(again.converged) else found
+        found = found if bool(found.converged) else dataclasses.replace(found, looked=looked)
+    classed = bool(found.converged) and not free and kind in KINDS_WITH_ONE
+    return _classed(found, around(float(found.value), 0.1)) if classed else found
+
+
+def _classed(point: BifurcationPoint, follower: Follower) -> BifurcationPoint:
+    """The point with the coefficient of its normal form."""
+    place = np.asarray(point.state), float(point.value)
+    frame = follower.frame(point.state, place[1], int(point.periods))
+    # So many copies that the program for many lanes, which the coefficient needs, is the only one to be compiled.
+    again = lambda follower: take(seeds(follower, frame, [place] * (LANES[0] + 1), int(point.steps)), slice(1))
+    orbit = again(follower)
+    if not orbit.converged[0]:
+        follower = stable_steps(follower, place, int(point.periods))
+        orbit = again(follower)
+    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size)[0]
+    return dataclasses.replace(point, coefficient=jnp.asarray(found[0]), coefficient_error=jnp.asarray(found[1]))
 
 
 def _read_guess(
@@ -299,7 +323,7 @@ def _find_point(
     unit = frozen(jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at)))
     system, here = with_value(frozen(given.system), frozen(speed), parameter, at)
     if spin:
-        start = settle(problem, Given(system, here), start, 200, counts)
+        start = settle(problem, Given(system, here), start, SPUN, counts)
     frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
     u0 = start / frame.scale
     if problem.free_speed:
@@ -337,7 +361,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     keep = lambda x: x * jnp.where((outcome == 0) | (outcome == 3), 1.0, jnp.nan)  # its derivative is NaN too
     direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
     length = jnp.linalg.norm(direction)
-    cubic = _cubic(equations, u, found, given)
     (parameter,) = problem.parameters
     return BifurcationPoint(
         value=keep(value),
@@ -349,8 +372,8 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         angle=keep(jnp.abs(jnp.angle(critical))),
         residual=jnp.max(jnp.abs(frozen(found.newton.residual))),
         transversality=keep(rate / frame.units[0]),
-        coefficient=frozen(keep(cubic.value)),
-        coefficient_error=frozen(keep(cubic.error)),
+        coefficient=jnp.asarray(jnp.nan),
+        coefficient_error=jnp.asarray(jnp.nan),
         direction=keep(direction / jnp.where(length > 0, length, 1.0) * frame.scale),
         outcome=outcome,
         iterations=found.iterations,
@@ -358,20 +381,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         kind=kind,
         parameter=parameter if isinstance(parameter, str) else "parameter",
     )
-
-
-def _cubic(equations: PointEquations, u: Array, found: Found, given: Given) -> Coefficient:
-    """The coefficient of the normal form at the root."""
-    problem, frame, kind = equations.problem, equations.frame, equations.kind
-    if kind not in KINDS_WITH_ONE or problem.free_speed:
-        return Coefficient(jnp.asarray(jnp.nan), jnp.asarray(jnp.nan))
-    u, given, m = frozen((u, given, found.aux.monodromy))
-    finite = jnp.all(jnp.isfinite(m))
-    critical = critical_vectors(kind, jnp.where(finite, m, 0.0))
-    strobe = by_steps(problem, found.steps).prepare(jnp.where(finite, u, 1.0), given, frame)
-    z = jnp.where(finite, u[: problem.dimension], 0.0)
-    derivatives = jax.vmap(lambda move: ReturnMap(strobe, frame).pushed(z + move)[1])(around(critical))
-    return coefficient(critical, derivatives)
 
 
 def critical_multiplier(kind: Kind, multipliers: Complex[Array, " dim"]) -> tuple[Array, Array]:

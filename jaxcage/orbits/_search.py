@@ -54,6 +54,16 @@ class Stretch:
         """How much speed it covers [rpm]."""
         return self.upper_rpm - self.lower_rpm
 
+    @property
+    def error_rpm(self) -> float:
+        """By how much the width is not known: what half the steps change in its ends [rpm]."""
+        return sum((p.error_rpm for p in (self.lower, self.upper) if p is not None), 0.0)
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether it is there by half the steps, too: both ends are located to less than its width."""
+        return not self.error_rpm > self.width_rpm
+
     def __str__(self) -> str:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
         return f"{end(self.lower, self.lower_rpm)} to {end(self.upper, self.upper_rpm)} rpm, {self.met} settled"

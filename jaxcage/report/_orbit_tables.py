@@ -67,6 +67,7 @@ def stretch_document(stretch: Stretch, found: SynchronousOrbits) -> dict[str, An
         "lower_kind": lower,
         "upper_kind": upper,
         "branch": stretch.branch,
+        "confirmed": stretch.confirmed,
         "family": stretch.family,
         "met": stretch.met,
         "met_first": stretch.met_first,
@@ -186,6 +187,9 @@ def unsettled_notes(found: SynchronousOrbits) -> list[str]:
     """Bifurcations that were left out, and those that must have been missed."""
     count = found.unsettled
     notes = [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
+    for s in found.stretches:
+        if not s.confirmed:
+            notes.append(f"Not confirmed: the stretch from {number(s.lower_rpm, 2)} rpm is narrower than its error")
     for p in found.unexplained:
         place = f"{number(p.speed_rpm, 3)} ± {error_cell(p.error_rpm)} rpm on branch {branch_of(found, p)}"
         notes.append(f"Unexplained: the stability changes at {place}, and no bifurcation was found there")
