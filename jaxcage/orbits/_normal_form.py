@@ -113,12 +113,18 @@ _around, _coefficient = jax.jit(around, static_argnums=1), jax.jit(coefficient, 
 
 
 def coefficients(
-    curves: Curves, points: Corrected, kinds: Sequence[str], n: int, steps: tuple[float, ...] = STEPS
+    curves: Curves,
+    points: Corrected,
+    kinds: Sequence[str],
+    n: int,
+    steps: tuple[float, ...] = STEPS,
+    finer: Float[np.ndarray, "#points n"] | None = None,
 ) -> Float[np.ndarray, "points 2"]:
     """The coefficients at points of curves and their errors, NaN for kinds that have none.
 
     **Arguments:** curves, one per point, whose first equations and unknowns are those of an orbit; points; kinds;
-    dimension of the state; lengths of the differences.
+    dimension of the state; lengths of the differences; the curves' scale over that in whose units the coefficients
+    are wanted, by default their own.
     """
     monodromy = lambda found: found.jacobian[:, :n, :n] + np.eye(n)
     mine = [i for i, kind in enumerate(kinds) if kind in KINDS_WITH_ONE]
@@ -136,4 +142,7 @@ def coefficients(
             parts = np.split(np.where(moved.converged[:, None, None], monodromy(moved), np.nan), counts[:-1])
             each.append([_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
         found[mine] = [with_half(fine, coarse) for fine, coarse in zip(*each, strict=True)]
+        if finer is not None:
+            longer = np.stack([np.asarray(c.right) for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
+            found[mine] /= np.sum(np.abs(longer) ** 2, axis=1, keepdims=True)
     return found
