@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 import jaxcage as jc
+from jaxcage.orbits._normal_form import around, coefficient, critical_vectors, criticality
 from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
@@ -143,6 +144,7 @@ def test_period_doublings_over_the_force(over_force):
     assert abs(first.value - DOUBLING) < 1e-7
     assert first.edge and first.speed == 1.2 and abs(first.critical + 1) < 1e-8
     assert over_force.stable[first.index] != over_force.stable[first.index + 1]
+    assert first.criticality == "supercritical"  # as the cascade that follows shows
 
 
 @pytest.fixture(scope="module")
@@ -243,6 +245,8 @@ def test_branch_point_and_period_doublings_of_the_rest_state():
     np.testing.assert_allclose([p.value for p in ordered], exact, rtol=0, atol=1e-8)
     for point, (_, _, sign) in zip(ordered, brackets, strict=True):
         assert abs(point.critical - sign) < 1e-7 and point.edge
+    # The cube stiffens: doubled orbits are at lower a, where the rest state is stable at the first doubling only.
+    assert [p.criticality for p in ordered] == ["", "subcritical", "supercritical"]
     inside = (branch.value > exact[0]) & (branch.value < exact[1])
     assert np.array_equal(branch.stable, inside | (branch.value > exact[2]))
     np.testing.assert_allclose(branch.state, 0.0, atol=1e-12)
@@ -322,9 +326,9 @@ def planted(a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
     return jc.ForcedSystem(Planted(**numbers(p=0.0, a=a, c=c, s=s, b=b)), dimension=4)
 
 
-def planted_branch(speed=1.1, lower=-0.2, upper=0.2, **settings):
+def planted_branch(speed=1.1, lower=-0.2, upper=0.2, how=dict(method=METHOD), **settings):
     start = ((1.0, 0.0, 1.0, 0.0), lower + 0.01)
-    return jc.branch(planted(**settings), start, "p", lower=lower, upper=upper, speed=speed, method=METHOD)
+    return jc.branch(planted(**settings), start, "p", lower=lower, upper=upper, speed=speed, **how)
 
 
 def planted_multipliers(branch, a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
@@ -388,7 +392,63 @@ def test_crossings_within_one_step_are_in_order(first):
     assert branch.special[0].index == branch.special[1].index
     np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0204], rtol=0, atol=1e-8)
     assert branch.special[0].kind == first and sorted(kinds(branch)) == ["branch-point", "period-doubling"]
+    # Along the critical direction e' = -e^3 and the map is -e / sqrt(1 + 2 T e^2), to third order -e + T e^3.
+    doubling = next(p for p in branch.special if p.kind == "period-doubling")
+    np.testing.assert_allclose(doubling.coefficient, 2 * np.pi / 1.1, rtol=1e-6)
+    assert doubling.criticality == "supercritical" and doubling.coefficient_error < 1e-6
     assert [p.edge for p in branch.special] == [True, False]
+
+
+@pytest.mark.parametrize("kind, block", [("period-doubling", dict(s=(0.1, 0.0002))), ("torus", dict(b=(0.4, 0.3)))])
+def test_two_crossings_of_one_kind_within_a_step(kind, block):
+    """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""
+    places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)
+    a = (-places[0], -places[1]) if kind == "torus" else (-0.3, -0.02)
+    block |= dict(a=a, c=(1.0, 1.0) if kind == "torus" else (0.2, 1.0))
+    branch = planted_branch(how=dict(steps=jc.Steps(first=0.1, longest=0.4), method=METHOD), **block)
+    assert kinds(branch) == [kind, kind]
+    np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
+    assert np.diff(branch.value)[branch.special[0].index] < 0.003 < 0.007 < np.max(np.diff(branch.value))  # halved
+    finer = dict(steps=jc.Steps(first=0.05, longest=0.2), method=jc.method("rodas4", steps=512))
+    again = planted_branch(how=finer, **block)
+    assert kinds(again) == kinds(branch) and again.value.size > 1.5 * branch.value.size
+    np.testing.assert_allclose([p.value for p in again.special], places, rtol=0, atol=1e-8)
+    if kind == "torus":  # in the second block |z|' = -|z|^3; along q = (1, -i) / sqrt(2), w' = -2 |w|^2 w
+        np.testing.assert_allclose(branch.special[1].coefficient, -4 * np.pi / 1.1, rtol=1e-6)
+        assert branch.special[1].criticality == "supercritical"
+    assert np.array_equal(branch.stable, branch.value < places[0])
+
+
+def test_crossing_that_is_not_found_is_said_to_be_unexplained():
+    """Two multipliers are -exp((p - 0.02) T): both cross -1 at once, and their product has no sign there."""
+    branch = planted_branch(a=(-0.3, -0.02), c=(0.2, 1.0), s=(0.1, 0.0))
+    (point,) = branch.special
+    assert point.kind == point.status == "unexplained" and point.edge
+    assert abs(point.value - 0.02) <= point.error < 2e-4
+    assert abs(point.critical + 1) < 1e-3 and "unexplained" in str(branch)
+    away = np.abs(branch.value - 0.02) > 1e-9
+    assert np.array_equal(branch.stable[away], branch.value[away] < 0.02)
+
+
+def test_normal_forms_of_maps():
+    """Henon's map at its first doubling by the formula with its own second derivative; the delayed logistic map at
+    r = 2, whose amplitude r_k+1 = r_k (1 - r_k^2) for |q| = 1: exact, and as 400 000 iterations show to 2e-3."""
+    b, a = 0.3, 0.3675
+    x = (b - 1 + np.sqrt((1 - b) ** 2 + 4 * a)) / (2 * a)
+    henon = lambda at: jnp.array([[-2 * a * (x + at[0]), 1.0], [b, 0.0]])
+    logistic = lambda at: jnp.array([[2 * (0.5 - at[1]), -2 * (0.5 + at[0])], [1.0, 0.0]])
+    q, p = np.array([1, -b]) / np.hypot(1, b), np.array([1.0, -1.0])
+    second = lambda u, v: np.array([-2 * a * u[0] * v[0], 0.0])
+    p = p / (p @ q)
+    matrix = np.array(henon(np.zeros(2)))
+    exact = p @ second(q, np.linalg.solve(np.eye(2) - matrix, second(q, q))) / 2
+    for kind, slope, value in (("period-doubling", henon, exact), ("torus", logistic, -1.0)):
+        critical = critical_vectors(kind, slope(np.zeros(2)))
+        found = coefficient(critical, jax.vmap(slope)(around(critical)))
+        np.testing.assert_allclose(found.value, value, rtol=1e-10)
+        assert found.error < 1e-10 and criticality(kind, *found) == "supercritical"
+        assert criticality(kind, -found.value, found.error) == "subcritical"
+        assert criticality(kind, found.value, 2.0) == "unknown" and criticality("fold", *found) == ""
 
 
 class VanDerPol(eqx.Module):

@@ -1,5 +1,6 @@
 """Commands about synchronous orbits: bifurcations, gradient, map."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ from jaxcage.report import (
     shown_unit,
     stretch_table,
     touching,
+    unsettled_notes,
 )
 
 
@@ -131,7 +133,30 @@ def test_document_of_a_search(found: SynchronousOrbits):
     assert [(o["branch"], o["stable"]) for o in edges["zone 2 onset"]["coexisting"]][-1] == (1, True)
     assert document["published"][1] == {"zone": 2, "onset_rpm": 25500.0, "exit_rpm": None}
     assert document["missed"] == 2
+    assert [p["criticality"] for p in document["points"]] == [None] * 4 and document["unexplained"] == []
     json.dumps(document, allow_nan=False)
+
+
+def test_search_says_what_is_unexplained_and_what_is_not_confirmed(found: SynchronousOrbits):
+    change = dataclasses.replace(point("unexplained", 9500.0, 1.1, 14), error=0.2 * PER_RPM)
+    wide, rough = (
+        point("period-doubling", 9600.0, -1.0, 15),
+        dataclasses.replace(point("fold", 9600.5, 1.0, 16), error=1.0),
+    )
+    sort = dataclasses.replace(wide, coefficient=-3.0, coefficient_error=0.1)
+    narrow = Stretch(sort, rough, 9600.0, 9600.5, 0)
+    first = dataclasses.replace(found.branches[0], special=(change, sort, rough))
+    doubtful = dataclasses.replace(found, branches=(first,), stretches=(narrow,))
+    assert unsettled_notes(found) == [] and not narrow.confirmed and all(s.confirmed for s in found.stretches)
+    assert unsettled_notes(doubtful) == [
+        "Not confirmed: the stretch from 9600.00 rpm is narrower than its error",
+        "Unexplained: the stability changes at 9500.000 ± 0.2 rpm on branch 0, and no bifurcation was found there",
+    ]
+    document = plain(orbits_document("1a", doubtful, loss_zones(doubtful), None))
+    assert [p["speed_rpm"] for p in document["unexplained"]] == pytest.approx([9500.0])
+    assert [p["criticality"] for p in document["points"]] == ["subcritical", None]
+    assert document["stretches"][0]["confirmed"] is False
+    assert edge_table("1a", doubtful, loss_zones(doubtful)).rows[0][2] == "subcritical period-doubling"
 
 
 def test_tables_of_a_search(found: SynchronousOrbits):

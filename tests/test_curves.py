@@ -142,12 +142,13 @@ class Planted(eqx.Module):
     b: jax.Array
     s: jax.Array
     turn: jax.Array
+    cube: jax.Array
 
     def __call__(self, tau, y, speed):
         cos, sin, along, across = jnp.cos(tau), jnp.sin(tau), jnp.cos(self.turn * tau), jnp.sin(self.turn * tau)
         x, v = y[0] - cos, y[1] - sin
         e, f = along * x + across * v, -across * x + along * v
-        growth, cubic, spin = self.a - self.b**2 / 5, e * e + f * f, self.turn * speed
+        growth, cubic, spin = self.a - self.b**2 / 5, self.cube * (e * e + f * f), self.turn * speed
         de = (growth + self.s - cubic) * e - self.b * f
         df = (growth - self.s - cubic) * f + self.b * e
         return (along * de - across * df - spin * v - speed * sin, across * de + along * df + spin * x + speed * cos)
@@ -157,7 +158,7 @@ SPEED = 1.2
 
 
 def torus_curve(b, lower, upper, s=0.0, turn=0.0):
-    system = jc.ForcedSystem(Planted(**numbers(a=0.1, b=b, s=s, turn=turn)), dimension=2)
+    system = jc.ForcedSystem(Planted(**numbers(a=0.1, b=b, s=s, turn=turn, cube=1.0)), dimension=2)
     point = jc.bifurcation(system, "torus", ((1.0, 0.0), b**2 / 5 + 0.01), "a", speed=SPEED, method=METHOD)
     assert abs(point.value - b**2 / 5) < 1e-8
     curve = jc.curve(system, point, "a", "b", lower=lower, upper=upper, x_lower=-1.0, x_upper=1.0, method=METHOD)
@@ -185,6 +186,49 @@ def test_torus_curve_passes_resonances():
     assert_resonances(curve, {"1:3 resonance": SPEED / 3, "1:4 resonance": SPEED / 4})
     np.testing.assert_allclose(np.abs(curve.multipliers), 1.0, atol=1e-4)
     assert str(curve).count("resonance") == 2
+    assert set(curve.criticality) == {"supercritical"}
+
+
+def test_torus_curve_turns_subcritical_at_a_chenciner_point():
+    """The amplitude changes by -cube |z|^3: exact."""
+    system = jc.ForcedSystem(Planted(**numbers(a=0.1, b=0.35, s=0.0, turn=0.0, cube=0.7)), dimension=2)
+    place = 0.35**2 / 5
+    point = jc.bifurcation(system, "torus", ((1.0, 0.0), place + 0.01), "a", speed=SPEED, method=METHOD)
+    np.testing.assert_allclose(point.coefficient, -0.7 * 4 * np.pi / SPEED, rtol=1e-6)
+    assert str(point).startswith("supercritical torus at ")
+    curve = jc.curve(system, point, "a", "cube", lower=-0.6, upper=1.0, x_lower=-1.0, x_upper=1.0, method=METHOD)
+    (turn,) = curve.special
+    assert turn.kind == "Chenciner" and abs(turn.y_value) < 1e-6 and abs(turn.x_value - place) < 1e-8
+    expected = np.where(curve.y_value > 0, "supercritical", "subcritical")
+    assert np.array_equal(curve.criticality, expected) and len(set(expected)) == 2
+
+
+class Flip(eqx.Module):
+    """e' = p e + g e^3 + e f / 2 and f' = -0.7 f + 0.6 e^2, where e turns by half a revolution a period."""
+
+    p: jax.Array
+    g: jax.Array
+
+    def __call__(self, tau, y, speed):
+        along, across = jnp.cos(tau / 2), jnp.sin(tau / 2)
+        x, z, f = y
+        e, k = along * x + across * z, -across * x + along * z
+        de, dk = self.p * e + self.g * e**3 + 0.5 * e * f, -0.5 * k
+        turned = (along * de - across * dk - speed / 2 * z, across * de + along * dk + speed / 2 * x)
+        return (*turned, -0.7 * f + 0.6 * e * e)
+
+
+def test_period_doubling_curve_turns_subcritical_at_a_generalised_flip():
+    """On the centre manifold f = 0.6 e^2 / 0.7, so that over a period e grows by (g + 0.3 / 0.7) T e^3: exact."""
+    system = jc.ForcedSystem(Flip(**numbers(p=-0.1, g=0.2)), dimension=3)
+    point = jc.bifurcation(system, "period-doubling", ((0.0, 0.0, 0.0), -0.1), "p", speed=SPEED, method=METHOD)
+    np.testing.assert_allclose(point.coefficient, -(0.2 + 0.3 / 0.7) * 2 * np.pi / SPEED, rtol=1e-6)
+    assert point.criticality == "subcritical" and abs(point.value) < 1e-9
+    curve = jc.curve(system, point, "p", "g", lower=-1.0, upper=0.5, x_lower=-1.0, x_upper=1.0, method=METHOD)
+    (turn,) = curve.special
+    assert turn.kind == "generalised flip" and abs(turn.y_value + 0.3 / 0.7) < 1e-6 and abs(turn.x_value) < 1e-8
+    expected = np.where(curve.y_value < -0.3 / 0.7, "supercritical", "subcritical")
+    assert np.array_equal(curve.criticality, expected) and len(set(expected)) == 2
 
 
 def test_torus_curve_goes_on_as_neutral_saddles_beyond_a_strong_resonance():

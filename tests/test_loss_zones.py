@@ -296,6 +296,18 @@ def test_synchronous_orbits_of_the_hardening_duffing(hardening):
     assert "2 stable stretches" in str(hardening) and "(fold)" in str(hardening)
 
 
+def test_orbits_are_found_from_simulations_that_have_not_settled(hardening):
+    """After two revolutions nothing has a period; Newton's method leads on, and few are said to have settled."""
+    starts = ((0.1, 0.2), (2.0, 1.0), (-1.5, 2.0))
+    system = jc.ForcedOscillator(Hardening(jnp.asarray(0.3)), coordinates=1, starts=starts)
+    early = jc.synchronous_orbits(system, LOWER, UPPER, count=GRID.size, discard=1, method=METHOD)
+    assert not np.any(early.sweep.label == "periodic-1")
+    assert [(s.lower_rpm, s.upper_rpm) for s in early.stretches] == [
+        pytest.approx((s.lower_rpm, s.upper_rpm)) for s in hardening.stretches
+    ]
+    assert sum(s.met for s in early.stretches) < 0.5 * early.sweep.label.size and early.missed == 0
+
+
 def test_orbits_that_coexist(hardening):
     """Three between the folds, the middle one unstable; one outside. Responses on the upper branch are larger."""
     for speed, count in ((1.0, 1), (1.5, 3), (2.1, 1)):

@@ -67,6 +67,36 @@ def test_no_orbit_and_so_no_point():
     assert np.isnan(point.value) and np.isnan(point.speed) and np.all(np.isnan(point.state))
     assert np.isnan(point.angle) and np.isnan(point.transversality) and np.all(np.isnan(point.multipliers))
     assert str(point).startswith("No fold found: no such point")
+    assert point.looked == "no orbit near the guess at speed = 9.5493 rpm to follow"
+
+
+class Pendulum(eqx.Module):
+    """x'' + 2 b x' + w0^2 sin x = g w0^2 cos(w t) with w = 2 pi, w0 = 1.5 w and b = w0/4 (J. R. Taylor, Classical
+    Mechanics, 2005, chapter 12)."""
+
+    g: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        natural = 1.5 * speed
+        return (-natural / 2 * u + natural**2 * (self.g * jnp.cos(tau) - jnp.sin(x)),)
+
+
+def test_period_doubling_from_beyond_a_superstable_orbit():
+    """Newton's method finds nothing from an orbit with the multiplier .18: the branch leads there (SciPy's DOP853 and
+    bisection put it at 1.08208437)."""
+    system = jc.ForcedOscillator(Pendulum(jnp.asarray(1.0805)), coordinates=1)
+    orbit = jc.periodic_orbit(system, 2 * np.pi, 4, guess=(-np.pi / 2, 0.0), revolutions=400)
+    assert 0.17 < orbit.multipliers[0].real < 0.19
+    find = lambda **settings: jc.bifurcation(system, "period-doubling", orbit, "g", **settings)
+    assert find(reach=0).status == "no such point"
+    point = find()
+    assert point.status == "converged" and abs(point.value - 1.08208437) < 1e-7 and point.looked == ""
+    lost = find(reach=0.001)
+    assert lost.status == "no such point" and np.isnan(lost.value)
+    assert "looked along the branch of its orbit, g from 1.07" in str(lost)
+    with pytest.raises(ValueError, match="`reach` must be at least 0, but -1 was given"):
+        find(reach=-1.0)
 
 
 @pytest.mark.slow

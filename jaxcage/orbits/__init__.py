@@ -10,10 +10,14 @@
 | `_coexisting`  | all orbits that many starts lead to                                                |
 | `_liouville`   | the determinant that every monodromy matrix must have                              |
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
+| `_walk`        | a bifurcation looked for along the branch of its orbits                            |
 | `_point`       | bifurcation points                                                                 |
 | `_arclength`   | pseudo-arclength continuation of many curves at a time                             |
 | `_illinois`    | where a function along a curve vanishes                                            |
-| `_branch`      | branches of orbits with their bifurcations located                                 |
+| `_follower`    | what the lanes of one continuation of orbits share                                 |
+| `_located`     | bifurcations between orbits of a branch, every change of stability accounted for   |
+| `_normal_form` | super- or subcritical period doublings and torus bifurcations                      |
+| `_branch`      | branches of orbits with their bifurcations                                         |
 | `_search`      | the synchronous orbits of a speed range, found without a hint                      |
 | `_loss`        | synchronous-loss zones and their edges                                             |
 | `_mechanism`   | chaotic edges matched with bifurcations and cascade limits                         |

@@ -27,6 +27,8 @@ LANES = (8, 32)
 they share the processor's instructions."""
 FOLLOWING = 1e-7
 """Newton's last step while following, in the unknowns' units: points are then good to about its square."""
+ONCE = 1e300
+"""The same for a single step: infinity would be no number where an unknown is zero."""
 CORRECTIONS = 8
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
@@ -168,7 +170,7 @@ def measured(curves: Curves, points: Corrected) -> Corrected:
     """The points with their errors: by one step of Newton's method with half the steps."""
     if int(curves.counts.last) == 1:
         return points
-    half = correct(curves, points.u, points.tangent, (points.steps + 1) // 2, np.inf)
+    half = correct(curves, points.u, points.tangent, (points.steps + 1) // 2, ONCE)
     with np.errstate(invalid="ignore"):
         error, over = curves.equations.apart(points.u - half.u, half.jacobian, points.jacobian)
     lost = ~(half.converged & points.converged)

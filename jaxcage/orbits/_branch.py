@@ -8,26 +8,31 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float, Int
 
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Curves, Steps, Trace, correct, follow, put, settle_on, stack, take
-from ._illinois import zeros
-from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._orbit import OrbitEquations, guess_state, is_free
-from ._problem import Frame, Given, OrbitProblem, make_frame
-from ._singularity import matches, null_vectors, singular_matrix, test_functions
-from ._steps import MOST_OF_A_POINT, POINT, SETTLED, STIFF_FIRST, Counts, counted
-
-
-Start = tuple[np.ndarray, float]
-"""A state [SI] and the value of the parameter."""
-WIDER = (0, 1, 3)
-"""How many orbits further out a bifurcation is looked for that is not between the two at which it was seen."""
+from ._arclength import Corrected, Steps, Trace, follow, take
+from ._follower import (
+    Follower,
+    Start,
+    eigenvalues,
+    is_stable,
+    make_follower,
+    seeds,
+    stable_steps,
+    turned,
+)
+from ._lens import SPEED, Parameter, value as value_of
+from ._located import UNEXPLAINED, Seen, account
+from ._normal_form import coefficients, criticality
+from ._orbit import guess_state
+from ._problem import Frame, Given
+from ._singularity import null_vectors, singular_matrix
+from ._steps import SETTLED
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +40,8 @@ class SpecialPoint:
     """A bifurcation on a branch."""
 
     kind: str
-    """`period-doubling`, `torus`, `fold` or `branch-point`."""
+    """`period-doubling`, `torus`, `fold` or `branch-point`; `unexplained` where the number of unstable multipliers
+    changes and no bifurcation is found: there is one that was missed, or the branch is not one."""
     value: float
     """Value of the parameter [SI]; NaN where it did not settle."""
     speed: float
@@ -55,7 +61,18 @@ class SpecialPoint:
     steps: int = 0
     """Steps per revolution; 0 where they are not known."""
     error: float = float("nan")
-    """Distance of the value to that by half the steps [SI]; infinite where these do not find it."""
+    """Distance of the value to that by half the steps [SI], infinite where these do not find it; of something
+    unexplained how far away it may be."""
+
+    coefficient: float = float("nan")
+    """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
+    (see `_normal_form`), which tells the `criticality`; NaN for others and for self-excited orbits."""
+    coefficient_error: float = float("nan")
+
+    @property
+    def criticality(self) -> str:
+        """`supercritical`, `subcritical` or, where the coefficient may be zero, `unknown`; nothing without one."""
+        return criticality(self.kind, self.coefficient, self.coefficient_error)
 
     @property
     def speed_rpm(self) -> float:
@@ -69,7 +86,9 @@ class SpecialPoint:
 
     @property
     def status(self) -> str:
-        """`converged`, or `not converged` where it is elsewhere by half the steps."""
+        """`converged`, `unexplained`, or `not converged` where it is elsewhere by half the steps."""
+        if self.kind == UNEXPLAINED:
+            return self.kind
         return "converged" if np.isfinite(self.value) else "not converged"
 
     @property
@@ -78,7 +97,7 @@ class SpecialPoint:
         target = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}.get(self.kind)
         mu = self.multipliers
         if target is None:
-            mu = mu[np.imag(mu) > 0]
+            mu = mu[np.imag(mu) > 0] if self.kind == "torus" else mu
             return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
         return complex(mu[np.argmin(np.abs(mu - target))])
 
@@ -118,52 +137,12 @@ class Branch:
         )
         rows = [
             f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
+            + f", {p.criticality}" * bool(p.criticality)
             for p in self.special
         ]
         return "\n".join([head, *rows])
 
     _repr_html_ = notebook_html
-
-
-class Follower(eqx.Module):
-    """What all lanes of one continuation share."""
-
-    problem: OrbitProblem
-    counts: Counts
-    given: Given
-    lower: float
-    upper: float
-    unit: float
-    designs: bool = eqx.field(static=True, default=False)
-    """Whether every lane has a system of its own, stacked in `given`."""
-
-    def of(self, lanes: Any) -> Given:
-        """What is given in these lanes."""
-        return take(self.given, np.asarray(lanes)) if self.designs else self.given
-
-    def curves(self, frame: Frame, lanes: Any) -> Curves:
-        """The branches of these lanes."""
-        equations = stack(OrbitEquations(self.problem, frame), len(lanes))
-        return Curves(equations, self.of(lanes), self.counts, self.designs)
-
-    @property
-    def parameter(self) -> Parameter:
-        return self.problem.parameters[0]
-
-    def frame(self, state: Array, at: Scalar, periods: Any) -> Frame:
-        """The frame of all lanes, around one of their orbits."""
-        given = self.of(0)
-        system, speed = with_value(given.system, given.speed, self.parameter, jnp.asarray(at, dtype=float))
-        return make_frame(self.problem, Given(system, speed), state, speed, jnp.full(1, self.unit), periods)
-
-    def inside(self, u: np.ndarray) -> np.ndarray:
-        """Whether the parameter is within the range."""
-        value = u[..., -1] * self.unit
-        return (value > self.lower) & (value < self.upper)
-
-    def monodromy(self, points: Corrected) -> np.ndarray:
-        n = self.problem.dimension
-        return points.jacobian[..., :n, :n] + np.eye(n)
 
 
 def branch(
@@ -245,47 +224,6 @@ def branches(
     return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
 
 
-def make_follower(
-    system: AbstractForcedSystem,
-    speed: Any,
-    parameter: Parameter,
-    lower: float,
-    upper: float,
-    period: str = "driven",
-    method: AbstractMethod | None = None,
-) -> Follower:
-    chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
-    given = Given(system, jnp.asarray(speed, dtype=float))
-    return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
-
-
-def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> Corrected:
-    """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
-    free = follower.problem.free_speed
-    u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
-    normal = np.zeros_like(u)
-    normal[:, -1] = 1.0
-    return settle_on(follower.curves(frame, range(len(starts))), u, normal, allowed=LOOSE)
-
-
-def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
-    """The follower itself or, where it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
-    if not follower.counts.tolerance > 0:
-        return follower
-    frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
-    (u,) = seeds(follower, frame, [start]).jacobian
-    if np.all(np.isfinite(u)):
-        return follower
-    chosen, counts = counted(None, solver="rodas4", first=STIFF_FIRST)
-    return eqx.tree_at(lambda f: (f.problem.method, f.counts), follower, (chosen, counts))
-
-
-def turned(points: Corrected, sign: Any) -> Corrected:
-    """The same points, to be followed the other way where `sign` is -1."""
-    return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
-
-
 def follow_both_ways(
     follower: Follower, starts: Sequence[Start], periods: int, steps: Steps, patience: int | None = None
 ) -> list[Branch | None]:
@@ -321,7 +259,7 @@ def follow_both_ways(
     both = turned(take(first, lanes), sign)
     traces = follow(follower.curves(frame, lanes), both, steps=steps, inside=follower.inside, stop=stop)
     kept = [i for i in range(count) if not taken[i]]
-    found = describe(follower, frame, [_joined(follower, traces[i], traces[i + count]) for i in kept], kept)
+    found = describe(follower, frame, [joined(follower, traces[i], traces[i + count]) for i in kept], kept)
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
 
 
@@ -333,7 +271,7 @@ def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) 
     return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
 
 
-def _joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
+def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
     """Both directions as one row of points.
 
     A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
@@ -355,121 +293,31 @@ def describe(
     lanes: Sequence[int] = (0,),
 ) -> list[Branch]:
     """Branches from their points and lanes, with special points located, all at once."""
-    found = [(i, *bracket) for i, (points, _) in enumerate(traces) for bracket in brackets(follower, points)]
-    located = locate(follower, frame, [(lanes[i], traces[i][0], k, kind) for i, k, kind in found])
-    branches = []
-    for i, (points, ended) in enumerate(traces):
-        mine = [(k, kind, p) for (j, k, kind), p in zip(found, located, strict=True) if j == i and p is not None]
-        along = lambda k, p: float(np.dot(p[0].u - points.u[k], points.u[k + 1] - points.u[k]))
-        mine.sort(key=lambda found: (found[0], along(found[0], found[2])))
-        branches.append(_branch(follower, frame, points, ended, mine))
-    return branches
-
-
-def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
-    """Multipliers, the largest first."""
-    mu = np.linalg.eigvals(monodromy).astype(complex)
-    return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
-
-
-def is_stable(multipliers: np.ndarray, free: bool) -> Any:
-    """Whether all multipliers are inside the unit circle, but for the one at 1 of a self-excited orbit."""
-    size = np.abs(multipliers)
-    if free:
-        np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
-    return np.max(size, axis=-1) < 1.0
-
-
-def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
-    """Functions along a branch that change sign at its special points."""
-    tests = test_functions(eigenvalues(follower.monodromy(points)))
-    tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
-    tests["fold"] = points.tangent[..., -1]
-    if follower.problem.free_speed:
-        del tests["branch-point"]
-    return tests
-
-
-def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
-    """Index and kind of each change of sign."""
-    found = []
-    for kind, value in signals(follower, points).items():
-        found += [(int(k), kind) for k in np.flatnonzero(value[:-1] * value[1:] < 0)]
-    return sorted(found)
-
-
-def locate(
-    follower: Follower, frame: Frame, wanted: Sequence[tuple[int, Corrected, int, str]]
-) -> list[tuple[Corrected, float] | None]:
-    """Where the test functions of (lane, points, index, kind) vanish, and the distance [SI] to the place by half the
-    steps; None where that could not be found.
-    """
-    if not wanted:
-        return []
-    curves = follower.curves(frame, [lane for lane, *_ in wanted])
-    kinds = [kind for *_, kind in wanted]
-    chooses, most = curves.chooses, MOST_OF_A_POINT if curves.chooses else int(curves.counts.last)
-    steps = np.full(len(wanted), int(curves.counts.first))
-    if chooses:
-        steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
-
-    def at(lanes: list[int]) -> list[Corrected | None]:
-        """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
-        placed: list[Corrected | None] = [None] * len(lanes)
-        for beyond in WIDER:
-            left = [j for j, p in enumerate(placed) if p is None]
-            some = [lanes[j] for j in left]
-            if some:
-                rows = [(wanted[i][1], wanted[i][2]) for i in some]
-                ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
-                for j, p in zip(left, _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])):
-                    placed[j] = p
-        return placed
-
-    found = at(list(range(len(wanted))))
-    error = np.full(len(wanted), np.inf if most > 1 else np.nan)
-    size = lambda p: max(abs(p.u[-1]), 1.0)
-    while True:
-        sure = [p is not None and e <= POINT * size(p) * chooses for p, e in zip(found, error, strict=True)]
-        again = np.flatnonzero(~np.array(sure) & (steps < most)).tolist()
-        if not again:
-            break
-        steps[again] = np.minimum(2 * steps[again], most)
-        for i, p in zip(again, at(again), strict=True):
-            before, found[i] = found[i], p if p is not None else found[i]
-            error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
-    return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
-
-
-def _zeros(
-    follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray
-) -> list[Corrected | None]:
-    """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
-    both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
-    lanes = np.repeat(np.arange(len(ends)), 2)
-    other = np.flatnonzero(both.steps != steps[lanes])
-    if other.size:
-        redone = correct(curves.take(lanes[other]), both.u[other], both.tangent[other], steps[lanes[other]])
-        both = put(both, other, redone)
-    signal = lambda i, points: signals(follower, points)[str(kinds[i])]
-    pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
-    there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
-    kept = np.flatnonzero(there).tolist()
-    found: list[Corrected | None] = [None] * len(ends)
-    if kept:
-        of_kept = lambda i, points: signal(kept[i], points)
-        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept])
-        for i, p in zip(kept, some, strict=True):
-            found[i] = p
-    return found
+    rows = account(follower, frame, [points for points, _ in traces], lanes)
+    every = [found for _, seen in rows for found in seen]
+    cubic = iter(())
+    if every:
+        lane = [i for i, (_, seen) in zip(lanes, rows, strict=True) for _ in seen]
+        places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(found.point for found in every))
+        kinds = ["" if follower.problem.free_speed else found.kind for found in every]
+        own = follower.parameter == SPEED  # each in the scale at its own speed
+        scale_at = lambda i, value: follower.of(i).system.scale(value * follower.unit)
+        scales = [scale_at(i, u[-1]) if own else frame.scale for i, u in zip(lane, places.u, strict=True)]
+        finer = np.asarray(frame.scale) / np.array([[float(c) for c in row] for row in scales])
+        n = follower.problem.dimension
+        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer))
+    return [
+        _branch(follower, frame, points, [(s, next(cubic).tolist()) for s in seen], ended)
+        for (points, seen), (_, ended) in zip(rows, traces, strict=True)
+    ]
 
 
 def _branch(
     follower: Follower,
     frame: Frame,
     points: Corrected,
+    seen: Sequence[tuple[Seen, list[float]]],
     ended: tuple[str, str],
-    located: Sequence[tuple[int, str, tuple[Corrected, float]]],
 ) -> Branch:
     problem, free = follower.problem, follower.problem.free_speed
     multipliers = eigenvalues(follower.monodromy(points))
@@ -485,18 +333,17 @@ def _branch(
         return np.asarray(found)
 
     special = []
-    located = [found for found in located if matches(found[1], eigenvalues(follower.monodromy(found[2][0])))]
-    before = [k for k, _, _ in located]
-    for i, (k, kind, (p, error)) in enumerate(located):
+    before = [found.after for found, _ in seen]
+    for i, ((k, kind, p, error), cubic) in enumerate(seen):
         mu = eigenvalues(follower.monodromy(p))
         direction = np.zeros(n)
-        if kind != "torus":
+        if kind in ("period-doubling", "fold", "branch-point"):
             m = jnp.asarray(follower.monodromy(p))
-            direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])  # pyright: ignore[reportArgumentType]
+            direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])
         # Of several between two points, the outer ones only are next to orbits whose stability is known.
         edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)
-        lost = float("nan") if error > SETTLED * max(abs(at), follower.unit) else 1.0
+        lost = float("nan") if kind != UNEXPLAINED and error > SETTLED * max(abs(at), follower.unit) else 1.0
         special.append(
             SpecialPoint(
                 kind=kind,
@@ -511,6 +358,8 @@ def _branch(
                 periods=int(frame.periods),
                 steps=int(p.steps),
                 error=error,
+                coefficient=cubic[0],
+                coefficient_error=cubic[1],
             )
         )
     return Branch(

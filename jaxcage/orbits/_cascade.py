@@ -11,14 +11,8 @@ from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
-from ._branch import (
-    Branch,
-    Follower,
-    SpecialPoint,
-    describe,
-    eigenvalues,
-    make_follower,
-)
+from ._branch import Branch, SpecialPoint, describe
+from ._follower import Follower, eigenvalues, make_follower
 from ._lens import SPEED, Parameter
 from ._point import BifurcationPoint
 from ._singularity import test_functions

@@ -5,18 +5,21 @@ import itertools
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float, Int, Shaped
 
 from .._checks import require_x64
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Curves, Steps, follow, settle_on, stack, take
-from ._branch import SpecialPoint, eigenvalues, turned
+from ._branch import SpecialPoint
+from ._follower import eigenvalues, turned
 from ._illinois import zeros
 from ._lens import SPEED, value as value_of
+from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import BifurcationPoint, PointEquations, critical_matrix
 from ._problem import Given, OrbitProblem, ReturnMap, make_frame
@@ -24,12 +27,17 @@ from ._singularity import Kind, null_vectors
 from ._steps import ENOUGH, Counts, by_steps, counted
 
 
+TURNS = {"period-doubling": "generalised flip", "torus": "Chenciner"}
+"""Where bifurcations of a kind turn from super- to subcritical."""
+
+
 @dataclasses.dataclass(frozen=True)
 class CodimensionTwo:
     """A point of a curve at which something else happens too."""
 
     kind: str
-    """`cusp`; `1:1`, `1:2`, `1:3`, `1:4 resonance`; `fold-flip`, `fold-torus`, `flip-torus`, `double torus`; or
+    """`cusp`; `1:1`, `1:2`, `1:3`, `1:4 resonance`; `fold-flip`, `fold-torus`, `flip-torus`, `double torus`;
+    `generalised flip` or `Chenciner`, where period doublings or torus bifurcations turn from super- to subcritical; or
     `extreme`, where the curve turns back in x: at the value of y two edges meet there, or are born."""
     x_value: float
     y_value: float
@@ -57,6 +65,8 @@ class Curve:
     """Steps per revolution."""
     error: Float[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     """Distance in x, or in y in the same share of its range, to the curve by half the steps [SI]."""
+    criticality: Shaped[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=str))
+    """`supercritical`, `subcritical` or `unknown`; nothing without a coefficient."""
 
     def __str__(self) -> str:
         head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}, {self.x_value.size} points"
@@ -112,7 +122,8 @@ def curve(
         inside=tracer.inside,
         update=_fresh_borders,
     )
-    special = [*tracer.special(down.points), *tracer.special(up.points)]
+    cubic = [tracer.cubic(t.points) for t in (down, up)]
+    special = [p for t, c in zip((down, up), cubic, strict=True) for p in tracer.special(t.points, c)]
     back = take(down.points, np.arange(len(down.points.u) - 1, 0, -1))
     u, m = (np.concatenate([f(back), f(up.points)]) for f in (lambda p: p.u, lambda p: p.aux.monodromy))
     multipliers = eigenvalues(m)
@@ -130,6 +141,7 @@ def curve(
         error=np.concatenate([back.error, up.points.error]) * tracer.units[0],
         ended=(down.ended, up.ended),
         name=name,
+        criticality=np.array([criticality(point.kind, *c) for c in np.concatenate([cubic[0][:0:-1], cubic[1]])]),
     )
 
 
@@ -182,20 +194,41 @@ class _Tracer(eqx.Module):
     def curves(self, equations: Any) -> Curves:
         return Curves(equations, self.given, self.counts)
 
-    def special(self, points: Corrected) -> list[CodimensionTwo]:
+    def through(self, points: Corrected) -> Curves:
+        """A curve through each point."""
+        count = len(points.u)
+        base = stack(PointEquations(self.problem, self.frame, jnp.zeros(1), jnp.zeros(1), self.kind), count)
+        return self.curves(_fresh_borders(base, points, np.arange(count)))
+
+    def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
+        """Coefficients of the normal form and their errors."""
+        known = [self.kind != "torus" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
+        kinds = [self.kind if k and not self.problem.free_speed else "" for k in known]
+        return coefficients(self.through(points), points, kinds, self.problem.dimension, FEW)
+
+    def special(self, points: Corrected, cubic: Float[np.ndarray, "points 2"]) -> list[CodimensionTwo]:
         """Codimension-2 points between the points of one direction, located."""
         signals = self.signals(points)
-        wanted = [(kind, int(k)) for kind, f in signals.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0)]
+        wanted = [(kind, int(k), int(k) + 1) for kind, f in signals.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0)]
+        sure = np.flatnonzero(np.abs(cubic[:, 0]) > cubic[:, 1])
+        turns = np.flatnonzero(cubic[sure[:-1], 0] * cubic[sure[1:], 0] < 0)
+        wanted += [(TURNS[self.kind], int(sure[k]), int(sure[k + 1])) for k in turns]
         if not wanted:
             return []
-        ends = [take(points, np.array([k, k + 1])) for _, k in wanted]
-        borders = take(points, np.array([k for _, k in wanted]))
-        base = stack(PointEquations(self.problem, self.frame, jnp.zeros(1), jnp.zeros(1), self.kind), len(wanted))
-        curves = _fresh_borders(base, borders, np.arange(len(wanted)))
+        ends = [take(points, np.array([k, m])) for _, k, m in wanted]
+        curves = self.through(take(points, np.array([k for _, k, _ in wanted])))
         steps = np.array([e.steps.max() for e in ends])
-        located = zeros(self.curves(curves), ends, lambda i, p: self.signals(p)[wanted[i][0]], steps)
+
+        def signal(i: int, p: Corrected) -> np.ndarray:
+            kind = wanted[i][0]
+            return self.cubic(p)[:, 0] if kind in TURNS.values() else self.signals(p)[kind]
+
+        located = zeros(curves, ends, signal, steps)
         found = []
-        for (kind, _), p in zip(wanted, located, strict=True):
+        for i, ((kind, k, m), p) in enumerate(zip(wanted, located, strict=True)):
+            if p is not None and kind in TURNS.values():  # and not the pole that it has at a fold-flip
+                at = abs(signal(i, jax.tree.map(lambda x: np.asarray(x)[None], p))[0])
+                p = p if at < 0.01 * np.min(np.abs(cubic[[k, m], 0])) else None
             if p is not None and _real(kind, self.kind, eigenvalues(p.aux.monodromy)):
                 x, y = p.u[-2:] * np.asarray(self.units)
                 found.append(CodimensionTwo(kind, float(x), float(y), eigenvalues(p.aux.monodromy)))

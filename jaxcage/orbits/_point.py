@@ -1,9 +1,13 @@
 """Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
 
+import dataclasses
 from typing import Any, NamedTuple, cast, get_args
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
@@ -11,12 +15,16 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
+from ._arclength import LANES, take
+from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._orbit import OrbitEquations, guess_state, is_free, settle, sorted_multipliers
+from ._normal_form import KINDS_WITH_ONE, coefficients, criticality
+from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
+from ._walk import walk
 
 
 POINT_OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged")
@@ -28,6 +36,8 @@ that is elsewhere by half the steps."""
 TANGENTIAL = 1e-2
 """A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
 ON_CIRCLE = 1e-5
+SPUN = 200
+"""Revolutions of the simulation that finds an orbit."""
 
 
 class Singular(NamedTuple):
@@ -121,6 +131,11 @@ class BifurcationPoint(eqx.Module):
     transversality: Float[Array, ""]
     """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
     p dP/d parameter of the map along the critical direction, with p q = 1."""
+    coefficient: Float[Array, ""]
+    """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
+    (see `_normal_form`), which tells the `criticality`; NaN for others, for self-excited orbits and under `jit`,
+    `vmap` and `grad`."""
+    coefficient_error: Float[Array, ""]
     direction: Float[Array, " dim"]
     """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
     outcome: Int[Array, ""]
@@ -129,6 +144,8 @@ class BifurcationPoint(eqx.Module):
     periods: Int[Array, ""]
     kind: str = eqx.field(static=True)
     parameter: str = eqx.field(static=True)
+    looked: str = eqx.field(static=True, default="")
+    """Where it was looked for, if Newton's method did not find it from the guess and neither did the branch."""
 
     @property
     def speed_rpm(self) -> Float[Array, ""]:
@@ -151,17 +168,24 @@ class BifurcationPoint(eqx.Module):
         return self.outcome == 0
 
     @property
+    def criticality(self) -> str:
+        """`supercritical`, `subcritical` or, where the coefficient may be zero, `unknown`; nothing without one."""
+        return criticality(self.kind, float(self.coefficient), float(self.coefficient_error))
+
+    @property
     def status(self) -> str:
         """One of `POINT_OUTCOMES`."""
         return POINT_OUTCOMES[int(self.outcome)]
 
     def __str__(self) -> str:
         if not bool(self.converged):
-            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e})"
+            looked = f"; {self.looked}" if self.looked else ""
+            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
         angle = f", angle {float(self.angle) * 180 / jnp.pi:.2f} deg" if self.kind == "torus" else ""
         error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
+        sort = f"{self.criticality} " if self.criticality else ""
         return (
-            f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
+            f"{sort}{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
             f"+- {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
             f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
         )
@@ -178,9 +202,12 @@ def bifurcation(
     speed: Scalar | None = None,
     periods: Any = None,
     period: str = "driven",
+    reach: float | int = 0.1,
     method: AbstractMethod | None = None,
 ) -> BifurcationPoint:
     """The bifurcation of `kind` near `guess`, where `parameter` is free.
+
+    Where Newton's method finds none, the branch of orbits through `guess` is followed both ways to the nearest.
 
     **Arguments:**
 
@@ -192,13 +219,18 @@ def bifurcation(
     - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
+    - `reach`: how far the branch is followed, in parts of the parameter's value (of 1 where that is 0); 0 for not at
+        all, as under `jit`, `vmap` and `grad`, where nothing is known of what Newton's method finds.
 
-    **Returns:** `BifurcationPoint`; it does not raise if there is none. Works under `jit` and `vmap`; value, speed and
-    state have derivatives of every order with respect to `system` and `speed`, by the implicit function theorem.
+    **Returns:** `BifurcationPoint`; it does not raise if there is none, but says where it looked. Works under `jit` and
+    `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`, by the implicit
+    function theorem.
 
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
     require_x64()
+    if not reach >= 0:
+        raise ValueError(f"Argument `reach` must be at least 0, but {reach:g} was given.")
     if kind not in get_args(Kind):
         raise ValueError(f"Argument `kind` must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     free = is_free(period)
@@ -206,13 +238,50 @@ def bifurcation(
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     periods = jnp.asarray(getattr(guess, "periods", 1) if periods is None else periods)
 
-    def find(method: AbstractMethod, counts: Counts) -> BifurcationPoint:
-        problem = OrbitProblem(method, system.dimension, free, (parameter,))
-        counts = from_steps(counts, getattr(guess, "steps", None))
-        begin = jnp.asarray(first, dtype=float)
-        return _find_point(problem, counts, given, cast(Kind, kind), start, begin, at, periods, spin)
+    def find(state: Any, speed: Any, at: Any, spin: bool) -> BifurcationPoint:
+        def by(method: AbstractMethod, counts: Counts) -> BifurcationPoint:
+            problem = OrbitProblem(method, system.dimension, free, (parameter,))
+            counts = from_steps(counts, getattr(guess, "steps", None))
+            begin = jnp.asarray(speed, dtype=float)
+            return _find_point(problem, counts, given, cast(Kind, kind), state, begin, at, periods, spin)
 
-    return that_serves(find, method, MOST_OF_A_POINT)
+        return that_serves(by, method, MOST_OF_A_POINT)
+
+    def around(value: float, part: float) -> Follower:
+        away = part * (abs(value) or 1.0)
+        return make_follower(system, given.speed, parameter, value - away, value + away, period, method)
+
+    found = find(start, first, at, spin)
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves((found, given, start))):
+        return found
+    if reach and POINT_OUTCOMES[int(found.outcome)] in ("no such point", "other kind"):
+        if spin:
+            here, turning = with_value(system, first, parameter, at)
+            start = periodic_orbit(
+                here, turning, int(periods), guess=start, revolutions=SPUN, period=period, method=method
+            ).state
+        there, looked = walk(around(float(at), float(reach)), (np.asarray(start), float(at)), int(periods), kind)
+        if there is not None:
+            looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
+            again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
+            found = again if bool(again.converged) else found
+        found = found if bool(found.converged) else dataclasses.replace(found, looked=looked)
+    classed = bool(found.converged) and not free and kind in KINDS_WITH_ONE
+    return _classed(found, around(float(found.value), 0.1)) if classed else found
+
+
+def _classed(point: BifurcationPoint, follower: Follower) -> BifurcationPoint:
+    """The point with the coefficient of its normal form."""
+    place = np.asarray(point.state), float(point.value)
+    frame = follower.frame(point.state, place[1], int(point.periods))
+    # So many copies that the program for many lanes, which the coefficient needs, is the only one to be compiled.
+    again = lambda follower: take(seeds(follower, frame, [place] * (LANES[0] + 1), int(point.steps)), slice(1))
+    orbit = again(follower)
+    if not orbit.converged[0]:
+        follower = stable_steps(follower, place, int(point.periods))
+        orbit = again(follower)
+    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size)[0]
+    return dataclasses.replace(point, coefficient=jnp.asarray(found[0]), coefficient_error=jnp.asarray(found[1]))
 
 
 def _read_guess(
@@ -254,7 +323,7 @@ def _find_point(
     unit = frozen(jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at)))
     system, here = with_value(frozen(given.system), frozen(speed), parameter, at)
     if spin:
-        start = settle(problem, Given(system, here), start, 200, counts)
+        start = settle(problem, Given(system, here), start, SPUN, counts)
     frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
     u0 = start / frame.scale
     if problem.free_speed:
@@ -303,6 +372,8 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         angle=keep(jnp.abs(jnp.angle(critical))),
         residual=jnp.max(jnp.abs(frozen(found.newton.residual))),
         transversality=keep(rate / frame.units[0]),
+        coefficient=jnp.asarray(jnp.nan),
+        coefficient_error=jnp.asarray(jnp.nan),
         direction=keep(direction / jnp.where(length > 0, length, 1.0) * frame.scale),
         outcome=outcome,
         iterations=found.iterations,

@@ -1,6 +1,6 @@
 """The synchronous (period-1) orbits of a system over a range of speed, found without a hint of where they are.
 
-Simulations from several starts on a coarse grid settle on stable orbits here and there; each is followed both ways by
+Newton's method leads from the ends of simulations on a coarse grid to stable orbits; each is followed both ways by
 arclength, until every orbit that was met lies on a branch that is known. Stable stretches of the branches, bounded by
 bifurcations, are what the synchronous-loss edges are about.
 """
@@ -18,18 +18,8 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..sweeps import sweep
 from ._arclength import Steps, take
-from ._branch import (
-    Branch,
-    Follower,
-    SpecialPoint,
-    Start,
-    eigenvalues,
-    follow_both_ways,
-    is_stable,
-    make_follower,
-    seeds,
-    stable_steps,
-)
+from ._branch import Branch, SpecialPoint, follow_both_ways
+from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
 from ._lens import SPEED
 
 
@@ -63,6 +53,16 @@ class Stretch:
     def width_rpm(self) -> float:
         """How much speed it covers [rpm]."""
         return self.upper_rpm - self.lower_rpm
+
+    @property
+    def error_rpm(self) -> float:
+        """By how much the width is not known: what half the steps change in its ends [rpm]."""
+        return sum((p.error_rpm for p in (self.lower, self.upper) if p is not None), 0.0)
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether it is there by half the steps, too: both ends are located to less than its width."""
+        return not self.error_rpm > self.width_rpm
 
     def __str__(self) -> str:
         end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
@@ -98,7 +98,12 @@ class SynchronousOrbits:
     @property
     def unsettled(self) -> int:
         """How many bifurcations are elsewhere, or nowhere, by half the steps: none of them is in `points`."""
-        return sum(p.status != "converged" for b in self.branches for p in b.special)
+        return sum(p.status == "not converged" for b in self.branches for p in b.special)
+
+    @property
+    def unexplained(self) -> tuple[SpecialPoint, ...]:
+        """Where the stability of an orbit changes and no bifurcation is found: none of these is in `points`."""
+        return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
         """Orbits at `speed` [rad/s]: branch, whether stable, state [SI], multipliers; to the accuracy of the steps."""
@@ -252,27 +257,31 @@ def synchronous_orbits(
     families = _families(follower, branches)
     stretches = []
     for piece in pieces:
-        met = [o.start for o in orbits if piece.holds(o.speed * 30 / np.pi, o.state, _scale(follower, o.speed))]
+        there = [o for o in orbits if o.settled]
+        met = [o.start for o in there if piece.holds(o.speed * 30 / np.pi, o.state, _scale(follower, o.speed))]
         family = families[piece.stretch.branch]
         stretches.append(dataclasses.replace(piece.stretch, family=family, met=len(met), met_first=met.count(0)))
     return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
 
 
 class _Settled(NamedTuple):
-    """A stable orbit that a simulation led to."""
+    """A stable orbit that the end of a simulation led to."""
 
     state: np.ndarray
     speed: float
     start: int
+    settled: bool = False
+    """Whether the simulation had come near it, before Newton's method."""
 
 
 def _met(settled: Sweep) -> list[list[int]]:
-    """Speed and start of the simulations that settled on a synchronous orbit."""
-    return np.argwhere(settled.label == "periodic-1").tolist()
+    """Speed and start of the simulations that ran to their end, whatever their label: where an orbit hardly attracts
+    they are still on the way to it, and where it attracts few of them Newton's method may come upon it."""
+    return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
 
 
 def _stable_orbits(follower: Follower, settled: Sweep) -> list[_Settled]:
-    """Stable orbits on which simulations settled, by speed, corrected by Newton's method."""
+    """Stable orbits to which Newton's method leads from the ends of simulations, by speed."""
     lanes = _met(settled)
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
@@ -282,7 +291,8 @@ def _stable_orbits(follower: Follower, settled: Sweep) -> list[_Settled]:
     good = points.converged.copy()
     good[good] = is_stable(eigenvalues(follower.monodromy(take(points, good))), follower.problem.free_speed)
     states = points.u[:, :-1] * np.asarray(frame.scale)
-    return [_Settled(states[i], met[i][1], lanes[i][1]) for i in np.flatnonzero(good)]
+    apart = [np.max(np.abs(y - x) / _scale(follower, at)) for x, (y, at) in zip(states, met, strict=True)]
+    return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
 
 
 def _spread(orbits: Sequence[_Settled], most: int) -> list[Start]:

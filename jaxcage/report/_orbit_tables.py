@@ -36,6 +36,7 @@ def point_document(point: SpecialPoint, branch: int | None) -> dict[str, Any]:
         "steps": point.steps,
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
+        "criticality": point.criticality or None,
         "edge": point.edge,
         "branch": branch,
         "state": point.state,
@@ -66,6 +67,7 @@ def stretch_document(stretch: Stretch, found: SynchronousOrbits) -> dict[str, An
         "lower_kind": lower,
         "upper_kind": upper,
         "branch": stretch.branch,
+        "confirmed": stretch.confirmed,
         "family": stretch.family,
         "met": stretch.met,
         "met_first": stretch.met_first,
@@ -100,6 +102,7 @@ def orbits_document(
         ],
         "missed": found.missed,
         "unsettled": found.unsettled,
+        "unexplained": [point_document(p, branch_of(found, p)) for p in found.unexplained],
     }
 
 
@@ -163,7 +166,7 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
         (
             number(p.speed_rpm, 3),
             error_cell(p.error_rpm),
-            p.kind,
+            f"{p.criticality} {p.kind}".strip(),
             multiplier_cell(p),
             number(angle_deg(p), 2),
             str(branch_of(found, p)),
@@ -181,9 +184,16 @@ def error_cell(error_rpm: float) -> str:
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
-    """Bifurcations that were left out."""
+    """Bifurcations that were left out, and those that must have been missed."""
     count = found.unsettled
-    return [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
+    notes = [f"Left out: {count} bifurcations that half the steps put elsewhere (not converged)"] if count else []
+    for s in found.stretches:
+        if not s.confirmed:
+            notes.append(f"Not confirmed: the stretch from {number(s.lower_rpm, 2)} rpm is narrower than its error")
+    for p in found.unexplained:
+        place = f"{number(p.speed_rpm, 3)} ± {error_cell(p.error_rpm)} rpm on branch {branch_of(found, p)}"
+        notes.append(f"Unexplained: the stability changes at {place}, and no bifurcation was found there")
+    return notes
 
 
 def multiplier_cell(point: SpecialPoint) -> str:

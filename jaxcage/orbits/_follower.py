@@ -1,0 +1,123 @@
+"""What the lanes of one continuation of orbits over a parameter share, its first points, and multipliers along it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from .._types import Scalar
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem
+from ._arclength import LOOSE, Corrected, Curves, settle_on, stack, take
+from ._lens import Parameter, with_value
+from ._orbit import OrbitEquations, is_free
+from ._problem import Frame, Given, OrbitProblem, make_frame
+from ._steps import STIFF_FIRST, Counts, counted
+
+
+Start = tuple[np.ndarray, float]
+"""A state [SI] and the value of the parameter."""
+
+
+class Follower(eqx.Module):
+    """What all lanes of one continuation share."""
+
+    problem: OrbitProblem
+    counts: Counts
+    given: Given
+    lower: float
+    upper: float
+    unit: float
+    designs: bool = eqx.field(static=True, default=False)
+    """Whether every lane has a system of its own, stacked in `given`."""
+
+    def of(self, lanes: Any) -> Given:
+        """What is given in these lanes."""
+        return take(self.given, np.asarray(lanes)) if self.designs else self.given
+
+    def curves(self, frame: Frame, lanes: Any) -> Curves:
+        """The branches of these lanes."""
+        equations = stack(OrbitEquations(self.problem, frame), len(lanes))
+        return Curves(equations, self.of(lanes), self.counts, self.designs)
+
+    @property
+    def parameter(self) -> Parameter:
+        return self.problem.parameters[0]
+
+    def frame(self, state: Array, at: Scalar, periods: Any) -> Frame:
+        """The frame of all lanes, around one of their orbits."""
+        given = self.of(0)
+        system, speed = with_value(given.system, given.speed, self.parameter, jnp.asarray(at, dtype=float))
+        return make_frame(self.problem, Given(system, speed), state, speed, jnp.full(1, self.unit), periods)
+
+    def inside(self, u: np.ndarray) -> np.ndarray:
+        """Whether the parameter is within the range."""
+        value = u[..., -1] * self.unit
+        return (value > self.lower) & (value < self.upper)
+
+    def monodromy(self, points: Corrected) -> np.ndarray:
+        n = self.problem.dimension
+        return points.jacobian[..., :n, :n] + np.eye(n)
+
+
+def make_follower(
+    system: AbstractForcedSystem,
+    speed: Any,
+    parameter: Parameter,
+    lower: float,
+    upper: float,
+    period: str = "driven",
+    method: AbstractMethod | None = None,
+) -> Follower:
+    chosen, counts = counted(method)
+    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
+    given = Given(system, jnp.asarray(speed, dtype=float))
+    return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
+
+
+def seeds(follower: Follower, frame: Frame, starts: Sequence[Start], steps: int = 0) -> Corrected:
+    """Orbits near (state, value of the parameter), the parameter kept, by at least so many steps, the lanes first."""
+    free = follower.problem.free_speed
+    u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
+    normal = np.zeros_like(u)
+    normal[:, -1] = 1.0
+    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps, LOOSE)
+
+
+def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
+    """The follower itself or, where it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
+    if not follower.counts.tolerance > 0:
+        return follower
+    frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
+    (u,) = seeds(follower, frame, [start]).jacobian
+    if np.all(np.isfinite(u)):
+        return follower
+    chosen, counts = counted(None, solver="rodas4", first=STIFF_FIRST)
+    return eqx.tree_at(lambda f: (f.problem.method, f.counts), follower, (chosen, counts))
+
+
+def turned(points: Corrected, sign: Any) -> Corrected:
+    """The same points, to be followed the other way where `sign` is -1."""
+    return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
+
+
+def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
+    """Multipliers, the largest first."""
+    mu = np.linalg.eigvals(monodromy).astype(complex)
+    return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
+
+
+def unstable_count(multipliers: np.ndarray, free: bool, circle: float = 1.0) -> Any:
+    """How many multipliers are outside a circle, without the one at 1 of a self-excited orbit."""
+    size = np.abs(multipliers)
+    if free:
+        np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
+    return np.sum(~(size < circle), axis=-1)
+
+
+def is_stable(multipliers: np.ndarray, free: bool) -> Any:
+    """Whether all multipliers are inside the unit circle, but for the one at 1 of a self-excited orbit."""
+    return unstable_count(multipliers, free) == 0

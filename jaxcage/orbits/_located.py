@@ -1,0 +1,222 @@
+"""Bifurcations along a branch: seen between neighbouring orbits, located, and changes of stability accounted for."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from ._arclength import Corrected, Curves, correct, put, take
+from ._follower import Follower, eigenvalues, unstable_count
+from ._illinois import zeros
+from ._problem import Frame
+from ._singularity import matches, test_functions
+from ._steps import MOST_OF_A_POINT, POINT
+
+
+WIDER = (0, 1, 3)
+"""How many orbits further out a bifurcation is looked for that is not between the two at which it was seen."""
+CLEAR = 1e-4
+"""Orbits are counted by where multipliers are further than this from the unit circle: the others may be on either side
+by rounding, or by what Newton's method left."""
+HALVINGS = 20
+UNEXPLAINED = "unexplained"
+
+
+class Seen(NamedTuple):
+    """A bifurcation between two orbits of a branch."""
+
+    after: int
+    """The orbit before it."""
+    kind: str
+    point: Corrected
+    error: float
+    """Distance to the place by half the steps [SI]."""
+
+
+def account(
+    follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes: Sequence[int]
+) -> list[tuple[Corrected, list[Seen]]]:
+    """The orbits of branches, and their bifurcations in order.
+
+    Where the count of unstable multipliers changes from one orbit to another by what was seen between them does not
+    explain, as when two real multipliers pass -1 within a step, the step is halved. Where it changes by what was
+    located there does not explain, its orbits are solved for again and it is looked at once more. What is left is in
+    the list, of the kind `unexplained`: there the branch cannot be trusted to be one.
+    """
+    rows = [_halved(follower, frame, row, lane) for row, lane in zip(rows, lanes, strict=True)]
+    seen = _located(follower, frame, rows, lanes)
+    left = lambda i: _gaps(follower, rows[i], [(s.after, s.kind) for s in seen[i]])
+    doubtful = [i for i in range(len(rows)) if left(i)]
+    if doubtful:
+        again, of = (
+            [_again(follower, frame, rows[i], lanes[i], left(i)) for i in doubtful],
+            [lanes[i] for i in doubtful],
+        )
+        again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
+        for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
+            rows[i], seen[i] = row, mine
+    found = []
+    for i, (row, mine) in enumerate(zip(rows, seen, strict=True)):
+        for a, b in left(i):
+            k = a + int(np.argmax(np.diff(count_of(follower, row)[a : b + 1]) != 0))
+            far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
+            middle = take(row, np.array(k))._replace(u=(row.u[k] + row.u[k + 1]) / 2)
+            mine.append(Seen(k, UNEXPLAINED, middle, far))
+        along = lambda s, row=row: float(np.dot(s.point.u - row.u[s.after], row.u[s.after + 1] - row.u[s.after]))
+        found.append((row, sorted(mine, key=lambda s: (s.after, along(s)))))
+    return found
+
+
+def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
+    """Pairs of orbits between which the count of unstable multipliers changes by what was seen does not explain."""
+    count = count_of(follower, row)
+    clear = np.flatnonzero(count_of(follower, row, 1 + CLEAR) == count_of(follower, row, 1 - CLEAR))
+    found = []
+    for a, b in zip(clear[:-1].tolist(), clear[1:].tolist(), strict=True):
+        crossing = sum(2 if kind == "torus" else 1 for k, kind in seen if a <= k < b)
+        change = abs(int(count[b] - count[a]))
+        if change > crossing or (crossing - change) % 2:
+            found.append((a, b))
+    return found
+
+
+def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
+    """What was seen, without products of two multipliers that pass 1 while no complex pair leaves the circle."""
+    mu = eigenvalues(follower.monodromy(row))
+    pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
+    return [(k, kind) for k, kind in brackets(follower, row) if kind != "torus" or pairs[k] != pairs[k + 1]]
+
+
+def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
+    """The orbits with further ones in steps over which their stability changes unseen."""
+    for _ in range(HALVINGS):
+        gaps = _gaps(follower, row, _likely(follower, row))
+        if not gaps:
+            break
+        length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+        after = np.array([a + int(np.argmax(length[a:b])) for a, b in gaps])
+        chord = row.u[after + 1] - row.u[after]
+        middle, normal = row.u[after] + chord / 2, chord / length[after, None]
+        steps = np.maximum(row.steps[after], row.steps[after + 1])
+        got = correct(follower.curves(frame, [lane] * len(gaps)), middle, normal, steps)
+        between = np.linalg.norm(got.u - middle, axis=1) < length[after] / 2
+        some = np.flatnonzero(got.converged & between)
+        if not some.size:
+            break
+        blank = got._replace(error=row.error[after], over=row.over[after])
+        row = jax.tree.map(lambda x, y: np.insert(x, after[some] + 1, y[some], axis=0), row, blank)
+    return row
+
+
+def _again(follower: Follower, frame: Frame, row: Corrected, lane: int, gaps: Sequence[tuple[int, int]]) -> Corrected:
+    """The orbits with those around the gaps solved for once more, each gap by steps of one length and twice as many."""
+    for a, b in gaps:
+        near = np.arange(max(a - 1, 0), min(b + 2, len(row.u)))
+        most = int(follower.counts.last)
+        steps = np.full(near.size, min(2 * int(row.steps[near].max()), most))
+        got = correct(follower.curves(frame, [lane] * near.size), row.u[near], row.tangent[near], steps)
+        got = got._replace(error=row.error[near], over=row.over[near])
+        good = np.flatnonzero(got.converged)
+        row = put(row, near[good], take(got, good))
+    return row
+
+
+def _located(follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes: Sequence[int]) -> list[list[Seen]]:
+    """What was seen on each branch, as far as it is there."""
+    wanted = [(i, k, kind) for i, row in enumerate(rows) for k, kind in brackets(follower, row)]
+    places = locate(follower, frame, [(lanes[i], rows[i], k, kind) for i, k, kind in wanted])
+    seen: list[list[Seen]] = [[] for _ in rows]
+    for (i, k, kind), place in zip(wanted, places, strict=True):
+        if place is not None and matches(kind, eigenvalues(follower.monodromy(place[0]))):
+            seen[i].append(Seen(k, kind, *place))
+    return seen
+
+
+def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
+    """Functions along a branch that change sign at its special points."""
+    tests = test_functions(eigenvalues(follower.monodromy(points)))
+    tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
+    tests["fold"] = points.tangent[..., -1]
+    if follower.problem.free_speed:
+        del tests["branch-point"]
+    return tests
+
+
+def count_of(follower: Follower, points: Corrected, circle: float = 1.0) -> np.ndarray:
+    """How many multipliers of each orbit are outside a circle."""
+    return unstable_count(eigenvalues(follower.monodromy(points)), follower.problem.free_speed, circle)
+
+
+def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
+    """Index and kind of each change of sign."""
+    found = []
+    for kind, value in signals(follower, points).items():
+        found += [(int(k), kind) for k in np.flatnonzero(value[:-1] * value[1:] < 0)]
+    return sorted(found)
+
+
+def locate(
+    follower: Follower, frame: Frame, wanted: Sequence[tuple[int, Corrected, int, str]]
+) -> list[tuple[Corrected, float] | None]:
+    """Where the test functions of (lane, points, index, kind) vanish, and the distance [SI] to the place by half the
+    steps; None where that could not be found.
+    """
+    if not wanted:
+        return []
+    curves = follower.curves(frame, [lane for lane, *_ in wanted])
+    kinds = [kind for *_, kind in wanted]
+    chooses, most = curves.chooses, MOST_OF_A_POINT if curves.chooses else int(curves.counts.last)
+    steps = np.full(len(wanted), int(curves.counts.first))
+    if chooses:
+        steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
+
+    def at(lanes: list[int]) -> list[Corrected | None]:
+        """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
+        placed: list[Corrected | None] = [None] * len(lanes)
+        for beyond in WIDER:
+            left = [j for j, p in enumerate(placed) if p is None]
+            some = [lanes[j] for j in left]
+            if some:
+                rows = [(wanted[i][1], wanted[i][2]) for i in some]
+                ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
+                for j, p in zip(left, _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])):
+                    placed[j] = p
+        return placed
+
+    found = at(list(range(len(wanted))))
+    error = np.full(len(wanted), np.inf if most > 1 else np.nan)
+    size = lambda p: max(abs(p.u[-1]), 1.0)
+    while True:
+        sure = [p is not None and e <= POINT * size(p) * chooses for p, e in zip(found, error, strict=True)]
+        again = np.flatnonzero(~np.array(sure) & (steps < most)).tolist()
+        if not again:
+            break
+        steps[again] = np.minimum(2 * steps[again], most)
+        for i, p in zip(again, at(again), strict=True):
+            before, found[i] = found[i], p if p is not None else found[i]
+            error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
+    return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
+
+
+def _zeros(
+    follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray
+) -> list[Corrected | None]:
+    """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
+    both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
+    lanes = np.repeat(np.arange(len(ends)), 2)
+    other = np.flatnonzero(both.steps != steps[lanes])
+    if other.size:
+        redone = correct(curves.take(lanes[other]), both.u[other], both.tangent[other], steps[lanes[other]])
+        both = put(both, other, redone)
+    signal = lambda i, points: signals(follower, points)[str(kinds[i])]
+    pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
+    there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
+    kept = np.flatnonzero(there).tolist()
+    found: list[Corrected | None] = [None] * len(ends)
+    if kept:
+        of_kept = lambda i, points: signal(kept[i], points)
+        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept])
+        for i, p in zip(kept, some, strict=True):
+            found[i] = p
+    return found
