@@ -18,6 +18,8 @@ SETTLING = 60
 """Revolutions before a state counts as settled."""
 CERTAIN = 1e-4
 """The reference counts where its integrators agree to this [scale]."""
+ROUNDING = 1e-13
+"""Of a revolution [scale]: no error is below it."""
 NOISE = 3.0
 """Its error is not above so many times the difference of its integrators."""
 INACCURATE = {"cases": 0.0, "narrow": 0.02, "wide": 0.10}
@@ -59,7 +61,7 @@ class Lane(NamedTuple):
     @property
     def off(self) -> bool:
         """Called a success, and further from the truth than it says."""
-        return self.known and self.success and not self.error <= self.stated + self.noise
+        return self.known and self.success and not self.error <= self.stated + self.noise + ROUNDING
 
     @property
     def cover(self) -> float:
@@ -114,7 +116,10 @@ def of_model(subject: Subject, count: int) -> Iterator[list[Lane]]:
     settled = jc.sweep(model, speeds, starts=first, discard=0, revolutions=SETTLING, exponents=0, blocks=1)
     later = np.where(settled.failed[..., None], first, settled.last)
     lanes = compare(f"{subject.kind} {subject.name}, settled", model, speeds, later)
-    yield [lane for lane, lost in zip(lanes, settled.failed.ravel(), strict=True) if not lost]
+    inside = [bool(model.excursion(tuple(y)) <= 1) for y in later.reshape(len(lanes), -1)]  # others may not start
+    yield [
+        lane for lane, lost, starts in zip(lanes, settled.failed.ravel(), inside, strict=True) if starts and not lost
+    ]
 
 
 COLUMNS = ("lanes", "known", "failed", "refused", "inacc.", "sure", "OFF", "stated", "largest", "error", "largest")

@@ -22,7 +22,7 @@ import xarray as xr
 from scipy import stats
 
 import jaxcage as jc
-from jaxcage.studies import LABELS, OtherStudy, Plan, Study, _dask, label_names, with_values
+from jaxcage.studies import KINDS, LABELS, OtherStudy, Plan, Study, _dask, kinds, label_names, with_values
 from jaxcage.studies._store import Store
 
 
@@ -349,3 +349,11 @@ def test_a_store_is_made_once_by_whoever_comes_first(tmp_path: Path):
     first, second = (Store(tmp_path / "study.zarr", study) for _ in range(2))
     assert first.pending() == second.pending() == list(range(plan.chunks))
     assert [p.name for p in tmp_path.iterdir()] == ["study.zarr"]
+
+
+def test_what_no_rung_can_is_inaccurate_and_no_calm(tmp_path: Path):
+    """A lane beyond its tolerance is stored by its label, and on a map it counts as failed."""
+    coarse = jc.controlled(1e-9, [("rk4", 4), ("rk4", 8), ("rk4", 16)])
+    found = duffing_study(tmp_path / "store", method=coarse)
+    assert set(label_names(found).values[..., :3, :, :].ravel()) == {"inaccurate"}
+    assert np.all(kinds(np.full((2, 2), LABELS.index("inaccurate"))) == KINDS.index("failed"))

@@ -24,7 +24,7 @@ from ._moved import Moved, moved_by
 from ._results import INACCURATE, result_of
 
 
-DEFAULT_ERROR = 1e-3
+DEFAULT_ERROR = 3e-3
 """Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
 DEFAULT_LADDER = (*(("rk4", 64 << i) for i in range(8)), *(("rodas4", 512 << i) for i in range(6)))
 TURN = 0.5
@@ -33,9 +33,14 @@ default error."""
 FALL = 16.0
 """What the difference of two rungs is never below, however well they agree: so many times less than that of the two
 before them. By fourth order it is 16; where it falls faster two rungs agree by accident: both may miss a contact."""
+CHANCE = 32.0
+"""Two rungs that agree so many times better than the two before them do so by chance: no order is assumed of them."""
 SLOW = 4.0
 """Where the difference of two rungs is not so many times below that of the two before them, the law jumps on the way
 (the film's at its centre), and the error is that of first order: so many times the difference."""
+SURE = 3.0
+"""So many times the difference is stated: where contacts and the ends of the film's arc move between the steps of two
+rungs, the finer one may be a little further from the truth than from the coarser."""
 EASY = 8
 """A lane whose error is so many times below the tolerance begins the next revolution one rung lower: in vain that
 costs an eighth of the steps of the rung that is taken."""
@@ -188,7 +193,8 @@ def climb(
 
 def _error(apart: Any, gap: Any) -> Any:
     """Of a rung, from its difference to the one before it, and the difference of that to the one before."""
-    return jnp.maximum(jnp.where(SLOW * apart > gap, SLOW * apart, apart), gap / FALL)
+    least = gap / jnp.where(gap > CHANCE * apart, SLOW, FALL)
+    return SURE * jnp.maximum(jnp.where(SLOW * apart > gap, SLOW * apart, apart), least)
 
 
 def _apart(y: tuple[Any, ...], other: tuple[Any, ...], scale: tuple[Any, ...]) -> Any:

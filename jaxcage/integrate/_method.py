@@ -75,7 +75,7 @@ def _worse(first: RESULTS, second: RESULTS) -> RESULTS:
     return RESULTS.where(first == RESULTS.successful, second, first)  # pyright: ignore[reportReturnType]
 
 
-def judge(result: Any, y: State, excursion: Scalar, limit: float) -> RESULTS:
+def judge(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
     """What to say of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore

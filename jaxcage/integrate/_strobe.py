@@ -34,9 +34,9 @@ class StrobeMap(eqx.Module):
         phase = jnp.asarray(i, dtype=float) * (REVOLUTION / jnp.asarray(parts, dtype=float))
         return self.method.advance(self.field, self.system, self.scale, y, phase, parts)
 
-    def admit(self, y: State) -> RESULTS:
-        """Whether a lane may start from `y`."""
-        return judge(dfx.RESULTS.successful, y, self.system.excursion(y), 1.0)
+    def admit(self, y: State, limit: Scalar = 1.0) -> RESULTS:
+        """Whether a lane may start from `y`: no further out than `limit`."""
+        return judge(dfx.RESULTS.successful, y, self.system.excursion(y), limit)
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:

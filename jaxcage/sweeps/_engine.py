@@ -19,7 +19,7 @@ from jaxtyping import Array, Float, Int
 from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
 from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
-from ..models import AbstractForcedSystem
+from ..models import ESCAPE, AbstractForcedSystem
 
 
 CHUNKS = (16, 32, 64, 128, 256, 512)
@@ -32,8 +32,8 @@ Progress = Callable[[int, int], None]
 
 
 @compiled
-def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array, part: "Part") -> Lane:
-    return over_lanes(lambda lane: settle(designs.strobe(method, lane), lane.y, revolutions), part)
+def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array, limit: Array, part: "Part") -> Lane:
+    return over_lanes(lambda lane: settle(designs.strobe(method, lane), lane.y, revolutions, limit), part)
 
 
 @compiled
@@ -160,8 +160,11 @@ def run_lanes(
     y0: Float[np.ndarray, "lanes dim"],
     progress: Progress | None = None,
     which: Int[np.ndarray, " lanes"] | None = None,
+    onward: bool = False,
 ) -> Observation:
     """Observe lanes given by their speeds [rad/s] and initial states, and with several systems by which they have.
+
+    Lanes that go `onward`, from where another run left them, may be as far out as lanes come on their way.
 
     Lanes are dealt out to the chunks, first by their place and after the discarded revolutions by the number of steps
     that they need, so that all chunks take about as long.
@@ -177,7 +180,8 @@ def run_lanes(
     plan = Plan(*map(int, plan))
     first, watched = plan.discard - plan.align, plan.align + plan.block * plan.blocks
     share = np.array([first, watched]) / (first + watched)
-    alone, lengths = jnp.asarray(first), Lengths(*map(jnp.asarray, (plan.align, plan.block, plan.blocks)))
+    alone, limit = jnp.asarray(first), jnp.asarray(ESCAPE if onward else 1.0)
+    lengths = Lengths(*map(jnp.asarray, (plan.align, plan.block, plan.blocks)))
     room = Room(_room(plan.keep), _room(plan.blocks), plan.exponents)
     done = [0, 0]
 
@@ -190,7 +194,7 @@ def run_lanes(
         return add
 
     def begin(lane: np.ndarray) -> tuple[Any, ...]:
-        got = _settle_chunk(designs, method, alone, _part(speed, which, y0, lane))
+        got = _settle_chunk(designs, method, alone, limit, _part(speed, which, y0, lane))
         return *got.y, got.outcome, got.level, got.error
 
     *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0))

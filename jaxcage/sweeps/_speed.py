@@ -156,7 +156,7 @@ def sweep_designs(
 
     def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray | None = None) -> Observation:
         begin = lane_start[lane] if y is None else y
-        return run_lanes(systems, method, plan, lane_speed[lane], begin, progress, which[lane])
+        return run_lanes(systems, method, plan, lane_speed[lane], begin, progress, which[lane], onward=y is not None)
 
     def each_system(seen: Observation) -> list[Sweep]:
         parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
