@@ -34,9 +34,13 @@ def assert_closes(model, sweep, i, j):
 
 def test_an_orbit_that_fixed_steps_called_chaotic_is_periodic():
     found = jc.sweep(MODEL, jc.rpm(18200, 18400, 3), horizon=0)
-    assert set(found.label.ravel()) <= {"periodic-2", "periodic-4"}
-    assert np.all(np.abs(found.exponents + 0.07) < 0.05)
-    assert_closes(MODEL, found, 1, 0)
+    # The synchronous orbit is stable up to its fold at 18686 rpm; which start leads to it is a matter of the last digit.
+    assert set(found.label.ravel()) <= {"periodic-1", "periodic-2", "periodic-4"}
+    double = found.label != "periodic-1"
+    assert np.sum(double) >= 6 and np.all(np.abs(found.exponents[double] + 0.07) < 0.05)
+    assert np.all(found.exponents < -0.01)
+    for j in range(3):
+        assert_closes(MODEL, found, 1, j)
 
 
 def test_a_stiff_land_is_periodic():
