@@ -23,7 +23,7 @@ from .report import machine, page
 from .rivals import Rival, all_rivals, few_rivals
 
 
-SECTIONS = ("precision", "plain", "exponents", "monodromy", "edge", "scaling")
+SECTIONS = ("precision", "plain", "exponents", "labels", "monodromy", "edge", "scaling")
 
 
 def arguments() -> argparse.Namespace:
@@ -75,6 +75,7 @@ def main() -> None:
             "precision": lambda: sections.precision(setup),
             "plain": lambda: sections.plain(setup, results["precision"]["rivals"]),
             "exponents": lambda: sections.exponents(setup),
+            "labels": lambda: sections.labels(setup),
             "monodromy": lambda: sections.monodromy(setup),
             "edge": lambda: sections.edge(setup),
             "scaling": lambda: sections.scaling(setup),

@@ -2,14 +2,19 @@
 
 import dataclasses
 import statistics
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 import jaxcage as jc
+from jaxcage.analysis import closing_period
 
 from .plain import check, ladder, pick, seconds, time_all
 from .problem import Problem, our_map, reached_error
 from .rivals import Rival
+from .rivals_scipy import SciPy
 from .worker import ask
 
 
@@ -18,6 +23,9 @@ REFERENCE, FINER = 8192, 16384
 REPEATS = 3
 SLOW = 1000.0
 """Microseconds a revolution and lane above which a rival is not timed on one core."""
+LABEL_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+LAST = 16
+"""Revolutions at the end by which SciPy's lanes are judged."""
 EDGE_RANGE = (11500.0, 13500.0)
 """Speeds [rpm] between which the edge is searched."""
 PATIENCE = 150.0
@@ -99,6 +107,34 @@ def exponents(setup: Setup) -> dict[str, Any]:
 
     found = in_turns({str(k): lambda k=k: run(k) for k in ((0, 1) if setup.quick else (0, 1, 4))})
     return {"lanes": few.speeds.size, "revolutions": turns, "runs": found}
+
+
+def labels(setup: Setup) -> dict[str, Any]:
+    """A confirmed label of the default sweep, against SciPy at the coarsest tolerance that has the same periods.
+
+    SciPy's lanes are judged by whether their last strobe states close; the exponents that tell chaos from a torus, and
+    confirmation, are not in its time.
+    """
+    few = setup.problem.lanes(32 if setup.quick else 128)
+    found = jc.sweep(few.model, few.speeds, starts=few.states[:, None], horizon=0)
+    spent = in_turns({"ours": lambda: jc.sweep(few.model, few.speeds, starts=few.states[:, None], horizon=0)})["ours"]
+    period = closing_period(found.strobe[:, 0], few.scale)
+    rival = SciPy("LSODA", LABEL_TOLERANCES, 1e-10, 0, 0)
+    if rival.missing():
+        return {"missing": f"SciPy: {rival.missing()}"}
+    rival.prepare(setup.cores)
+    rows = []
+    for tolerance in LABEL_TOLERANCES:
+        begin = time.perf_counter()
+        states = [rival.on(few)(found.discard + found.revolutions - LAST, tolerance)]
+        for _ in range(LAST):
+            states.append(rival.on(dataclasses.replace(few, states=states[-1]))(1, tolerance))
+        seconds = time.perf_counter() - begin
+        theirs = closing_period(np.stack(states, axis=1), few.scale)
+        rows.append({"tolerance": tolerance, "seconds": seconds, "same": float(np.mean(theirs == period))})
+    rival.close()
+    lanes = {"lanes": few.speeds.size, "closed": int(np.sum(period > 0)), "length": found.discard + found.revolutions}
+    return {**lanes, **spent, "rows": rows}
 
 
 def monodromy(setup: Setup) -> dict[str, Any]:

@@ -34,7 +34,7 @@ def assert_closes(model, sweep, i, j):
 
 def test_an_orbit_that_fixed_steps_called_chaotic_is_periodic():
     found = jc.sweep(MODEL, jc.rpm(18200, 18400, 3), horizon=0)
-    # The synchronous orbit is stable up to its fold at 18686 rpm; which start leads to it is a matter of the last digit.
+    # The synchronous orbit is stable up to its fold at 18686 rpm; which start leads to it is decided by last digits.
     assert set(found.label.ravel()) <= {"periodic-1", "periodic-2", "periodic-4"}
     double = found.label != "periodic-1"
     assert np.sum(double) >= 6 and np.all(np.abs(found.exponents[double] + 0.07) < 0.05)
