@@ -140,8 +140,8 @@ def _labels(found: Mapping[str, Any]) -> str:
         body.append([f"SciPy LSODA, tol {row['tolerance']:.0e}", f"{row['same']:.1%}", *cells(row["seconds"])])
     return (
         f"{head}{found['closed']} of {lanes} lanes are periodic after {found['length']} revolutions. `same` is the "
-        "share of lanes in which SciPy closes after as many revolutions, or does not close; chaotic transients and basins "
-        "keep it below all. Exponents and confirmation are in our time and not in SciPy's.\n\n"
+        "share of lanes in which SciPy closes after as many revolutions, or does not close; chaotic transients and "
+        "basins keep it below all. Exponents and confirmation are in our time and not in SciPy's.\n\n"
         f"{table(['rival', 'same', 'ms a label', 'ratio'], body)}\n"
     )
 
