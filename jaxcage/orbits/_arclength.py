@@ -1,8 +1,9 @@
 """Pseudo-arclength continuation of curves of solutions, many at a time.
 
-A curve R(u) = 0 with one unknown more than equations is followed by predicting along its tangent and correcting by
-Newton's method on the plane across it, through folds and whatever the stability. Every curve (lane) has its own step
-length; the corrections of all lanes run in chunks of one compiled program on all cores.
+A curve R(u) = 0 with one unknown more than equations is followed by predicting along the cubic through its last two
+points and their tangents, and correcting by Newton's method on the plane across it, through folds and whatever the
+stability. Every curve (lane) has its own step length; the corrections of all lanes run in chunks of one compiled
+program on all cores.
 """
 
 import concurrent.futures
@@ -30,6 +31,11 @@ FOLLOWING = 1e-7
 ONCE = 1e300
 """The same for a single step: infinity would be no number where an unknown is zero."""
 CORRECTIONS = 8
+AIM = 3e-3
+"""Distance to the prediction that the next step should have, in the unknowns' units and of the step's length: at least
+one of them."""
+VEER = 0.5
+"""Angle between neighbouring tangents that the next step should have at most, of the largest allowed."""
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
@@ -202,7 +208,7 @@ class Steps:
     """How far to go: lengths of steps in the unknowns' units, and their number per lane."""
 
     first: float = 0.02
-    longest: float = 0.1
+    longest: float = 0.5
     shortest: float = 1e-7
     most: int = 400
     turn: float = 0.95
@@ -238,6 +244,20 @@ def _closed(points: list[Corrected]) -> bool:
     share = np.dot(first.u - before.u, step) / np.dot(step, step)
     off = np.linalg.norm(before.u + share * step - first.u)
     return bool(0 < share <= 1 and off < 0.2 * np.linalg.norm(step) and np.dot(step, first.tangent) > 0)
+
+
+def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """The curve so far beyond its last point, and its unit tangent there: by the cubic through the last two."""
+    tangent = last.tangent
+    if before is None:
+        return last.u + length * tangent, tangent
+    chord = last.u - before.u
+    apart = np.linalg.norm(chord)
+    off, bent = (apart * tangent - chord) / apart, tangent - before.tangent
+    share = length / apart
+    square, cube = share * (3 * off - bent), share**2 * (2 * off - bent)
+    slope = tangent + 2 * square + 3 * cube
+    return last.u + length * (tangent + square + cube), slope / np.linalg.norm(slope)
 
 
 def follow(
@@ -283,12 +303,14 @@ def follow(
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
         last = [points[i][-1] for i in index]
-        u, tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent", "jacobian"))
+        tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("tangent", "jacobian"))
         some = curves.take(index)
-        ahead = u + length[index, None] * tangent
-        got = measured(some, correct(some, ahead, tangent, count[index], FOLLOWING))
-        straight = np.sum(got.tangent * tangent, axis=1) > steps.turn
-        near = np.linalg.norm(got.u - ahead, axis=1) < steps.bend * length[index]
+        ways = [predicted(points[i][-1], points[i][-2] if len(points[i]) > 1 else None, length[i]) for i in index]
+        ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
+        got = measured(some, correct(some, ahead, normal, count[index], FOLLOWING))
+        turned = np.arccos(np.clip(np.sum(got.tangent * tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
+        missed = np.linalg.norm(got.u - ahead, axis=1)
+        straight, near = turned < 1, missed < steps.bend * length[index]
         largest = lambda m: np.max(np.abs(m), axis=(1, 2))
         smooth = largest(got.jacobian - before) < steps.swing * (1 + largest(before))
         good = got.converged & straight & near & smooth
@@ -306,8 +328,9 @@ def follow(
                 continue
             points[i].append(take(got, np.array(k)))
             coarser[i] = curves.chooses and count[i] > least and got.over[k] < LOOSE / COARSER
-            quick = got.iterations[k] <= 4
-            length[i] = min(steps.longest, length[i] * (1.5 if quick else 0.8))
+            rest = max(AIM / max(missed[k], 1e-12), 1e-12)
+            grow = min(2.0, rest**0.25, VEER / max(turned[k], 1e-12))
+            length[i] = min(steps.longest, length[i] * max(grow, 0.5))
             if not inside(got.u[k][None])[0]:
                 ended[i] = "range"
             elif stop(int(i), points[i]):
