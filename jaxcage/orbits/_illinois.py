@@ -51,7 +51,7 @@ def zeros(
         margin = 1e-3 * (high - low)
         aimed = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
         share = np.clip(aimed + aside, low, high)
-        at = u0[index] + share[index, None] * chord[index]
+        at = np.stack([_on_plane(u0[i] + share[i] * chord[i], normal[i], sides[i]) for i in index])
         got = correct(curves.take(index), at, normal[index], steps[index])
         for k, i in enumerate(index):
             if not got.converged[k]:
@@ -74,6 +74,21 @@ def zeros(
             moved = np.inf if before is None else np.linalg.norm(got.u[k] - before.u)
             active[i] = aside[i] != 0.0 or f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
     return best
+
+
+def _on_plane(at: np.ndarray, normal: np.ndarray, sides: list[Corrected]) -> np.ndarray:
+    """The point of a plane, through `at`, where the cubic through two points of the curve passes it, nearly."""
+    first, second = sides
+    chord = second.u - first.u
+    across = np.dot(chord, normal)
+    if not across > 0:
+        return at
+    share = np.dot(at - first.u, normal) / across
+    length = np.linalg.norm(chord)
+    out, back = length * first.tangent - chord, chord - length * second.tangent
+    aside = share * (1 - share) * ((1 - share) * out + share * back)
+    found = first.u + share * chord + aside
+    return found + np.dot(at - found, normal) * normal
 
 
 def _between(sides: list[Corrected], share: float) -> Corrected:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ._arclength import Corrected, Curves, correct, put, take
 from ._follower import Follower, eigenvalues, unstable_count
-from ._illinois import zeros
+from ._illinois import LOCATED, zeros
 from ._problem import Frame
 from ._singularity import matches, test_functions
 from ._steps import MOST_OF_A_POINT, POINT
@@ -16,6 +16,9 @@ from ._steps import MOST_OF_A_POINT, POINT
 
 WIDER = (0, 1, 3)
 """How many orbits further out a bifurcation is looked for that is not between the two at which it was seen."""
+BESIDE = 0.02
+"""By other steps it is looked for first so near to where it was, of the length between the two, or twice as far as it
+moved last."""
 CLEAR = 1e-4
 """Orbits are counted by where multipliers are further than this from the unit circle: the others may be on either side
 by rounding, or by what Newton's method left."""
@@ -171,9 +174,21 @@ def locate(
     if chooses:
         steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
 
+    def beside(lanes: list[int]) -> list[Corrected | None]:
+        """Where those of these lanes vanish, close to where they did by fewer steps."""
+        placed: list[Corrected | None] = [None] * len(lanes)
+        known = [(j, i, p) for j, i in enumerate(lanes) if (p := found[i]) is not None]
+        if known:
+            some = [i for _, i, _ in known]
+            ends = [_sides(p, 2 * moved[i]) for _, i, p in known]
+            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])
+            for (j, _, _), p in zip(known, there, strict=True):
+                placed[j] = p
+        return placed
+
     def at(lanes: list[int]) -> list[Corrected | None]:
         """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
-        placed: list[Corrected | None] = [None] * len(lanes)
+        placed = beside(lanes)
         for beyond in WIDER:
             left = [j for j, p in enumerate(placed) if p is None]
             some = [lanes[j] for j in left]
@@ -184,6 +199,8 @@ def locate(
                     placed[j] = p
         return placed
 
+    moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for _, points, k, _ in wanted])
+    found: list[Corrected | None] = [None] * len(wanted)
     found = at(list(range(len(wanted))))
     error = np.full(len(wanted), np.inf if most > 1 else np.nan)
     size = lambda p: max(abs(p.u[-1]), 1.0)
@@ -196,7 +213,15 @@ def locate(
         for i, p in zip(again, at(again), strict=True):
             before, found[i] = found[i], p if p is not None else found[i]
             error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
+            if p is not None and before is not None:
+                moved[i] = max(float(np.linalg.norm(p.u - before.u)), LOCATED)
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
+
+
+def _sides(place: Corrected, apart: float) -> Corrected:
+    """Points so far from a place along its tangent, on both sides."""
+    along = np.outer([-apart, apart], place.tangent)
+    return jax.tree.map(lambda x: np.stack([x, x]), place)._replace(u=place.u + along)
 
 
 def _zeros(
