@@ -27,7 +27,7 @@ LANES, FEW = (8, 32), 40
 """Lanes per call: two programs for any number of curves, and work for every core; the second where there are more than
 a few lanes, so that one branch needs the first alone. Up to eight lanes cost what one does: they share the processor's
 instructions."""
-FOLLOWING = 1e-7
+FOLLOWING = 1e-6
 """Newton's last step while following, in the unknowns' units: points are then good to about its square."""
 ONCE = 1e300
 """The same for a single step: infinity would be no number where an unknown is zero."""
@@ -35,7 +35,7 @@ CORRECTIONS = 8
 AIM = 3e-3
 """Distance to the prediction that the next step should have, in the unknowns' units and of the step's length: at least
 one of them."""
-VEER = 0.5
+VEER = 0.7
 """Angle between neighbouring tangents that the next step should have at most, of the largest allowed."""
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
@@ -94,7 +94,8 @@ def _correct(
         at, normal = plane
         by = jnp.where(half, (steps + 1) // 2, steps)
         last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
-        u, found = solve(OnPlane(curve, at, normal).by_steps(by), given, at, CORRECTIONS, last, skip=skip)
+        plane, near = OnPlane(curve, at, normal).by_steps(by), tolerance == FOLLOWING
+        u, found = solve(plane, given, at, CORRECTIONS, last, skip=skip, near=near)
         jacobian = found.newton.jacobian[:-1]
         whole = jnp.concatenate([jacobian, normal[None]])
         tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
@@ -331,7 +332,7 @@ def follow(
                 finer[i] = True
                 continue
             if not good[k]:
-                length[i] /= 2
+                length[i] /= 2 if got.converged[k] else 4
                 if length[i] < steps.shortest:
                     finer[i], length[i] = may, steps.first
                     ended[i] = "" if may else "stuck"
