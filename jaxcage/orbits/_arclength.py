@@ -33,10 +33,11 @@ ONCE = 1e300
 """The same for a single step: infinity would be no number where an unknown is zero."""
 CORRECTIONS = 8
 AIM = 3e-3
-"""Distance to the prediction that the next step should have, in the unknowns' units and of the step's length: at least
-one of them."""
+"""Distance from its prediction that the next point should have, in the unknowns' units."""
 VEER = 0.7
-"""Angle between neighbouring tangents that the next step should have at most, of the largest allowed."""
+"""How far the next step should turn, of the largest angle allowed."""
+GROWTH = 1.8
+"""Longest step over the one before."""
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
@@ -339,9 +340,9 @@ def follow(
                 continue
             points[i].append(take(got, np.array(k)))
             coarser[i] = curves.chooses and count[i] > least and got.over[k] < LOOSE / COARSER
-            rest = max(AIM / max(missed[k], 1e-12), 1e-12)
-            grow = min(2.0, rest**0.25, VEER / max(turned[k], 1e-12))
-            length[i] = min(steps.longest, length[i] * max(grow, 0.5))
+            # What a cubic leaves out grows with the fourth power of the step.
+            growth = min((AIM / max(missed[k], 1e-12)) ** 0.25, VEER / max(turned[k], 1e-12))
+            length[i] = min(steps.longest, length[i] * np.clip(growth, 0.5, GROWTH))
             if not inside(got.u[k][None])[0]:
                 ended[i] = "range"
             elif stop(int(i), points[i]):

@@ -31,7 +31,7 @@ from ._located import UNEXPLAINED, Seen, account
 from ._normal_form import coefficients, criticality
 from ._orbit import guess_state
 from ._problem import Frame, Given
-from ._singularity import null_vectors, singular_matrix
+from ._singularity import singular_matrix
 from ._steps import SETTLED
 
 
@@ -338,8 +338,7 @@ def _branch(
         mu = eigenvalues(follower.monodromy(p))
         direction = np.zeros(n)
         if kind in ("period-doubling", "fold", "branch-point"):
-            m = jnp.asarray(follower.monodromy(p))
-            direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])
+            direction = np.linalg.svd(singular_matrix(kind, follower.monodromy(p)))[2][-1]
         # Of several between two points, the outer ones only are next to orbits whose stability is known.
         edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)
