@@ -91,10 +91,34 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     return [(k, kind) for k, kind in brackets(follower, row) if kind != "torus" or pairs[k] != pairs[k + 1]]
 
 
+def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
+    """Steps over which a test function has one sign at both ends and, by a parabola through three orbits, the other
+    in between: two special points of a kind, whose effects on the count may cancel."""
+    if len(row.u) < 3:
+        return []
+    tests = test_functions(eigenvalues(follower.monodromy(row)))
+    if follower.problem.free_speed:
+        del tests["fold"]  # zero along the branch
+    f = np.stack([*tests.values(), row.tangent[:, -1]])
+    length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+    back, ahead = length[:-1], length[1:]
+    chord = np.diff(f) / length
+    bend = np.diff(chord) / (back + ahead)
+    slope = chord[:, 1:] - bend * ahead
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place, extreme = -slope / (2 * bend), f[:, 1:-1] - slope**2 / (4 * bend)
+    found = set()
+    for first, inside in enumerate([(-back < place) & (place < 0), (0 < place) & (place < ahead)]):
+        one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
+        twice = inside & (one * other > 0) & (extreme * one < 0)
+        found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}
+    return sorted(found)
+
+
 def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
-    """The orbits with further ones in steps over which their stability changes unseen."""
+    """The orbits with further ones in steps over which their stability changes unseen, or may do so twice."""
     for _ in range(HALVINGS):
-        gaps = _gaps(follower, row, _likely(follower, row))
+        gaps = sorted({*_gaps(follower, row, _likely(follower, row)), *_dips(follower, row)})
         if not gaps:
             break
         length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
