@@ -95,8 +95,8 @@ def _correct(
         at, normal = plane
         by = jnp.where(half, (steps + 1) // 2, steps)
         last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
-        plane, near = OnPlane(curve, at, normal).by_steps(by), tolerance == FOLLOWING
-        u, found = solve(plane, given, at, CORRECTIONS, last, skip=skip, near=near)
+        across, near = OnPlane(curve, at, normal).by_steps(by), tolerance == FOLLOWING
+        u, found = solve(across, given, at, CORRECTIONS, last, skip=skip, near=near)
         jacobian = found.newton.jacobian[:-1]
         whole = jnp.concatenate([jacobian, normal[None]])
         tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
@@ -224,7 +224,7 @@ class Steps:
     longest: float = 0.5
     shortest: float = 1e-7
     most: int = 400
-    turn: float = 0.95
+    turn: float = 0.9
     """Smallest cosine of the angle between neighbouring tangents."""
     bend: float = 0.3
     """Largest correction, over the step's length: more, and Newton's method may have gone to another curve."""

@@ -1,7 +1,7 @@
 """Bifurcations along a branch: seen between neighbouring orbits, located, and changes of stability accounted for."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -19,6 +19,8 @@ WIDER = (0, 1, 3)
 BESIDE = 0.02
 """By other steps it is looked for first so near to where it was, of the length between the two, or twice as far as it
 moved last."""
+PART = 1e-3
+"""It is refined until it moves by this part of that: what is left is by far less than its error."""
 CLEAR = 1e-4
 """Orbits are counted by where multipliers are further than this from the unit circle: the others may be on either side
 by rounding, or by what Newton's method left."""
@@ -205,7 +207,8 @@ def locate(
         if known:
             some = [i for _, i, _ in known]
             ends = [_sides(p, 2 * moved[i]) for _, i, p in known]
-            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])
+            enough = np.maximum(PART * moved[some], LOCATED)
+            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some], enough)
             for (j, _, _), p in zip(known, there, strict=True):
                 placed[j] = p
         return placed
@@ -219,7 +222,8 @@ def locate(
             if some:
                 rows = [(wanted[i][1], wanted[i][2]) for i in some]
                 ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
-                for j, p in zip(left, _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])):
+                there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])
+                for j, p in zip(left, there, strict=True):
                     placed[j] = p
         return placed
 
@@ -249,7 +253,12 @@ def _sides(place: Corrected, apart: float) -> Corrected:
 
 
 def _zeros(
-    follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray
+    follower: Follower,
+    curves: Curves,
+    ends: Sequence[Corrected],
+    kinds: Sequence[str],
+    steps: np.ndarray,
+    within: Any = LOCATED,
 ) -> list[Corrected | None]:
     """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
     both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
@@ -265,7 +274,8 @@ def _zeros(
     found: list[Corrected | None] = [None] * len(ends)
     if kept:
         of_kept = lambda i, points: signal(kept[i], points)
-        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept])
+        closely = np.broadcast_to(within, len(ends))[kept]
+        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept], closely)
         for i, p in zip(kept, some, strict=True):
             found[i] = p
     return found

@@ -41,6 +41,14 @@ class Coefficient(NamedTuple):
     error: float
 
 
+def _solved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a^-1 b, NaN where there is none."""
+    try:
+        return np.linalg.solve(a, b)
+    except np.linalg.LinAlgError:
+        return np.full(b.shape, np.nan)
+
+
 def critical_vectors(kind: str, monodromy: Float[Array | np.ndarray, "n n"]) -> Critical:
     """Those of the multiplier next to -1, or of the complex one next to the unit circle."""
     if kind == "period-doubling":
@@ -48,24 +56,16 @@ def critical_vectors(kind: str, monodromy: Float[Array | np.ndarray, "n n"]) -> 
         return Critical(-1.0, vh[-1], u[:, -1] / (u[:, -1] @ vh[-1]))
     mu, v = np.linalg.eig(monodromy)
     i = np.argmin(np.where(np.imag(mu) > 1e-9, np.abs(np.abs(mu) - 1), np.inf))
-    return Critical(np.exp(1j * np.angle(mu[i])), v[:, i], np.linalg.inv(v)[i])
+    return Critical(np.exp(1j * np.angle(mu[i])), v[:, i], _solved(v, np.eye(len(v)))[i])
 
 
 def around(critical: Critical, steps: tuple[float, ...] = STEPS) -> Float[np.ndarray, "places n"]:
     """Where the derivative of the map is needed, from the fixed point, in units of the system's scale."""
     q = critical.right
-    along = np.stack([q.real, q.imag] if np.iscomplexobj(q) else [q])
+    along = np.stack([np.real(q), np.imag(q)] if np.iscomplexobj(q) else [q])
     signed = np.outer(steps, [1.0, -1.0])
     moved = np.einsum("dn,js->djsn", along, signed)
     return np.concatenate([np.zeros((1, q.size)), moved.reshape(-1, q.size)])
-
-
-def _solved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a^-1 b, NaN where there is none."""
-    try:
-        return np.linalg.solve(a, b)
-    except np.linalg.LinAlgError:
-        return np.full(b.shape, np.nan)
 
 
 def coefficient(
@@ -87,7 +87,7 @@ def coefficient(
         if not np.iscomplexobj(q):
             return p @ c[0] @ q / 6 + p @ b[0] @ _solved(eye - a, b[0] @ q) / 2
         of_q = b[0] + 1j * b[1]
-        still = _solved(eye - a, b[0] @ q.real + b[1] @ q.imag)
+        still = _solved(eye - a, b[0] @ np.real(q) + b[1] @ np.imag(q))
         turning = _solved(mu**2 * eye - a, of_q @ q)
         whole = p @ (c[0] + c[1]) @ q + 2 * p @ of_q @ still + p @ np.conj(of_q) @ turning
         return np.real(whole / mu) / 2

@@ -26,7 +26,7 @@ def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     return m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)]
 
 
-def singular_matrix(kind: Kind, m: Float[Array | np.ndarray, "n n"]) -> Float[Array | np.ndarray, "k k"]:
+def singular_matrix(kind: Kind, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     """The matrix that is singular at a bifurcation of `kind` of an orbit with monodromy matrix `m`."""
     if kind == "period-doubling":
         return m + np.eye(m.shape[0])
