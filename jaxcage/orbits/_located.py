@@ -207,8 +207,7 @@ def locate(
         if known:
             some = [i for _, i, _ in known]
             ends = [_sides(p, 2 * moved[i]) for _, i, p in known]
-            enough = np.maximum(PART * moved[some], LOCATED)
-            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some], enough)
+            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some], within[some])
             for (j, _, _), p in zip(known, there, strict=True):
                 placed[j] = p
         return placed
@@ -228,6 +227,7 @@ def locate(
         return placed
 
     moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for _, points, k, _ in wanted])
+    within = np.full(len(wanted), LOCATED)
     found: list[Corrected | None] = [None] * len(wanted)
     found = at(list(range(len(wanted))))
     error = np.full(len(wanted), np.inf if most > 1 else np.nan)
@@ -243,6 +243,7 @@ def locate(
             error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
             if p is not None and before is not None:
                 moved[i] = max(float(np.linalg.norm(p.u - before.u)), LOCATED)
+                within[i] = max(PART * moved[i], LOCATED)
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
 
 
