@@ -110,9 +110,16 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     map_of = eqx.filter_jit(jax.vmap(lambda w, y: jnp.stack(jc.strobe_map(hardening(), w, METHOD)((y[0], y[1])).y)))
     images = map_of(jnp.asarray(over_speed.speed), jnp.asarray(over_speed.state))
     np.testing.assert_allclose(images, over_speed.state, atol=1e-9)
-    # Neighbours are near: no step has gone over to another branch.
-    step = np.diff(np.c_[over_speed.value / 0.1, over_speed.state], axis=0)
-    assert np.max(np.linalg.norm(step, axis=1)) < 0.15
+    # No step has gone over to another branch: all points are on one whose neighbours are near.
+    start = over_speed.state[1], over_speed.value[1]
+    fine = jc.branch(hardening(), start, lower=0.5, upper=2.5, steps=jc.Steps(longest=0.1), method=METHOD)
+    curve, points = (np.c_[b.value / 0.1, b.state] for b in (fine, over_speed))
+    length = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    assert np.max(length) < 0.15
+    along = np.r_[0.0, np.cumsum(length)]
+    dense = CubicSpline(along, curve)(np.linspace(0.0, along[-1], 20000))
+    away = np.linalg.norm(points[:, None] - dense[None], axis=2).min(axis=1)
+    assert np.max(away[1:-1]) < 1e-3  # the first and the last are beyond the range
 
 
 def test_branch_in_the_force_passes_folds_of_its_own():
@@ -208,6 +215,30 @@ def test_system_of_one_state():
     assert np.array_equal(branch.stable, branch.state[:, 0] > 0)
     # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
     np.testing.assert_allclose(branch.multipliers[:, 0], np.exp(-2 * branch.state[:, 0] * np.pi), rtol=2e-3)
+
+
+class Bend(eqx.Module):
+    """x' = p + a x - x^3."""
+
+    p: jax.Array
+    a: jax.Array
+
+    def __call__(self, tau, y, speed):
+        (x,) = y
+        return (self.p + self.a * x - x**3,)
+
+
+@pytest.mark.parametrize("start", [-1.3, -1.2, -1.1, -1.0, -0.9])
+def test_two_folds_within_a_step(start):
+    """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
+    a = 0.001
+    system = jc.ForcedSystem(Bend(**numbers(p=0.0, a=a)), dimension=1)
+    orbit = (start,), start**3 - a * start
+    branch = jc.branch(system, orbit, "p", lower=-2.5, upper=2.5, speed=6.0, method=METHOD)
+    assert kinds(branch) == ["fold", "fold"]
+    place = np.sqrt(a / 3)
+    np.testing.assert_allclose([p.value for p in branch.special], [2 * place**3, -2 * place**3], rtol=0, atol=1e-8)
+    assert np.array_equal(branch.stable, np.abs(branch.state[:, 0]) > place)
 
 
 class Mathieu(eqx.Module):
@@ -505,7 +536,7 @@ def test_no_doubled_branch_begins_at_a_fold(over_speed):
         jc.orbits.doubled_branch(hardening(), over_speed.special[0], lower=0.5, upper=2.5, method=METHOD)
 
 
-@pytest.mark.parametrize("steps", [dict(first=0.2), dict(shortest=0.05), dict(shortest=0.0), dict(longest=0.01)])
+@pytest.mark.parametrize("steps", [dict(first=0.6), dict(shortest=0.05), dict(shortest=0.0), dict(longest=0.01)])
 def test_lengths_of_steps_must_be_in_order(steps):
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
         jc.Steps(**steps)

@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.special
-import scipy.stats
 from jaxtyping import Float, Shaped
 
 from .._notebook import notebook_html
@@ -245,9 +244,13 @@ def same_rate(first: Survival, second: Survival) -> float:
         return 1.0
     if first.block and first.block == second.block:
         table = [[s.escapes, round(s.survived / s.block)] for s in (first, second)]
-        return float(scipy.stats.fisher_exact(table)[1])  # pyright: ignore[reportArgumentType]
+        from scipy.stats import fisher_exact  # takes half a second to load
+
+        return float(fisher_exact(table)[1])  # pyright: ignore[reportArgumentType]
     share = first.exposure / (first.exposure + second.exposure)
-    return float(scipy.stats.binomtest(first.escapes, n, share).pvalue)
+    from scipy.stats import binomtest  # takes half a second to load
+
+    return float(binomtest(first.escapes, n, share).pvalue)
 
 
 def compare(first: Survival, second: Survival) -> Comparison:
@@ -301,7 +304,9 @@ def coexisting(ends: Shaped[np.ndarray, " lanes"]) -> dict[str, Share]:
     lanes = sum(counts.values())
     shares = {}
     for end, count in counts.most_common():
-        low, high = scipy.stats.binomtest(count, lanes).proportion_ci(method="wilson")
+        from scipy.stats import binomtest  # takes half a second to load
+
+        low, high = binomtest(count, lanes).proportion_ci(method="wilson")
         shares[end] = Share(count, lanes, (float(low), float(high)))
     return shares
 

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import expit
-from scipy.stats import norm, qmc
+from scipy.special import expit, ndtri
 
 from ..analysis import CHAOS_THRESHOLD
 from ..integrate import AbstractMethod
@@ -98,8 +97,10 @@ class ChaosMeasure(AbstractObjective):
     def _directions(self, n: int) -> Float[np.ndarray, "pairs n"]:
         """Evenly spread over a normal distribution, the same at every design."""
         pairs = self.cloud // 2
+        from scipy.stats import qmc  # takes half a second to load
+
         sample = qmc.Sobol(n, rng=self.seed).random_base2(int(np.ceil(np.log2(pairs))))[:pairs]
-        return norm.ppf(np.clip(sample, 1e-3, 1 - 1e-3))
+        return ndtri(np.clip(sample, 1e-3, 1 - 1e-3))
 
     def _plane(self, around: np.ndarray, found: np.ndarray, drawn: np.ndarray) -> Measured:
         """Value and slope from pairs of opposite designs, with errors by the bootstrap over pairs."""

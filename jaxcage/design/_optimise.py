@@ -18,7 +18,6 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from .._checks import require_x64
 from .._parameters import parameters
@@ -191,6 +190,8 @@ def _first_places(
     if scouts and scouts < starts - 1:
         raise ValueError(f"Argument `scouts` must be 0 or at least {starts - 1}, but {scouts} was given.")
     count = max(scouts, starts - 1)
+    from scipy.stats import qmc  # takes half a second to load
+
     drawn = qmc.Sobol(len(own), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     if scouts and starts > 1:
         drawn = drawn[np.argsort(objective.values(space, drawn), kind="stable")]  # NaN comes last

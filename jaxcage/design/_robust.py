@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from ._objective import AbstractObjective, DesignSpace, Measured
 
@@ -50,6 +49,8 @@ class Robust(AbstractObjective):
         """Made over nominal value of each parameter that varies."""
         if missing := [name for name in self.scatter if name not in space.names]:
             raise ValueError(f"Scatter of `{missing[0]}` must be of one of {', '.join(space.names)}.")
+        from scipy.stats import qmc  # takes half a second to load
+
         sample = qmc.Sobol(len(space.names), rng=self.seed).random_base2(int(np.ceil(np.log2(self.draws))))
         drawn = [self.scatter[n](q) if n in self.scatter else np.ones_like(q) for n, q in zip(space.names, sample.T)]
         return np.array(drawn).T[: self.draws]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm, sobol_indices, uniform
+from scipy.special import ndtri
 
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
@@ -63,6 +63,8 @@ def global_sensitivity(
             )
         return found[None]
 
+    from scipy.stats import sobol_indices, uniform  # takes half a second to load
+
     found = sobol_indices(func=evaluate, n=samples, dists=[uniform()] * len(space.names), rng=seed)
     spread = found.bootstrap(confidence_level=0.95)
     named = lambda row: dict(zip(space.names, np.ravel(row).tolist(), strict=True))
@@ -94,7 +96,7 @@ class ToleranceBudget:
     def __str__(self) -> str:
         order = sorted(self.deviation_rpm.items(), key=lambda item: -item[1])
         rows = [f"  {n:<24} +-{d:.3g} rpm, {100 * (d / self.total_rpm) ** 2:.0f} % of the variance" for n, d in order]
-        half = norm.ppf(0.975) * self.total_rpm
+        half = ndtri(0.975) * self.total_rpm
         return "\n".join([f"{self.edge} at {self.speed_rpm:.1f} rpm: +-{half:.3g} rpm (95 %)", *rows])
 
 

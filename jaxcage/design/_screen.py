@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from .._checks import require_x64
 from .._notebook import notebook_html
@@ -164,6 +163,8 @@ def screen(
             if report is not None:
                 report(len(tried), min(tried, key=lambda c: c.score))
         return np.array([c.score for c in new])
+
+    from scipy.stats import qmc  # takes half a second to load
 
     sample = qmc.Sobol(len(unknowns), rng=seed).random_base2(max(1, int(np.ceil(np.log2(designs)))))
     first = scores(sample)

@@ -1,8 +1,9 @@
 """Pseudo-arclength continuation of curves of solutions, many at a time.
 
-A curve R(u) = 0 with one unknown more than equations is followed by predicting along its tangent and correcting by
-Newton's method on the plane across it, through folds and whatever the stability. Every curve (lane) has its own step
-length; the corrections of all lanes run in chunks of one compiled program on all cores.
+A curve R(u) = 0 with one unknown more than equations is followed by predicting along the cubic through its last two
+points and their tangents, and correcting by Newton's method on the plane across it, through folds and whatever the
+stability. Every curve (lane) has its own step length; the corrections of all lanes run in chunks of one compiled
+program on all cores.
 """
 
 import concurrent.futures
@@ -22,14 +23,21 @@ from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, Counts
 
 
-LANES = (8, 32)
-"""Lanes per call: two programs for any number of curves, and work for every core. Up to eight lanes cost what one does:
-they share the processor's instructions."""
-FOLLOWING = 1e-7
+LANES, FEW = (8, 32), 40
+"""Lanes per call: two programs for any number of curves, and work for every core; the second where there are more than
+a few lanes, so that one branch needs the first alone. Up to eight lanes cost what one does: they share the processor's
+instructions."""
+FOLLOWING = 1e-6
 """Newton's last step while following, in the unknowns' units: points are then good to about its square."""
 ONCE = 1e300
 """The same for a single step: infinity would be no number where an unknown is zero."""
 CORRECTIONS = 8
+AIM = 3e-3
+"""Distance from its prediction that the next point should have, in the unknowns' units."""
+VEER = 0.7
+"""How far the next step should turn, of the largest angle allowed."""
+GROWTH = 1.8
+"""Longest step over the one before."""
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
@@ -79,21 +87,30 @@ class Corrected(NamedTuple):
 
 
 def _correct(
-    curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array
+    curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
 ) -> Corrected:
-    u, found = solve(OnPlane(curve, at, normal).by_steps(steps), given, at, CORRECTIONS, tolerance)
-    jacobian = found.newton.jacobian[:-1]
-    whole = jnp.concatenate([jacobian, normal[None]])
-    tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
-    tangent = tangent / jnp.linalg.norm(tangent)
-    fine = found.converged & jnp.all(jnp.isfinite(u)) & jnp.all(jnp.isfinite(tangent))
-    unknown = jnp.full(2, jnp.nan)
-    return Corrected(u, tangent, jacobian, fine, found.iterations, found.aux, steps, *unknown)
+    """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
+
+    def turn(plane: tuple[Array, Array], half: Array) -> tuple[tuple[Array, Array], Corrected]:
+        at, normal = plane
+        by = jnp.where(half, (steps + 1) // 2, steps)
+        last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
+        across, near = OnPlane(curve, at, normal).by_steps(by), tolerance == FOLLOWING
+        u, found = solve(across, given, at, CORRECTIONS, last, skip=skip, near=near)
+        jacobian = found.newton.jacobian[:-1]
+        whole = jnp.concatenate([jacobian, normal[None]])
+        tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
+        tangent = tangent / jnp.linalg.norm(tangent)
+        fine = found.converged & jnp.all(jnp.isfinite(u)) & jnp.all(jnp.isfinite(tangent))
+        unknown = jnp.full(2, jnp.nan)
+        return (u, tangent), Corrected(u, tangent, jacobian, fine, found.iterations, found.aux, by, *unknown)
+
+    return jax.lax.scan(turn, (at, normal), jnp.array([False, True]))[1]
 
 
 _axes = eqx.if_array(0)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None, None)))
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None, None)))
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None, None, None)))
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None, None, None)))
 
 
 def take(tree: Any, lanes: Any) -> Any:
@@ -139,22 +156,29 @@ class Curves(NamedTuple):
 
 
 def correct(
-    curves: Curves, at: np.ndarray, normal: np.ndarray, steps: np.ndarray, tolerance: float = TOLERANCE
+    curves: Curves,
+    at: np.ndarray,
+    normal: np.ndarray,
+    steps: np.ndarray,
+    tolerance: float = TOLERANCE,
+    measured: bool = False,
 ) -> Corrected:
     """Points of many curves on planes across them.
 
-    **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step.
+    **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step; whether
+    errors are wanted too, by one step of Newton's method with half the steps.
     """
     run = _correct_own if curves.own_given else _correct_shared
+    measured = measured and int(curves.counts.last) > 1
     chunks = []
     for count in np.unique(steps):  # lanes by as many steps run together
         mine = np.flatnonzero(steps == count)
-        size = LANES[mine.size > LANES[0]]
+        size = LANES[mine.size > FEW]
         chunks += [mine[np.minimum(np.arange(i, i + size), mine.size - 1)] for i in range(0, mine.size, size)]
 
     def part(k: np.ndarray) -> Corrected:
         some = curves.take(k)
-        numbers = (jnp.asarray(x) for x in (at[k], normal[k], tolerance, steps[k[0]]))
+        numbers = (np.asarray(x) for x in (at[k], normal[k], float(tolerance), steps[k[0]], measured))
         return jax.tree.map(np.asarray, run(some.equations, some.given, *numbers))
 
     if len(chunks) == 1:
@@ -163,14 +187,10 @@ def correct(
         with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
             parts = list(pool.map(part, chunks))
     _, where = np.unique(np.concatenate(chunks), return_index=True)
-    return jax.tree.map(lambda *x: np.concatenate(x)[where], *parts)
-
-
-def measured(curves: Curves, points: Corrected) -> Corrected:
-    """The points with their errors: by one step of Newton's method with half the steps."""
-    if int(curves.counts.last) == 1:
+    both = jax.tree.map(lambda *x: np.concatenate(x)[where], *parts)
+    points, half = take(both, (slice(None), 0)), take(both, (slice(None), 1))
+    if not measured:
         return points
-    half = correct(curves, points.u, points.tangent, (points.steps + 1) // 2, ONCE)
     with np.errstate(invalid="ignore"):
         error, over = curves.equations.apart(points.u - half.u, half.jacobian, points.jacobian)
     lost = ~(half.converged & points.converged)
@@ -184,16 +204,15 @@ def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0
     """
     first = int(curves.counts.first if curves.chooses else curves.counts.last)
     count = np.maximum(np.broadcast_to(steps, at.shape[0]), first)
-    found = measured(curves, correct(curves, at, normal, count))
+    found = correct(curves, at, normal, count, measured=True)
     while curves.chooses:
         given_up = ~found.converged & (found.steps >= GIVEN_UP)
         again = np.flatnonzero(~(found.over <= allowed) & ~given_up & (found.steps < int(curves.counts.last)))
         if not again.size:
             break
         begin = np.where(found.converged[again, None], found.u[again], at[again])
-        some = curves.take(again)
-        finer = correct(some, begin, normal[again], 2 * found.steps[again])
-        found = put(found, again, measured(some, finer))
+        finer = correct(curves.take(again), begin, normal[again], 2 * found.steps[again], measured=True)
+        found = put(found, again, finer)
     return found
 
 
@@ -202,10 +221,10 @@ class Steps:
     """How far to go: lengths of steps in the unknowns' units, and their number per lane."""
 
     first: float = 0.02
-    longest: float = 0.1
+    longest: float = 0.5
     shortest: float = 1e-7
     most: int = 400
-    turn: float = 0.95
+    turn: float = 0.9
     """Smallest cosine of the angle between neighbouring tangents."""
     bend: float = 0.3
     """Largest correction, over the step's length: more, and Newton's method may have gone to another curve."""
@@ -238,6 +257,20 @@ def _closed(points: list[Corrected]) -> bool:
     share = np.dot(first.u - before.u, step) / np.dot(step, step)
     off = np.linalg.norm(before.u + share * step - first.u)
     return bool(0 < share <= 1 and off < 0.2 * np.linalg.norm(step) and np.dot(step, first.tangent) > 0)
+
+
+def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """The curve so far beyond its last point, and its unit tangent there: by the cubic through the last two."""
+    tangent = last.tangent
+    if before is None:
+        return last.u + length * tangent, tangent
+    chord = last.u - before.u
+    apart = np.linalg.norm(chord)
+    off, bent = (apart * tangent - chord) / apart, tangent - before.tangent
+    share = length / apart
+    square, cube = share * (3 * off - bent), share**2 * (2 * off - bent)
+    slope = tangent + 2 * square + 3 * cube
+    return last.u + length * (tangent + square + cube), slope / np.linalg.norm(slope)
 
 
 def follow(
@@ -283,12 +316,13 @@ def follow(
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
         last = [points[i][-1] for i in index]
-        u, tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent", "jacobian"))
-        some = curves.take(index)
-        ahead = u + length[index, None] * tangent
-        got = measured(some, correct(some, ahead, tangent, count[index], FOLLOWING))
-        straight = np.sum(got.tangent * tangent, axis=1) > steps.turn
-        near = np.linalg.norm(got.u - ahead, axis=1) < steps.bend * length[index]
+        tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("tangent", "jacobian"))
+        ways = [predicted(points[i][-1], points[i][-2] if len(points[i]) > 1 else None, length[i]) for i in index]
+        ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
+        got = correct(curves.take(index), ahead, normal, count[index], FOLLOWING, measured=True)
+        turned = np.arccos(np.clip(np.sum(got.tangent * tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
+        missed = np.linalg.norm(got.u - ahead, axis=1)
+        straight, near = turned < 1, missed < steps.bend * length[index]
         largest = lambda m: np.max(np.abs(m), axis=(1, 2))
         smooth = largest(got.jacobian - before) < steps.swing * (1 + largest(before))
         good = got.converged & straight & near & smooth
@@ -299,15 +333,16 @@ def follow(
                 finer[i] = True
                 continue
             if not good[k]:
-                length[i] /= 2
+                length[i] /= 2 if got.converged[k] else 4
                 if length[i] < steps.shortest:
                     finer[i], length[i] = may, steps.first
                     ended[i] = "" if may else "stuck"
                 continue
             points[i].append(take(got, np.array(k)))
             coarser[i] = curves.chooses and count[i] > least and got.over[k] < LOOSE / COARSER
-            quick = got.iterations[k] <= 4
-            length[i] = min(steps.longest, length[i] * (1.5 if quick else 0.8))
+            # What a cubic leaves out grows with the fourth power of the step.
+            growth = min((AIM / max(missed[k], 1e-12)) ** 0.25, VEER / max(turned[k], 1e-12))
+            length[i] = min(steps.longest, length[i] * np.clip(growth, 0.5, GROWTH))
             if not inside(got.u[k][None])[0]:
                 ended[i] = "range"
             elif stop(int(i), points[i]):

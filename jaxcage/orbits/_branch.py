@@ -31,8 +31,11 @@ from ._located import UNEXPLAINED, Seen, account
 from ._normal_form import coefficients, criticality
 from ._orbit import guess_state
 from ._problem import Frame, Given
-from ._singularity import null_vectors, singular_matrix
 from ._steps import SETTLED
+
+
+CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
+"""The multiplier that each kind is about, where it is real."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -94,7 +97,7 @@ class SpecialPoint:
     @property
     def critical(self) -> complex:
         """The multiplier on the unit circle, with a positive imaginary part."""
-        target = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}.get(self.kind)
+        target = CRITICAL.get(self.kind)
         mu = self.multipliers
         if target is None:
             mu = mu[np.imag(mu) > 0] if self.kind == "torus" else mu
@@ -337,9 +340,8 @@ def _branch(
     for i, ((k, kind, p, error), cubic) in enumerate(seen):
         mu = eigenvalues(follower.monodromy(p))
         direction = np.zeros(n)
-        if kind in ("period-doubling", "fold", "branch-point"):
-            m = jnp.asarray(follower.monodromy(p))
-            direction = np.asarray(null_vectors(singular_matrix(kind, m))[1])
+        if kind in CRITICAL:
+            direction = np.linalg.svd(follower.monodromy(p) - CRITICAL[kind] * np.eye(n))[2][-1]
         # Of several between two points, the outer ones only are next to orbits whose stability is known.
         edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)

@@ -5,6 +5,7 @@ are treated at a time.
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -14,14 +15,18 @@ from ._arclength import Corrected, Curves, correct, take
 
 MOST = 40
 LOCATED = 1e-9
-"""Places are refined until they move by less than this in the unknowns' units."""
+"""As closely as places are refined, in the unknowns' units."""
 ASIDE = 1e-5
 """At a branch point the curve's equations are singular, and no point is found where the function vanishes: it is then
 bracketed this closely, and interpolated."""
 
 
 def zeros(
-    curves: Curves, ends: Sequence[Corrected], signal: Callable[[int, Corrected], np.ndarray], steps: np.ndarray
+    curves: Curves,
+    ends: Sequence[Corrected],
+    signal: Callable[[int, Corrected], np.ndarray],
+    steps: np.ndarray,
+    within: Any = LOCATED,
 ) -> list[Corrected | None]:
     """Points at which `signal` vanishes.
 
@@ -31,10 +36,12 @@ def zeros(
     - `ends`: pairs of neighbouring points, between which the signal changes sign.
     - `signal`: values for the lane's number and some points of its curve.
     - `steps`: per revolution.
+    - `within`: places are refined until they move by less than this, in the unknowns' units; one for all or each.
 
     **Returns:** a point per pair, None where the curve was lost.
     """
     lanes = len(ends)
+    within = np.broadcast_to(within, lanes)
     u0, u1 = (np.stack([e.u[j] for e in ends]) for j in (0, 1))
     f0, f1 = np.array([signal(i, e) for i, e in enumerate(ends)]).T.copy()
     chord = u1 - u0
@@ -51,7 +58,7 @@ def zeros(
         margin = 1e-3 * (high - low)
         aimed = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
         share = np.clip(aimed + aside, low, high)
-        at = u0[index] + share[index, None] * chord[index]
+        at = np.stack([_on_plane(u0[i] + share[i] * chord[i], normal[i], sides[i]) for i in index])
         got = correct(curves.take(index), at, normal[index], steps[index])
         for k, i in enumerate(index):
             if not got.converged[k]:
@@ -72,8 +79,23 @@ def zeros(
                 high[i], f1[i], f0[i] = share[i], f, f0[i] * halve
             last[i] = f
             moved = np.inf if before is None else np.linalg.norm(got.u[k] - before.u)
-            active[i] = aside[i] != 0.0 or f != 0.0 and moved > LOCATED and (high[i] - low[i]) * length[i] > LOCATED
+            active[i] = aside[i] != 0.0 or f != 0.0 and moved > within[i] and (high[i] - low[i]) * length[i] > within[i]
     return best
+
+
+def _on_plane(at: np.ndarray, normal: np.ndarray, sides: list[Corrected]) -> np.ndarray:
+    """The point of a plane, through `at`, where the cubic through two points of the curve passes it, nearly."""
+    first, second = sides
+    chord = second.u - first.u
+    across = np.dot(chord, normal)
+    if not across > 0:
+        return at
+    share = np.dot(at - first.u, normal) / across
+    length = np.linalg.norm(chord)
+    out, back = length * first.tangent - chord, chord - length * second.tangent
+    aside = share * (1 - share) * ((1 - share) * out + share * back)
+    found = first.u + share * chord + aside
+    return found + np.dot(at - found, normal) * normal
 
 
 def _between(sides: list[Corrected], share: float) -> Corrected:

@@ -91,8 +91,10 @@ def solve(
     tolerance: Scalar = TOLERANCE,
     at_root: bool = False,
     skip: Any = False,
+    near: Any = False,
 ) -> tuple[Float[Array, " n"], Found]:
-    """Newton's method from `guess`; not a step of it in lanes that `skip` it.
+    """Newton's method from `guess`; not a step of it in lanes that `skip` it. A guess that is said to be near is given
+    up where a full step leads away.
 
     **Returns:** the root and `Found`: its Newton state is that of the last point before the root or, if `at_root`, of
     the root, for one evaluation more.
@@ -102,7 +104,8 @@ def solve(
         r, jacobian, aux = equations.linearised(u, given)
         return r, (jacobian, aux)
 
-    solver = DampedNewton(tolerance, tolerance, at_root=at_root)
+    smallest = jnp.where(near, 0.75, DampedNewton.smallest_factor)
+    solver = DampedNewton(tolerance, tolerance, smallest_factor=smallest, at_root=at_root)
     options = {"skip": skip}
     got = optx.root_find(fn, solver, guess, given, options, has_aux=True, max_steps=max_steps, throw=False)
     converged = got.result == optx.RESULTS.successful

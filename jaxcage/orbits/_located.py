@@ -1,14 +1,14 @@
 """Bifurcations along a branch: seen between neighbouring orbits, located, and changes of stability accounted for."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
 from ._arclength import Corrected, Curves, correct, put, take
 from ._follower import Follower, eigenvalues, unstable_count
-from ._illinois import zeros
+from ._illinois import LOCATED, zeros
 from ._problem import Frame
 from ._singularity import matches, test_functions
 from ._steps import MOST_OF_A_POINT, POINT
@@ -16,6 +16,11 @@ from ._steps import MOST_OF_A_POINT, POINT
 
 WIDER = (0, 1, 3)
 """How many orbits further out a bifurcation is looked for that is not between the two at which it was seen."""
+BESIDE = 0.02
+"""By other steps it is looked for first so near to where it was, of the length between the two, or twice as far as it
+moved last."""
+PART = 1e-3
+"""It is refined until it moves by this part of that: what is left is by far less than its error."""
 CLEAR = 1e-4
 """Orbits are counted by where multipliers are further than this from the unit circle: the others may be on either side
 by rounding, or by what Newton's method left."""
@@ -88,10 +93,34 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     return [(k, kind) for k, kind in brackets(follower, row) if kind != "torus" or pairs[k] != pairs[k + 1]]
 
 
+def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
+    """Steps over which a test function has one sign at both ends and, by a parabola through three orbits, the other
+    in between: two special points of a kind, whose effects on the count may cancel."""
+    if len(row.u) < 3:
+        return []
+    tests = test_functions(eigenvalues(follower.monodromy(row)))
+    if follower.problem.free_speed:
+        del tests["fold"]  # zero along the branch
+    f = np.stack([*tests.values(), row.tangent[:, -1]])
+    length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+    back, ahead = length[:-1], length[1:]
+    chord = np.diff(f) / length
+    bend = np.diff(chord) / (back + ahead)
+    slope = chord[:, 1:] - bend * ahead
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place, extreme = -slope / (2 * bend), f[:, 1:-1] - slope**2 / (4 * bend)
+    found = set()
+    for first, inside in enumerate([(-back < place) & (place < 0), (0 < place) & (place < ahead)]):
+        one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
+        twice = inside & (one * other > 0) & (extreme * one < 0)
+        found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}
+    return sorted(found)
+
+
 def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
-    """The orbits with further ones in steps over which their stability changes unseen."""
+    """The orbits with further ones in steps over which their stability changes unseen, or may do so twice."""
     for _ in range(HALVINGS):
-        gaps = _gaps(follower, row, _likely(follower, row))
+        gaps = sorted({*_gaps(follower, row, _likely(follower, row)), *_dips(follower, row)})
         if not gaps:
             break
         length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
@@ -171,19 +200,35 @@ def locate(
     if chooses:
         steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
 
+    def beside(lanes: list[int]) -> list[Corrected | None]:
+        """Where those of these lanes vanish, close to where they did by fewer steps."""
+        placed: list[Corrected | None] = [None] * len(lanes)
+        known = [(j, i, p) for j, i in enumerate(lanes) if (p := found[i]) is not None]
+        if known:
+            some = [i for _, i, _ in known]
+            ends = [_sides(p, 2 * moved[i]) for _, i, p in known]
+            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some], within[some])
+            for (j, _, _), p in zip(known, there, strict=True):
+                placed[j] = p
+        return placed
+
     def at(lanes: list[int]) -> list[Corrected | None]:
         """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
-        placed: list[Corrected | None] = [None] * len(lanes)
+        placed = beside(lanes)
         for beyond in WIDER:
             left = [j for j, p in enumerate(placed) if p is None]
             some = [lanes[j] for j in left]
             if some:
                 rows = [(wanted[i][1], wanted[i][2]) for i in some]
                 ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
-                for j, p in zip(left, _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])):
+                there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])
+                for j, p in zip(left, there, strict=True):
                     placed[j] = p
         return placed
 
+    moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for _, points, k, _ in wanted])
+    within = np.full(len(wanted), LOCATED)
+    found: list[Corrected | None] = [None] * len(wanted)
     found = at(list(range(len(wanted))))
     error = np.full(len(wanted), np.inf if most > 1 else np.nan)
     size = lambda p: max(abs(p.u[-1]), 1.0)
@@ -196,11 +241,25 @@ def locate(
         for i, p in zip(again, at(again), strict=True):
             before, found[i] = found[i], p if p is not None else found[i]
             error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
+            if p is not None and before is not None:
+                moved[i] = max(float(np.linalg.norm(p.u - before.u)), LOCATED)
+                within[i] = max(PART * moved[i], LOCATED)
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
 
 
+def _sides(place: Corrected, apart: float) -> Corrected:
+    """Points so far from a place along its tangent, on both sides."""
+    along = np.outer([-apart, apart], place.tangent)
+    return jax.tree.map(lambda x: np.stack([x, x]), place)._replace(u=place.u + along)
+
+
 def _zeros(
-    follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray
+    follower: Follower,
+    curves: Curves,
+    ends: Sequence[Corrected],
+    kinds: Sequence[str],
+    steps: np.ndarray,
+    within: Any = LOCATED,
 ) -> list[Corrected | None]:
     """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
     both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
@@ -216,7 +275,8 @@ def _zeros(
     found: list[Corrected | None] = [None] * len(ends)
     if kept:
         of_kept = lambda i, points: signal(kept[i], points)
-        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept])
+        closely = np.broadcast_to(within, len(ends))[kept]
+        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept], closely)
         for i, p in zip(kept, some, strict=True):
             found[i] = p
     return found

@@ -41,7 +41,7 @@ class DampedNewton(optx.AbstractRootFinder):
     norm: Callable = optx.max_norm
     longest: float = 1.0
     """Longest step in any component."""
-    smallest_factor: float = 2.0**-10
+    smallest_factor: Any = 2.0**-10
     at_root: bool = False
 
     def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> NewtonState:

@@ -12,13 +12,10 @@ differences, extrapolated to the fourth order, with the step at which neighbouri
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ._arclength import ONCE, Corrected, Curves, correct, take
-from ._singularity import null_vectors
 
 
 KINDS_WITH_ONE = ("period-doubling", "torus")
@@ -31,65 +28,74 @@ FEW = STEPS[1:5]
 class Critical(NamedTuple):
     """Critical multiplier and vectors; real at a period doubling."""
 
-    multiplier: Array
-    right: Array
-    left: Array
+    multiplier: complex
+    right: np.ndarray
+    left: np.ndarray
 
 
 class Coefficient(NamedTuple):
     """The cubic coefficient, and how far it is from those by neighbouring differences and by half the steps of a
     revolution; in units of the system's scale."""
 
-    value: Float[Array, ""]
-    error: Float[Array, ""]
+    value: float
+    error: float
 
 
-def critical_vectors(kind: str, monodromy: Float[Array, "n n"]) -> Critical:
+def _solved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a^-1 b, NaN where there is none."""
+    try:
+        return np.linalg.solve(a, b)
+    except np.linalg.LinAlgError:
+        return np.full(b.shape, np.nan)
+
+
+def critical_vectors(kind: str, monodromy: Float[Array | np.ndarray, "n n"]) -> Critical:
     """Those of the multiplier next to -1, or of the complex one next to the unit circle."""
     if kind == "period-doubling":
-        left, right = null_vectors(monodromy + jnp.eye(monodromy.shape[0]))
-        return Critical(-jnp.ones(()), right, left / (left @ right))
-    mu, v = jnp.linalg.eig(monodromy)
-    i = jnp.argmin(jnp.where(jnp.imag(mu) > 1e-9, jnp.abs(jnp.abs(mu) - 1), jnp.inf))
-    return Critical(jnp.exp(1j * jnp.angle(mu[i]).astype(mu.dtype)), v[:, i], jnp.linalg.inv(v)[i])
+        u, _, vh = np.linalg.svd(monodromy + np.eye(len(monodromy)))
+        return Critical(-1.0, vh[-1], u[:, -1] / (u[:, -1] @ vh[-1]))
+    mu, v = np.linalg.eig(monodromy)
+    i = np.argmin(np.where(np.imag(mu) > 1e-9, np.abs(np.abs(mu) - 1), np.inf))
+    return Critical(np.exp(1j * np.angle(mu[i])), v[:, i], _solved(v, np.eye(len(v)))[i])
 
 
-def around(critical: Critical, steps: tuple[float, ...] = STEPS) -> Float[Array, "places n"]:
+def around(critical: Critical, steps: tuple[float, ...] = STEPS) -> Float[np.ndarray, "places n"]:
     """Where the derivative of the map is needed, from the fixed point, in units of the system's scale."""
     q = critical.right
-    along = jnp.stack([jnp.real(q), jnp.imag(q)] if jnp.iscomplexobj(q) else [q])
-    signed = jnp.outer(jnp.array(steps), jnp.array([1.0, -1.0]))
-    moved = jnp.einsum("dn,js->djsn", along, signed)
-    return jnp.concatenate([jnp.zeros((1, q.size)), moved.reshape(-1, q.size)])
+    along = np.stack([np.real(q), np.imag(q)] if np.iscomplexobj(q) else [q])
+    signed = np.outer(steps, [1.0, -1.0])
+    moved = np.einsum("dn,js->djsn", along, signed)
+    return np.concatenate([np.zeros((1, q.size)), moved.reshape(-1, q.size)])
 
 
 def coefficient(
-    critical: Critical, derivatives: Float[Array, "places n n"], steps: tuple[float, ...] = STEPS
+    critical: Critical, derivatives: Float[Array | np.ndarray, "places n n"], steps: tuple[float, ...] = STEPS
 ) -> Coefficient:
     """The coefficient from the derivative of the map at the places of `around`."""
     mu, q, p = critical
+    derivatives = np.asarray(derivatives)
     a, n = derivatives[0], q.size
     sides = derivatives[1:].reshape(-1, len(steps), 2, n, n)
-    h = jnp.array(steps)[None, :, None, None]
-    finer = lambda x: ((4 * x[:, 1:] - x[:, :-1]) / 3).astype(q.dtype)
+    h = np.array(steps)[None, :, None, None]
+    finer = lambda x: (4 * x[:, 1:] - x[:, :-1]) / 3
     second = finer((sides[:, :, 0] - sides[:, :, 1]) / (2 * h))
-    third = finer((sides[:, :, 0] + sides[:, :, 1] - 2 * a[None, None]) / h**2)
-    eye, a = jnp.eye(n, dtype=q.dtype), a.astype(q.dtype)
+    third = finer((sides[:, :, 0] + sides[:, :, 1] - 2 * a) / h**2)
+    eye = np.eye(n)
 
-    def one(b: Array, c: Array) -> Array:
+    def one(b: np.ndarray, c: np.ndarray) -> float:
         """From B and C along the parts of q."""
-        if not jnp.iscomplexobj(q):
-            return p @ c[0] @ q / 6 + p @ b[0] @ jnp.linalg.solve(eye - a, b[0] @ q) / 2
-        of_q, (x, y) = b[0] + 1j * b[1], (part(q).astype(q.dtype) for part in (jnp.real, jnp.imag))
-        still = jnp.linalg.solve(eye - a, b[0] @ x + b[1] @ y)
-        turning = jnp.linalg.solve(mu**2 * eye - a, of_q @ q)
-        whole = p @ (c[0] + c[1]) @ q + 2 * p @ of_q @ still + p @ jnp.conj(of_q) @ turning
-        return jnp.real(whole / mu) / 2
+        if not np.iscomplexobj(q):
+            return p @ c[0] @ q / 6 + p @ b[0] @ _solved(eye - a, b[0] @ q) / 2
+        of_q = b[0] + 1j * b[1]
+        still = _solved(eye - a, b[0] @ np.real(q) + b[1] @ np.imag(q))
+        turning = _solved(mu**2 * eye - a, of_q @ q)
+        whole = p @ (c[0] + c[1]) @ q + 2 * p @ of_q @ still + p @ np.conj(of_q) @ turning
+        return np.real(whole / mu) / 2
 
-    found = jax.vmap(one, in_axes=1)(second, third)
-    moved = jnp.abs(jnp.diff(found))
-    apart = jnp.maximum(moved[:-1], moved[1:])
-    best = jnp.argmin(jnp.where(jnp.isfinite(apart), apart, jnp.inf))
+    found = np.array([one(second[:, j], third[:, j]) for j in range(len(steps) - 1)])
+    moved = np.abs(np.diff(found))
+    apart = np.maximum(moved[:-1], moved[1:])
+    best = np.argmin(np.where(np.isfinite(apart), apart, np.inf))
     return Coefficient(found[best + 1], apart[best])
 
 
@@ -108,10 +114,6 @@ def criticality(kind: str, value: Any, error: Any) -> str:
     return "supercritical" if (value > 0) == (kind == "period-doubling") else "subcritical"
 
 
-_vectors = jax.jit(critical_vectors, static_argnums=0)
-_around, _coefficient = jax.jit(around, static_argnums=1), jax.jit(coefficient, static_argnums=2)
-
-
 def coefficients(
     curves: Curves,
     points: Corrected,
@@ -127,11 +129,12 @@ def coefficients(
     are wanted, by default their own.
     """
     monodromy = lambda found: found.jacobian[:, :n, :n] + np.eye(n)
-    mine = [i for i, kind in enumerate(kinds) if kind in KINDS_WITH_ONE]
+    known = np.all(np.isfinite(points.jacobian), axis=(1, 2))
+    mine = [i for i, kind in enumerate(kinds) if kind in KINDS_WITH_ONE and known[i]]
     found = np.full((len(kinds), 2), np.nan)
     if mine:
-        critical = [_vectors(kinds[i], m) for i, m in zip(mine, monodromy(take(points, mine)), strict=True)]
-        ways = [np.asarray(_around(c, steps)) for c in critical]
+        critical = [critical_vectors(kinds[i], m) for i, m in zip(mine, monodromy(take(points, mine)), strict=True)]
+        ways = [around(c, steps) for c in critical]
         lane, counts = np.repeat(mine, [len(w) for w in ways]), np.cumsum([len(w) for w in ways])
         at = points.u[lane]
         at[:, :n] += np.concatenate(ways)
@@ -140,9 +143,9 @@ def coefficients(
             # One step of Newton's method, whose derivative is that at the place itself.
             moved = correct(curves.take(lane), at, points.tangent[lane], count, ONCE)
             parts = np.split(np.where(moved.converged[:, None, None], monodromy(moved), np.nan), counts[:-1])
-            each.append([_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
+            each.append([coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
         found[mine] = [with_half(fine, coarse) for fine, coarse in zip(*each, strict=True)]
         if finer is not None:
-            longer = np.stack([np.asarray(c.right) for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
+            longer = np.stack([c.right for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
             found[mine] /= np.sum(np.abs(longer) ** 2, axis=1, keepdims=True)
     return found

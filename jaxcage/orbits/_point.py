@@ -15,7 +15,6 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
-from ._arclength import LANES, take
 from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
@@ -274,8 +273,7 @@ def _classed(point: BifurcationPoint, follower: Follower) -> BifurcationPoint:
     """The point with the coefficient of its normal form."""
     place = np.asarray(point.state), float(point.value)
     frame = follower.frame(point.state, place[1], int(point.periods))
-    # So many copies that the program for many lanes, which the coefficient needs, is the only one to be compiled.
-    again = lambda follower: take(seeds(follower, frame, [place] * (LANES[0] + 1), int(point.steps)), slice(1))
+    again = lambda follower: seeds(follower, frame, [place], int(point.steps))
     orbit = again(follower)
     if not orbit.converged[0]:
         follower = stable_steps(follower, place, int(point.periods))

@@ -15,6 +15,7 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
 from .._types import Scalar
@@ -35,8 +36,8 @@ def depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
 
 
 def frozen(tree: Any) -> Any:
-    """The same without derivatives."""
-    return jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, tree)
+    """The same without derivatives; only what is traced can have them."""
+    return jax.tree.map(lambda x: jax.lax.stop_gradient(x) if isinstance(x, Tracer) else x, tree)
 
 
 class Given(eqx.Module):
