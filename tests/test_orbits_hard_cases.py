@@ -310,14 +310,17 @@ CONTACT = {"pressed": (10.0, 20000.0, 0.998), "grazed": (3.0, 20000.0, 0.971)}
 def test_cage_in_contact_with_its_land(name):
     model, speed, orbit, expected_peak = cage_in_contact(name)
     assert bool(orbit.stable) and orbit.residual < 1e-10
+    # Steps near the land move with the state and are held fixed in the derivative: with shorter ones that is less.
+    method = jc.method("rk4", steps=4096)
+    orbit = jc.periodic_orbit(model, speed, guess=orbit, method=method)
     scale = jnp.stack(model.scale(speed))
     z = orbit.state / scale
-    again, peak = strobe(model, speed, z)
+    again, peak = strobe(model, speed, z, method)
     assert abs(peak - expected_peak) < 1e-3 and peak > 0.97
     np.testing.assert_allclose(again, z, rtol=0, atol=1e-10)
     h, columns = 3e-6, []
     for move in h * jnp.eye(4):
-        values = [strobe(model, speed, z + i * move)[0] for i in (-2.0, -1.0, 1.0, 2.0)]
+        values = [strobe(model, speed, z + i * move, method)[0] for i in (-2.0, -1.0, 1.0, 2.0)]
         columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
     size = jnp.max(jnp.abs(orbit.monodromy))
     np.testing.assert_allclose(orbit.monodromy / size, jnp.stack(columns, -1) / size, rtol=0, atol=1e-7)
@@ -343,8 +346,8 @@ def cage_in_contact(name):
 
 
 @eqx.filter_jit
-def strobe(model, speed, z):
+def strobe(model, speed, z, method):
     """State after a revolution, in units of the scale, and the peak on the way."""
-    strobe = jc.strobe_map(model, speed)
+    strobe = jc.strobe_map(model, speed, method)
     stretch = strobe(tuple(z[i] * strobe.scale[i] for i in range(4)))
     return jnp.stack([c / s for c, s in zip(stretch.y, strobe.scale, strict=True)]), stretch.peak
