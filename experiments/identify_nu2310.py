@@ -77,13 +77,13 @@ def main() -> None:
     parser.add_argument("--begin", type=Path, help="file of values to begin with, as --out writes it")
     parser.add_argument("--check", action="store_true", help="no search: the edges with the values of --begin")
     parser.add_argument("--out", type=Path, help="file for the best values")
-    parser.add_argument("--quick", action="store_true", help="few designs and speeds, one generation: for trying")
+    parser.add_argument("--quick", action="store_true", help="few designs, speeds and generations: for trying")
     given = parser.parse_args()
     jc.keep_compiled_programs()
     systems = {name: jc.case(name, "identified") for name in given.cases}
     grid = np.geomspace(4000, 27500, 12 if given.quick else given.speeds) * np.pi / 30
     small = (
-        dict(designs=4, generations=1, discard=20, revolutions=20)
+        dict(designs=4, generations=4, discard=20, revolutions=20)
         if given.quick
         else dict(generations=given.generations)
     )

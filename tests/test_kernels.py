@@ -510,7 +510,7 @@ def test_controlled_steps_reach_1e_4_of_the_clearance(attractor):
     assert not np.any(got.failed)
     assert np.quantile(error, 0.95) < 1e-4
     assert error.max() < 5e-4
-    coarse = one_revolution(speeds, states, method("rk4", steps=128))
+    coarse = one_revolution(speeds, states, method("rk4", steps=64))
     assert np.nanmax(np.abs(coarse.last - truth.last)[..., :2]) / CLEARANCE > 1e-3  # the control has work to do
 
 

@@ -64,10 +64,13 @@ def test_strobe_map_derivatives_match_finite_differences(name: str):
     paths = [parameter_paths(model)[n] for n in names]
     values = jnp.stack([get(model, p) for p in paths])
 
+    # Steps are shortened by how far the land is, which the derivative by its onset leaves out: with many it is nothing.
+    method = jc.method("rk4", steps=4096)
+
     @jax.jit
     def scaled_map(shares):
         changed = eqx.tree_at(lambda m: [get(m, p) for p in paths], model, list(values * shares))
-        return jnp.stack(jc.strobe_map(changed, speed, METHOD)(tuple(y)).y) / scale
+        return jnp.stack(jc.strobe_map(changed, speed, method)(tuple(y)).y) / scale
 
     ones = jnp.ones(len(names))
     exact = np.asarray(jax.jacfwd(scaled_map)(ones))
