@@ -155,3 +155,11 @@ def test_summary_counts_failures_apart():
     outside = (1.5 * C, 0.0, 0.0, 0.0)
     text = str(sweep(MODEL, SPEEDS, starts=[HEALTHY, OTHER, outside], **SETTINGS))
     assert "2 failed" in text and "2 lanes failed: outside" in text
+
+
+def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
+    """A soft land lets a cage pass eps = 1 on its way: no start, but no failure where another run has left it."""
+    outside = np.array([[1.005 * C, 0.0, 0.0, 0.0]])
+    ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 0), SPEEDS[:1], outside, onward=on) for on in (False, True)]
+    assert [OUTCOMES[int(end.outcome[0])] for end in ends] == ["outside", "successful"]
+    assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005
