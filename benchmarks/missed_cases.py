@@ -1,0 +1,2 @@
+def report(cases, quick, log):
+    return []
