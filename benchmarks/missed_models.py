@@ -317,6 +317,14 @@ def planted() -> list[Planted]:
         *(folds(apart) for apart in (2e-2, 2e-3, 2e-4)),
         curve("cusp, met exactly", {(0, 1): 1.0, (3, 0): -1.0}, -0.9, -0.729),
         curve("pitchfork", {(1, 1): 1.0, (3, 0): -1.0}, 0.0, -0.9, Point("branch-point", 0.0)),
+        curve(
+            "pitchfork, from the bent side",
+            {(1, 1): 1.0, (3, 0): -1.0},
+            0.7,
+            0.49,
+            Point("branch-point", 0.0),
+            Point("fold", 0.0),
+        ),
         *(imperfect(gap, side) for gap in (1e-3, 1e-4) for side in (1, -1)),
         crossing(0.0, 1),
         *(crossing(gap, side) for gap in (1e-3, 1e-4) for side in (1, -1)),
@@ -444,6 +452,6 @@ def published() -> list[Planted]:
         Planted("double well", duffing(d=0.3, k=1.0, p=0.25), (1.0, 0.0), 0.25, 0.1, 0.35, (first,), False, speed=1.2, **settled),
         Planted("Ueda", duffing(d=0.05, k=0.0, p=1.0), (1.0, 0.0), 1.0, 0.1, 12.0, (), False, speed=1.0, **settled),
         Planted("Mathieu", mathieu, (0.0, 0.0), 0.5, -0.8, 2.5, tuple(thresholds), speed=2.0),
-        Planted("pendulum", pendulum, (-1.0, 10.0), 1.05, 0.9, 1.08, (Point("period-doubling", 1.0663, 5e-5),), False, speed=2 * math.pi, **settled),
+        Planted("pendulum", pendulum, (-math.pi / 2, 0.0), 1.05, 0.9, 1.08, (Point("period-doubling", 1.0663, 1e-4),), False, speed=2 * math.pi, **settled),
         Planted("van der Pol", van_der_pol, (0.5, 1.5), 1.2, 0.9, 1.6, (let_go,), False, speed=1.3, **settled),
     ]

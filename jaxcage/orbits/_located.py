@@ -133,7 +133,7 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         some = np.flatnonzero(got.converged & between)
         if not some.size:
             break
-        blank = got._replace(error=row.error[after], over=row.over[after])
+        blank = got._replace(error=row.error[after], over=row.over[after], moved=row.moved[after])
         row = jax.tree.map(lambda x, y: np.insert(x, after[some] + 1, y[some], axis=0), row, blank)
     return row
 
@@ -145,7 +145,7 @@ def _again(follower: Follower, frame: Frame, row: Corrected, lane: int, gaps: Se
         most = int(follower.counts.last)
         steps = np.full(near.size, min(2 * int(row.steps[near].max()), most))
         got = correct(follower.curves(frame, [lane] * near.size), row.u[near], row.tangent[near], steps)
-        got = got._replace(error=row.error[near], over=row.over[near])
+        got = got._replace(error=row.error[near], over=row.over[near], moved=row.moved[near])
         good = np.flatnonzero(got.converged)
         row = put(row, near[good], take(got, good))
     return row
