@@ -25,7 +25,7 @@ from .missed_models import Planted, Point, planted, published
 from .truth_models import CASES
 
 
-FLOOR = 1e-8
+FLOOR = 1e-7
 """Error that counts as none, of a parameter in units of a twentieth of its range."""
 QUICK = ("two folds 2e-03", "two flips 4e-04", "branches 1e-02", "hardening Duffing")
 
@@ -86,7 +86,7 @@ def judged(given: Planted, branch: jc.Branch, fine: jc.Branch) -> Row:
         near = [p for p in left if p.kind == point.kind and p.status != "not converged"]
         best = min(near, key=lambda p: abs(p.value - point.value), default=None)
         stated = np.inf if best is None else best.error + point.tolerance + floor
-        if best is None or not abs(best.value - point.value) <= max(stated, 100 * floor):
+        if best is None or not abs(best.value - point.value) <= max(stated, 10 * floor):
             lost.append(said(point))
             continue
         left.remove(best)

@@ -295,15 +295,13 @@ class VanDerPol(eqx.Module):
 
 
 class Cycle(eqx.Module):
-    """A circle with the angular velocity 1.3, and beside it a pair that grows with p +- 0.37 i and with `k` of the
-    cube."""
+    """A circle with the angular velocity 1.3, and beside it a pair that grows with p +- 0.37 i."""
 
     p: Array
-    k: Array
 
     def __call__(self, tau, y, speed):
         x, z, u, v = y
-        growth, aside = 0.3 - x * x - z * z, self.p - self.k * (u * u + v * v)
+        growth, aside = 0.3 - x * x - z * z, self.p - u * u - v * v
         return growth * x - 1.3 * z, growth * z + 1.3 * x, aside * u - 0.37 * v, 0.37 * u + aside * v
 
 
@@ -411,19 +409,16 @@ def planted() -> list[Planted]:
             ("period-doubling", (-0.044, 0.0), 1.8234, up),
         ),
         kicked("delayed logistic map", 1.0, (0.47, 0.47), 1.9, (1.5, 2.3), 1, ("torus", (0.5, 0.5), 2.0, up)),
-        *(
-            Planted(
-                f"limit cycle, torus {sort}",
-                jc.ForcedSystem(Cycle(**numbers(p=-0.1, k=k)), dimension=4),
-                (math.sqrt(0.3), 0.0, 0.0, 0.0),
-                -0.1,
-                -0.2,
-                0.2,
-                (Point("torus", 0.0, criticality=sort),),
-                speed=1.3,
-                period="free",
-            )
-            for sort, k in ((up, 1.0), (down, -1.0))
+        Planted(
+            "limit cycle",
+            jc.ForcedSystem(Cycle(**numbers(p=-0.1)), dimension=4),
+            (math.sqrt(0.3), 0.0, 0.0, 0.0),
+            -0.1,
+            -0.2,
+            0.2,
+            (Point("torus", 0.0),),
+            speed=1.3,
+            period="free",
         ),
     ]
 

@@ -27,7 +27,7 @@ LANES, FEW = (8, 32), 40
 """Lanes per call: two programs for any number of curves, and work for every core; the second where there are more than
 a few lanes, so that one branch needs the first alone. Up to eight lanes cost what one does: they share the processor's
 instructions."""
-FOLLOWING, OF_A_STEP = 1e-6, 1e-3
+FOLLOWING, OF_A_STEP = 1e-6, 1e-5
 """Newton's last step while following, in the unknowns' units, and over the step's length where that is less: points are
 then good to about its square."""
 ONCE = 1e300
@@ -43,7 +43,7 @@ ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
 """How far a point may be from where its tangent says that it is (see `astray`), in the unknowns' units and over the
 step's length, or over its distance from the prediction: more, and it is on another curve, or there is a bend that was
 not seen."""
-CROSSED, ASIDE = 1e-5, 0.01
+CROSSED, ASIDE = 1e-4, 0.01
 """A step across which the curve's orientation changes is halved down to this length: two curves that nearly meet look
 as if they crossed to a longer one. Where it changes all the same they do cross, and the step is taken in one from so
 far off: near the crossing tangents are lost to rounding."""

@@ -24,7 +24,8 @@ PART = 1e-3
 CLEAR = 1e-4
 """Orbits are counted by where multipliers are further than this from the unit circle: the others may be on either side
 by rounding, or by what Newton's method left."""
-HALVINGS = 20
+HALVINGS, APART = 20, 1e-7
+"""A step is halved so often, and not below this length in the unknowns' units."""
 UNEXPLAINED = "unexplained"
 
 
@@ -124,11 +125,14 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         if not gaps:
             break
         length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
-        after = np.array([a + int(np.argmax(length[a:b])) for a, b in gaps])
+        longest = sorted({a + int(np.argmax(length[a:b])) for a, b in gaps})
+        after = np.array([k for k in longest if length[k] > APART], dtype=int)
+        if not after.size:
+            break
         chord = row.u[after + 1] - row.u[after]
         middle, normal = row.u[after] + chord / 2, chord / length[after, None]
         steps = np.maximum(row.steps[after], row.steps[after + 1])
-        got = correct(follower.curves(frame, [lane] * len(gaps)), middle, normal, steps)
+        got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, steps)
         between = np.linalg.norm(got.u - middle, axis=1) < length[after] / 2
         some = np.flatnonzero(got.converged & between)
         if not some.size:
