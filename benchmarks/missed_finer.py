@@ -18,7 +18,13 @@ ORDER = 4
 def twice_the_steps() -> Iterator[None]:
     """Orbits and their special points take twice the integration steps that they would take."""
     part = 2.0**-ORDER
-    kept = [(m, n, getattr(m, n)) for m, n in ((_arclength, "LOOSE"), (_follower, "LOOSE"), (_located, "POINT"))]
+    changed = (
+        (_arclength, "LOOSE", part),
+        (_follower, "LOOSE", part),
+        (_located, "POINT", part),
+        (_located, "MOST_OF_A_POINT", 2),
+    )
+    kept = [(module, name, getattr(module, name)) for module, name, _ in changed]
     counted = _follower.counted
 
     def doubled(*given: Any, **settings: Any) -> Any:
@@ -26,8 +32,8 @@ def twice_the_steps() -> Iterator[None]:
         return method, counts._replace(first=2 * counts.first, last=2 * counts.last)
 
     try:
-        for module, name, value in kept:
-            setattr(module, name, value * part)
+        for (module, name, value), (_, _, times) in zip(kept, changed, strict=True):
+            setattr(module, name, value * times)
         setattr(_follower, "counted", doubled)
         yield
     finally:

@@ -26,6 +26,9 @@ CLEAR = 1e-4
 by rounding, or by what Newton's method left."""
 HALVINGS, APART = 20, 1e-7
 """A step is halved so often, and not below this length in the unknowns' units."""
+NEARLY = 0.1
+"""Part of what a test function changes over the steps beside an extremum that a parabola through three orbits may be
+wrong by there."""
 UNEXPLAINED = "unexplained"
 
 
@@ -96,7 +99,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     """Steps over which a test function has one sign at both ends and, by a parabola through three orbits, the other
-    in between: two special points of a kind, whose effects on the count may cancel."""
+    in between, or nearly: two special points of a kind, whose effects on the count may cancel."""
     if len(row.u) < 3:
         return []
     tests = test_functions(eigenvalues(follower.monodromy(row)))
@@ -110,10 +113,12 @@ def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     slope = chord[:, 1:] - bend * ahead
     with np.errstate(divide="ignore", invalid="ignore"):
         place, extreme = -slope / (2 * bend), f[:, 1:-1] - slope**2 / (4 * bend)
+    change = np.abs(np.diff(f))
+    nearly = NEARLY * np.minimum(change[:, :-1], change[:, 1:])
     found = set()
     for first, inside in enumerate([(-back < place) & (place < 0), (0 < place) & (place < ahead)]):
         one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
-        twice = inside & (one * other > 0) & (extreme * one < 0)
+        twice = inside & (one * other > 0) & (extreme * np.sign(one) < nearly)
         found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}
     return sorted(found)
 
