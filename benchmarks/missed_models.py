@@ -1,6 +1,6 @@
-"""Oscillators whose special points are known: planted in closed form, or published.
+"""Oscillators whose special points are planted: known in closed form.
 
-The closed forms come in four kinds. `Curve`: about a driven orbit x' = f(x, p), so that the orbits of the system are
+They come in four kinds. `Curve`: about a driven orbit x' = f(x, p), so that the orbits of the system are
 the zeros of f. `Turning`: two planes that turn about a driven orbit, one by half a turn a revolution, with multipliers
 +-exp((g(p) +- r) T). `Kicked`: a map in disguise, its variables held while the copies relax to their image, then the
 other way about, so that the strobe map is known exactly. `Comb`: many copies of one curve close together, all of them
@@ -16,10 +16,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
-from scipy.optimize import brentq, fsolve
+from scipy.optimize import root
 
 import jaxcage as jc
-from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL_LET_GO
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,6 +71,11 @@ class Curve(eqx.Module):
         return (row[0] + x * (row[1] + x * (row[2] + x * row[3])) - speed * jnp.sin(tau),)
 
 
+def solved(f: Callable[[np.ndarray], np.ndarray], guess: Any) -> np.ndarray:
+    """A root, as closely as it can be had."""
+    return np.asarray(root(f, guess, options={"xtol": 1e-13}).x)
+
+
 def curve(
     name: str, terms: dict[tuple[int, int], float], x: float, p: float, *points: Point, ends=(-1.0, 1.0), lane=None
 ) -> Planted:
@@ -89,13 +93,15 @@ def folds(apart: float) -> Planted:
     third = (apart / 4) ** (2 / 3)
     at = 2 * third**1.5
     points = Point("fold", -at), Point("fold", at)
-    return curve(f"two folds {apart:.0e} apart", {(0, 1): 1, (1, 0): 3 * third, (3, 0): -1}, -1.0, third * 3 - 1, *points)
+    return curve(
+        f"two folds {apart:.0e} apart", {(0, 1): 1, (1, 0): 3 * third, (3, 0): -1}, -1.0, third * 3 - 1, *points
+    )
 
 
 def imperfect(gap: float, side: int) -> Planted:
     """gap + p X - X^3: what a pitchfork becomes; one branch passes, the other turns."""
     turns = () if side > 0 else (Point("fold", 3 * (gap / 2) ** (2 / 3)),)
-    x = float(fsolve(lambda x: gap + 0.5 * x - x**3, side * math.sqrt(0.5), xtol=1e-13)[0])
+    x = float(solved(lambda x: gap + 0.5 * x - x**3, [side * math.sqrt(0.5)])[0])
     name = f"imperfect pitchfork {gap:.0e}, {'past' if side > 0 else 'turning'}"
     terms = {(0, 0): gap, (1, 1): 1.0, (3, 0): -1.0}
     return curve(name, terms, x, 0.5, *turns, lane=lambda p, x: np.sign(x))
@@ -207,7 +213,7 @@ def kicked_map(y: np.ndarray, p: float, delay: float, times: int = 1) -> tuple[n
     return y, whole
 
 
-def kicked_point(kind: str, guess: tuple[float, ...], delay: float, times: int, criticality: str = "") -> Point:
+def kicked_point(kind: str, guess: Any, delay: float, times: int, criticality: str = "") -> Point:
     """Where the exact map has the multiplier, from a guess at (state, p)."""
 
     def off(u: np.ndarray) -> np.ndarray:
@@ -218,80 +224,17 @@ def kicked_point(kind: str, guess: tuple[float, ...], delay: float, times: int, 
         products = np.linalg.det(m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)] - np.eye(6))
         return np.append(y - u[:4], products)
 
-    found, _, good, why = fsolve(off, guess, xtol=1e-13, full_output=True)
-    assert good == 1 or np.max(np.abs(off(found))) < 1e-11, why
+    found = solved(off, guess)
+    assert np.max(np.abs(off(found))) < 1e-11
     return Point(kind, float(found[4]), 1e-9, criticality)
 
 
 def kicked(name: str, delay: float, x: tuple[float, float], p: float, ends, times: int, *wanted) -> Planted:
     """Orbits of so many revolutions, from near (x, z) at p; special points as (kind, (x, z), p, criticality)."""
-    settled = lambda x, p: fsolve(lambda y: kicked_map(y, p, delay, times)[0] - y, (*x, *x), xtol=1e-13)
+    settled = lambda x, p: solved(lambda y: kicked_map(y, p, delay, times)[0] - y, (*x, *x))
     points = [kicked_point(kind, (*settled(x, q), q), delay, times, sort) for kind, x, q, sort in wanted]
     system = jc.ForcedSystem(Kicked(**numbers(p=p, delay=delay)), dimension=4, harmonics=4)
     return Planted(name, system, tuple(settled(x, p).tolist()), p, *ends, tuple(points), periods=times)
-
-
-class Duffing(eqx.Module):
-    """x'' = -d x' + k x - x^3 + p cos(tau)."""
-
-    d: Array
-    k: Array
-    p: Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-self.d * u + self.k * x - x**3 + self.p * jnp.cos(tau),)
-
-
-def duffing(**values: float) -> jc.ForcedOscillator:
-    return jc.ForcedOscillator(Duffing(**numbers(**values)), coordinates=1)
-
-
-class Mathieu(eqx.Module):
-    """x'' + 2 z x' + (p - 2 cos 2t) x + x^3 = 0 with tau = 2t."""
-
-    p: Array
-    z: Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-2 * self.z * u - (self.p - 2 * jnp.cos(tau)) * x - x**3,)
-
-
-def mathieu_edge(sign: int, ends: tuple[float, float], damping: float) -> float:
-    """Where the trace of the undamped equation, at p - z^2, is +-2 cosh(z pi): by Hill's determinant."""
-    n = np.arange(-30, 31)
-
-    def determinant(p: float) -> float:
-        """Of exp((damping + i m) t) times a series in exp(2 i n t), m = 0 for periods of pi and 1 of 2 pi; scaled."""
-        rate = damping + 1j * (2 * n + (sign < 0))
-        diagonal = rate**2 + p - damping**2
-        near = 1.0 / np.abs(diagonal + 1.0)[:, None]
-        rows = np.diag(diagonal) - np.eye(n.size, k=1) - np.eye(n.size, k=-1)
-        return float(np.linalg.det(rows * near).real)
-
-    return float(brentq(determinant, *ends, xtol=1e-14))
-
-
-class Pendulum(eqx.Module):
-    """Taylor's: x'' + 2 b x' + w0^2 sin x = p w0^2 cos(w t) with w = 2 pi, w0 = 1.5 w, b = w0/4."""
-
-    p: Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        natural = 1.5 * speed
-        return (-natural / 2 * u + natural**2 * (self.p * jnp.cos(tau) - jnp.sin(x)),)
-
-
-class VanDerPol(eqx.Module):
-    """x'' - .3 (1 - x^2) x' + x = p cos(tau)."""
-
-    p: Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (0.3 * (1 - x * x) * u - x + self.p * jnp.cos(tau),)
 
 
 class Cycle(eqx.Module):
@@ -397,7 +340,9 @@ def planted() -> list[Planted]:
             ("fold", (-0.5, 0.0), -0.24, ""),
             ("period-doubling", (0.5, 0.0), 0.75, up),
         ),
-        kicked("quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25, up)),
+        kicked(
+            "quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25, up)
+        ),
         kicked(
             "quadratic map, period 3",
             0.0,
@@ -420,33 +365,4 @@ def planted() -> list[Planted]:
             speed=1.3,
             period="free",
         ),
-    ]
-
-
-def published() -> list[Planted]:
-    """Those of which some or all special points are printed, and some of which none is."""
-    of = lambda kind, number, sort="": Point(kind, number.value, number.tolerance, sort)
-    damping, edges = 0.1, ((-0.6, -0.3, 1), (-0.2, 0.0, -1), (1.7, 1.9, -1))
-    thresholds = [
-        Point(kind, mathieu_edge(sign, (low, high), damping), 1e-11, sort)
-        for (low, high, sign), kind, sort in zip(
-            edges, ("branch-point", "period-doubling", "period-doubling"), ("", "subcritical", "supercritical"), strict=True
-        )
-    ]
-    mathieu = jc.ForcedOscillator(Mathieu(**numbers(p=0.5, z=damping)), coordinates=1)
-    pendulum = jc.ForcedOscillator(Pendulum(**numbers(p=1.06)), coordinates=1)
-    van_der_pol = jc.ForcedOscillator(VanDerPol(**numbers(p=1.2)), coordinates=1)
-    hard = tuple(of("fold", DUFFING_FOLDS[way]) for way in ("up", "down"))
-    first = of("period-doubling", DUFFING_DOUBLINGS[1][1], "supercritical")
-    let_go = of("torus", VAN_DER_POL_LET_GO)
-    speed, settled = {"parameter": "speed", "spin": 300}, {"spin": 300}
-    return [
-        Planted("hardening Duffing", duffing(d=0.1, k=-1.0, p=0.3), (0.9, 0.0), 0.8, 0.5, 2.5, hard, **speed),
-        Planted("hardening Duffing, slow", duffing(d=0.1, k=-1.0, p=3.0), (1.5, 0.0), 1.1, 0.25, 1.2, (), False, **speed),
-        Planted("softening well", duffing(d=0.2, k=1.0, p=0.1), (1.1, 0.0), 1.0, 0.5, 2.0, (), False, **speed),
-        Planted("double well", duffing(d=0.3, k=1.0, p=0.25), (1.0, 0.0), 0.25, 0.1, 0.35, (first,), False, speed=1.2, **settled),
-        Planted("Ueda", duffing(d=0.05, k=0.0, p=1.0), (1.0, 0.0), 1.0, 0.1, 12.0, (), False, speed=1.0, **settled),
-        Planted("Mathieu", mathieu, (0.0, 0.0), 0.5, -0.8, 2.5, tuple(thresholds), speed=2.0),
-        Planted("pendulum", pendulum, (-math.pi / 2, 0.0), 1.05, 0.9, 1.08, (Point("period-doubling", 1.0663, 1e-4),), False, speed=2 * math.pi, **settled),
-        Planted("van der Pol", van_der_pol, (0.5, 1.5), 1.2, 0.9, 1.6, (let_go,), False, speed=1.3, **settled),
     ]

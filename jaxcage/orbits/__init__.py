@@ -12,6 +12,7 @@
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
 | `_walk`        | a bifurcation looked for along the branch of its orbits                            |
 | `_point`       | bifurcation points                                                                 |
+| `_astray`      | steps that lead to another curve, told from their ends                             |
 | `_arclength`   | pseudo-arclength continuation of many curves at a time                             |
 | `_illinois`    | where a function along a curve vanishes                                            |
 | `_follower`    | what the lanes of one continuation of orbits share                                 |

@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 
 from ..integrate import compiled
 from ..sweeps import cores
+from ._astray import ASIDE, CROSSED, judged
 from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, Counts
 
@@ -39,14 +40,6 @@ VEER = 0.7
 """How far the next step should turn, of the largest angle allowed."""
 GROWTH = 1.8
 """Longest step over the one before."""
-ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
-"""How far a point may be from where its tangent says that it is (see `astray`), in the unknowns' units and over the
-step's length, or over its distance from the prediction: more, and it is on another curve, or there is a bend that was
-not seen."""
-CROSSED, ASIDE = 1e-4, 0.01
-"""A step across which the curve's orientation changes is halved down to this length: two curves that nearly meet look
-as if they crossed to a longer one. Where it changes all the same they do cross, and the step is taken in one from so
-far off: near the crossing tangents are lost to rounding."""
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
@@ -140,6 +133,11 @@ def put(tree: Any, lanes: np.ndarray, new: Any) -> Any:
         return whole
 
     return jax.tree.map(placed, tree, new)
+
+
+def measured_as(new: Corrected, old: Corrected) -> Corrected:
+    """The first with the second's errors."""
+    return new._replace(error=old.error, over=old.over, moved=old.moved)
 
 
 def stack(tree: Any, lanes: int) -> Any:
@@ -289,28 +287,6 @@ def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple
     return last.u + length * (tangent + square + cube), slope / np.linalg.norm(slope)
 
 
-def astray(
-    got: Corrected, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
-) -> Float[np.ndarray, " lanes"]:
-    """How far points are from where their tangents say that they are.
-
-    What the prediction over `length` from two points `apart` leaves out, a s^2 (s + apart)^2, is nearly as far in the
-    tangent as in the point. Another curve beside this one has its own place, but not the tangent that belongs to it.
-    """
-    turned = got.tangent - normal
-    turned -= np.sum(turned * normal, axis=1, keepdims=True) * normal
-    share = 1 / (2 / length + 2 / (length + apart))
-    return np.linalg.norm(got.u - ahead - share[:, None] * turned, axis=1)
-
-
-def orientation(jacobian: np.ndarray, tangent: np.ndarray) -> Float[np.ndarray, " lanes"]:
-    """Sign of the determinant of a curve's equations with its tangent, the same all along it until it crosses another.
-
-    A branch point changes it, a fold does not.
-    """
-    return np.linalg.slogdet(np.concatenate([jacobian, tangent[:, None]], axis=1))[0]
-
-
 def follow(
     curves: Curves,
     start: Corrected,
@@ -322,8 +298,9 @@ def follow(
 ) -> list[Trace]:
     """Follow many curves from their first points, each in the direction of its tangent.
 
-    The error of each point is measured. Where it is too large the revolutions get twice as many steps, the last point
-    is solved for again by these, and the step along the curve is repeated; where it is small they get half as many.
+    A step to another curve is refused (see `_astray`). The error of each point is measured. Where it is too large the
+    revolutions get twice as many steps, the last point is solved for again by these, and the step along the curve is
+    repeated; where it is small they get half as many.
 
     **Arguments:**
 
@@ -350,27 +327,19 @@ def follow(
         again = correct(curves.take(lanes), u, tangent, count[lanes])
         for k, i in enumerate(lanes):
             if again.converged[k]:
-                points[i][-1] = take(again, np.array(k))._replace(error=points[i][-1].error, over=points[i][-1].over, moved=points[i][-1].moved)
+                points[i][-1] = measured_as(take(again, np.array(k)), points[i][-1])
 
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
-        last = [points[i][-1] for i in index]
-        tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("tangent", "jacobian"))
-        second = [points[i][-2] if len(points[i]) > 1 else None for i in index]
-        ways = [predicted(p, q, length[i]) for p, q, i in zip(last, second, index, strict=True)]
-        apart = [np.inf if q is None else np.linalg.norm(p.u - q.u) for p, q in zip(last, second, strict=True)]
+        some = [points[i] for i in index]
+        last: Corrected = jax.tree.map(lambda *x: np.stack(x), *(p[-1] for p in some))
+        ways = [predicted(p[-1], p[-2] if len(p) > 1 else None, length[i]) for p, i in zip(some, index, strict=True)]
+        apart = np.array([np.linalg.norm(p[-1].u - p[-2].u) if len(p) > 1 else np.inf for p in some])
         ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
         closely = np.clip(OF_A_STEP * length[index], 2 * TOLERANCE, FOLLOWING)
         got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True)
-        turned = np.arccos(np.clip(np.sum(got.tangent * tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
-        missed = np.linalg.norm(got.u - ahead, axis=1)
-        straight, near = turned < 1, missed < steps.bend * length[index]
-        largest = lambda m: np.max(np.abs(m), axis=(1, 2))
-        smooth = largest(got.jacobian - before) < steps.swing * (1 + largest(before))
-        off = astray(got, ahead, normal, length[index], np.array(apart))
-        belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length[index]), OF_MISSED * missed)
-        sure = got.converged & straight & near & smooth & belongs
-        same = orientation(got.jacobian, got.tangent) == orientation(before, tangent)
+        missed, turned, sure, same = judged(steps, last, got, ahead, normal, length[index], apart)
+        same |= update is not None  # new equations have an orientation of their own
         good = sure & (same | crosses[index])
         finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)
         for k, i in enumerate(index):

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from ._arclength import Corrected, Curves, correct, put, take
+from ._arclength import Corrected, Curves, correct, measured_as, put, take
 from ._follower import Follower, eigenvalues, unstable_count
 from ._illinois import LOCATED, zeros
 from ._problem import Frame
@@ -142,7 +142,7 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         some = np.flatnonzero(got.converged & between)
         if not some.size:
             break
-        blank = got._replace(error=row.error[after], over=row.over[after], moved=row.moved[after])
+        blank = measured_as(got, take(row, after))
         row = jax.tree.map(lambda x, y: np.insert(x, after[some] + 1, y[some], axis=0), row, blank)
     return row
 
@@ -154,7 +154,7 @@ def _again(follower: Follower, frame: Frame, row: Corrected, lane: int, gaps: Se
         most = int(follower.counts.last)
         steps = np.full(near.size, min(2 * int(row.steps[near].max()), most))
         got = correct(follower.curves(frame, [lane] * near.size), row.u[near], row.tangent[near], steps)
-        got = got._replace(error=row.error[near], over=row.over[near], moved=row.moved[near])
+        got = measured_as(got, take(row, near))
         good = np.flatnonzero(got.converged)
         row = put(row, near[good], take(got, good))
     return row

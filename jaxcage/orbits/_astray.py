@@ -1,0 +1,71 @@
+"""Steps along a curve that lead to another curve, or past a bend: told from the point that they lead to.
+
+A point of the same curve has the tangent that belongs to its place, and the orientation of the curve. Another curve
+beside it has its own place, but neither; two that nearly meet look as if they crossed, until steps are shorter than
+what is between them.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
+"""How far a point may be from where its tangent says that it is (see `astray`), in the unknowns' units and over the
+step's length, or over its distance from the prediction."""
+CROSSED, ASIDE = 1e-4, 0.01
+"""A step across which the orientation changes is halved down to this length. Where it changes all the same the curve
+crosses another, and the step is taken in one from so far off: near the crossing tangents are lost to rounding."""
+
+
+class Step(NamedTuple):
+    """What is known of steps of many curves."""
+
+    missed: Float[np.ndarray, " lanes"]
+    """Distance of the point from its prediction."""
+    turned: Float[np.ndarray, " lanes"]
+    """Angle between the tangents, over the largest allowed."""
+    sure: Bool[np.ndarray, " lanes"]
+    """Whether the point is on the curve, or on one that crosses it."""
+    same: Bool[np.ndarray, " lanes"]
+    """Whether the orientation is."""
+
+
+def judged(
+    steps: Any, last: Any, got: Any, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
+) -> Step:
+    """Steps judged by the points that they begin and end with.
+
+    **Arguments:** what is allowed (`Steps`); last points and new ones (`Corrected`); predictions and their unit
+    tangents; lengths of the steps and of those before, infinite where there was none.
+    """
+    turned = np.arccos(np.clip(np.sum(got.tangent * last.tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
+    missed = np.linalg.norm(got.u - ahead, axis=1)
+    largest = lambda m: np.max(np.abs(m), axis=(1, 2))
+    smooth = largest(got.jacobian - last.jacobian) < steps.swing * (1 + largest(last.jacobian))
+    off = astray(got.u - ahead, got.tangent - normal, normal, length, apart)
+    belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length), OF_MISSED * missed)
+    sure = got.converged & (turned < 1) & (missed < steps.bend * length) & smooth & belongs
+    same = orientation(got.jacobian, got.tangent) == orientation(last.jacobian, last.tangent)
+    return Step(missed, turned, sure, same)
+
+
+def astray(
+    missed: np.ndarray, turned: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
+) -> Float[np.ndarray, " lanes"]:
+    """How far points are from where their tangents say that they are.
+
+    What a prediction over `length` from two points `apart` leaves out, a s^2 (s + apart)^2, is nearly as far in the
+    tangent as in the point.
+    """
+    across = turned - np.sum(turned * normal, axis=1, keepdims=True) * normal
+    share = 1 / (2 / length + 2 / (length + apart))
+    return np.linalg.norm(missed - share[:, None] * across, axis=1)
+
+
+def orientation(jacobian: np.ndarray, tangent: np.ndarray) -> Float[np.ndarray, " lanes"]:
+    """Sign of the determinant of a curve's equations with its tangent: a fold does not change it, a crossing does."""
+    whole = np.concatenate([jacobian, tangent[:, None]], axis=1)
+    known = np.all(np.isfinite(whole), axis=(1, 2), keepdims=True)
+    return np.linalg.slogdet(np.where(known, whole, 0.0))[0]
