@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
 from ._follower import Follower, eigenvalues, unstable_count
@@ -27,8 +28,8 @@ by rounding, or by what Newton's method left."""
 HALVINGS, APART = 20, 1e-7
 """A step is halved so often, and not below this length in the unknowns' units."""
 NEARLY = 0.1
-"""Part of what a test function changes over the steps beside an extremum that a parabola through three orbits may be
-wrong by there."""
+"""By this part of what a function changes over the steps beside an extremum a parabola through three points may be wrong
+there."""
 UNEXPLAINED = "unexplained"
 
 
@@ -98,15 +99,19 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 
 
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
-    """Steps over which a test function has one sign at both ends and, by a parabola through three orbits, the other
-    in between, or nearly: two special points of a kind, whose effects on the count may cancel."""
-    if len(row.u) < 3:
-        return []
+    """Steps over which a test function may vanish twice: two special points of a kind, whose effects on the count may
+    cancel."""
     tests = test_functions(eigenvalues(follower.monodromy(row)))
     if follower.problem.free_speed:
         del tests["fold"]  # zero along the branch
-    f = np.stack([*tests.values(), row.tangent[:, -1]])
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+    return dips(np.stack([*tests.values(), row.tangent[:, -1]]), length)
+
+
+def dips(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " steps"]) -> list[tuple[int, int]]:
+    """Steps over which one of some functions along a curve has one sign at both ends and, by a parabola through three
+    points, the other in between, or nearly.
+    """
     back, ahead = length[:-1], length[1:]
     chord = np.diff(f) / length
     bend = np.diff(chord) / (back + ahead)

@@ -1,0 +1,81 @@
+"""Nothing is missed: planted points are found, and a branch stays on its own side of one that runs close by."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxcage as jc
+from benchmarks.missed import followed, judged
+from benchmarks.missed_models import comb, crossing, imperfect, planted
+from jaxcage.orbits._astray import astray, orientation
+from jaxcage.orbits._located import dips
+
+
+BENT = next(given for given in planted() if "bent" in given.name)
+
+
+@pytest.mark.parametrize("apart", [1e-2, 1e-3, 1e-4])
+def test_branch_does_not_jump_to_its_copies(apart):
+    """Copies of one curve, every other stable, closer to each other than a prediction is to its point."""
+    given = comb(apart)
+    branch = followed(given, jc.Steps())
+    assert branch.special == () and np.all(branch.stable) and branch.ended == ("range", "range")
+    np.testing.assert_allclose(branch.state[:, 0] - 1 - np.tanh(20 * branch.value) / 2, 0.0, atol=1e-7)
+
+
+NEAR = {
+    "lines that cross": crossing(0.0, 1),
+    "lines that pass": crossing(1e-3, 1),
+    "lines that turn": crossing(1e-3, -1),
+    "lines that turn sharply": crossing(1e-4, -1),
+    "what is left of a pitchfork, passing": imperfect(1e-4, 1),
+    "what is left of a pitchfork, turning": imperfect(1e-4, -1),
+    "pitchfork along the side that turns": BENT,
+}
+
+
+@pytest.mark.parametrize("name", NEAR)
+def test_branches_that_cross_and_branches_that_nearly_do(name):
+    branch = followed(NEAR[name], jc.Steps())
+    row = judged(NEAR[name], branch, branch)
+    assert not row.bad, row
+    assert branch.ended == ("range", "range") and branch.value.size < 100
+
+
+def test_points_and_tangents_of_one_curve_belong_together():
+    """What a cubic leaves out, a s^2 (s + apart)^2, is in the tangent too; the distance to a parallel curve is not."""
+    length, apart, missed = 0.2, 0.1, np.array([[0.0, 1e-3]])
+    slope = missed * (2 / length + 2 / (length + apart))
+    off = lambda turned: astray(missed, turned, np.array([[1.0, 0.0]]), np.array([length]), np.array([apart]))[0]
+    assert off(slope) < 1e-15 and off(0 * slope) == pytest.approx(1e-3)
+    assert off(slope + np.array([[-0.1, 0.0]])) < 1e-15  # along the curve a tangent says nothing
+
+
+def test_orientation_changes_where_curves_cross_and_not_at_a_fold():
+    """Along p = x^2, and along p = 0 through x p = 0."""
+    x = np.array([-0.5, 0.5])
+    fold = np.stack([np.stack([-2 * x, np.ones(2)], axis=1)], axis=1), np.stack([np.ones(2), 2 * x], axis=1)
+    cross = np.stack([np.stack([0 * x, x], axis=1)], axis=1), np.stack([np.ones(2), 0 * x], axis=1)
+    assert np.prod(orientation(*fold)) == 1 and np.prod(orientation(*cross)) == -1
+
+
+@pytest.mark.parametrize("lowest, looked_at", [(0.0327, True), (0.2, False)])
+def test_a_test_function_that_nearly_vanishes_is_looked_at(lowest, looked_at):
+    """Case 2a at 3833, 4008 and 4128 rpm, where the period doubles and comes back between the last two: a parabola
+    through the three does not reach zero."""
+    f = np.array([[0.802, lowest, 0.516]])
+    assert dips(f, np.array([0.140, 0.096])) == ([(1, 2)] if looked_at else [])
+    assert dips(-f, np.array([0.140, 0.096])) == dips(f, np.array([0.140, 0.096]))
+
+
+def test_search_meets_what_only_the_opposite_start_leads_to():
+    """Two wells, and starts in one of them: the orbits of both are found, and the counts are those of the starts."""
+
+    def well(tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-0.5 * u + x - x**3 + 0.05 * jnp.cos(tau),)
+
+    system = jc.ForcedOscillator(well, coordinates=1, starts=((1.1, 0.1),))
+    found = jc.synchronous_orbits(system, 0.5, 0.6, count=3, discard=20, method=jc.method("rk4", steps=128))
+    assert {float(np.sign(b.state[0, 0])) for b in found.branches} == {-1.0, 1.0} and found.missed == 0
+    assert sorted(s.met for s in found.stretches) == [0, 3]
