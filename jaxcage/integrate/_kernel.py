@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import diffrax as dfx
 import equinox as eqx
@@ -89,10 +89,10 @@ def evaluated_often(structure: Structure, numbers: Numbers, tau: Scalar, y: Stat
     return structure.remake(numbers)[0](tau, y)
 
 
-class _CalledField(NamedTuple):
+class _CalledField(AbstractField):
     """A field that a step evaluates several times, as calls of one function."""
 
-    structure: Structure
+    structure: Structure = eqx.field(static=True)
     numbers: Numbers
 
     def __call__(self, tau: Scalar, y: State) -> State:
