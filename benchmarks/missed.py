@@ -52,7 +52,7 @@ class Row(NamedTuple):
         return len(self.missed) + len(self.spurious) + len(self.changed) + len(self.wrong) + (self.left > 0)
 
 
-def followed(given: Planted, steps: jc.Steps) -> jc.Branch:
+def followed(given: Planted, steps: jc.orbits.Steps) -> jc.Branch:
     """The branch, from an orbit that a simulation leads to where none is known."""
     state, value = given.state, given.value
     speed = value if given.parameter == "speed" else given.speed
@@ -122,16 +122,14 @@ def planted_report(quick: bool, only: str) -> list[str]:
     total = 0
     for given in chosen:
         begin = time.process_time()
-        branch = followed(given, jc.Steps())
+        branch = followed(given, jc.orbits.Steps())
         with twice_the_steps():
             fine = followed(given, finer(branch, (given.upper - given.lower) / 20, scale_of(given)))
         row = judged(given, branch, fine)
         total += row.known
         cells = (row.length, row.known, len(branch.special), len(row.missed), len(row.spurious), len(row.changed))
         cells = "".join(f"{c:9d}" for c in cells)
-        print(
-            f"{given.name:34s}{cells}{row.left:9.0%}{row.worst:9.2g}{time.process_time() - begin:9.1f}", flush=True
-        )
+        print(f"{given.name:34s}{cells}{row.left:9.0%}{row.worst:9.2g}{time.process_time() - begin:9.1f}", flush=True)
         for what in ("missed", "spurious", "changed", "wrong"):
             for text in getattr(row, what):
                 print(f"    {what}: {text}", flush=True)
@@ -145,10 +143,14 @@ def main(arguments: Sequence[str] | None = None) -> list[str]:
     """Run what was asked for; what is wrong."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.missed", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--planted", action="store_true", help="oscillators with known special points")
-    parser.add_argument("--cases", nargs="*", choices=CASES, metavar="CASE", help="the published cases, or some of them")
+    parser.add_argument(
+        "--cases", nargs="*", choices=CASES, metavar="CASE", help="the published cases, or some of them"
+    )
     parser.add_argument("--only", default="", help="planted oscillators with this in their name")
     parser.add_argument("--quick", action="store_true", help="few oscillators; of the cases 1a over a short range")
-    parser.add_argument("--log", type=pathlib.Path, default=pathlib.Path("out/missed"), help="results of cases are kept here")
+    parser.add_argument(
+        "--log", type=pathlib.Path, default=pathlib.Path("out/missed"), help="results of cases are kept here"
+    )
     given = parser.parse_args(arguments)
     jc.enable_x64()
     jc.keep_compiled_programs()

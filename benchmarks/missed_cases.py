@@ -60,7 +60,7 @@ def twice(model: jc.CageModel, found: Any, ends: tuple[float, float]) -> Any:
     """The search with half the step lengths and twice the integration steps, from the same simulations."""
     unit = (ends[1] - ends[0]) / 20
     steps = [finer(b, unit, scale_at(model, float(b.value[0]))) for b in found.branches]
-    half = jc.Steps(first=0.01, longest=float(np.median([s.longest for s in steps])), most=10000)
+    half = jc.orbits.Steps(first=0.01, longest=float(np.median([s.longest for s in steps])), most=10000)
     patience = _search.PATIENCE
     try:
         _search.PATIENCE = PATIENCE * patience
@@ -86,7 +86,11 @@ def narrow(found: Any, fine: Any) -> tuple[int, list[str]]:
     """How many stretches are narrow, and which of them the finer search has not."""
     mine = [s for s in found.stretches if s.width_rpm < NARROW]
     near = lambda s, t: max(abs(s.lower_rpm - t.lower_rpm), abs(s.upper_rpm - t.upper_rpm)) <= s.error_rpm + t.error_rpm
-    lost = [s for s in mine if not any(near(s, t) or abs(s.width_rpm - t.width_rpm) < 0.01 * s.width_rpm for t in fine.stretches)]
+    lost = [
+        s
+        for s in mine
+        if not any(near(s, t) or abs(s.width_rpm - t.width_rpm) < 0.01 * s.width_rpm for t in fine.stretches)
+    ]
     return len(mine), [f"stretch {s.lower_rpm:.4f} to {s.upper_rpm:.4f} rpm: not confirmed" for s in lost]
 
 

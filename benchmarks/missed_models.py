@@ -89,7 +89,9 @@ def folds(apart: float) -> Planted:
     third = (apart / 4) ** (2 / 3)
     at = 2 * third**1.5
     points = Point("fold", -at), Point("fold", at)
-    return curve(f"two folds {apart:.0e} apart", {(0, 1): 1, (1, 0): 3 * third, (3, 0): -1}, -1.0, third * 3 - 1, *points)
+    return curve(
+        f"two folds {apart:.0e} apart", {(0, 1): 1, (1, 0): 3 * third, (3, 0): -1}, -1.0, third * 3 - 1, *points
+    )
 
 
 def imperfect(gap: float, side: int) -> Planted:
@@ -397,7 +399,9 @@ def planted() -> list[Planted]:
             ("fold", (-0.5, 0.0), -0.24, ""),
             ("period-doubling", (0.5, 0.0), 0.75, up),
         ),
-        kicked("quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25, up)),
+        kicked(
+            "quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25, up)
+        ),
         kicked(
             "quadratic map, period 3",
             0.0,
@@ -430,7 +434,10 @@ def published() -> list[Planted]:
     thresholds = [
         Point(kind, mathieu_edge(sign, (low, high), damping), 1e-11, sort)
         for (low, high, sign), kind, sort in zip(
-            edges, ("branch-point", "period-doubling", "period-doubling"), ("", "subcritical", "supercritical"), strict=True
+            edges,
+            ("branch-point", "period-doubling", "period-doubling"),
+            ("", "subcritical", "supercritical"),
+            strict=True,
         )
     ]
     mathieu = jc.ForcedOscillator(Mathieu(**numbers(p=0.5, z=damping)), coordinates=1)
@@ -442,11 +449,35 @@ def published() -> list[Planted]:
     speed, settled = {"parameter": "speed", "spin": 300}, {"spin": 300}
     return [
         Planted("hardening Duffing", duffing(d=0.1, k=-1.0, p=0.3), (0.9, 0.0), 0.8, 0.5, 2.5, hard, **speed),
-        Planted("hardening Duffing, slow", duffing(d=0.1, k=-1.0, p=3.0), (1.5, 0.0), 1.1, 0.25, 1.2, (), False, **speed),
+        Planted(
+            "hardening Duffing, slow", duffing(d=0.1, k=-1.0, p=3.0), (1.5, 0.0), 1.1, 0.25, 1.2, (), False, **speed
+        ),
         Planted("softening well", duffing(d=0.2, k=1.0, p=0.1), (1.1, 0.0), 1.0, 0.5, 2.0, (), False, **speed),
-        Planted("double well", duffing(d=0.3, k=1.0, p=0.25), (1.0, 0.0), 0.25, 0.1, 0.35, (first,), False, speed=1.2, **settled),
+        Planted(
+            "double well",
+            duffing(d=0.3, k=1.0, p=0.25),
+            (1.0, 0.0),
+            0.25,
+            0.1,
+            0.35,
+            (first,),
+            False,
+            speed=1.2,
+            **settled,
+        ),
         Planted("Ueda", duffing(d=0.05, k=0.0, p=1.0), (1.0, 0.0), 1.0, 0.1, 12.0, (), False, speed=1.0, **settled),
         Planted("Mathieu", mathieu, (0.0, 0.0), 0.5, -0.8, 2.5, tuple(thresholds), speed=2.0),
-        Planted("pendulum", pendulum, (-math.pi / 2, 0.0), 1.05, 0.9, 1.08, (Point("period-doubling", 1.0663, 1e-4),), False, speed=2 * math.pi, **settled),
+        Planted(
+            "pendulum",
+            pendulum,
+            (-math.pi / 2, 0.0),
+            1.05,
+            0.9,
+            1.08,
+            (Point("period-doubling", 1.0663, 1e-4),),
+            False,
+            speed=2 * math.pi,
+            **settled,
+        ),
         Planted("van der Pol", van_der_pol, (0.5, 1.5), 1.2, 0.9, 1.6, (let_go,), False, speed=1.3, **settled),
     ]

@@ -343,7 +343,9 @@ def follow(
         again = correct(curves.take(lanes), u, tangent, count[lanes])
         for k, i in enumerate(lanes):
             if again.converged[k]:
-                points[i][-1] = take(again, np.array(k))._replace(error=points[i][-1].error, over=points[i][-1].over, moved=points[i][-1].moved)
+                points[i][-1] = take(again, np.array(k))._replace(
+                    error=points[i][-1].error, over=points[i][-1].over, moved=points[i][-1].moved
+                )
 
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
