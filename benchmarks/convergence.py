@@ -42,7 +42,7 @@ PICTURES = [
 ]
 
 
-def make(solver: str, steps: int) -> jc.AbstractMethod:
+def make(solver: str, steps: int) -> jc.integrate.AbstractMethod:
     """A method of the tables; `controlled` is the default of sweeps, which chooses its steps."""
     return jc.controlled() if solver == "controlled" else jc.method(solver, steps=steps)
 
@@ -53,7 +53,7 @@ def attractor_states(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
 
 
 def one_revolution(
-    model: jc.CageModel, speeds: np.ndarray, states: np.ndarray, method: jc.AbstractMethod
+    model: jc.CageModel, speeds: np.ndarray, states: np.ndarray, method: jc.integrate.AbstractMethod
 ) -> np.ndarray:
     """The strobe map of every state, shape (speeds, starts, 4)."""
     return jc.sweep(model, speeds, starts=states, method=method, discard=0, revolutions=1, blocks=1, exponents=0).last

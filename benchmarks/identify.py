@@ -6,7 +6,7 @@ The upper end of zone 1 of case 1a is a period doubling. It is followed to twelv
 eccentricity, as a test rig would have them, and measured there with 1 % noise. Six constants are sought; the cage is
 weighed, and the contact, the oil and gravity are known. Of every unknown a guess is known beforehand, wrong by 20 %
 (one standard deviation, drawn anew each time). Every draw starts at the truth: what is tested is the least-squares fit
-and its intervals, not the search for the valley (`jaxcage.screen`).
+and its intervals, not the search for the valley (`jaxcage.design.screen`).
 """
 
 import argparse
@@ -36,14 +36,14 @@ DESIGNS = [(gap * 1e-3, e * 1e-6) for gap in (0.43, 0.45, 0.47) for e in (19, 22
 SUBSTEPS = 8
 
 
-def planted(model: jc.CageModel) -> tuple[list[jc.Unknown], dict[str, float]]:
+def planted(model: jc.CageModel) -> tuple[list[jc.design.Unknown], dict[str, float]]:
     """The unknowns, within a factor of four of the truth, and the truth."""
     known = jc.parameters(model)
     truth = {name: float(known[(sets or (name,))[0]]) for name, sets in UNKNOWNS.items()}
-    return [jc.Unknown(n, v / 4, v * 4, sets=UNKNOWNS[n]) for n, v in truth.items()], truth
+    return [jc.design.Unknown(n, v / 4, v * 4, sets=UNKNOWNS[n]) for n, v in truth.items()], truth
 
 
-def followed(model: jc.CageModel) -> dict[tuple[float, float], jc.Sensitivity]:
+def followed(model: jc.CageModel) -> dict[tuple[float, float], jc.orbits.Sensitivity]:
     """The period doubling in every design, from that of case 1a, each from the nearest that is known."""
     orbits = jc.synchronous_orbits(model, float(jc.rpm(12000)), float(jc.rpm(13000)), count=21, discard=1500)
     first = next(p for p in orbits.edges if p.kind == "period-doubling")
@@ -57,7 +57,7 @@ def followed(model: jc.CageModel) -> dict[tuple[float, float], jc.Sensitivity]:
             assert last.state is not None, f"the period doubling ends before {design}"
             steps = {"guidance_gap": (design[0] - near[0]) / SUBSTEPS, "eccentricity": (design[1] - near[1]) / SUBSTEPS}
             rpm = last.value_rpm + sum(last.derivative[n] * d for n, d in steps.items())
-            guess = jc.Located("period-doubling", float(jc.rpm(rpm)), last.state)
+            guess = jc.orbits.Located("period-doubling", float(jc.rpm(rpm)), last.state)
             last = jc.sensitivity(jc.replace(model, guidance_gap=gap, eccentricity=e), guess)
         found[design] = last
     return {design: found[design] for design in DESIGNS}
@@ -76,7 +76,9 @@ def main() -> None:
         print(f"{1e3 * gap:.2f} mm {1e6 * e:3.0f} um {edge.value_rpm:10.2f} rpm, {edge.status}", flush=True)
     names = {d: f"{1e3 * d[0]:.2f} mm, {1e6 * d[1]:.0f} um" for d in edges}
     models = {names[d]: jc.replace(model, guidance_gap=d[0], eccentricity=d[1]) for d in edges}
-    points = [jc.Located("period-doubling", float(jc.rpm(s.value_rpm)), np.asarray(s.state)) for s in edges.values()]
+    points = [
+        jc.orbits.Located("period-doubling", float(jc.rpm(s.value_rpm)), np.asarray(s.state)) for s in edges.values()
+    ]
     rng, fits, began = np.random.default_rng(0), [], time.perf_counter()
     for draw in range(options.draws):
         noise, wrong = rng.normal(size=len(edges)), rng.normal(size=len(unknowns))
@@ -85,7 +87,7 @@ def main() -> None:
             for u, n in zip(unknowns, wrong, strict=True)
         ]
         measured = [
-            jc.MeasuredEdge(names[d], "zone 1 exit", s.value_rpm * (1 + NOISE * n), NOISE * s.value_rpm)
+            jc.design.MeasuredEdge(names[d], "zone 1 exit", s.value_rpm * (1 + NOISE * n), NOISE * s.value_rpm)
             for (d, s), n in zip(edges.items(), noise, strict=True)
         ]
         fit = jc.fit_edges(models, guessed, measured, points, start=truth)

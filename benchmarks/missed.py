@@ -53,7 +53,7 @@ class Row(NamedTuple):
         return len(self.missed) + len(self.spurious) + len(self.changed) + len(self.wrong) + (self.left > 0)
 
 
-def followed(given: Planted, steps: jc.Steps) -> jc.Branch:
+def followed(given: Planted, steps: jc.orbits.Steps) -> jc.Branch:
     """The branch, from an orbit that a simulation leads to where none is known."""
     state, value = given.state, given.value
     speed = value if given.parameter == "speed" else given.speed
@@ -123,7 +123,7 @@ def planted_report(quick: bool, only: str) -> list[str]:
     total = 0
     for given in chosen:
         begin = time.process_time()
-        branch = followed(given, jc.Steps())
+        branch = followed(given, jc.orbits.Steps())
         with twice_the_steps():
             fine = followed(given, finer(branch, (given.upper - given.lower) / 20, scale_of(given)))
         row = judged(given, branch, fine)

@@ -60,7 +60,7 @@ def twice(model: jc.CageModel, found: Any, ends: tuple[float, float]) -> Any:
     """The search with half the step lengths and twice the integration steps, from the same simulations."""
     unit = (ends[1] - ends[0]) / 20
     steps = [finer(b, unit, scale_at(model, float(b.value[0]))) for b in found.branches]
-    half = jc.Steps(first=0.01, longest=float(np.median([s.longest for s in steps])), most=10000)
+    half = jc.orbits.Steps(first=0.01, longest=float(np.median([s.longest for s in steps])), most=10000)
     patience = _search.PATIENCE
     try:
         _search.PATIENCE = PATIENCE * patience

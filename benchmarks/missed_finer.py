@@ -42,11 +42,11 @@ def twice_the_steps() -> Iterator[None]:
         setattr(_follower, "counted", counted)
 
 
-def finer(branch: jc.Branch, unit: float, scale: np.ndarray) -> jc.Steps:
+def finer(branch: jc.Branch, unit: float, scale: np.ndarray) -> jc.orbits.Steps:
     """Steps at most half as long as those of a branch are in the mean."""
     u = np.column_stack([branch.state / scale, branch.value / unit])
     half = float(np.mean(np.linalg.norm(np.diff(u, axis=0), axis=1))) / 2
-    return jc.Steps(first=min(0.01, half), longest=half, most=100000)
+    return jc.orbits.Steps(first=min(0.01, half), longest=half, most=100000)
 
 
 def compared(some: Sequence[Any], others: Sequence[Any], floor: float) -> list[str]:

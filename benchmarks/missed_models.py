@@ -85,7 +85,7 @@ def curve(
         c[place] = value
     system = jc.ForcedSystem(Curve(**numbers(p=p, c=c)), dimension=1)
     about = None if lane is None else lambda value, state: lane(value, state[:, 0] - 1)
-    return Planted(name, system, (1 + x,), p, *ends, points, lane=about)
+    return Planted(name, system, (1 + x,), p, ends[0], ends[1], points, lane=about)
 
 
 def folds(apart: float) -> Planted:
@@ -176,7 +176,7 @@ def turning(name: str, *points: Point, ends=(-0.2, 0.2), start=-0.19, **given: t
     """Planes as given; the rest is quiet."""
     settings = dict(a=(-0.3, -0.3), c=(0.0, 0.0), e=(0.0, 0.0), s=(0.05, 0.05), b=(0.0, 0.0), k=(1.0, 1.0)) | given
     system = jc.ForcedSystem(Turning(**numbers(p=start, **settings)), dimension=4)
-    return Planted(name, system, (1.0, 0.0, 1.0, 0.0), start, *ends, points)
+    return Planted(name, system, (1.0, 0.0, 1.0, 0.0), start, ends[0], ends[1], points)
 
 
 LEFT = math.exp(-5.0)
@@ -234,7 +234,7 @@ def kicked(name: str, delay: float, x: tuple[float, float], p: float, ends, time
     settled = lambda x, p: solved(lambda y: kicked_map(y, p, delay, times)[0] - y, (*x, *x))
     points = [kicked_point(kind, (*settled(x, q), q), delay, times, sort) for kind, x, q, sort in wanted]
     system = jc.ForcedSystem(Kicked(**numbers(p=p, delay=delay)), dimension=4, harmonics=4)
-    return Planted(name, system, tuple(settled(x, p).tolist()), p, *ends, tuple(points), periods=times)
+    return Planted(name, system, tuple(settled(x, p).tolist()), p, ends[0], ends[1], tuple(points), periods=times)
 
 
 class Cycle(eqx.Module):

@@ -81,7 +81,7 @@ def cage_numbers(task: Task) -> str:
     from .problem import constants
 
     model = task.make()
-    assert isinstance(model, jc.CageModel) and isinstance(model.impact, jc.SynchronousImpact)
+    assert isinstance(model, jc.CageModel) and isinstance(model.impact, jc.forces.SynchronousImpact)
     (known,) = constants(model, np.array([task.speed]))
     powers = [float(model.impact.exponent) - 2 if math.isnan(p) else p for p in POWERS]
     row = lambda name, values: f"static const double {name}[] = {{{', '.join(repr(float(v)) for v in values)}}};\n"

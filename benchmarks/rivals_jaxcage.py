@@ -31,7 +31,7 @@ class Jaxcage:
     def close(self) -> None:
         pass
 
-    def method(self, setting: Any) -> jc.AbstractMethod | None:
+    def method(self, setting: Any) -> jc.integrate.AbstractMethod | None:
         if self.solver is None or setting is None:
             return None
         if self.solver == "controlled":

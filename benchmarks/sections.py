@@ -146,7 +146,7 @@ def monodromy(setup: Setup) -> dict[str, Any]:
         "runs": in_turns(
             {
                 "plain": lambda: our_map(few, None, 10),
-                "matrices": lambda: jc.monodromy(few.model, few.speeds, few.states),
+                "matrices": lambda: jc.sweeps.monodromy(few.model, few.speeds, few.states),
             }
         ),
     }

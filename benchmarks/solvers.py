@@ -57,10 +57,10 @@ def models(cases: list[str]) -> dict[str, jc.CageModel]:
     return found
 
 
-def located(model: jc.CageModel) -> dict[str, jc.Located]:
+def located(model: jc.CageModel) -> dict[str, jc.orbits.Located]:
     """Ends of the synchronous-loss zones, at the default steps."""
     edges = jc.loss_zones(jc.synchronous_orbits(model, float(jc.rpm(4000)), float(jc.rpm(27500)))).edges
-    return {n: jc.Located(p.kind, p.speed, p.state) for n, p in edges.items() if p.kind != "branch-point"}
+    return {n: jc.orbits.Located(p.kind, p.speed, p.state) for n, p in edges.items() if p.kind != "branch-point"}
 
 
 def starts(model: jc.CageModel, speed: float) -> list[tuple[float, ...]]:
@@ -70,18 +70,18 @@ def starts(model: jc.CageModel, speed: float) -> list[tuple[float, ...]]:
     return [tuple(float(v) for v in size * rng.uniform(-1, 1, 4)) for _ in range(STARTS)]
 
 
-def exponent(model: jc.CageModel, speed: float, method: jc.AbstractMethod) -> tuple[float, float]:
+def exponent(model: jc.CageModel, speed: float, method: jc.integrate.AbstractMethod) -> tuple[float, float]:
     """Mean of the largest exponent over the starts, and its standard error."""
     swept = jc.sweep(model, speed, starts=starts(model, speed), method=method, discard=100, revolutions=150, blocks=1)
     every = swept.exponents[0, :, 0]
     return float(np.nanmean(every)), float(np.nanstd(every) / np.sqrt(every.size))
 
 
-def optimum(model: jc.CageModel, method: jc.AbstractMethod, quick: bool) -> tuple[float, ...]:
+def optimum(model: jc.CageModel, method: jc.integrate.AbstractMethod, quick: bool) -> tuple[float, ...]:
     """Gap and eccentricity [m], objective and its error [rpm] of the best design found."""
-    width = jc.chaotic_width(4000, 27500, cloud=12, spread=0.1, method=method)
+    width = jc.design.chaotic_width(4000, 27500, cloud=12, spread=0.1, method=method)
     starts, scouts, steps = (1, 0, 1) if quick else (3, 32, 12)
-    best = jc.optimise(model, BOUNDS, width + 1000.0 * jc.cost(), starts=starts, scouts=scouts, steps=steps).best
+    best = jc.optimise(model, BOUNDS, width + 1000.0 * jc.design.cost(), starts=starts, scouts=scouts, steps=steps).best
     return (*(best.values[name] for name in BOUNDS), best.objective, best.error)
 
 

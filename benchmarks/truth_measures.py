@@ -63,7 +63,7 @@ def by_reference(model: jc.CageModel, run: jc.Trajectory, revolutions: int) -> N
 
 def apart(model: jc.CageModel, run: jc.Trajectory, ours: Numbers, theirs: Numbers) -> dict[str, float]:
     """How far two histories are apart, by the names of `OFF`."""
-    film = np.max(np.linalg.norm(jc.cage_forces(model, run)["film"], axis=1))
+    film = np.max(np.linalg.norm(jc.analysis.cage_forces(model, run)["film"], axis=1))
     size = max(theirs.force, float(film))
     whirl = abs(ours.whirl - theirs.whirl)
     return {

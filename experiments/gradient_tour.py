@@ -68,7 +68,7 @@ for n in (10, 40, 80)[: small(3, 2)]:
     print(f"{n} revolutions: {float(jax.jit(jax.jacfwd(mean_square))(0.45e-3)):+.3e}")
 
 # %%
-width = jc.chaotic_width(4000, 20000, small(48, 8), cloud=small(24, 4), discard=small(150, 10))
+width = jc.design.chaotic_width(4000, 20000, small(48, 8), cloud=small(24, 4), discard=small(150, 10))
 space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3)})
 (got,) = width.measure(space, space.place[None])
 print(f"chaotic speeds below 20000 rpm: {got.value:.0f} +- {got.error:.0f} rpm")

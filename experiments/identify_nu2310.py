@@ -1,8 +1,8 @@
 """The constants that the paper leaves out, from its edges: `python experiments/identify_nu2310.py [--minutes M]`.
 
 Every candidate is swept over speeds in equal ratios in all six cases; its score is about the mean relative error of
-the edges, with a price for every band too many (`jaxcage.screen`). An evolution strategy starts again and again, in
-turns from the best set known and from quasi-random designs. `--cases 1a` fits cases of their own. Every better
+the edges, with a price for every band too many (`jaxcage.design.screen`). An evolution strategy starts again and again,
+in turns from the best set known and from quasi-random designs. `--cases 1a` fits cases of their own. Every better
 candidate is printed with its values; another run ends elsewhere. `--begin experiments/case_fits/1a.json --cases 1a
 --check` shows what values do.
 """
@@ -22,28 +22,28 @@ from jaxcage.reproduction import compare_edges, zones_in_range
 jc.enable_x64()
 
 UNKNOWNS = (
-    jc.Unknown("cage_mass", 0.20, 0.36),  # [kg] from the cage's shape
-    jc.Unknown("stiffness_x", 5e3, 4e5),  # [N/m] of the support
-    jc.Unknown("stiffness_y", 5e3, 4e5),
-    jc.Unknown("cubic_stiffness", 1e10, 1e15),  # [N/m^3]
-    jc.Unknown("damping", 0.3, 60.0),  # [N s/m]
-    jc.Unknown("cross_stiffness", -1e4, 1e4, "linear"),  # [N/m]
-    jc.Unknown("land_width", 0.5e-3, 6.5e-3),  # [m]
-    jc.Unknown("amplitude", 10.0, 500.0),  # [N] at 1000 rad/s
-    jc.Unknown("exponent", 1.0, 2.0, "linear"),
-    jc.Unknown("contact_stiffness", 1e7, 1e11, sets=("stiffness",)),  # [N/m^(10/9)]
-    jc.Unknown("restitution", 0.3, 1.0, "linear"),
+    jc.design.Unknown("cage_mass", 0.20, 0.36),  # [kg] from the cage's shape
+    jc.design.Unknown("stiffness_x", 5e3, 4e5),  # [N/m] of the support
+    jc.design.Unknown("stiffness_y", 5e3, 4e5),
+    jc.design.Unknown("cubic_stiffness", 1e10, 1e15),  # [N/m^3]
+    jc.design.Unknown("damping", 0.3, 60.0),  # [N s/m]
+    jc.design.Unknown("cross_stiffness", -1e4, 1e4, "linear"),  # [N/m]
+    jc.design.Unknown("land_width", 0.5e-3, 6.5e-3),  # [m]
+    jc.design.Unknown("amplitude", 10.0, 500.0),  # [N] at 1000 rad/s
+    jc.design.Unknown("exponent", 1.0, 2.0, "linear"),
+    jc.design.Unknown("contact_stiffness", 1e7, 1e11, sets=("stiffness",)),  # [N/m^(10/9)]
+    jc.design.Unknown("restitution", 0.3, 1.0, "linear"),
 )
 
 
-def edges(cases: list[str]) -> list[jc.MeasuredEdge]:
+def edges(cases: list[str]) -> list[jc.design.MeasuredEdge]:
     """The published ones, with the 2 % to which a diagram can be read."""
     made = []
     for name in cases:
         case = PUBLISHED_CASES[name]
         read = {"zone 1 onset": case.zone_1_onset_rpm, "zone 1 exit": case.zone_1_exit_rpm}
         read |= {"zone 2 onset": case.zone_2_onset_rpm}
-        made += [jc.MeasuredEdge(name, edge, rpm, 0.02 * rpm, "chaotic") for edge, rpm in read.items()]
+        made += [jc.design.MeasuredEdge(name, edge, rpm, 0.02 * rpm, "chaotic") for edge, rpm in read.items()]
     return made
 
 
@@ -95,7 +95,7 @@ def main() -> None:
         return check(given.cases, begin)
     began, best, seed = time.perf_counter(), None, 0
 
-    def better(tried: int, candidate: jc.Candidate) -> None:
+    def better(tried: int, candidate: jc.design.Candidate) -> None:
         nonlocal best
         if best is None or candidate.score < best.score:
             best = candidate
@@ -108,7 +108,7 @@ def main() -> None:
         near = best.values if best is not None else begin
         own = dict(begin=near, designs=2) if seed % 2 == 0 else dict(designs=256)
         options = dict(spread=given.spread, report=better, starts=starts, seed=seed, by=given.by) | own | small
-        jc.screen(systems, UNKNOWNS, edges(given.cases), grid, **options)
+        jc.design.screen(systems, UNKNOWNS, edges(given.cases), grid, **options)
         seed += 1
         if given.quick:
             break

@@ -25,10 +25,10 @@ jc.keep_compiled_programs()
 model = jc.case("1b")
 vary = {"guidance_gap": (0.30e-3, 0.60e-3), "eccentricity": (5e-6, 60e-6)}
 COST = 1000.0  # rpm of chaotic speeds that one unit of manufacturing cost is worth
-width = jc.chaotic_width(
+width = jc.design.chaotic_width(
     4000, 27500, small(48, 6), cloud=small(12, 4), spread=0.1, discard=small(150, 10), revolutions=small(100, 10)
 )
-objective = width + COST * jc.cost()
+objective = width + COST * jc.design.cost()
 
 # %%
 scouts = small(64, 2)
@@ -106,13 +106,13 @@ for name, values in rows.items():
 # Gaps within 10 %, balance Rayleigh-distributed: the mean chaotic width is made small instead.
 
 # %%
-scatter = {"guidance_gap": jc.uniform(0.1), "eccentricity": jc.rayleigh()}
-few = jc.chaotic_width(4000, 27500, small(32, 6), cloud=4, discard=small(120, 10), revolutions=small(80, 10))
-robust = jc.Robust(few, scatter, draws=small(16, 2)) + COST * jc.cost()
+scatter = {"guidance_gap": jc.design.uniform(0.1), "eccentricity": jc.design.rayleigh()}
+few = jc.design.chaotic_width(4000, 27500, small(32, 6), cloud=4, discard=small(120, 10), revolutions=small(80, 10))
+robust = jc.design.Robust(few, scatter, draws=small(16, 2)) + COST * jc.design.cost()
 nominal = np.array([[u.place(found.best.values[u.name]) for u in space.unknowns]])
 made = jc.optimise(model, vary, robust, starts=nominal, steps=small(8, 1))
 print(made)
-many = jc.Robust(width, scatter, draws=small(64, 4))
+many = jc.design.Robust(width, scatter, draws=small(64, 4))
 result = {}
 for name, values in (("nominal", found.best.values), ("robust", made.best.values)):
     place = np.array([u.place(values[u.name]) for u in space.unknowns])

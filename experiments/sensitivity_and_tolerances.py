@@ -24,8 +24,8 @@ now = {name: float(value) for name, value in jc.parameters(model).items()}
 # %%
 varied = ("guidance_gap", "eccentricity", "cage_mass", "stiffness_x", "damping", "amplitude", "land_width")
 vary = {name: (0.8 * now[name], 1.2 * now[name]) for name in varied}
-width = jc.chaotic_width(4000, 27500, small(32, 4), discard=small(120, 5), revolutions=small(80, 5))
-shares = jc.global_sensitivity(model, vary, width, samples=small(64, 2))
+width = jc.design.chaotic_width(4000, 27500, small(32, 4), discard=small(120, 5), revolutions=small(80, 5))
+shares = jc.design.global_sensitivity(model, vary, width, samples=small(64, 2))
 print(shares)
 
 # %% [markdown]
@@ -36,7 +36,7 @@ orbits = jc.synchronous_orbits(model, jc.rpm(12700), jc.rpm(13700), count=21, di
 edge = next(p for p in orbits.edges if p.kind == "period-doubling")
 exact = jc.sensitivity(model, edge, "lower edge of the calm stretch")
 tolerances = dict.fromkeys(varied, 0.05 / np.sqrt(3))
-budget = jc.tolerance_budget(exact, tolerances)
+budget = jc.design.tolerance_budget(exact, tolerances)
 print(budget)
 
 # %%
@@ -45,7 +45,7 @@ solved = []
 for _ in range(small(60, 2)):
     changed = {name: now[name] * (1 + 0.05 * rng.uniform(-1, 1)) for name in varied}
     guess = exact.value_rpm * (1 + sum(exact.elasticity[n] * (v / now[n] - 1) for n, v in changed.items())) * np.pi / 30
-    found = jc.sensitivity(jc.replace(model, **changed), jc.Located(edge.kind, guess, exact.state))
+    found = jc.sensitivity(jc.replace(model, **changed), jc.orbits.Located(edge.kind, guess, exact.state))
     solved.append(found.value_rpm)
 solved = np.array(solved)
 print(

@@ -42,7 +42,7 @@ print({name: float(jc.parameters(model)[name]) for name in ("guidance_gap", "ecc
 # How the load is carried, where the cage sits at rest, and how it runs.
 
 # %%
-load = jc.load_distribution(model.bearing, model.load)
+load = jc.bearing.load_distribution(model.bearing, model.load)
 print(
     f"largest roller load {float(load.max_load):.0f} N, the shaft goes down by {1e6 * float(load.shaft_shift):.1f} um"
 )

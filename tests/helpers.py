@@ -33,12 +33,14 @@ def in_other_units(model: jc.CageModel, base: str, factor: float) -> jc.CageMode
 
 def elastic(model: jc.CageModel, mass: float = 1.0, stiffness: float = 5e7, damping: float = 500.0) -> jc.CageModel:
     """The model with an elastic rib."""
-    return jc.replace(model, rib=jc.ElasticRib(mass=mass, stiffness=stiffness, damping=damping, cubic_stiffness=1e14))
+    return jc.replace(
+        model, rib=jc.forces.ElasticRib(mass=mass, stiffness=stiffness, damping=damping, cubic_stiffness=1e14)
+    )
 
 
 def roller_pass(model: jc.CageModel) -> jc.CageModel:
     """The model with impacts roller by roller."""
-    return jc.replace(model, impact=jc.RollerPassImpact(jc.PocketImpact()))
+    return jc.replace(model, impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))
 
 
 class EvenSteps(jc.CageModel):

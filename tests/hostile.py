@@ -156,8 +156,8 @@ def leaves(table: dict[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[
             yield (*path, name), value
 
 
-_ELASTIC = jc.replace(jc.case("2a"), rib=jc.ElasticRib(mass=1.0, stiffness=5e7, damping=500.0))
-_ROLLER_PASS = jc.replace(jc.case("3b"), impact=jc.RollerPassImpact(jc.PocketImpact()))
+_ELASTIC = jc.replace(jc.case("2a"), rib=jc.forces.ElasticRib(mass=1.0, stiffness=5e7, damping=500.0))
+_ROLLER_PASS = jc.replace(jc.case("3b"), impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))
 MODELS = (*map(jc.case, PUBLISHED_CASES), _ELASTIC, _ROLLER_PASS)
 FIELDS = {path: field for model in MODELS for path, field in walk(model)}
 """Everything that a file may give: its place and declaration."""

@@ -112,7 +112,7 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     np.testing.assert_allclose(images, over_speed.state, atol=1e-9)
     # No step has gone over to another branch: all points are on one whose neighbours are near.
     start = over_speed.state[1], over_speed.value[1]
-    fine = jc.branch(hardening(), start, lower=0.5, upper=2.5, steps=jc.Steps(longest=0.1), method=METHOD)
+    fine = jc.branch(hardening(), start, lower=0.5, upper=2.5, steps=jc.orbits.Steps(longest=0.1), method=METHOD)
     curve, points = (np.c_[b.value / 0.1, b.state] for b in (fine, over_speed))
     length = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     assert np.max(length) < 0.15
@@ -180,7 +180,7 @@ def test_doubled_branch_has_twice_the_period(doubling):
 
 def test_cascade_of_the_double_well_duffing(doubling):
     """DOP853, all printed digits; the limit is where chaos sets in, 0.2923 on a grid of simulations."""
-    found = jc.cascade(double_well(), doubling, "g", lower=0.1, upper=0.35, levels=4, method=FINE)
+    found = jc.orbits.cascade(double_well(), doubling, "g", lower=0.1, upper=0.35, levels=4, method=FINE)
     known = [number.value for _, number in DUFFING_DOUBLINGS.values()]
     np.testing.assert_allclose(found.values, known, rtol=0, atol=2e-9)
     assert [int(p.periods) for p in found.points] == [1, 2, 4, 8]
@@ -191,7 +191,7 @@ def test_cascade_of_the_double_well_duffing(doubling):
 
 def test_cascade_that_does_not_go_on_is_shorter(doubling):
     """The range ends before the third doubling: what was found is returned, the limit from two points."""
-    found = jc.cascade(double_well(), doubling, "g", lower=0.1, upper=0.29, levels=4, method=FINE)
+    found = jc.orbits.cascade(double_well(), doubling, "g", lower=0.1, upper=0.29, levels=4, method=FINE)
     assert len(found.points) == 2
     assert found.error == np.inf and abs(found.limit - 0.2924) < 2e-4
 
@@ -436,11 +436,11 @@ def test_two_crossings_of_one_kind_within_a_step(kind, block):
     places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)
     a = (-places[0], -places[1]) if kind == "torus" else (-0.3, -0.02)
     block |= dict(a=a, c=(1.0, 1.0) if kind == "torus" else (0.2, 1.0))
-    branch = planted_branch(how=dict(steps=jc.Steps(first=0.1, longest=0.4), method=METHOD), **block)
+    branch = planted_branch(how=dict(steps=jc.orbits.Steps(first=0.1, longest=0.4), method=METHOD), **block)
     assert kinds(branch) == [kind, kind]
     np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
     assert np.diff(branch.value)[branch.special[0].index] < 0.003 < 0.007 < np.max(np.diff(branch.value))  # halved
-    finer = dict(steps=jc.Steps(first=0.05, longest=0.2), method=jc.method("rodas4", steps=512))
+    finer = dict(steps=jc.orbits.Steps(first=0.05, longest=0.2), method=jc.method("rodas4", steps=512))
     again = planted_branch(how=finer, **block)
     assert kinds(again) == kinds(branch) and again.value.size > 1.5 * branch.value.size
     np.testing.assert_allclose([p.value for p in again.special], places, rtol=0, atol=1e-8)
@@ -539,18 +539,18 @@ def test_no_doubled_branch_begins_at_a_fold(over_speed):
 @pytest.mark.parametrize("steps", [dict(first=0.6), dict(shortest=0.05), dict(shortest=0.0), dict(longest=0.01)])
 def test_lengths_of_steps_must_be_in_order(steps):
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
-        jc.Steps(**steps)
-    assert dataclasses.replace(jc.Steps(), first=0.1).first == 0.1
+        jc.orbits.Steps(**steps)
+    assert dataclasses.replace(jc.orbits.Steps(), first=0.1).first == 0.1
 
 
 @pytest.mark.slow
 def test_shorter_steps_change_no_bifurcation(over_speed):
     orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    steps = jc.Steps(first=0.01, longest=0.04, most=2000)
+    steps = jc.orbits.Steps(first=0.01, longest=0.04, most=2000)
     fine = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=steps, method=METHOD)
     assert fine.value.size > 2 * over_speed.value.size
     np.testing.assert_allclose(
         [p.value for p in fine.special], [p.value for p in over_speed.special], rtol=0, atol=1e-9
     )
-    few = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=jc.Steps(most=5), method=METHOD)
+    few = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=jc.orbits.Steps(most=5), method=METHOD)
     assert few.ended == ("steps", "steps") and few.value.size == 11

@@ -164,7 +164,7 @@ def test_what_can_be_varied():
     got = read_vary(given, jc.case("1a"))
     np.testing.assert_allclose(got["speed"], np.array([9000, 10000, 11000, 12000]) * np.pi / 30, rtol=1e-14)
     gap, eccentricity = got["guidance_gap"], got["eccentricity"]
-    assert isinstance(gap, jc.Between) and isinstance(eccentricity, jc.Tolerance)
+    assert isinstance(gap, jc.studies.Between) and isinstance(eccentricity, jc.studies.Tolerance)
     assert gap.bounds == pytest.approx((4e-4, 5e-4), rel=1e-12)
     assert (eccentricity.value, eccentricity.deviation) == pytest.approx((20e-6, 3e-6), rel=1e-12)
     np.testing.assert_array_equal(got["oil"], [32, 56.5, 78])

@@ -404,7 +404,7 @@ def test_a_kept_search_cannot_run_code(tmp_path: Path):
     kept, mark = tmp_path / "search.npz", tmp_path / "mark"
     np.savez(kept, what=np.array([_Touch(mark)], dtype=object), allow_pickle=True)
     with pytest.raises(ValueError, match="must be a file of this search, but .* is none"):
-        jc.optimise(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, jc.cost(), keep=kept)
+        jc.optimise(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, jc.design.cost(), keep=kept)
     assert not mark.exists()
 
 
@@ -537,10 +537,10 @@ def test_half_a_template_or_a_kept_search_is_not_left(tmp_path: Path):
         write_template(tmp_path / "new.toml")
     assert list(tmp_path.iterdir()) == []
     kept, space = tmp_path / "search.npz", {"guidance_gap": (3e-4, 6e-4)}
-    jc.optimise(jc.case("1a"), space, jc.cost(), keep=kept, steps=2)
+    jc.optimise(jc.case("1a"), space, jc.design.cost(), keep=kept, steps=2)
     before = contents(tmp_path)
     with full_disk(100), pytest.raises(OSError, match="could not be written .* goes on from there"):
-        jc.optimise(jc.case("1a"), space, jc.cost(), keep=tmp_path / "other.npz", steps=2)
+        jc.optimise(jc.case("1a"), space, jc.design.cost(), keep=tmp_path / "other.npz", steps=2)
     assert contents(tmp_path) == before
 
 

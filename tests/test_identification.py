@@ -21,7 +21,7 @@ from jaxcage.design._measured import inside_zones, matched
 METHOD = jc.method("rk4", steps=64)
 TRUTH = {"mass": 1.0, "damping": 0.3, "stiffness": 1.0, "cubic": 1.0, "gain": 1.0}
 FORCING = (0.24, 0.25, 0.262, 0.275, 0.29, 0.305)
-BOUNDS = [jc.Unknown(name, value / 4, value * 4) for name, value in TRUTH.items()]
+BOUNDS = [jc.design.Unknown(name, value / 4, value * 4) for name, value in TRUTH.items()]
 
 
 class DoubleWell(eqx.Module):
@@ -57,7 +57,7 @@ def located():
     for g in FORCING:
         for name, kind, table in (("onset", "fold", FOLD), ("exit", "period-doubling", DOUBLING)):
             speed, state = table[g]
-            point = jc.Located(kind, speed, np.array(state), 1)
+            point = jc.orbits.Located(kind, speed, np.array(state), 1)
             exact = jc.sensitivity(cases()[f"g={g}"], point, method=METHOD)
             assert exact.trusted
             found.append((f"g={g}", f"zone 1 {name}", point._replace(speed=exact.value_rpm * np.pi / 30), exact))
@@ -69,7 +69,7 @@ def measured_edges(located, noise):
     made = []
     for (case, name, _, exact), n in zip(located, noise, strict=True):
         sigma = 0.01 * exact.value_rpm
-        made.append(jc.MeasuredEdge(case, name, exact.value_rpm + n * sigma, sigma))
+        made.append(jc.design.MeasuredEdge(case, name, exact.value_rpm + n * sigma, sigma))
     return made
 
 
@@ -128,7 +128,8 @@ def test_intervals_cover_the_truth(located):
 def test_an_edge_that_vanishes_stops_the_step_and_not_the_search(located):
     """A target beyond the point where the period doubling is there at all: the fit ends and says what is lost."""
     far = [
-        jc.MeasuredEdge(e.case, e.name, 0.6 * e.rpm, e.uncertainty_rpm) for e in measured_edges(located, np.zeros(12))
+        jc.design.MeasuredEdge(e.case, e.name, 0.6 * e.rpm, e.uncertainty_rpm)
+        for e in measured_edges(located, np.zeros(12))
     ]
     points = [point for _, _, point, _ in located]
     fit = jc.fit_edges(cases(), BOUNDS[1:2], far, points, start={"damping": 0.3}, method=METHOD, max_steps=12)
@@ -139,7 +140,7 @@ def test_an_edge_that_vanishes_stops_the_step_and_not_the_search(located):
 def test_slopes_are_those_of_differences(located):
     cases_, points = [c for c, *_ in located], [p for _, _, p, _ in located]
     place = np.array([u.place(TRUTH[u.name]) for u in BOUNDS])
-    tracked = jc.TrackedEdges(cases(), BOUNDS, cases_, points, place, METHOD)
+    tracked = jc.design.TrackedEdges(cases(), BOUNDS, cases_, points, place, METHOD)
     here = tracked(place)
     for i in range(len(BOUNDS)):
         step = 1e-4 * np.eye(len(BOUNDS))[i]
@@ -158,7 +159,7 @@ def test_combinations_of_a_known_matrix():
 
 
 def test_a_prior_fixes_what_the_edges_cannot(located):
-    loose = [*BOUNDS[:4], jc.Unknown("gain", 0.25, 4.0, prior=(1.0, 0.02))]
+    loose = [*BOUNDS[:4], jc.design.Unknown("gain", 0.25, 4.0, prior=(1.0, 0.02))]
     free = fitted(located, np.zeros(12))
     held = fitted(located, np.zeros(12), unknowns=loose)
     finite = lambda fit: sum(np.isfinite(c.half_width) and c.half_width < 1e3 for c in fit.combinations)
@@ -175,19 +176,25 @@ def test_the_screen_finds_planted_zones():
         chaotic = swept.exponents[:, 0, 0] > 0.02
         assert chaotic.any() and not chaotic.all()
         first, last = swept.rpm[chaotic][[0, -1]]
-        edges += [jc.MeasuredEdge(case, "zone 1 onset", first, 0.1), jc.MeasuredEdge(case, "zone 1 exit", last, 0.1)]
-    near = [jc.Unknown("damping", 0.2, 0.45), jc.Unknown("cubic", 0.7, 1.4)]
+        edges += [
+            jc.design.MeasuredEdge(case, "zone 1 onset", first, 0.1),
+            jc.design.MeasuredEdge(case, "zone 1 exit", last, 0.1),
+        ]
+    near = [jc.design.Unknown("damping", 0.2, 0.45), jc.design.Unknown("cubic", 0.7, 1.4)]
     options = dict(starts=[(0.4, 0.3)], discard=100, revolutions=60)
-    best = jc.screen(systems, near, edges, grid, designs=32, best=32, **options)
+    best = jc.design.screen(systems, near, edges, grid, designs=32, best=32, **options)
     assert [c.score for c in best] == sorted(c.score for c in best)
     assert best[0].score < 0.6 * best[16].score
-    evolved = jc.screen(systems, near, edges, grid, designs=32, generations=3, best=1, **options)
+    evolved = jc.design.screen(systems, near, edges, grid, designs=32, generations=3, best=1, **options)
     assert evolved[0].score <= best[0].score
 
 
 def test_measured_zones_over_a_grid():
-    edges = [jc.MeasuredEdge("x", "zone 1 onset", 10.0, 1.0), jc.MeasuredEdge("x", "zone 1 exit", 20.0, 1.0)]
-    edges.append(jc.MeasuredEdge("x", "zone 2 onset", 30.0, 1.0))
+    edges = [
+        jc.design.MeasuredEdge("x", "zone 1 onset", 10.0, 1.0),
+        jc.design.MeasuredEdge("x", "zone 1 exit", 20.0, 1.0),
+    ]
+    edges.append(jc.design.MeasuredEdge("x", "zone 2 onset", 30.0, 1.0))
     got = inside_zones(edges, np.array([5.0, 10.0, 15.0, 20.0, 25.0, 35.0]))
     np.testing.assert_array_equal(got, [False, True, True, True, False, True])
 
@@ -195,14 +202,14 @@ def test_measured_zones_over_a_grid():
 @pytest.mark.parametrize(
     "make, words",
     [
-        (lambda: jc.Unknown("a", 2.0, 1.0), "must ascend"),
-        (lambda: jc.Unknown("a", -1.0, 1.0), "must be positive"),
-        (lambda: jc.MeasuredEdge("x", "exit of zone 1", 1.0, 1.0), "zone 1 onset"),
-        (lambda: jc.MeasuredEdge("x", "zone 1 exit", 1.0, 1.0, "both"), "synchronous-loss or chaotic"),
-        (lambda: jc.MeasuredEdge("x", "zone 1 exit", np.nan, 1.0), "positive numbers"),
+        (lambda: jc.design.Unknown("a", 2.0, 1.0), "must ascend"),
+        (lambda: jc.design.Unknown("a", -1.0, 1.0), "must be positive"),
+        (lambda: jc.design.MeasuredEdge("x", "exit of zone 1", 1.0, 1.0), "zone 1 onset"),
+        (lambda: jc.design.MeasuredEdge("x", "zone 1 exit", 1.0, 1.0, "both"), "synchronous-loss or chaotic"),
+        (lambda: jc.design.MeasuredEdge("x", "zone 1 exit", np.nan, 1.0), "positive numbers"),
         (lambda: jc.fit_edges(cases(), BOUNDS, [], [], start=TRUTH), "one point per edge"),
         (lambda: jc.fit_edges(cases(), [], [], [], start=TRUTH), "each unknown once"),
-        (lambda: jc.fit_edges(cases(), [jc.Unknown("heat", 1.0, 2.0)], [], [], start={}), "must be a parameter"),
+        (lambda: jc.fit_edges(cases(), [jc.design.Unknown("heat", 1.0, 2.0)], [], [], start={}), "must be a parameter"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, words):
@@ -215,7 +222,7 @@ def test_a_sliver_at_the_end_of_the_range_is_not_zone_2():
     edge = lambda rpm: Edge(rpm, 100.0, "chaotic")
     found = [Zone("chaotic", edge(a), b and edge(b), 1.0) for a, b in ((9.0e3, 12e3), (22e3, 27e3), (27.4e3, None))]
     ends = (("zone 1 onset", 9100.0), ("zone 1 exit", 12000.0), ("zone 2 onset", 21000.0))
-    measured = [jc.MeasuredEdge("x", name, rpm, 100.0, "chaotic") for name, rpm in ends]
+    measured = [jc.design.MeasuredEdge("x", name, rpm, 100.0, "chaotic") for name, rpm in ends]
     got = matched(measured, found, 27.5e3)
     assert [e and e.speed_rpm for e in got] == [9000.0, 12000.0, 22000.0]
     assert matched(measured, found[:1], 27.5e3)[2] is None

@@ -148,7 +148,7 @@ READINGS = {
     "clearance_reading": "radial",
     "film.model": "finite_length",
 }
-ROLLERS = jc.RollerPassImpact(jc.PocketImpact(), harmonics=6)
+ROLLERS = jc.forces.RollerPassImpact(jc.forces.PocketImpact(), harmonics=6)
 PARTS = {"as printed": jc.replace(CASE, cubic_ratio=0.5, cross_cubic=1e11, impact=ROLLERS, **READINGS), "default": CASE}
 
 
@@ -403,7 +403,7 @@ def liouville_defect(model, speed, start, steps):
     """log|det| of the derivative of a revolution less the integral of the divergence along it; that integral."""
     tau, _, _, divergence = first_revolution(model, speed, start, steps)
     method, at = jc.method("rodas4", steps=steps), in_si(model, speed, start)
-    _, matrix = jc.monodromy(model, np.array([speed]), at[None], method=method)
+    _, matrix = jc.sweeps.monodromy(model, np.array([speed]), at[None], method=method)
     size = np.array([1.0, 1.0, speed, speed])
     expected = simpson(divergence, x=tau)
     return abs(np.linalg.slogdet(matrix[0] * size / size[:, None])[1] - expected), abs(expected)

@@ -103,7 +103,7 @@ def test_base_is_changed_only_where_the_file_says_so():
 
 def test_oil_by_grade():
     model = model_from({"base": "1a", "lubricant": {"grade": 68, "temperature": "70 degC"}})
-    expected = jc.vg(68.0, 343.15)
+    expected = jc.bearing.vg(68.0, 343.15)
     assert float(model.lubricant.dynamic_viscosity) == pytest.approx(float(expected.dynamic_viscosity), rel=1e-12)
 
 
@@ -114,7 +114,9 @@ def test_bearing_by_designation_with_one_change():
     assert float(model.bearing.roller_diameter) == 16e-3
 
 
-@pytest.mark.parametrize("kind, law", [("synchronous", jc.SynchronousImpact), ("roller_pass", jc.RollerPassImpact)])
+@pytest.mark.parametrize(
+    "kind, law", [("synchronous", jc.forces.SynchronousImpact), ("roller_pass", jc.forces.RollerPassImpact)]
+)
 def test_kind_chooses_the_impact(kind: str, law: type):
     assert type(model_from({"base": "1a", "impact": {"kind": kind}}).impact) is law
 
@@ -122,10 +124,10 @@ def test_kind_chooses_the_impact(kind: str, law: type):
 def test_oscillator_of_the_impact():
     impact = {"kind": "roller_pass", "harmonics": 8, "oscillator": {"bar_mass": "5 g"}}
     model = model_from({"base": "1a", "impact": impact})
-    assert isinstance(model.impact, jc.RollerPassImpact)
+    assert isinstance(model.impact, jc.forces.RollerPassImpact)
     assert model.impact.harmonics == 8
     assert float(model.impact.oscillator.bar_mass) == pytest.approx(5e-3)
-    assert float(model.impact.oscillator.bar_stiffness) == float(jc.PocketImpact().bar_stiffness)
+    assert float(model.impact.oscillator.bar_stiffness) == float(jc.forces.PocketImpact().bar_stiffness)
 
 
 @pytest.mark.parametrize(
@@ -173,5 +175,5 @@ def test_example_in_the_documentation_is_valid(tmp_path: Path):
     path.write_text(_config.__doc__.split("\n\n", 1)[1])
     model = load_model(path)
     assert float(model.guidance_gap) == pytest.approx(0.5e-3)
-    assert isinstance(model.impact, jc.RollerPassImpact)
+    assert isinstance(model.impact, jc.forces.RollerPassImpact)
     assert float(model.impact.oscillator.bar_mass) == pytest.approx(4e-3)

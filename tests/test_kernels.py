@@ -226,8 +226,8 @@ def on_a_line(kind, solver, by_loop):
     if kind == "duffing":
         system, state, speed = jc.ForcedOscillator(duffing, coordinates=1), np.array([0.7, -0.3]), 1.1
     if kind == "elastic rib":
-        rib = jc.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=1e14)
-        system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.RigidRib))
+        rib = jc.forces.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=1e14)
+        system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.forces.RigidRib))
         state = np.concatenate([STATES[2][:2], [1e-6, -2e-6], STATES[2][2:], [1e-3, 0.0]])
     scale = system.scale(jnp.asarray(speed))
     field = system.at_speed(jnp.asarray(speed))
@@ -441,8 +441,8 @@ def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):
     else:
         system, free, parameters, speed = MODEL, False, ("speed", "guidance_gap"), jnp.asarray(SPEEDS[2])
         if kind == "elastic rib":
-            rib = jc.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=0.0)
-            system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.RigidRib))
+            rib = jc.forces.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=0.0)
+            system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.forces.RigidRib))
         state = np.asarray(system.starts(speed)[1])
     problem = OrbitProblem(method(solver, steps=96), system.dimension, free, parameters)
     given = Given(system, speed)
@@ -462,7 +462,7 @@ def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):
 @pytest.mark.slow
 def test_monodromy_matrices_against_the_strobe_map():
     chosen = method("rodas4", steps=256)
-    image, matrix = jc.monodromy(MODEL, SPEEDS, STATES, method=chosen)
+    image, matrix = jc.sweeps.monodromy(MODEL, SPEEDS, STATES, method=chosen)
     for i in (0, 2, 4):
         strobe = lambda y: jnp.stack(strobe_map(MODEL, SPEEDS[i], chosen)(tuple(y)).y)
         exact = np.asarray(jax.jit(jax.jacfwd(strobe))(jnp.asarray(STATES[i])))
@@ -474,13 +474,13 @@ def test_monodromy_matrices_against_the_strobe_map():
 
 def test_monodromy_of_bad_shapes_and_failed_lanes():
     with pytest.raises(ValueError, match="4 numbers for each of the 6 speeds"):
-        jc.monodromy(MODEL, SPEEDS, STATES[:, :3])
+        jc.sweeps.monodromy(MODEL, SPEEDS, STATES[:, :3])
     states = STATES.copy()
     states[1] = np.nan
-    image, matrix = jc.monodromy(MODEL, SPEEDS, states)
+    image, matrix = jc.sweeps.monodromy(MODEL, SPEEDS, states)
     assert np.all(np.isnan(image[1])) and np.all(np.isnan(matrix[1]))
     others = [0, 2, 3, 4, 5]
-    good = jc.monodromy(MODEL, SPEEDS, STATES)
+    good = jc.sweeps.monodromy(MODEL, SPEEDS, STATES)
     np.testing.assert_array_equal(image[others], good[0][others])
     np.testing.assert_array_equal(matrix[others], good[1][others])
 
@@ -665,7 +665,7 @@ def test_run_up_and_down_of_several_designs():
     models = [MODEL, jc.case("1b", "preliminary")]
     speeds = jc.rpm(8000, 9000, 3)
     options = dict(discard=5, revolutions=10, blocks=1, keep=2)
-    together = jc.run_up_down_designs(models, speeds, **options)
+    together = jc.sweeps.run_up_down_designs(models, speeds, **options)
     alone = jc.run_up_down(models[1], speeds, **options)
     for side in ("up", "down"):
         got, one = getattr(together[1], side), getattr(alone, side)

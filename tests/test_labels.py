@@ -142,11 +142,22 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     assert lasting.onset.speed_rpm == pytest.approx((followed.rpm[1] + followed.rpm[2]) / 2)
     assert dying.exit.speed_rpm == pytest.approx((followed.rpm[9] + followed.rpm[10]) / 2)
     assert lasting.life == pytest.approx((2 * 3000 / 3, 3 * 3000 / 3))  # bounds: two lanes at the rim, three within
-    n, survived, block = (
-        3,
-        3 * 270,
-        30,
-    )  # three escapes in the block that ends 300 revolutions after the first whole block begins
+    n, survived, block = 3, 3 * 270, 30  # three escapes in the block that ends 300 revolutions after the first begins
     assert dying.life is not None and dying.life[1] == pytest.approx(block / np.log1p(n * block / survived))
     assert "beyond 3020 revolutions" in str(found) and "Transient chaos" in str(found)
     assert jc.zones(sweep, close_below_rpm=0.0).transient == ()
+
+
+def test_an_edge_is_no_more_certain_than_the_mean_lives_next_to_it():
+    """Lanes that leave chaos at the first two speeds of a zone: none; 12 of 20, late; all of them, soon."""
+    sweep = made("111####11", starts=20)
+    alike = lambda x: np.broadcast_to(x[:, :1], x.shape)
+    sweep = dataclasses.replace(sweep, block_growth=alike(sweep.block_growth), strobe=alike(sweep.strobe))
+    for leaving, at, onset, apart in ((0, 2000.0, 5250, 100), (12, 2000.0, 5250, 150), (20, 320.0, 5450, 100)):
+        escape = np.full(sweep.outcome.shape, 20.0)
+        escape[3:7] = np.inf
+        escape[3:5, :leaving] = at
+        found = jc.zones(dataclasses.replace(sweep, escape=escape, horizon=3020), close_below_rpm=0.0)
+        assert found.zones[0].onset.speed_rpm == pytest.approx(onset)
+        assert found.zones[0].onset.uncertainty_rpm == pytest.approx(apart)
+        assert found.zones[0].exit.uncertainty_rpm == pytest.approx(100)

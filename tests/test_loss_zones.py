@@ -191,13 +191,13 @@ def test_width_below_which_is_closed_is_an_argument():
 
 
 def chaotic(onset=None, leaves=None, uncertainty=100.0):
-    edge = lambda rpm: None if rpm is None else jc.Edge(float(rpm), uncertainty, "chaotic")
-    zone = jc.Zone("chaotic", edge(onset), edge(leaves), 0.8)
+    edge = lambda rpm: None if rpm is None else jc.analysis.Edge(float(rpm), uncertainty, "chaotic")
+    zone = jc.analysis.Zone("chaotic", edge(onset), edge(leaves), 0.8)
     return jc.Zones((zone,), (), uncertainty, 500.0)
 
 
 def explained(zones, *stretches):
-    return jc.explain(zones, found(*stretches), hardening_system())
+    return jc.orbits.explain(zones, found(*stretches), hardening_system())
 
 
 def test_chaotic_edges_at_bifurcations_take_their_mechanism():

@@ -99,7 +99,7 @@ def test_stiff_heavy_rib_is_the_rigid_rib():
 def test_forces_on_cage_and_rib_are_opposite():
     """Momentum of cage and rib together changes only by weight, unbalance, impact and what holds the rib."""
     model = helpers.elastic(jc.case("1a", "preliminary"))
-    assert isinstance(model.rib, jc.ElasticRib)
+    assert isinstance(model.rib, jc.forces.ElasticRib)
     speed, tau = jnp.asarray(1200.0), jnp.asarray(0.7)
     q = tuple(map(jnp.asarray, (1e-4, -2e-4, 2e-6, -3e-6)))
     v = tuple(map(jnp.asarray, (0.1, 0.05, 0.01, -0.02)))
@@ -153,8 +153,8 @@ def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool
 def test_dimensionless_groups_have_no_dimension(base: str):
     model, factor = jc.case("1a", "preliminary"), 2.3
     rate = factor ** (-1.0 if base == "time" else 0.0)
-    here = jc.dimensionless_groups(model, 1000.0)
-    there = jc.dimensionless_groups(helpers.in_other_units(model, base, factor), 1000.0 * rate)
+    here = jc.models.dimensionless_groups(model, 1000.0)
+    there = jc.models.dimensionless_groups(helpers.in_other_units(model, base, factor), 1000.0 * rate)
     assert len(here) == 7
     for name, value in here.items():
         assert float(there[name]) == pytest.approx(float(value), rel=1e-12), name

@@ -33,10 +33,10 @@ def differences(objective, space, place, step=1e-4):
 @pytest.fixture(scope="module")
 def edges():
     points = {
-        "zone 1 onset": jc.Located("fold", FOLD[G][0], np.array(FOLD[G][1])),
-        "zone 1 exit": jc.Located("period-doubling", DOUBLING[G][0], np.array(DOUBLING[G][1])),
+        "zone 1 onset": jc.orbits.Located("fold", FOLD[G][0], np.array(FOLD[G][1])),
+        "zone 1 exit": jc.orbits.Located("period-doubling", DOUBLING[G][0], np.array(DOUBLING[G][1])),
     }
-    return jc.FollowedEdges(points, METHOD)
+    return jc.design.FollowedEdges(points, METHOD)
 
 
 def agrees(objective, space, place, rtol=1e-5):
@@ -50,7 +50,7 @@ def agrees(objective, space, place, rtol=1e-5):
 
 
 def test_width_of_a_zone(edges):
-    width = jc.zone_width(edges)
+    width = jc.design.zone_width(edges)
     got = agrees(width, SPACE, SPACE.place + 0.01)
     assert got.error == 0.0
     (here,) = width.measure(SPACE, SPACE.place[None])
@@ -62,7 +62,7 @@ def test_width_of_a_zone(edges):
 
 @pytest.mark.parametrize("operating", [(10.0,), (9.9, 11.0)])
 def test_distance_from_the_nearest_edge(edges, operating):
-    far = jc.EdgeClearance(edges, operating, softness=0.05)
+    far = jc.design.EdgeClearance(edges, operating, softness=0.05)
     got = agrees(far, SPACE, SPACE.place)
     speeds, _ = edges.at(SPACE, SPACE.place)
     nearest = np.min(np.abs(speeds[:, None] - np.array(operating)))
@@ -73,7 +73,7 @@ def test_stability_margin():
     """Around the small orbit, stable and unstable: the largest multiplier at each speed and its soft maximum."""
     speeds = np.array([1.10, 1.15, 1.21])
     orbit = jc.periodic_orbit(double_well(), DOUBLING[G][0], guess=DOUBLING[G][1], method=METHOD)
-    margin = jc.StabilityMargin(speeds, np.tile(np.asarray(orbit.state), (3, 1)), method=METHOD)
+    margin = jc.design.StabilityMargin(speeds, np.tile(np.asarray(orbit.state), (3, 1)), method=METHOD)
     got = agrees(margin, SPACE, SPACE.place)
     sizes = []
     for s in speeds:
@@ -92,7 +92,7 @@ def test_derivatives_of_a_multiplier_against_autodiff():
     system = double_well()
     at = lambda s: jnp.abs(jc.periodic_orbit(s, 1.15, guess=DOUBLING[G][1], method=METHOD).multipliers[0])
     slope = jax.grad(at)(system)
-    got = jc.leading_multiplier(system, 1.15, DOUBLING[G][1], method=METHOD)
+    got = jc.orbits.leading_multiplier(system, 1.15, DOUBLING[G][1], method=METHOD)
     assert got.size == pytest.approx(float(at(system)), rel=1e-10)
     for name, value in got.derivative.items():
         assert value == pytest.approx(float(jc.parameters(slope)[name]), rel=1e-7, abs=1e-9), name
@@ -101,14 +101,14 @@ def test_derivatives_of_a_multiplier_against_autodiff():
 def test_cost_is_its_formula():
     model = jc.case("1a")
     space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 60e-6)})
-    got = agrees(jc.cost(), space, np.array([0.3, 0.7]))
+    got = agrees(jc.design.cost(), space, np.array([0.3, 0.7]))
     gap, e = 0.3e-3 + 0.3 * 0.3e-3, 5e-6 + 0.7 * 55e-6
     assert got.value == pytest.approx(0.45e-3 / gap + 23e-6 / e, rel=1e-12)
     assert set(COSTS) == {"guidance_gap", "eccentricity"}
 
 
 def test_objectives_add_up(edges):
-    width, price = jc.zone_width(edges), jc.Smooth(lambda s: 1 / jc.parameters(s)["damping"])
+    width, price = jc.design.zone_width(edges), jc.design.Smooth(lambda s: 1 / jc.parameters(s)["damping"])
     both = agrees(2.0 * width + price * 0.5 - width, SPACE, SPACE.place)
     (a,), (b,) = width.measure(SPACE, SPACE.place[None]), price.measure(SPACE, SPACE.place[None])
     assert both.value == pytest.approx(a.value + 0.5 * b.value, rel=1e-12)
@@ -120,7 +120,7 @@ CHAOS_SPACE = jc.DesignSpace.of(double_well(), {"damping": (0.2, 0.45), "cubic":
 
 
 def chaos_width(**options):
-    return jc.chaotic_width(9.0, 14.0, 20, **(CHAOS | options))
+    return jc.design.chaotic_width(9.0, 14.0, 20, **(CHAOS | options))
 
 
 @pytest.mark.slow
@@ -143,7 +143,7 @@ def test_statistical_slopes_satisfy_homogeneity():
     names = ("mass", "damping", "stiffness", "cubic", "forcing")
     now = jc.parameters(system)
     space = jc.DesignSpace.of(system, {n: (0.7 * float(now[n]), 1.3 * float(now[n])) for n in names})
-    (got,) = jc.chaotic_width(7.0, 17.0, 40, **(CHAOS | {"cloud": 256})).measure(space, space.place[None])
+    (got,) = jc.design.chaotic_width(7.0, 17.0, 40, **(CHAOS | {"cloud": 256})).measure(space, space.place[None])
     per = np.array([float(now[n]) / u.span for n, u in zip(names, space.unknowns, strict=True)])
     elasticity, error = got.slope * per, got.slope_error * per
     units = {"mass": (1, 1, 1, 1, 1), "length": (0, 0, 0, -2, 1), "time": (0, -1, -2, -2, -2)}
@@ -174,7 +174,7 @@ def test_why_chaos_is_not_differentiated_through():
 
 def test_a_share_is_a_mean_over_the_hours():
     spectrum = [(9.0, 10.0, 3.0), (11.0, 12.0, 1.0)]
-    share = jc.chaotic_share(spectrum, count=6, **CHAOS)
+    share = jc.design.chaotic_share(spectrum, count=6, **CHAOS)
     chaos = share.chaos(CHAOS_SPACE, np.array([[0.4, 0.5]]))[0]
     assert share.weights.sum() == pytest.approx(1.0)
     assert share.values(CHAOS_SPACE, np.array([[0.4, 0.5]]))[0] == pytest.approx(
@@ -186,7 +186,7 @@ def test_a_failed_lane_counts_as_chaotic():
     """Starts beyond what the model holds for fail; a design of which nothing is known is not called calm."""
     model = jc.case("1a")
     space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3)})
-    bad = jc.ChaosMeasure(
+    bad = jc.design.ChaosMeasure(
         jc.rpm(9000, 10000, 2), np.ones(2), discard=2, revolutions=2, method=jc.method("rk4", steps=2)
     )
     assert np.all(bad.chaos(space, np.array([[0.5]])) == 1.0)
@@ -196,19 +196,21 @@ def test_robust_mean_and_worst_of_a_parabola():
     """(p - 1)^2 under +-10 % has the mean (p - 1)^2 + p^2 0.1^2/3 and, at the worst, (|p - 1| + 0.1 p)^2."""
     system = double_well()
     space = jc.DesignSpace.of(system, {"cubic": (0.5, 3.0)})
-    parabola = jc.Smooth(lambda s: (jc.parameters(s)["cubic"] - 1.0) ** 2)
+    parabola = jc.design.Smooth(lambda s: (jc.parameters(s)["cubic"] - 1.0) ** 2)
     place = np.array([space.unknowns[0].place(1.5)])
-    mean = jc.Robust(parabola, {"cubic": jc.uniform(0.1)}, draws=256)
+    mean = jc.design.Robust(parabola, {"cubic": jc.design.uniform(0.1)}, draws=256)
     got = agrees(mean, space, place)
     assert got.value == pytest.approx(0.25 + 1.5**2 * 0.01 / 3, rel=2e-3)
-    worst = agrees(jc.Robust(parabola, {"cubic": jc.uniform(0.1)}, draws=256, worst=1 / 256), space, place)
+    worst = agrees(
+        jc.design.Robust(parabola, {"cubic": jc.design.uniform(0.1)}, draws=256, worst=1 / 256), space, place
+    )
     assert worst.value == pytest.approx((0.5 + 0.15) ** 2, rel=5e-3)
 
 
 def test_scatter_laws():
     q = (np.arange(4096) + 0.5) / 4096
-    assert jc.uniform(0.1)(q).std() == pytest.approx(0.1 / np.sqrt(3), rel=1e-3)
-    ray = jc.rayleigh()(q)
+    assert jc.design.uniform(0.1)(q).std() == pytest.approx(0.1 / np.sqrt(3), rel=1e-3)
+    ray = jc.design.rayleigh()(q)
     assert ray.mean() == pytest.approx(1.0, rel=2e-3)
     assert ray.std() == pytest.approx(np.sqrt(4 / np.pi - 1), rel=5e-3)  # of a Rayleigh distribution with mean 1
 
@@ -218,13 +220,13 @@ def test_scatter_laws():
     [
         (lambda: jc.DesignSpace.of(double_well(), {"heat": (0.0, 1.0)}), "must be a parameter"),
         (lambda: jc.DesignSpace.of(double_well(), {"damping": (1.0, 0.5)}), "must ascend"),
-        (lambda: jc.FollowedEdges({}), "at least one edge"),
-        (lambda: jc.chaotic_width(9.0, 14.0, cloud=5), "even number"),
-        (lambda: jc.chaotic_width(9.0, 14.0, spread=0.0), "must be positive"),
-        (lambda: jc.chaotic_share([(9.0, 12.0, 1.0), (11.0, 14.0, 1.0)]), "do not overlap"),
-        (lambda: jc.Robust(jc.cost(), {}, draws=1), "at least 2"),
-        (lambda: jc.regular_motion("noise", 1.0, (0.0,)), "must be one of displacement"),
-        (lambda: jc.StabilityMargin(np.ones(2), np.ones((1, 2))), "a state for each speed"),
+        (lambda: jc.design.FollowedEdges({}), "at least one edge"),
+        (lambda: jc.design.chaotic_width(9.0, 14.0, cloud=5), "even number"),
+        (lambda: jc.design.chaotic_width(9.0, 14.0, spread=0.0), "must be positive"),
+        (lambda: jc.design.chaotic_share([(9.0, 12.0, 1.0), (11.0, 14.0, 1.0)]), "do not overlap"),
+        (lambda: jc.design.Robust(jc.design.cost(), {}, draws=1), "at least 2"),
+        (lambda: jc.design.regular_motion("noise", 1.0, (0.0,)), "must be one of displacement"),
+        (lambda: jc.design.StabilityMargin(np.ones(2), np.ones((1, 2))), "a state for each speed"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, words):

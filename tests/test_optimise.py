@@ -23,7 +23,7 @@ def bowl(damping=0.4, cubic=1.5):
         p = jc.parameters(system)
         return 1.0 + 40 * (p["damping"] - damping) ** 2 + (p["cubic"] - cubic) ** 2
 
-    return jc.Smooth(height)
+    return jc.design.Smooth(height)
 
 
 @pytest.mark.parametrize("optimiser", [None, optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)])
@@ -43,7 +43,9 @@ def test_starts_that_lead_to_one_optimum_are_one():
 
 def test_several_optima_are_listed():
     """Two valleys, in the damping."""
-    two = jc.Smooth(lambda s: 50 * (jc.parameters(s)["damping"] - 0.3) ** 2 * (jc.parameters(s)["damping"] - 0.8) ** 2)
+    two = jc.design.Smooth(
+        lambda s: 50 * (jc.parameters(s)["damping"] - 0.3) ** 2 * (jc.parameters(s)["damping"] - 0.8) ** 2
+    )
     places = np.array([[0.1], [0.3], [0.7], [0.9]])
     found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, 100.0 * two, starts=places, steps=300)
     where = sorted(o.values["damping"] for o, _ in found.distinct)
@@ -58,7 +60,7 @@ def test_scouts_find_the_deeper_valley():
         d = jc.parameters(system)["damping"]
         return (d - 0.7) ** 2 - 0.5 * jnp.exp(-(((d - 0.2) / 0.05) ** 2))
 
-    search = lambda **options: jc.optimise(double_well(), {"damping": (0.1, 1.0)}, jc.Smooth(height), **options)
+    search = lambda **options: jc.optimise(double_well(), {"damping": (0.1, 1.0)}, jc.design.Smooth(height), **options)
     assert search(steps=200).best.values["damping"] == pytest.approx(0.7, abs=0.02)  # from the design itself, 0.3
     looked = search(starts=4, scouts=32, steps=200)
     assert looked.best.values["damping"] == pytest.approx(0.2, abs=0.02)
@@ -84,7 +86,7 @@ def test_a_step_to_where_nothing_is_known_is_taken_back():
 
     import jax
 
-    found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, jc.Smooth(height), steps=60).best
+    found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, jc.design.Smooth(height), steps=60).best
     assert any(s.status != "ok" for s in found.history)
     assert found.values["damping"] == pytest.approx(0.49, abs=0.03)
 
@@ -116,9 +118,9 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(tmp_path):
 
 
 def test_a_noisy_search_ends_within_its_error():
-    class Noisy(jc.AbstractObjective):
+    class Noisy(jc.design.AbstractObjective):
         def measure(self, space, places):
-            return [jc.Measured(1.0, 0.1, np.array([1e-2]), np.array([0.1])) for _ in places]
+            return [jc.design.Measured(1.0, 0.1, np.array([1e-2]), np.array([0.1])) for _ in places]
 
         def values(self, space, places):
             return np.ones(len(places))
@@ -138,7 +140,7 @@ def test_sobol_indices_of_ishigami():
         x = [2 * jnp.pi * (jc.parameters(system)[n] - 1.0) for n in names]
         return jnp.sin(x[0]) + 7 * jnp.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * jnp.sin(x[0])
 
-    got = jc.global_sensitivity(double_well(), vary, jc.Smooth(ishigami), samples=4096)
+    got = jc.design.global_sensitivity(double_well(), vary, jc.design.Smooth(ishigami), samples=4096)
     assert list(got.first.values()) == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
     assert list(got.total.values()) == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
     for name in names:
@@ -147,19 +149,21 @@ def test_sobol_indices_of_ishigami():
 
 def test_tolerance_budget_is_the_root_of_squares():
     elasticity = {"gap": 0.5, "mass": -2.0}
-    edge = jc.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")
-    got = jc.tolerance_budget(edge, {"gap": 0.02, "mass": 0.01})
+    edge = jc.orbits.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")
+    got = jc.design.tolerance_budget(edge, {"gap": 0.02, "mass": 0.01})
     assert got.deviation_rpm == pytest.approx({"gap": 100.0, "mass": 200.0})
     assert got.total_rpm == pytest.approx(np.hypot(100, 200))
     assert "80 % of the variance" in str(got)
     with pytest.raises(ValueError, match="must be of one of"):
-        jc.tolerance_budget(edge, {"heat": 0.1})
+        jc.design.tolerance_budget(edge, {"heat": 0.1})
 
 
 def test_pareto_front_of_two_parabolas():
     """(x - 0.3)^2 and (x - 0.8)^2 trade off along sqrt(f) + sqrt(g) = 0.5."""
-    f, g = (jc.Smooth(lambda s, c=c: (jc.parameters(s)["damping"] - c) ** 2) for c in (0.3, 0.8))
-    front = jc.pareto_front(double_well(), {"damping": (0.1, 1.0)}, f, g, [0.2, 1.0, 5.0], steps=200, tolerance=1e-5)
+    f, g = (jc.design.Smooth(lambda s, c=c: (jc.parameters(s)["damping"] - c) ** 2) for c in (0.3, 0.8))
+    front = jc.design.pareto_front(
+        double_well(), {"damping": (0.1, 1.0)}, f, g, [0.2, 1.0, 5.0], steps=200, tolerance=1e-5
+    )
     assert len(front) == 3
     for p in front:
         assert np.sqrt(p.first.value) + np.sqrt(p.second.value) == pytest.approx(0.5, abs=0.01)
@@ -178,4 +182,4 @@ def test_bad_input_gets_a_sentence(options, words):
     with pytest.raises(ValueError, match=words):
         jc.optimise(double_well(), VARY, bowl(), **options)
     with pytest.raises(ValueError, match="power of 2"):
-        jc.global_sensitivity(double_well(), VARY, bowl(), samples=3)
+        jc.design.global_sensitivity(double_well(), VARY, bowl(), samples=3)

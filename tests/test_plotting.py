@@ -120,7 +120,7 @@ def test_zones_are_shaded_where_they_are():
 def test_published_edges_are_marked_only_inside_the_axis():
     ax = new_figure().subplots()
     ax.set_xlim(2500, 20000)
-    mark_published(ax, jc.published_case("1a"))
+    mark_published(ax, jc.bearing.published_case("1a"))
     lines = [line for line in ax.get_lines() if line.get_linestyle() != "None"]
     assert [float(np.asarray(line.get_xdata())[0]) for line in lines] == [9100, 12000]
     assert [text.get_text() for text in ax.texts] == ["9100", "12000"]
@@ -130,7 +130,7 @@ def test_published_edges_are_marked_only_inside_the_axis():
 
 def test_sweep_figure_has_both_panels_on_one_axis_and_no_clash():
     sweep = sweep_of()
-    figure = sweep_figure(sweep, zones(sweep), jc.published_case("1a"), "Case 1a")
+    figure = sweep_figure(sweep, zones(sweep), jc.bearing.published_case("1a"), "Case 1a")
     above, below = figure.axes
     assert above.get_xlim() == below.get_xlim()
     np.testing.assert_allclose(spans(above), [(8050, 8150)])
@@ -207,7 +207,7 @@ def test_each_force_is_drawn():
 
 
 def test_impact_history():
-    history = impact_history(jc.PocketImpact(), 0.0423, 0.16, jnp.asarray(6e-4), samples=64)
+    history = impact_history(jc.forces.PocketImpact(), 0.0423, 0.16, jnp.asarray(6e-4), samples=64)
     ax = impact_forces(history)
     contact = points(ax, "roller-bar contact force $Q_{cw}$")
     np.testing.assert_allclose(contact[:, 1], history.contact_force)
@@ -217,7 +217,7 @@ def test_impact_history():
 
 
 def test_load_bars():
-    shared = load_distribution(jc.nu2310())
+    shared = load_distribution(jc.bearing.nu2310())
     ax = load_bars(shared)
     bars = [p for p in ax.patches if isinstance(p, Rectangle)]
     assert len(bars) == 13

@@ -79,7 +79,7 @@ def test_restitution_of_the_reference_is_that_of_a_bounce():
 
 def test_pulses_of_rollers():
     """At 27500 rpm they overlap."""
-    model = jc.replace(jc.case("1a"), impact=jc.RollerPassImpact(jc.PocketImpact()))
+    model = jc.replace(jc.case("1a"), impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))
     phases = np.linspace(0, 2 * np.pi / 13, 50)
     force = eqx.filter_jit(lambda speed: jax.vmap(model.cage_at(speed).impact_force)(phases))
     for speed in (300.0, 2880.0):
@@ -90,7 +90,9 @@ def test_pulses_of_rollers():
 
 OSCILLATOR = {"contact_stiffness": 2e8, "bar_stiffness": 2.5e6, "bar_mass": 4e-3, "approach_ratio": 0.45}
 LIMITS = {
-    name: (info.lower, info.upper) for name, info in jc.parameter_info(jc.PocketImpact()).items() if name in OSCILLATOR
+    name: (info.lower, info.upper)
+    for name, info in jc.parameter_info(jc.forces.PocketImpact()).items()
+    if name in OSCILLATOR
 }
 spectrum = eqx.filter_jit(pulse_spectrum)
 
@@ -112,7 +114,7 @@ spectrum = eqx.filter_jit(pulse_spectrum)
 def test_spectrum_of_a_pulse_at_the_ends_of_the_ranges(changed):
     given = {"roller_mass": 0.0423, "pocket_clearance": 3e-4, "omega": 1000.0, **OSCILLATOR, **changed}
     oscillator, omega, clearance = {name: given[name] for name in OSCILLATOR}, given["omega"], given["pocket_clearance"]
-    law, mass = jc.RollerPassImpact(jc.PocketImpact(**oscillator), harmonics=128), given["roller_mass"]
+    law, mass = jc.forces.RollerPassImpact(jc.forces.PocketImpact(**oscillator), harmonics=128), given["roller_mass"]
     cosine, sine = map(np.asarray, spectrum(law, jnp.asarray(omega), 13, jnp.asarray(mass), jnp.asarray(clearance)))
     waves = 13 * omega * np.arange(129)
     speed = oscillator["approach_ratio"] * omega * clearance

@@ -43,7 +43,7 @@ def test_names_are_there_without_having_been_used():
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    assert len(offered) > 100
+    assert 35 <= len(offered) <= 60, "the top holds what most scripts need; the layers hold the rest"
     assert set(run("import jaxcage; print(*dir(jaxcage), sep='\\n')")) >= offered | {"orbits", "keep_compiled_programs"}
     assert run("import jaxcage as jc; print(jc.orbits.branch is jc.branch)") == ["True"]
 

@@ -43,7 +43,7 @@ OSCILLATOR = jc.ForcedOscillator(Duffing(jnp.array(0.1), jnp.array(1.0)), coordi
 SPEEDS, CUBICS = np.linspace(1.1, 1.9, 9), np.array([0.5, 1.0, 1.5, -4.0])
 LENGTH: dict[str, Any] = {"discard": 40, "revolutions": 40, "blocks": 4, "method": jc.method("rodas4", steps=32)}
 OPTIONS: dict[str, Any] = {**LENGTH, "starts": 2, "lanes": 12}
-VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": jc.Tolerance(0.1, 0.02)}
+VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": jc.studies.Tolerance(0.1, 0.02)}
 
 
 def duffing_study(store: Path, **more: Any) -> xr.Dataset:
@@ -296,7 +296,7 @@ def test_chunks_cover_every_lane_once(shape: tuple[int, ...], lanes: int):
 def test_samples_fill_their_distributions():
     """A Sobol sequence has one point in each of n equal parts, of every parameter; a tolerance is a normal distribution
     cut off at three standard deviations."""
-    sampled = {"a": jc.Between(2.0, 6.0), "b": jc.Tolerance(10.0, 0.3)}
+    sampled = {"a": jc.studies.Between(2.0, 6.0), "b": jc.studies.Tolerance(10.0, 0.3)}
     first, again, other = (Plan({}, sampled, 256, seed, 1).cloud for seed in (0, 0, 1))
     assert all(np.array_equal(first[name], again[name]) for name in sampled)
     assert not np.array_equal(first["a"], other["a"])
@@ -310,10 +310,10 @@ def test_samples_fill_their_distributions():
 @pytest.mark.parametrize(
     "make, words",
     [
-        (lambda: jc.Between(2.0, 2.0), "must ascend"),
-        (lambda: jc.Between(2.0, math.inf), "must ascend"),
-        (lambda: jc.Tolerance(1.0, 0.0), "above 0"),
-        (lambda: jc.Tolerance(math.nan, 1.0), "above 0"),
+        (lambda: jc.studies.Between(2.0, 2.0), "must ascend"),
+        (lambda: jc.studies.Between(2.0, math.inf), "must ascend"),
+        (lambda: jc.studies.Tolerance(1.0, 0.0), "above 0"),
+        (lambda: jc.studies.Tolerance(math.nan, 1.0), "above 0"),
     ],
 )
 def test_impossible_distributions_are_refused(make: Any, words: str):
@@ -335,7 +335,7 @@ def test_designs_of_a_cage_by_name():
             model,
             guidance_gap=values["guidance_gap"][i],
             land_width=values["land_width"][i],
-            lubricant=jc.vg(values["oil"][i], model.lubricant.temperature),
+            lubricant=jc.bearing.vg(values["oil"][i], model.lubricant.temperature),
         )
         mine = jax.tree.map(lambda x, i=i: x[i] if eqx.is_array(x) else x, many)
         for name, value in jc.parameters(one).items():

@@ -131,7 +131,7 @@ def test_map_of_a_system_agrees_with_a_sweep():
     make = lambda force: jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)
     speeds, forces = np.linspace(0.9, 1.4, 9), np.linspace(4.0, 8.0, 8)
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rodas4", steps=32))
-    pictures: list[jc.LabelMap] = []
+    pictures: list[jc.studies.LabelMap] = []
     found = jc.label_map(
         make(7.5), {"speed": speeds}, {"force": forces}, starts=2, first=4, report=pictures.append, **length
     )

@@ -98,7 +98,7 @@ def test_text_and_data_stand_out_from_the_paper(style: str):
 def example() -> Figure:
     """One figure with every kind of artist that the house style uses."""
     figure = new_figure(5.0, 3.0)
-    ax = load_bars(jc.load_distribution(jc.nu2310(), 4450.0), figure.subplots())
+    ax = load_bars(jc.bearing.load_distribution(jc.bearing.nu2310(), 4450.0), figure.subplots())
     ax.axvspan(-20, 20, color=ZONE)
     ax.plot([-90, 90], [100, 800], color=lighter(BLUE), path_effects=[Halo(3.0)], label="line")
     ax.plot([0], [500], "o", color=BLACK, markerfacecolor="white")

@@ -199,7 +199,7 @@ def test_replace_by_name():
         jc.replace(model, **{"film.model": "half"})
 
 
-class Decay(jc.AbstractForcedSystem):
+class Decay(jc.models.AbstractForcedSystem):
     """It falls to zero from where it starts, its farthest point."""
 
     @property

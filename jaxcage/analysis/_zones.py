@@ -2,15 +2,17 @@
 
 Two kinds of edge are never mixed. A **chaotic edge** is the end of a run of chaotic speeds, after windows narrower than
 a stated width are closed: it is statistical, and no more certain than the grid. Chaos that lasts beyond the horizon of
-the sweep and chaos that dies out before it make zones of their own. A **synchronous-loss edge** is where
-the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
+the sweep and chaos that dies out before it make zones of their own; between these an edge is no more certain than the
+mean lives next to it, which may be on either side of the horizon within their errors. A **synchronous-loss edge** is
+where the stable period-1 orbit appears or disappears; a sweep only brackets it between two neighbouring speeds.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from .._notebook import notebook_html
 from ._sweep import Sweep
@@ -115,29 +117,45 @@ def close_windows(
     return joined
 
 
-def _edge(rpm: np.ndarray, known: np.ndarray, inner: int, step: int, kind: str) -> Edge | None:
+class _Speeds(NamedTuple):
+    """What is known at the speeds of a sweep about one kind of zone."""
+
+    known: Bool[np.ndarray, " speeds"]
+    """Whether a speed is inside or outside; false for a gap."""
+    undecided: Bool[np.ndarray, " speeds"]
+    """Known, but the other is possible too."""
+    share: Float[np.ndarray, " speeds"]
+    """Share of the starts that do what the zone is named for."""
+
+
+def _edge(rpm: np.ndarray, at: _Speeds, inner: int, step: int, kind: str) -> Edge | None:
     """The edge between the zone's end at `inner` and the first speed beyond it of which something is known."""
-    outer = inner + step
-    while 0 <= outer < rpm.size and not known[outer]:
-        outer += step
+    outer = _first(at.known, inner + step, step)
     if not 0 <= outer < rpm.size:
         return None
-    apart = abs(float(rpm[outer] - rpm[inner]))
-    return Edge((float(rpm[inner]) + float(rpm[outer])) / 2, apart, kind)
+    speed = (float(rpm[inner]) + float(rpm[outer])) / 2
+    sure = (_first(~at.undecided, inner, -step), _first(~at.undecided, outer, step))
+    reach = max(abs(float(rpm[min(max(i, 0), rpm.size - 1)]) - speed) for i in sure)
+    return Edge(speed, max(abs(float(rpm[outer] - rpm[inner])), reach), kind)
 
 
-def _zones(
-    sweep: Sweep, known: np.ndarray, share: np.ndarray, spans: Sequence[tuple[int, int]], kind: str
-) -> tuple[Zone, ...]:
-    edge: Callable[[int, int], Edge | None] = lambda i, step: _edge(sweep.rpm, known, i, step, kind)
-    restless = sweep.restless if kind != "synchronous-loss" and sweep.escape is not None else None
+def _first(mask: Bool[np.ndarray, " speeds"], index: int, step: int) -> int:
+    """The first true value from `index` on, by steps; beyond the ends if there is none."""
+    while 0 <= index < mask.size and not mask[index]:
+        index += step
+    return index
+
+
+def _zones(sweep: Sweep, at: _Speeds, spans: Sequence[tuple[int, int]], kind: str) -> tuple[Zone, ...]:
+    followed = kind != "synchronous-loss" and sweep.escape is not None
+    restless = sweep.restless
     return tuple(
         Zone(
             kind,
-            edge(a, -1),
-            edge(b, 1),
-            float(np.nanmean(share[a : b + 1])),
-            None if restless is None else _life(sweep, restless, a, b),
+            _edge(sweep.rpm, at, a, -1, kind),
+            _edge(sweep.rpm, at, b, 1, kind),
+            float(np.nanmean(at.share[a : b + 1])),
+            _life(sweep, restless, a, b) if followed else None,
         )
         for a, b in spans
     )
@@ -159,20 +177,34 @@ def zones(sweep: Sweep, close_below_rpm: float = CLOSE_BELOW_RPM) -> Zones:
 
     **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm].
 
-    **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty.
+    **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty, or the
+    distance to the first speed on either side at which the interval of the mean life (95 %) leaves the horizon out.
     """
     label = sweep.label
     lasting = sweep.lasting
-    transient = sweep.restless & ~lasting
+    restless = sweep.restless
     sound = np.all(~sweep.failed, axis=1)
     synchronous = np.asarray(np.any(label == "periodic-1", axis=1))
     share_1 = np.mean(label == "periodic-1", axis=1)
+    chaos = _Speeds(restless | sound, _undecided(sweep, restless), sweep.chaotic_share)
     between = lambda chaotic: close_windows(sweep.rpm, chaotic, close_below_rpm)
     return Zones(
-        _zones(sweep, lasting | sound, sweep.chaotic_share, between(lasting), "chaotic"),
-        _zones(sweep, synchronous | sound, share_1, runs(synchronous), "synchronous-loss"),
+        _zones(sweep, chaos, between(lasting), "chaotic"),
+        _zones(
+            sweep, _Speeds(synchronous | sound, np.zeros_like(sound), share_1), runs(synchronous), "synchronous-loss"
+        ),
         sweep.resolution_rpm,
         close_below_rpm,
-        _zones(sweep, transient | sound, sweep.chaotic_share, runs(transient), "transient"),
+        _zones(sweep, chaos, runs(restless & ~lasting), "transient"),
         sweep.horizon,
     )
+
+
+def _undecided(sweep: Sweep, restless: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
+    """Speeds at which lanes left chaos, after a mean life that may be on either side of the horizon."""
+    undecided = np.zeros_like(restless)
+    if sweep.escape is not None:
+        for i in np.flatnonzero(restless).tolist():
+            lives = sweep.survival(i)
+            undecided[i] = lives.escapes > 0 and lives.interval[0] < sweep.horizon <= lives.interval[1]
+    return undecided

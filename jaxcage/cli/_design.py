@@ -140,7 +140,7 @@ def chaotic_rpm(found: Sweep) -> float:
 
 
 def price(model: CageModel) -> float:
-    """Manufacturing cost, in units of `jaxcage.cost`."""
+    """Manufacturing cost, in units of `jaxcage.design.cost`."""
     return float(cost().function(model))
 
 

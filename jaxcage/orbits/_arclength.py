@@ -54,13 +54,6 @@ class OnPlane(AbstractEquations):
     at: Float[Array, " n"]
     normal: Float[Array, " n"]
 
-    def prepare(self, u: Array, given: Any) -> Any:
-        return self.curve.prepare(u, given)
-
-    def residual(self, u: Array, prepared: Any) -> tuple[Array, Any]:
-        r, aux = self.curve.residual(u, prepared)
-        return jnp.append(r, jnp.dot(self.normal, u - self.at)), aux
-
     def linearised(self, u: Array, given: Any) -> tuple[Array, Array, Any]:
         r, jacobian, aux = self.curve.linearised(u, given)
         off = jnp.dot(self.normal, u - self.at)

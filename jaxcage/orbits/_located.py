@@ -28,8 +28,8 @@ by rounding, or by what Newton's method left."""
 HALVINGS, APART = 20, 1e-7
 """A step is halved so often, and not below this length in the unknowns' units."""
 NEARLY = 0.1
-"""By this part of what a function changes over the steps beside an extremum a parabola through three points may be wrong
-there."""
+"""A parabola through three points may be wrong about an extremum by this part of what the function changes over the
+steps beside it, and about its place by this part of a step."""
 UNEXPLAINED = "unexplained"
 
 
@@ -121,7 +121,8 @@ def dips(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " s
     change = np.abs(np.diff(f))
     nearly = NEARLY * np.minimum(change[:, :-1], change[:, 1:])
     found = set()
-    for first, inside in enumerate([(-back < place) & (place < 0), (0 < place) & (place < ahead)]):
+    before, after = (-back < place) & (place < NEARLY * ahead), (-NEARLY * back < place) & (place < ahead)
+    for first, inside in enumerate([before, after]):
         one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
         twice = inside & (one * other > 0) & (extreme * np.sign(one) < nearly)
         found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}

@@ -1,7 +1,6 @@
 """Why a chaotic zone ends where it does: statistical edges matched with bifurcations and cascade limits."""
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -30,7 +29,9 @@ class Explained:
 def explain(
     zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
 ) -> Explained:
-    """Give each chaotic edge the mechanism it coincides with, within its uncertainty.
+    """Give each chaotic edge the mechanism it coincides with, within its uncertainty and the resolution of the sweep.
+
+    A bar that is wider than that, for mean lives near the horizon or failed lanes, coincides with anything.
 
     An onset can be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations themselves are
     tried first, then the limits of the cascades that begin at period doublings on the calm side.
@@ -42,7 +43,8 @@ def explain(
     for number, zone in enumerate(zones.zones, start=1):
         ends = {}
         for end, edge, calm in (("onset", zone.onset, -1), ("exit", zone.exit, 1)):
-            source = None if edge is None else _source(edge, calm, found, system, method)
+            near = 0.0 if edge is None else min(edge.uncertainty_rpm, zones.resolution_rpm)
+            source = None if edge is None else _source(edge.speed_rpm, near, calm, found, system, method)
             if edge is not None and source is not None:
                 sources[f"zone {number} {end}"] = source
                 edge = _taken(edge, source)
@@ -52,27 +54,28 @@ def explain(
 
 
 def _source(
-    edge: Edge, calm: int, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None
+    rpm: float,
+    near: float,
+    calm: int,
+    found: SynchronousOrbits,
+    system: AbstractForcedSystem,
+    method: AbstractMethod | None,
 ) -> SpecialPoint | Cascade | None:
+    """What lies within `near` of an edge at `rpm`, whose calm side is above or below it."""
     ends = [s.upper if calm < 0 else s.lower for s in found.stretches]
     points = [p for p in ends if p is not None]
-    away = lambda p: abs(p.speed_rpm - edge.speed_rpm)
-    here = [p for p in points if away(p) <= edge.uncertainty_rpm + np.nan_to_num(p.error_rpm)]
+    away = lambda p: abs(p.speed_rpm - rpm)
+    here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
     if here:
         return min(here, key=away)
-    beyond = lambda p: 0 < calm * (p.speed_rpm - edge.speed_rpm) <= CASCADE_REACH_RPM
-    return _cascade_at(edge, [p for p in points if p.kind == "period-doubling" and beyond(p)], system, method)
-
-
-def _cascade_at(
-    edge: Edge, doublings: Sequence[SpecialPoint], system: AbstractForcedSystem, method: AbstractMethod | None
-) -> Cascade | None:
+    beyond = lambda p: 0 < calm * (p.speed_rpm - rpm) <= CASCADE_REACH_RPM
+    doublings = [p for p in points if p.kind == "period-doubling" and beyond(p)]
     reach = 2 * CASCADE_REACH_RPM * np.pi / 30
-    for point in sorted(doublings, key=lambda p: abs(p.speed_rpm - edge.speed_rpm)):
+    for point in sorted(doublings, key=away):
         tried = cascade(
             system, point, lower=point.speed - reach, upper=point.speed + reach, levels=CASCADE_LEVELS, method=method
         )
-        if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - edge.speed_rpm) <= edge.uncertainty_rpm:
+        if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - rpm) <= near:
             return tried
     return None
 

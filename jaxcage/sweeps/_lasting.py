@@ -77,7 +77,7 @@ def follow(
         end = late[: stage.stop, active].T
         calm[active] = calm_at_the_end(strobe, scale[active], end, LIFE_BLOCK)
         closed = closing_period(strobe, scale[active]) > 0
-        still = np.all(end[:, -CONFIRM:] <= calm_threshold(LIFE_BLOCK), axis=1) & (stage.stop >= CONFIRM)
+        still = np.all(end[:, -CONFIRM:] <= calm_threshold(LIFE_BLOCK), axis=1)
         active = active[~(closed & still) & (new.outcome == 0)]
     failed = np.asarray(seen.outcome) != 0
     times, end = escape_times(np.concatenate([early, late]).T, calm, LIFE_BLOCK, failed=failed)

@@ -43,10 +43,10 @@ def random_model(seed: int, wide: bool = False) -> CageModel:
     rng = np.random.default_rng([seed, wide])
     model = jc.case("1a")
     if rng.random() < 0.25:
-        rib = jc.ElasticRib(mass=1.0, stiffness=5e7, damping=500.0, cubic_stiffness=1e13)
+        rib = jc.forces.ElasticRib(mass=1.0, stiffness=5e7, damping=500.0, cubic_stiffness=1e13)
         model = jc.replace(model, rib=rib)
     if rng.random() < 0.25:
-        model = jc.replace(model, impact=jc.RollerPassImpact(jc.PocketImpact()))
+        model = jc.replace(model, impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))
     model = jc.replace(model, **{name: options[rng.integers(len(options))] for name, options in CHOICES.items()})
     drawn = (_wide if wide else _narrow)(rng, model)
     size = math.exp(rng.uniform(-1, 1) * math.log(FACTOR if wide else 1.5))
