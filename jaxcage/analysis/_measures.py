@@ -14,8 +14,9 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._notebook import notebook_html
+from ..forces import Force
 from ..integrate import Trajectory
-from ..models import CageForces, CageModel
+from ..models import FORCES, CageModel
 
 
 BATCH = 256
@@ -44,7 +45,7 @@ def relative_state(
 @eqx.filter_jit
 def _forces_at_one_speed(
     model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
-) -> CageForces:
+) -> dict[str, Force]:
     cage = model.cage_at(speed)
     return jax.vmap(lambda t, m: cage.forces(t, *m))(tau, motion)
 
@@ -55,8 +56,8 @@ def _forces(
     speed: Float[Array, " n"],
     tau: Float[Array, " n"],
     motion: Float[Array, "n 4"],
-) -> CageForces:
-    def at(sample: tuple[Array, Array, Array]) -> CageForces:
+) -> dict[str, Force]:
+    def at(sample: tuple[Array, Array, Array]) -> dict[str, Force]:
         omega, t, m = sample
         return model.cage_at(omega).forces(t, *m)
 
@@ -66,8 +67,8 @@ def _forces(
 def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, "n 2"]]:
     """Every force on the cage along a trajectory of `model`.
 
-    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance` and `weight`, each
-    (F_x, F_y) [N] at every sample, at the speed of that sample.
+    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance`, `weight` and those of the model's `extra`
+    by the names of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
     require_x64()
     position, velocity = relative_state(model, trajectory.state)
@@ -77,7 +78,8 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
         forces = _forces_at_one_speed(model, speed[0], tau, motion)
     else:
         forces = _forces(model, speed, tau, motion)
-    return {name: np.stack(pair, axis=1) for name, pair in forces._asdict().items()}
+    names = (*FORCES, *(n for n in forces if n not in FORCES))
+    return {name: np.stack(forces[name][:2], axis=1) for name in names}
 
 
 def film_drag_power(

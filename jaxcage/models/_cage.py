@@ -14,6 +14,7 @@ from .._parameters import choice, parameter
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
 from ..forces import (
+    AbstractForce,
     ElasticRib,
     LandContact,
     RibFilm,
@@ -63,8 +64,23 @@ class CageModel(AbstractForcedSystem):
     unbalance: UnbalanceReading = choice(
         "physical", "as_printed", text="eccentricity as given, or as (20) prints it", default="physical"
     )
+    extra: tuple[AbstractForce, ...] = ()
+    """Forces of one's own between land and cage, each a `jaxcage.forces.AbstractForce`."""
 
     def __check_init__(self) -> None:
+        for name, kinds in PARTS.items():
+            part = getattr(self, name)
+            if isinstance(part, eqx.Module) and type(part) not in kinds:
+                wanted = " or ".join(f"`{kind.__name__}`" for kind in kinds)
+                raise ValueError(
+                    f"Argument `{name}` must be a {wanted}, but is a `{type(part).__name__}`; a force of your own goes "
+                    "into `extra`."
+                )
+        if not isinstance(self.extra, tuple) or not all(isinstance(law, AbstractForce) for law in self.extra):
+            raise ValueError(
+                "Argument `extra` must be a tuple of `jaxcage.forces.AbstractForce`s, but "
+                f"{[type(law).__name__ for law in self.extra]} was given."
+            )
         clearance = self.clearance
         for name, length in (("contact", self.contact.smoothing), ("film", self.film.smoothing)):
             if is_concrete(length, clearance) and np.any(np.asarray(length) > SMOOTHEST * np.asarray(clearance)):
@@ -128,6 +144,16 @@ class CageModel(AbstractForcedSystem):
         eps, growth = jax.jvp(lambda *y: jnp.asarray(self.excursion(y)), y, rate)
         width = ONSET_WIDTH * self.contact.smoothing / self.clearance
         return smooth_norm(eps - self.contact.onset, 0.0, width), jnp.abs(growth)
+
+
+PARTS: dict[str, tuple[type, ...]] = {
+    "film": (RibFilm,),
+    "contact": (LandContact,),
+    "support": (Support,),
+    "impact": (SynchronousImpact, RollerPassImpact),
+    "rib": (RigidRib, ElasticRib),
+}
+"""Kinds of each part that a cage knows how to use."""
 
 
 def _worst(length: Scalar | Array, clearance: Scalar | Array) -> tuple[float, float]:
