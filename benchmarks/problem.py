@@ -118,8 +118,8 @@ def constants(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
     film, contact, support, impact = (cage.law(name) for name in ("film", "contact", "support", "impact"))
     law, land = model.support, cage.land
     plain = model.film.model == "fixed_half" and law.cross == "circulatory" and not np.any(film.supply_scale)
-    if not plain or not isinstance(impact, jc.forces.SynchronousForce):
-        raise ValueError("The rivals know no film, coupling and impact but those of the published cases.")
+    if not plain or model.extra or not isinstance(impact, jc.forces.SynchronousForce):
+        raise ValueError("The rivals know no film, coupling, impact and forces but those of the published cases.")
     c, w, mass = land.clearance, cage.speed, cage.mass
     inertia = mass * w * w
     columns = (

@@ -70,6 +70,22 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
     **Returns:** `film`, `contact`, `support`, `impact`, `unbalance`, `weight` and those of the model's `extra`
     by the names of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
+    return {name: np.stack(force[:2], axis=1) for name, force in _along(model, trajectory).items()}
+
+
+def cage_moments(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, " n"]]:
+    """The moment of every force on the cage about its centre along a trajectory of `model`, counter-clockwise.
+
+    The cage turns at a speed that is given: moments enter no equation of motion. A moment times the speed is the power
+    that it gives the cage, for the film minus that of `film_drag_power`.
+
+    **Returns:** moments [N m] at every sample, by the names of `cage_forces`.
+    """
+    return {name: np.broadcast_to(force[2], len(trajectory.tau)) for name, force in _along(model, trajectory).items()}
+
+
+def _along(model: CageModel, trajectory: Trajectory) -> dict[str, Force]:
+    """Every force and moment at each sample."""
     require_x64()
     position, velocity = relative_state(model, trajectory.state)
     motion = jax.numpy.asarray(np.concatenate([position, velocity], axis=1))
@@ -78,8 +94,8 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
         forces = _forces_at_one_speed(model, speed[0], tau, motion)
     else:
         forces = _forces(model, speed, tau, motion)
-    names = (*FORCES, *(n for n in forces if n not in FORCES))
-    return {name: np.stack(forces[name][:2], axis=1) for name in names}
+    names = (*FORCES, *(type(law).__name__ for law in model.extra))
+    return {name: forces[name] for name in names}  # programs return a dictionary sorted
 
 
 def film_drag_power(

@@ -22,6 +22,7 @@
 Frame: x to the right, y up, rotation positive counter-clockwise; forces act on the cage.
 """
 
+from .._parameters import choice as choice, count as count, parameter as parameter
 from ._contact import (
     ContactForce as ContactForce,
     LandContact as LandContact,
@@ -59,7 +60,13 @@ from ._impact_forcing import (
 )
 from ._land import Land as Land
 from ._land_film import FilmForce as FilmForce, RibFilm as RibFilm
-from ._motion import AbstractForce as AbstractForce, Force as Force, Motion as Motion, Rows as Rows
+from ._motion import (
+    AbstractForce as AbstractForce,
+    AbstractForcing as AbstractForcing,
+    Force as Force,
+    Motion as Motion,
+    Rows as Rows,
+)
 from ._pocket_impact import (
     ImpactHistory as ImpactHistory,
     PocketImpact as PocketImpact,

@@ -5,7 +5,7 @@ declared by a module of parameters that has `at(cage, speed)`, which works these
 """
 
 import abc
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -15,7 +15,11 @@ from ._land import Land, Place
 
 
 Force = tuple[Scalar, Scalar, Scalar]
-"""(F_x, F_y, moment) on the cage [N, N, N m], the moment about its centre and counter-clockwise."""
+"""(F_x, F_y, moment) on the cage [N, N, N m], the moment about its centre and counter-clockwise.
+
+The cage turns at a speed that is given: moments do not change its motion. They are reported
+(`jaxcage.analysis.cage_moments`), and times the speed they are the power that drives the cage.
+"""
 Rows = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
 """A 2 x 2 matrix, e.g. of the derivatives of (F_x, F_y)."""
 
@@ -24,7 +28,7 @@ class Motion(NamedTuple):
     """How the cage moves, relative to the land that guides it."""
 
     phase: Scalar
-    """Angle of the cage [rad]."""
+    """Angle of the cage [rad]; what depends on it must repeat with every turn."""
     x: Scalar
     """Position of its centre [m]."""
     y: Scalar
@@ -46,6 +50,7 @@ class Motion(NamedTuple):
         return self.land.place(self.x, self.y, self.vx, self.vy)
 
 
+@runtime_checkable
 class GuidedCage(Protocol):
     """What the laws ask of a cage."""
 
@@ -63,7 +68,25 @@ class GuidedCage(Protocol):
 
 
 class AbstractForce(eqx.Module):
-    """A force on the cage."""
+    """A force between land and cage: an elastic rib feels its opposite.
+
+    Numbers of a law are fields: declared with `jaxcage.forces.parameter`, with unit, range and words; or plain ones,
+    `coefficient: float`, parameters as well but of unknown unit. What is no parameter is a static field.
+
+    !!! example
+        class ViscousDrag(jc.forces.AbstractForce):
+            coefficient: float
+
+            def force(self, motion):
+                return -self.coefficient * motion.vx, -self.coefficient * motion.vy, 0.0
+
+        model = jc.CageModel(..., extra=(ViscousDrag(3.0),))
+    """
+
+    @property
+    def harmonics(self) -> int:
+        """The highest harmonic of the phase in the force, a static number: no step is longer than half its period."""
+        return 1
 
     @abc.abstractmethod
     def force(self, motion: Motion) -> Force:
@@ -89,7 +112,7 @@ class AbstractForce(eqx.Module):
 
 
 class AbstractForcing(AbstractForce):
-    """A force that the phase alone decides."""
+    """A force that the phase alone decides; it does not react on the rib."""
 
     def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
         none = ((0.0, 0.0), (0.0, 0.0))

@@ -3,10 +3,12 @@
 from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
+import jax.numpy as jnp
 
 from .._types import Scalar, State
 from ..forces import (
     AbstractForce,
+    AbstractForcing,
     ElasticRib,
     Force,
     Land,
@@ -54,7 +56,7 @@ class CageAtSpeed(eqx.Module):
             WeightForce(mass * model.gravity),
             *model.extra,
         )
-        names = (*FORCES, *own_names(model.extra))
+        names = (*FORCES, *(type(law).__name__ for law in model.extra))
         c, contact = model.clearance, model.contact
         land = Land(c, 1 / c, contact.onset, contact.smoothing / c, model.film.smoothing / c)
         return cls(laws, names, land, mass, speed, model.bearing.shaft_speed(speed))
@@ -70,7 +72,13 @@ class CageAtSpeed(eqx.Module):
     def forces(self, tau: Scalar, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> dict[str, Force]:
         """Every force on the cage by name, as (F_x, F_y, moment) [N, N, N m]."""
         motion = self.motion(tau, x, y, vx, vy)
-        return {name: law.force(motion) for name, law in zip(self.names, self.laws, strict=True)}
+        return {name: _force(name, law, motion) for name, law in zip(self.names, self.laws, strict=True)}
+
+    @property
+    def on_land(self) -> tuple[str, ...]:
+        """Names of the forces between land and cage."""
+        own = zip(self.names[len(FORCES) :], self.laws[len(FORCES) :], strict=True)
+        return (*ON_LAND, *(name for name, law in own if not isinstance(law, AbstractForcing)))
 
     def slopes(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Rows, Rows] | None:
         """Derivatives of the whole force with respect to position [N/m] and velocity [N s/m], as rows.
@@ -86,14 +94,12 @@ class CageAtSpeed(eqx.Module):
         return _sum(of_q), _sum(of_v)
 
 
-def own_names(laws: tuple[AbstractForce, ...]) -> list[str]:
-    """Names of forces of one's own: those of their classes, with a number from the second of a kind on."""
-    names: list[str] = []
-    for law in laws:
-        name = type(law).__name__
-        before = sum(n.split(" ")[0] == name for n in names)
-        names.append(f"{name} {before + 1}" if before else name)
-    return names
+def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
+    """**Raises:** `ValueError` for a law of one's own that returns something else than three numbers."""
+    force = law.force(motion)
+    if not isinstance(force, tuple) or [jnp.shape(part) for part in force] != [(), (), ()]:
+        raise ValueError(f"Force `{name}` must return (F_x, F_y, moment), three numbers, but returned {force}.")
+    return force
 
 
 def _sum(matrices: tuple[Rows, ...]) -> Rows:
@@ -124,7 +130,7 @@ class RigidRibLaw(eqx.Module):
 
 
 class ElasticRibLaw(eqx.Module):
-    """Acceleration of cage and rib: film, contact and support act on their difference and react on the rib."""
+    """Acceleration of cage and rib: forces between land and cage act on their difference and react on the rib."""
 
     cage: CageAtSpeed
     rib: ElasticRib
@@ -137,5 +143,5 @@ class ElasticRibLaw(eqx.Module):
         held = rib_force(xo, yo, uo, wo, rib.stiffness, rib.damping, rib.cubic_stiffness)
         down = weight(rib.mass, self.gravity)
         on_cage = [sum(p[i] for p in f.values()) for i in (0, 1)]
-        on_rib = [held[i] + down[i] - sum(f[name][i] for name in ON_LAND) for i in (0, 1)]
+        on_rib = [held[i] + down[i] - sum(f[name][i] for name in self.cage.on_land) for i in (0, 1)]
         return (*(c / self.cage.mass for c in on_cage), *(c / rib.mass for c in on_rib))

@@ -12,7 +12,7 @@ from ._cage import CageModel
 
 
 def dimensionless_groups(model: CageModel, speed: Scalar) -> dict[str, Array]:
-    """The groups that decide the motion, at cage speed `speed` [rad/s].
+    """The groups that decide the motion, at cage speed `speed` [rad/s]; those of the model's `extra` come on top.
 
     **Returns:** by name: e/c, omega sqrt(c/g), load number W c^2/(mu omega R L^3) of all lands together,
     K_s/(M omega^2), B_s/(M omega), K_3 c^2/(M omega^2), and for a synchronous impact A/(M c omega^2).

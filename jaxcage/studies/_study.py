@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
 from ..integrate import AbstractMethod
@@ -195,14 +196,19 @@ def _start_and_scale(
 
 
 def _described(system: AbstractForcedSystem) -> Any:
-    """The configuration of a cage; of another system its numbers, and the text of its functions."""
+    """The configuration of a cage, with its user's forces; of another system its numbers, and the text of its functions."""
     if isinstance(system, CageModel):
         from ..io import configuration  # the core does not load the tables of `io`
 
-        return configuration(system)
-    leaves = jax.tree.leaves(system)
+        own = {type(law).__name__: [*_numbers_and_text(law), _text(type(law))] for law in system.extra}
+        return configuration(replace(system, extra=())) | ({"extra": own} if own else {})
+    return _numbers_and_text(system)
+
+
+def _numbers_and_text(module: eqx.Module) -> list[Any]:
+    leaves = jax.tree.leaves(module)
     numbers = [np.asarray(x).tolist() for x in leaves if eqx.is_array_like(x)]
-    return [str(jax.tree.structure(system)), numbers, [_text(x) for x in leaves if callable(x)]]
+    return [str(jax.tree.structure(module)), numbers, [_text(x) for x in leaves if callable(x)]]
 
 
 def _text(f: Callable[..., Any]) -> str:
