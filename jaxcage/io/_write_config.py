@@ -19,7 +19,7 @@ def configuration(model: CageModel) -> dict[str, Any]:
     """
     if model.extra:
         names = ", ".join(type(law).__name__ for law in model.extra)
-        raise ConfigError(f"Argument `model` must have no forces of your own to be written down, but has {names}.")
+        raise ConfigError(f"Argument `model` must have no forces of your own to be put into a file, but has {names}.")
     return _table(model)
 
 
