@@ -76,7 +76,7 @@ Declared = tuple[tuple[str, ...], dataclasses.Field]
 def walk(module: eqx.Module) -> tuple[Declared, ...]:
     """Every declared field below `module`, depth first, and the plain numbers of modules in `extra`."""
     leaves, structure = jax.tree.flatten(module)
-    return _declared(structure, tuple(eqx.is_inexact_array_like(leaf) for leaf in leaves))
+    return _declared(structure, tuple(eqx.is_inexact_array(leaf) for leaf in leaves))
 
 
 @functools.lru_cache(maxsize=256)

@@ -34,7 +34,8 @@ SEEN_BY = {
 }
 CYCLES = {
     "kinds of motion": tuple(KIND_COLOURS.values()),
-    "forces": (*FORCE_COLOURS.values(), *OWN_COLOURS),
+    "forces": tuple(FORCE_COLOURS.values()),
+    "forces of one's own": OWN_COLOURS,
     "kinds of bifurcation": tuple(mark.colour for mark in MARKS.values()),
     "periods": tuple(_PERIOD_COLOURS.values()),
     "edges": tuple(ELASTICITIES),

@@ -120,7 +120,7 @@ def test_readings_of_the_cubic_stiffness():
 def test_dimensionless_cubic_reaches_the_cage():
     given = Support(stiffness_x=3e4, stiffness_y=5e4, damping=0.0, cubic_ratio=2.0, cubic="dimensionless")
     _, cage = cage_with(support=given)
-    assert float(cage.cubic_stiffness) == pytest.approx(2.0 * 4e4 / 0.45e-3**2, rel=1e-13)
+    assert float(cage.law("support").cubic) == pytest.approx(2.0 * 4e4 / 0.45e-3**2, rel=1e-13)
 
 
 def test_elastic_rib_is_held_by_its_own_spring():
