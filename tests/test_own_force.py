@@ -59,7 +59,9 @@ CASE = jc.case("1a", "preliminary")
 SHARE = 1.5
 """Damping [N s/m] that the drag takes over from the support."""
 OWN = jc.replace(CASE, damping=CASE.support.damping - SHARE, extra=(ViscousDrag(SHARE, arm=0.05),))
-SPEED = jc.rpm(9000.0)
+SPEED = jc.rpm(11200.0)
+NEAR = (1.37021e-05, -5.62481e-05, 0.513971, 0.0203827)
+"""A state of the stable orbit there."""
 METHOD = jc.method("rk4", steps=128)
 
 
@@ -91,17 +93,17 @@ def test_a_drag_that_nobody_has_moves_the_cage_as_scipy_says():
 
     start = (1e-4, -5e-5, 0.1, 0.02)
     model = with_extra(QuadraticDrag(coefficient))
-    run = jc.simulate(model, SPEED, revolutions=2, samples=1, start=start, method=jc.method("rk4", steps=1024))
-    exact = solve_ivp(rates, (0, 4 * np.pi), start, method="DOP853", rtol=1e-11, atol=1e-15)
-    free = solve_ivp(field, (0, 4 * np.pi), start, method="DOP853", rtol=1e-11, atol=1e-15)
+    run = jc.simulate(model, SPEED, revolutions=2, samples=8, start=start, method=jc.method("rk4", steps=1024))
+    exact = solve_ivp(rates, (0, run.tau[-1]), start, method="DOP853", rtol=1e-11, atol=1e-15)
+    free = solve_ivp(field, (0, run.tau[-1]), start, method="DOP853", rtol=1e-11, atol=1e-15)
     scale = np.array([float(c) for c in CASE.scale(SPEED)])
     assert np.max(np.abs(run.state[-1] - exact.y[:, -1]) / scale) < 1e-7
     assert np.max(np.abs(free.y[:, -1] - exact.y[:, -1]) / scale) > 1e-3
 
 
 def test_a_sweep_with_a_drag_is_that_with_the_damping():
-    speeds = jc.rpm(9000, 10000, 2)
-    swept = [raw_sweep(m, speeds, discard=10, revolutions=20, blocks=2, method=METHOD) for m in (OWN, CASE)]
+    speeds = jc.rpm(11200, 12000, 2)
+    swept = [raw_sweep(m, speeds, discard=2, revolutions=4, blocks=2, method=METHOD) for m in (OWN, CASE)]
     np.testing.assert_allclose(*(s.exponents for s in swept), atol=1e-9)
     np.testing.assert_allclose(*(s.last / s.scale[:, None] for s in swept), atol=1e-9)
     assert np.min(np.abs(swept[0].exponents)) > 0
@@ -118,7 +120,7 @@ def test_a_force_of_many_harmonics_keeps_the_steps_short():
 
 
 def test_an_orbit_moves_with_a_drag_as_differences_say():
-    orbit = jc.periodic_orbit(OWN, SPEED, method=METHOD)
+    orbit = jc.periodic_orbit(OWN, SPEED, guess=NEAR, method=METHOD)
     assert orbit.converged
 
     def state(coefficient):
@@ -126,7 +128,7 @@ def test_an_orbit_moves_with_a_drag_as_differences_say():
         return jc.periodic_orbit(model, SPEED, guess=orbit, method=METHOD).state
 
     slope = jax.jacfwd(state)(SHARE)
-    differences = (state(SHARE + 1e-3) - state(SHARE - 1e-3)) / 2e-3
+    differences = (state(SHARE + 3e-4) - state(SHARE - 3e-4)) / 6e-4
     np.testing.assert_allclose(slope, differences, atol=1e-6 * float(jnp.max(jnp.abs(slope))))
 
 
@@ -177,8 +179,8 @@ def test_parameters_of_a_force_of_ones_own_have_names():
 
 def test_a_design_space_holds_a_force_of_ones_own():
     value = jc.design.Smooth(lambda m: (m.extra[0].coefficient - 2.0) ** 2)
-    found = jc.optimise(OWN, {"extra.ViscousDrag.coefficient": (0.5, 5.0)}, value)
-    assert float(found.values["extra.ViscousDrag.coefficient"]) == pytest.approx(2.0, abs=1e-3)
+    found = jc.optimise(OWN, {"extra.ViscousDrag.coefficient": (0.5, 5.0)}, value, starts=1).best
+    assert float(found.values["extra.ViscousDrag.coefficient"]) == pytest.approx(2.0, abs=5e-3)
 
 
 def test_a_unit_that_is_none_is_refused_where_it_is_declared():
@@ -240,15 +242,14 @@ def test_no_file_holds_a_force_of_ones_own(tmp_path: Path):
 
 def test_a_study_of_a_force_of_ones_own_knows_its_law_and_numbers(tmp_path: Path):
     """Another number or another text of the law is another study; nothing pretends to be a configuration."""
-    run = lambda model: jc.study(
-        model, {"speed": [SPEED]}, store=tmp_path / "own", discard=1, revolutions=2, method=METHOD, starts=1
-    )
+    brief = {"discard": 1, "revolutions": 2, "blocks": 1, "method": METHOD, "starts": 1}
+    run = lambda model: jc.study(model, {"speed": np.array([SPEED])}, store=tmp_path / "own", **brief)
     assert "configuration" not in run(OWN).attrs
     name = "extra.ViscousDrag.coefficient"
     with pytest.raises(ValueError, match="holds another study, which differs in extra.ViscousDrag"):
         run(jc.replace(OWN, **{name: 2.0}))
-    varied = {"speed": [SPEED], name: [1.0, 2.0]}
-    found = jc.study(OWN, varied, store=tmp_path / "varied", discard=1, revolutions=2, method=METHOD, starts=1)
+    varied = {"speed": np.array([SPEED]), name: np.array([1.0, 2.0])}
+    found = jc.study(OWN, varied, store=tmp_path / "varied", **brief)
     assert found[name].attrs["units"] == "N s/m" and np.ptp(found["peak"].values) > 0
 
 

@@ -22,6 +22,9 @@ from ..models import FORCES, CageModel
 BATCH = 256
 """Samples whose forces are worked out at a time where the speed changes from sample to sample."""
 
+Histories = dict[str, tuple[Array, Array, Array]]
+"""(F_x, F_y, moment) of each force at every sample."""
+
 STILL = 1e-9
 """A centre that moves by less than this part of the clearance, or per radian, stands still."""
 
@@ -45,7 +48,7 @@ def relative_state(
 @eqx.filter_jit
 def _forces_at_one_speed(
     model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
-) -> dict[str, Force]:
+) -> Histories:
     cage = model.cage_at(speed)
     return jax.vmap(lambda t, m: cage.forces(t, *m))(tau, motion)
 
@@ -56,7 +59,7 @@ def _forces(
     speed: Float[Array, " n"],
     tau: Float[Array, " n"],
     motion: Float[Array, "n 4"],
-) -> dict[str, Force]:
+) -> Histories:
     def at(sample: tuple[Array, Array, Array]) -> dict[str, Force]:
         omega, t, m = sample
         return model.cage_at(omega).forces(t, *m)
@@ -84,7 +87,7 @@ def cage_moments(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np
     return {name: np.broadcast_to(force[2], len(trajectory.tau)) for name, force in _along(model, trajectory).items()}
 
 
-def _along(model: CageModel, trajectory: Trajectory) -> dict[str, Force]:
+def _along(model: CageModel, trajectory: Trajectory) -> Histories:
     """Every force and moment at each sample."""
     require_x64()
     position, velocity = relative_state(model, trajectory.state)
