@@ -161,8 +161,8 @@ def unit_dimensions(unit: str) -> dict[str, float]:
 
 
 def parameter_dimensions(module: eqx.Module) -> dict[str, dict[str, float]]:
-    """Exponents of mass, length and time of every differentiable parameter, by name; NaN where its unit is not known."""
-    unknown = dict.fromkeys(("mass", "length", "time"), math.nan)
+    """Exponents of mass, length and time of every differentiable parameter, by name; NaN where the unit is unknown."""
+    unknown = {"mass": math.nan, "length": math.nan, "time": math.nan}
     units = {name: info.unit for name, info in parameter_info(module).items()}
     return {name: unknown if unit == UNKNOWN else unit_dimensions(unit) for name, unit in units.items()}
 
@@ -193,9 +193,7 @@ def replace(module: M, **values: PyTree) -> M:
     """
     leaves, choices = parameter_paths(module), choice_paths(module)
     parts = [
-        f.name
-        for f in dataclasses.fields(module)
-        if f.name == EXTRA or isinstance(getattr(module, f.name), eqx.Module)
+        f.name for f in dataclasses.fields(module) if f.name == EXTRA or isinstance(getattr(module, f.name), eqx.Module)
     ]
     fields = dict(walk(module))
     for name, value in values.items():

@@ -20,6 +20,7 @@ import jaxcage as jc
 from jaxcage.forces import AbstractForce, AbstractForcing, parameter
 from jaxcage.io import ConfigError, configuration, save_model, to_dataset
 from jaxcage.orbits import Located, edge_speed
+from jaxcage.plotting import force_history
 
 
 class ViscousDrag(AbstractForce):
@@ -204,6 +205,15 @@ def test_forces_and_moments_of_a_run_name_it(tmp_path: Path):
     assert not np.any(moments["contact"])
 
 
+def test_a_figure_draws_each_force_of_ones_own_in_a_line_of_its_own():
+    model = with_extra(ViscousDrag(1.0, arm=0.0), Shaker(1.0))
+    run = jc.simulate(model, SPEED, revolutions=1, samples=16, method=METHOD)
+    lines = force_history(run, jc.analysis.cage_forces(model, run)).get_lines()
+    assert [line.get_label() for line in lines] == [*jc.models.FORCES, "ViscousDrag", "Shaker"]
+    assert len({line.get_color() for line in lines}) == len(lines)
+    assert [line.get_linestyle() for line in lines] == ["-"] * len(jc.models.FORCES) + ["--"] * 2
+
+
 def test_equilibrium_knows_a_force_of_ones_own():
     """A force that turns with the cage is left out like the unbalance; one that hides the phase is refused."""
 
@@ -213,7 +223,9 @@ def test_equilibrium_knows_a_force_of_ones_own():
         def force(self, motion):
             return self.newtons, 0.0, 0.0
 
-    class Hidden(Push):
+    class Hidden(AbstractForce):
+        newtons: float
+
         def force(self, motion):
             return self.newtons * jnp.cos(motion.phase), 0.0, 0.0
 
@@ -267,7 +279,7 @@ def test_what_is_not_honoured_is_refused():
         pass
 
     class Two(ViscousDrag):
-        def force(self, motion):
+        def force(self, motion):  # pyright: ignore[reportIncompatibleMethodOverride]
             return motion.vx, motion.vy
 
     drag = ViscousDrag(1.0, arm=0.0)

@@ -19,7 +19,18 @@ from jaxcage.plotting import STYLES, load_bars, new_figure, orbit_diagram, resty
 from jaxcage.plotting._branches import _PERIOD_COLOURS, MARKS
 from jaxcage.plotting._elasticities import _COLOURS as ELASTICITIES
 from jaxcage.plotting._section import _COLOURS as STARTS
-from jaxcage.plotting._style import BLACK, BLUE, FORCE_COLOURS, GREY, KIND_COLOURS, OWN_COLOURS, PAPER, ZONE, Halo, lighter
+from jaxcage.plotting._style import (
+    BLACK,
+    BLUE,
+    FORCE_COLOURS,
+    GREY,
+    KIND_COLOURS,
+    OWN_COLOURS,
+    PAPER,
+    ZONE,
+    Halo,
+    lighter,
+)
 
 
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1.0.

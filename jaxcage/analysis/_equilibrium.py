@@ -184,8 +184,8 @@ def stability_chart(
 def film_whirl_speed(model: CageModel) -> Array:
     """Speed [rad/s] above which the cage would whirl, in its film under its weight alone.
 
-    Support, contact, supply pressure, forcing and forces of one's own are left out: it is the oil-whirl line to lay over
-    a diagram of the full model, for a film of finite length that of its short film. On it
+    Support, contact, supply pressure, forcing and forces of one's own are left out: it is the oil-whirl
+    line to lay over a diagram of the full model, for a film of finite length that of its short film. On it
     omega = threshold(eps) sqrt(g/c), with the load number of the weight at that speed: one equation
     for eps. Differentiable with respect to every parameter.
 

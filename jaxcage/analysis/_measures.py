@@ -50,7 +50,8 @@ def _forces_at_one_speed(
     model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
 ) -> Histories:
     cage = model.cage_at(speed)
-    return jax.vmap(lambda t, m: cage.forces(t, *m))(tau, motion)
+    forces: Any = jax.vmap(lambda t, m: cage.forces(t, *m))  # of many samples, so not `Force` any more
+    return forces(tau, motion)
 
 
 @eqx.filter_jit

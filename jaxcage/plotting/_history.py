@@ -79,8 +79,8 @@ def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axe
     time = shown("time", trajectory.time)
     own = itertools.cycle(OWN_COLOURS)
     for name, force in forces.items():
-        line = {"color": FORCE_COLOURS[name]} if name in FORCE_COLOURS else {"color": next(own), "linestyle": "--"}
-        ax.plot(time, force[:, axis], **line, linewidth=0.9, label=name)
+        colour, line = (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
+        ax.plot(time, force[:, axis], color=colour, linestyle=line, linewidth=0.9, label=name)
     ax.set(
         xlabel=quantity("time").label,
         ylabel=f"{('Horizontal', 'Vertical')[axis]} force [N]",
