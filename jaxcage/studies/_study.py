@@ -197,7 +197,7 @@ def _start_and_scale(
 
 
 def _described(system: AbstractForcedSystem) -> Any:
-    """The configuration of a cage, with its user's forces; of another system its numbers and the text of its functions."""
+    """The configuration of a cage, with its user's forces; of another system its numbers, and its functions' text."""
     if isinstance(system, CageModel):
         from ..io import configuration  # the core does not load the tables of `io`
 
