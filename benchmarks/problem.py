@@ -115,26 +115,28 @@ def constants(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
     With lengths over c and phase tau for time, a force F becomes F / (M c omega^2). All come from `model.cage_at`.
     """
     cage = jax.vmap(model.cage_at)(jnp.asarray(speeds))
-    plain = cage.film_model == "fixed_half" and cage.cross == "circulatory" and not np.any(cage.supply_scale)
-    if not plain or isinstance(cage.impact, tuple):
-        raise ValueError("The rivals know no film, coupling and impact but those of the published cases.")
-    c, w, mass = cage.clearance, cage.omega, cage.mass
+    film, contact, support, impact = (cage.law(name) for name in ("film", "contact", "support", "impact"))
+    law, land = model.support, cage.land
+    plain = model.film.model == "fixed_half" and law.cross == "circulatory" and not np.any(film.supply_scale)
+    if not plain or model.extra or not isinstance(impact, jc.forces.SynchronousForce):
+        raise ValueError("The rivals know no film, coupling, impact and forces but those of the published cases.")
+    c, w, mass = land.clearance, cage.speed, cage.mass
     inertia = mass * w * w
     columns = (
-        cage.film_scale / (2 * mass * c * w),
-        cage.contact_stiffness * c ** (1 / 9) / inertia,
-        cage.damping_number / cage.contact_approach_speed * c * w,
-        cage.contact_onset,
-        cage.contact_smoothing,
-        cage.film_smoothing**2,
-        cage.stiffness_x / inertia,
-        cage.stiffness_y / inertia,
-        cage.cubic_stiffness * c * c / inertia,
-        cage.support_damping / (mass * w),
-        cage.cross_stiffness / inertia,
-        cage.eccentricity / c,
-        cage.impact / (c * inertia),
-        cage.gravity / (c * w * w),
+        film.scale / (2 * mass * c * w),
+        contact.stiffness * c ** (1 / 9) / inertia,
+        contact.damping * c * w,
+        land.onset,
+        land.onset_width,
+        land.centre_width**2,
+        law.stiffness_x / inertia,
+        law.stiffness_y / inertia,
+        support.cubic * c * c / inertia,
+        law.damping / (mass * w),
+        law.cross_stiffness / inertia,
+        cage.law("unbalance").unbalance / (mass * c),
+        impact.amplitude / (c * inertia),
+        model.gravity / (c * w * w),
     )
     return np.stack([np.broadcast_to(np.asarray(x, dtype=float), speeds.shape) for x in columns], axis=-1)
 

@@ -6,6 +6,7 @@ What is declared here once is used by the configuration reader (units, ranges, u
 
 import dataclasses
 import functools
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, TypeVar
@@ -30,13 +31,25 @@ class ParameterInfo:
     text: str
 
 
+UNKNOWN = "?"
+"""Unit of a parameter that is not declared."""
+EXTRA = "extra"
+"""The field in which a model holds modules of its user, a tuple. Their numbers are parameters, declared or not, named
+by the class of the module: `extra.MyDrag.coefficient`."""
+
+
 def _as_leaf(x: Any) -> Any:
     """Python numbers become float64 leaves; arrays, tracers and the placeholders of tree surgery pass."""
     return jnp.asarray(np.asarray(x, dtype=float)) if isinstance(x, int | float) else x
 
 
 def parameter(unit: str, lower: float, upper: float, text: str, **kwargs: Any) -> Any:
-    """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give."""
+    """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
+
+    **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
+    """
+    if unit != UNKNOWN:
+        unit_dimensions(unit)
     info = ParameterInfo(unit, lower, upper, text)
     return eqx.field(converter=_as_leaf, metadata={"parameter": info}, **kwargs)
 
@@ -51,42 +64,60 @@ def count(lower: int, upper: int, text: str, **kwargs: Any) -> Any:
     return eqx.field(static=True, metadata={"count": (lower, upper), "text": text}, **kwargs)
 
 
+def with_numbers(modules: Any) -> Any:
+    """Modules of a user with their plain numbers as leaves that can be differentiated."""
+    return jax.tree.map(lambda x: x if isinstance(x, bool) else _as_leaf(x), modules)
+
+
 Declared = tuple[tuple[str, ...], dataclasses.Field]
 """A declared field with its path of attribute names."""
 
 
 def walk(module: eqx.Module) -> tuple[Declared, ...]:
-    """Every declared field below `module`, depth first."""
-    return _declared(jax.tree.structure(module))
+    """Every declared field below `module`, depth first, and the plain numbers of modules in `extra`."""
+    leaves, structure = jax.tree.flatten(module)
+    return _declared(structure, tuple(eqx.is_inexact_array(leaf) for leaf in leaves))
 
 
 @functools.lru_cache(maxsize=256)
-def _declared(structure: Any) -> tuple[Declared, ...]:
+def _declared(structure: Any, is_number: tuple[bool, ...]) -> tuple[Declared, ...]:
     """The declared fields of modules of one structure: they are many, and asked for with every change of a design."""
 
-    def below(module: eqx.Module, path: tuple[str, ...]) -> Iterator[Declared]:
+    def below(module: eqx.Module, path: tuple[str, ...], own: bool) -> Iterator[Declared]:
         for field in dataclasses.fields(module):
-            value = getattr(module, field.name)
+            value, here = getattr(module, field.name), (*path, field.name)
             if isinstance(value, eqx.Module):
-                yield from below(value, (*path, field.name))
+                yield from below(value, here, own)
+            elif field.name == EXTRA and isinstance(value, tuple):
+                for each in value:
+                    yield from below(each, (*here, type(each).__name__), True)
             elif {"parameter", "choice", "count"} & set(field.metadata):
-                yield (*path, field.name), field
+                yield here, field
+            elif own and value is True and not field.metadata.get("static"):
+                yield here, parameter(UNKNOWN, -math.inf, math.inf, field.name.replace("_", " "))
 
-    return tuple(below(jax.tree.unflatten(structure, [0.0] * structure.num_leaves), ()))
+    return tuple(below(jax.tree.unflatten(structure, is_number), (), False))
 
 
 def get(module: Any, path: tuple[str, ...]) -> Any:
-    """The attribute of `module` at `path`."""
+    """What `module` has at `path`."""
     for name in path:
-        module = getattr(module, name)
+        module = _part(module, name)
     return module
 
 
+def _part(module: Any, name: str) -> Any:
+    """An attribute; of several modules, the one of that class."""
+    if isinstance(module, tuple):
+        return next(each for each in module if type(each).__name__ == name)
+    return getattr(module, name)
+
+
 def parameter_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
-    """Name -> path of every differentiable parameter; the name is dotted where the last word alone is ambiguous."""
+    """Name -> path of every differentiable parameter; dotted in `extra`, and where the last word alone is ambiguous."""
     paths = [path for path, field in walk(module) if "parameter" in field.metadata]
-    last = [path[-1] for path in paths]
-    return {(p[-1] if last.count(p[-1]) == 1 else ".".join(p)): p for p in paths}
+    last = [path[-1] for path in paths if path[0] != EXTRA]
+    return {(p[-1] if p[0] != EXTRA and last.count(p[-1]) == 1 else ".".join(p)): p for p in paths}
 
 
 def parameters(module: eqx.Module) -> dict[str, Array]:
@@ -130,8 +161,10 @@ def unit_dimensions(unit: str) -> dict[str, float]:
 
 
 def parameter_dimensions(module: eqx.Module) -> dict[str, dict[str, float]]:
-    """Exponents of mass, length and time of every differentiable parameter of `module`, by name."""
-    return {name: unit_dimensions(info.unit) for name, info in parameter_info(module).items()}
+    """Exponents of mass, length and time of every differentiable parameter, by name; NaN where the unit is unknown."""
+    unknown = {"mass": math.nan, "length": math.nan, "time": math.nan}
+    units = {name: info.unit for name, info in parameter_info(module).items()}
+    return {name: unknown if unit == UNKNOWN else unit_dimensions(unit) for name, unit in units.items()}
 
 
 def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
@@ -143,7 +176,9 @@ def choice_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
 def _with_static(module: Any, path: tuple[str, ...], value: Any) -> Any:
     """A copy of `module` with the static field at `path` set."""
     name, *rest = path
-    inner = _with_static(getattr(module, name), tuple(rest), value) if rest else value
+    inner = _with_static(_part(module, name), tuple(rest), value) if rest else value
+    if isinstance(module, tuple):
+        return tuple(inner if type(each).__name__ == name else each for each in module)
     return dataclasses.replace(module, **{name: inner})
 
 
@@ -152,12 +187,14 @@ def replace(module: M, **values: PyTree) -> M:
 
     **Arguments:** parameters by name in SI units, e.g. `replace(model, guidance_gap=0.5e-3)`; choices and counts by
     dotted name through a dictionary, `replace(model, **{"film.model": "positive_pressure"})`; and whole parts of the
-    model, `replace(model, rib=ElasticRib(...))`.
+    model, `replace(model, rib=ElasticRib(...))`, `replace(model, extra=(MyDrag(3.0),))`.
 
     **Raises:** `ValueError` for a name the module does not have, or an option a choice does not offer.
     """
     leaves, choices = parameter_paths(module), choice_paths(module)
-    parts = [f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)]
+    parts = [
+        f.name for f in dataclasses.fields(module) if f.name == EXTRA or isinstance(getattr(module, f.name), eqx.Module)
+    ]
     fields = dict(walk(module))
     for name, value in values.items():
         if not any(name in known for known in (parts, leaves, choices)):
@@ -167,8 +204,7 @@ def replace(module: M, **values: PyTree) -> M:
         if offered and value not in offered:
             raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
     if exchanged := {name: values[name] for name in parts if name in values}:
-        new = {id(getattr(module, name)): part for name, part in exchanged.items()}
-        module = jax.tree.map(lambda x: new.get(id(x), x), module, is_leaf=lambda x: id(x) in new)
+        module = _with_parts(module, exchanged)
     changed = [name for name in leaves if name in values and name not in parts]
     if changed:
         at = lambda m: [get(m, leaves[name]) for name in changed]
@@ -180,6 +216,15 @@ def replace(module: M, **values: PyTree) -> M:
         if name in values and name not in own:
             module = _with_static(module, path, values[name])
     return module
+
+
+def _with_parts(module: M, parts: dict[str, Any]) -> M:
+    """A copy of `module` with whole parts exchanged, not asked yet whether they go together."""
+    copy = object.__new__(type(module))
+    for field in dataclasses.fields(module):
+        value = parts.get(field.name, getattr(module, field.name))
+        object.__setattr__(copy, field.name, with_numbers(value) if field.name == EXTRA else value)
+    return copy
 
 
 def _checked(module: M) -> M:

@@ -287,7 +287,7 @@ def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
     x, y = at.coordinates
     forces = model.cage_at(speed).forces(zero, x, y, zero, zero)
     for i in (0, 1):
-        rest = sum(f[i] for f in (forces.film, forces.contact, forces.support, forces.weight))
+        rest = sum(forces[name][i] for name in ("film", "contact", "support", "weight"))
         assert abs(float(rest)) < 1e-9 * float(model.cage_mass) * 9.81
     assert 0 < float(at.eccentricity_ratio) < 0.1  # the support carries most of the weight
     assert float(at.growth_rate) < 0 and at.eigenvalues.shape == (4,)

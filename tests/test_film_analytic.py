@@ -309,7 +309,7 @@ def test_supply_pressure_in_the_cage_is_2_R_L_p0_for_each_land():
     model = case("1a", "preliminary")
     pressed = replace(model, supply_pressure=3e4)
     point = 1e-4, -0.5e-4, 0.01, 0.02
-    (film, _), (plain, _) = (m.cage_at(900.0).land_forces(*point) for m in (pressed, model))
+    film, plain = (m.cage_at(900.0).forces(0.0, *point)["film"][:2] for m in (pressed, model))
     difference = np.array(film) - np.array(plain)
     size = 2 * 2 * float(model.land_radius) * float(model.film.land_width) * 3e4
     tangential = np.array([0.5, 1.0]) / np.hypot(1.0, 0.5)
@@ -328,13 +328,14 @@ EPS = np.linspace(0.0, 1.5, 1501)
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("angle", [0.0, 2.2])
 def test_land_force_at_rest_is_finite_and_monotone_through_contact(model, angle):
-    cage = with_film(model).cage_at(1000.0)
+    built = with_film(model)
+    cage = built.cage_at(1000.0)
     x, y = np.cos(angle), np.sin(angle)
 
     def both(eps):
-        r = eps * cage.clearance
-        film, contact = cage.land_forces(r * x, r * y, 0.0, 0.0)
-        return jnp.stack([jnp.stack(film), jnp.stack(contact)])
+        r = eps * built.clearance
+        found = cage.forces(0.0, r * x, r * y, 0.0, 0.0)
+        return jnp.stack([jnp.stack(found[name][:2]) for name in ("film", "contact")])
 
     film, contact = np.moveaxis(np.asarray(jax.vmap(both)(jnp.asarray(EPS))), 1, 0)
     size = np.linalg.norm(film + contact, axis=-1)
@@ -342,7 +343,7 @@ def test_land_force_at_rest_is_finite_and_monotone_through_contact(model, angle)
     assert np.all(np.diff(size) > 0)
     inward = -(film + contact) @ np.array([x, y])
     assert np.all(np.diff(inward) >= (0.0 if model != "full" else -1e-12))
-    onset = float(cage.contact_onset)
+    onset = float(built.contact.onset)
     assert np.all(contact[onset - 1e-3 > EPS] == 0)
     # Beyond the onset the film grows with the drive alone, in proportion to eps.
     there = np.linalg.norm(film, axis=-1) / EPS.clip(1e-9)
@@ -351,23 +352,24 @@ def test_land_force_at_rest_is_finite_and_monotone_through_contact(model, angle)
 
 @pytest.mark.parametrize("model", MODELS)
 def test_film_in_the_cage_is_the_short_film_and_its_damping_saturates(model):
-    cage = with_film(model).cage_at(1000.0)
-    c, onset = float(cage.clearance), float(cage.contact_onset)
+    built = with_film(model)
+    cage, c, onset = built.cage_at(1000.0), float(built.clearance), float(built.contact.onset)
+    scale, smoothing = float(cage.law("film").scale), float(built.film.smoothing) / c
     drive = np.array([40.0, -60.0])  # the same at every eps, because the positive arc follows it
 
     def film(v, eps):
-        return jnp.stack(cage.land_forces(c * eps * 0.6, c * eps * 0.8, c * v[0], c * v[1])[0])
+        return jnp.stack(cage.forces(0.0, c * eps * 0.6, c * eps * 0.8, c * v[0], c * v[1])["film"][:2])
 
     def velocity(eps):
         return drive + 500.0 * eps * np.array([-0.8, 0.6])
 
     for eps in (0.2, onset - 1e-3):
         v = velocity(eps)
-        expected = force(model, eps * np.array([0.6, 0.8]), v, 1000.0, float(cage.film_smoothing))
-        np.testing.assert_allclose(film(v, eps), float(cage.film_scale) * expected, rtol=1e-10)
+        expected = force(model, eps * np.array([0.6, 0.8]), v, 1000.0, smoothing)
+        np.testing.assert_allclose(film(v, eps), scale * expected, rtol=1e-10)
     damping = jax.jacfwd(film)
-    at = onset * np.array([0.6, 0.8]), velocity(onset), 1000.0, float(cage.film_smoothing)
-    at_onset = -float(cage.film_scale) * matrix(model, *at)
+    at = onset * np.array([0.6, 0.8]), velocity(onset), 1000.0, smoothing
+    at_onset = -scale * matrix(model, *at)
     for eps in (onset + 1e-3, 1.0, 1.4):
         # The positive arc's direction is a unit vector to (smoothing omega / |P|)^2 = 2e-10.
         np.testing.assert_allclose(damping(velocity(eps), eps), at_onset, rtol=3e-8)

@@ -42,6 +42,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
     "branches": lambda m: jc.orbits.branches([OSCILLATOR], [STATE], lower=1.0, upper=2.0),
     "cage_forces": lambda m: jc.analysis.cage_forces(m, TRAJECTORY),
+    "cage_moments": lambda m: jc.analysis.cage_moments(m, TRAJECTORY),
     "cage_mass": lambda m: jc.bearing.cage_mass(m.bearing, 5e-4),
     "cascade": lambda m: jc.orbits.cascade(OSCILLATOR, DOUBLING, lower=1.0, upper=2.0),
     "case": lambda m: jc.case("1a"),

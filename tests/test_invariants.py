@@ -14,7 +14,7 @@ from scipy.integrate import simpson
 
 import jaxcage as jc
 from jaxcage.forces._reynolds import STATIONS
-from jaxcage.models import CageForces
+from jaxcage.models import FORCES
 
 
 CASE = jc.case("1a", "preliminary")
@@ -73,13 +73,14 @@ def in_si(model, speed, state):
 
 @eqx.filter_jit
 def stacked_forces(model, speed, tau, state):
-    return jnp.stack([jnp.stack(f) for f in model.cage_at(speed).forces(tau, *state)])
+    found = model.cage_at(speed).forces(tau, *state)
+    return jnp.stack([jnp.stack(found[name][:2]) for name in FORCES])
 
 
 def forces(model, speed, tau, state):
     """Each force on the cage by name [N], from a state in SI units."""
     found = stacked_forces(model, *(jnp.asarray(x, dtype=float) for x in (speed, tau, state)))
-    return dict(zip(CageForces._fields, np.asarray(found), strict=True))
+    return dict(zip(FORCES, np.asarray(found), strict=True))
 
 
 @pytest.mark.parametrize("film", FILMS)
@@ -120,7 +121,7 @@ def test_mirrored_states_have_mirrored_forces(film, cross, design, speed, tau, s
     model = jc.replace(CASE, **design, cross_cubic=cross_cubic, **{"film.model": film, "support.cross": cross})
     y = in_si(model, speed, state)
     here, there = forces(model, speed, tau, y), forces(mirrored(model), -speed, -tau, y * np.tile(FLIP, 2))
-    for law in CageForces._fields:
+    for law in FORCES:
         size = np.linalg.norm(here[law])
         np.testing.assert_allclose(
             there[law], FLIP * here[law], rtol=0, equal_nan=False, atol=1e-11 * size + 1e-12, err_msg=law
@@ -171,7 +172,7 @@ def test_forces_in_other_units(kind, design, speed, tau, state, scales):
     y = in_si(model, speed, state)
     here = forces(model, speed, tau, y)
     there = forces(rescaled(model, jnp.asarray(scales)), speed / time, tau, y * np.repeat([length, length / time], 2))
-    for law in CageForces._fields:
+    for law in FORCES:
         found, size = there[law] * time**2 / (mass * length), np.linalg.norm(here[law])
         np.testing.assert_allclose(found, here[law], rtol=0, equal_nan=False, atol=1e-10 * size + 1e-12, err_msg=law)
 
@@ -186,12 +187,12 @@ def test_film_takes_energy_out_in_a_frame_that_turns_at_half_speed(film, design,
     """Without rotation, out of every motion. The power is -(S/c) u.M u with u = v - w/2 x r, and the thickness of the
     film, from 1 - eps to 1 + eps, sets bounds to M. A film of finite width takes out less."""
     model = jc.replace(CASE, **{**design, "supply_pressure": 0.0, "film.model": film})
-    cage, y = model.cage_at(speed), in_si(model, 1e3, state)
+    c, y = float(model.clearance), in_si(model, 1e3, state)
     u = y[2:] - speed / 2 * np.array([-y[1], y[0]])
-    assume(np.linalg.norm(u) > float(cage.clearance))
-    found = -forces(model, speed, 0.0, y)["film"] @ u * float(cage.clearance / cage.film_scale) / (u @ u)
+    assume(np.linalg.norm(u) > c)
+    found = -forces(model, speed, 0.0, y)["film"] @ u * c / float(model.cage_at(speed).law("film").scale) / (u @ u)
     arc = np.pi if film == "full" else np.pi / 2
-    eps = min(np.hypot(*state[:2]), float(cage.contact_onset))
+    eps = min(np.hypot(*state[:2]), float(model.contact.onset))
     least = 0.95 if film == "finite_length" else 1.0
     assert least * arc / (1 + eps) ** 3 * (1 - 1e-9) <= found <= arc / (1 - eps) ** 3 * (1 + 1e-9)
 
@@ -202,14 +203,14 @@ def test_film_takes_energy_out_in_a_frame_that_turns_at_half_speed(film, design,
 def test_film_feeds_whirl_below_half_speed_only(film, design, speed, eps, phi, whirl):
     """Work on a circular whirl: 2 pi r F_t, F_t = S (w - 2 whirl w) pi eps/(2 (1 - eps^2)^(3/2)) for the whole film."""
     model = jc.replace(CASE, **{**design, "supply_pressure": 0.0, "film.smoothing": 1e-12, "film.model": film})
-    cage, c = model.cage_at(speed), float(model.clearance)
+    scale, c = float(model.cage_at(speed).law("film").scale), float(model.clearance)
     radial, along = turn(phi).T
     y = np.concatenate([eps * c * radial, eps * c * whirl * speed * along])
     found = forces(model, speed, 0.0, y)["film"] @ y[2:]
     share = 1.0 if film == "full" else 0.5
-    tangential = share * float(cage.film_scale) * speed * np.pi * eps / (2 * (1 - eps**2) ** 1.5)
-    scale = tangential * eps * c * speed
-    np.testing.assert_allclose(found, scale * (1 - 2 * whirl) * whirl, rtol=0, equal_nan=False, atol=1e-10 * scale)
+    tangential = share * scale * speed * np.pi * eps / (2 * (1 - eps**2) ** 1.5)
+    work = tangential * eps * c * speed
+    np.testing.assert_allclose(found, work * (1 - 2 * whirl) * whirl, rtol=0, equal_nan=False, atol=1e-10 * work)
 
 
 @random(50)
@@ -336,7 +337,9 @@ def along(model, speed, tau, states):
     cage, field = model.cage_at(speed), model.at_speed(speed)
 
     def at(t, y):
-        return jnp.stack([jnp.stack(f) for f in cage.forces(t, *y)]), field.linearise(t, tuple(y)).divergence
+        found = cage.forces(t, *y)
+        laws = jnp.stack([jnp.stack(found[name][:2]) for name in FORCES])
+        return laws, field.linearise(t, tuple(y)).divergence
 
     return jax.vmap(at)(tau, states)
 
@@ -359,7 +362,7 @@ def energy_defects(model, speed, start, steps):
     spring = (p["stiffness_x"] * r[:, 0] ** 2 + p["stiffness_y"] * r[:, 1] ** 2 + p["cubic_stiffness"] / 2 * r2**2) / 2
     height = p["cage_mass"] * p["gravity"] * r[:, 1]
     done = np.asarray(simpson(np.einsum("tik,tk->it", laws, v), x=tau / speed))
-    work = dict(zip(CageForces._fields, done, strict=True))
+    work = dict(zip(FORCES, done, strict=True))
     rest = p["cross_stiffness"] * (r[:, 0] * v[:, 1] - r[:, 1] * v[:, 0]) - p["damping"] * np.sum(v**2, -1)
     gain = lambda energy: energy[-1] - energy[0]
     found = (

@@ -109,7 +109,7 @@ def test_forces_on_cage_and_rib_are_opposite():
     f = cage.forces(tau, q[0] - q[2], q[1] - q[3], v[0] - v[2], v[1] - v[3])
     hold = rib.stiffness + rib.cubic_stiffness * (q[2] ** 2 + q[3] ** 2)
     for i in (0, 1):
-        outside = f.impact[i] + f.unbalance[i] + f.weight[i] - hold * q[2 + i] - rib.damping * v[2 + i]
+        outside = f["impact"][i] + f["unbalance"][i] + f["weight"][i] - hold * q[2 + i] - rib.damping * v[2 + i]
         outside = outside - (rib.mass * model.gravity if i else 0.0)
         assert total[i] == pytest.approx(float(outside), rel=1e-10)
 

@@ -5,6 +5,7 @@ import io
 import pathlib
 import re
 
+import jax
 import numpy as np
 import pytest
 
@@ -38,6 +39,7 @@ def test_python_blocks_of_the_guide():
     per_time = space["got"].exponents[0, :, 0].mean() / (2 * np.pi)
     error = np.max(space["got"].standard_error) / (2 * np.pi)
     ueda = EXPONENTS["Ueda x'' + .05 x' + x^3 = 7.5 sin t"]
+    assert space["orbit"].converged and float(jax.grad(space["growth"])(2.0)) < 0
     assert per_time == pytest.approx(ueda.value, abs=ueda.tolerance + 2 * error)
 
 

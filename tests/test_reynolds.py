@@ -271,7 +271,7 @@ POINT = (1.3e-4, -2.2e-4, 0.06, 0.11)
 
 @eqx.filter_jit
 def film_force(model: jc.CageModel, speed, point):
-    return jnp.stack(model.cage_at(speed).land_forces(*point)[0])
+    return jnp.stack(model.cage_at(speed).forces(0.0, *point)["film"][:2])
 
 
 def test_cage_uses_the_film_of_each_land():

@@ -14,12 +14,23 @@ from matplotlib.text import Text
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.models._cage_at_speed import CageForces
+from jaxcage.models import FORCES
 from jaxcage.plotting import STYLES, load_bars, new_figure, orbit_diagram, restyle
 from jaxcage.plotting._branches import _PERIOD_COLOURS, MARKS
 from jaxcage.plotting._elasticities import _COLOURS as ELASTICITIES
 from jaxcage.plotting._section import _COLOURS as STARTS
-from jaxcage.plotting._style import BLACK, BLUE, FORCE_COLOURS, GREY, KIND_COLOURS, PAPER, ZONE, Halo, lighter
+from jaxcage.plotting._style import (
+    BLACK,
+    BLUE,
+    FORCE_COLOURS,
+    GREY,
+    KIND_COLOURS,
+    OWN_COLOURS,
+    PAPER,
+    ZONE,
+    Halo,
+    lighter,
+)
 
 
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1.0.
@@ -35,6 +46,7 @@ SEEN_BY = {
 CYCLES = {
     "kinds of motion": tuple(KIND_COLOURS.values()),
     "forces": tuple(FORCE_COLOURS.values()),
+    "forces of one's own": OWN_COLOURS,
     "kinds of bifurcation": tuple(mark.colour for mark in MARKS.values()),
     "periods": tuple(_PERIOD_COLOURS.values()),
     "edges": tuple(ELASTICITIES),
@@ -66,7 +78,7 @@ def contrast(a: str, b: str) -> float:
 
 
 def test_every_force_has_a_colour():
-    assert set(FORCE_COLOURS) == set(CageForces._fields)
+    assert set(FORCE_COLOURS) == set(FORCES)
 
 
 @pytest.mark.parametrize("style", STYLES)

@@ -45,6 +45,7 @@ from ._labels import (
 from ._measures import (
     OrbitMeasures as OrbitMeasures,
     cage_forces as cage_forces,
+    cage_moments as cage_moments,
     film_drag_power as film_drag_power,
     orbit_measures as orbit_measures,
 )

@@ -25,8 +25,9 @@ import optimistix as optx
 from jaxtyping import Array, Complex, Float
 
 from .._checks import require_x64
+from .._parameters import replace
 from .._types import Scalar
-from ..forces import ShortFilm, SynchronousImpact, film_scale, short_film_force
+from ..forces import AbstractForcing, ShortFilm, SynchronousImpact, film_scale, short_film_force
 from ..models import CageModel, SecondOrderField
 
 
@@ -183,8 +184,8 @@ def stability_chart(
 def film_whirl_speed(model: CageModel) -> Array:
     """Speed [rad/s] above which the cage would whirl, in its film under its weight alone.
 
-    Support, contact, supply pressure and forcing are left out: it is the oil-whirl line to lay over
-    a diagram of the full model, for a film of finite length that of its short film. On it
+    Support, contact, supply pressure, forcing and forces of one's own are left out: it is the oil-whirl
+    line to lay over a diagram of the full model, for a film of finite length that of its short film. On it
     omega = threshold(eps) sqrt(g/c), with the load number of the weight at that speed: one equation
     for eps. Differentiable with respect to every parameter.
 
@@ -243,9 +244,20 @@ class Equilibrium(NamedTuple):
 
 
 def _unforced(model: CageModel) -> CageModel:
-    """The model without unbalance and impacts: an autonomous system at every speed."""
+    """The model without unbalance, impacts and forces of one's own that the phase alone decides."""
     calm = (jnp.zeros(()), SynchronousImpact(amplitude=jnp.zeros(()), exponent=jnp.ones(())))
-    return eqx.tree_at(lambda m: (m.eccentricity, m.impact), model, calm)
+    model = eqx.tree_at(lambda m: (m.eccentricity, m.impact), model, calm)
+    return replace(model, extra=tuple(law for law in model.extra if not isinstance(law, AbstractForcing)))
+
+
+def _phase_free(model: CageModel, speed: Scalar, q: Array) -> Array:
+    """Positions, checked: what asks for the phase gets none, and says so by what it returns."""
+    cage = model.cage_at(speed)
+    x, y = (q[0], q[1]) if q.size == 2 else (q[0] - q[2], q[1] - q[3])
+    forces = cage.forces(jnp.nan, x, y, 0.0, 0.0)
+    own = [jnp.asarray(part) for law in model.extra for part in forces[type(law).__name__][:2]]
+    words = "Argument `model` must have an equilibrium, but a force in its `extra` changes with the phase."
+    return eqx.error_if(q, jnp.any(~jnp.isfinite(jnp.stack(own))), words) if own else q
 
 
 def _film_position(model: CageModel, speed: Scalar) -> Float[Array, " coordinates"]:
@@ -272,11 +284,13 @@ def _imbalance(z: Array, args: tuple[SecondOrderField, Array, Scalar]) -> Array:
 @eqx.filter_jit
 def _equilibrium(model: CageModel, speed: Array, start: Array | None) -> Equilibrium:
     c, n = model.clearance, model.dimension // 2
-    field = _unforced(model).at_speed(speed)
+    calm = _unforced(model)
+    field = calm.at_speed(speed)
     assert isinstance(field, SecondOrderField)
     start = jax.lax.stop_gradient(_film_position(model, speed) if start is None else start)
     solver = optx.Dogleg(rtol=1e-12, atol=1e-12)
     q = c * optx.root_find(_imbalance, solver, start, (field, c, speed), max_steps=256).value
+    q = _phase_free(calm, speed, q)
     still = jnp.zeros_like(q)
     a_q, a_v = jax.jacfwd(_acceleration, argnums=(1, 2))(field, q, still)
     matrix = jnp.block([[jnp.zeros((n, n)), jnp.eye(n)], [a_q, a_v]])
@@ -286,14 +300,15 @@ def _equilibrium(model: CageModel, speed: Array, start: Array | None) -> Equilib
 
 
 def equilibrium(model: CageModel, speed: Scalar, *, start: Float[Array, " coordinates"] | None = None) -> Equilibrium:
-    """Where film, support, contact and weight hold the cage without unbalance and impacts.
+    """Where film, support, contact, weight and forces of one's own hold the cage without unbalance and impacts.
 
     Differentiable with respect to speed and every parameter, by the implicit function theorem.
 
     **Arguments:** model; cage speed [rad/s]; where the root find starts [m], by default at Ocvirk's
     equilibrium of the film alone. A nonlinear support can allow more than one equilibrium.
 
-    **Raises:** an error as the computation runs, where no equilibrium is found.
+    **Raises:** an error as the computation runs, where no equilibrium is found or a force of one's own changes with the
+    phase (one that depends on the phase alone, an `AbstractForcing`, is left out like the unbalance).
     """
     require_x64()
     first = None if start is None else jnp.asarray(start) / model.clearance

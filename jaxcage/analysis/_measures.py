@@ -14,12 +14,16 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._notebook import notebook_html
+from ..forces import Force
 from ..integrate import Trajectory
-from ..models import CageForces, CageModel
+from ..models import FORCES, CageModel
 
 
 BATCH = 256
 """Samples whose forces are worked out at a time where the speed changes from sample to sample."""
+
+Histories = dict[str, tuple[Array, Array, Array]]
+"""(F_x, F_y, moment) of each force at every sample."""
 
 STILL = 1e-9
 """A centre that moves by less than this part of the clearance, or per radian, stands still."""
@@ -44,9 +48,10 @@ def relative_state(
 @eqx.filter_jit
 def _forces_at_one_speed(
     model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
-) -> CageForces:
+) -> Histories:
     cage = model.cage_at(speed)
-    return jax.vmap(lambda t, m: cage.forces(t, *m))(tau, motion)
+    forces: Any = jax.vmap(lambda t, m: cage.forces(t, *m))  # of many samples, so not `Force` any more
+    return forces(tau, motion)
 
 
 @eqx.filter_jit
@@ -55,8 +60,8 @@ def _forces(
     speed: Float[Array, " n"],
     tau: Float[Array, " n"],
     motion: Float[Array, "n 4"],
-) -> CageForces:
-    def at(sample: tuple[Array, Array, Array]) -> CageForces:
+) -> Histories:
+    def at(sample: tuple[Array, Array, Array]) -> dict[str, Force]:
         omega, t, m = sample
         return model.cage_at(omega).forces(t, *m)
 
@@ -66,9 +71,25 @@ def _forces(
 def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, "n 2"]]:
     """Every force on the cage along a trajectory of `model`.
 
-    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance` and `weight`, each
-    (F_x, F_y) [N] at every sample, at the speed of that sample.
+    **Returns:** `film`, `contact`, `support`, `impact`, `unbalance`, `weight` and those of the model's `extra`
+    by the names of their classes, each (F_x, F_y) [N] at every sample, at the speed of that sample.
     """
+    return {name: np.stack(force[:2], axis=1) for name, force in _along(model, trajectory).items()}
+
+
+def cage_moments(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.ndarray, " n"]]:
+    """The moment of every force on the cage about its centre along a trajectory of `model`, counter-clockwise.
+
+    The cage turns at a speed that is given: moments enter no equation of motion. A moment times the speed is the power
+    that it gives the cage, for the film minus that of `film_drag_power`.
+
+    **Returns:** moments [N m] at every sample, by the names of `cage_forces`.
+    """
+    return {name: np.broadcast_to(force[2], len(trajectory.tau)) for name, force in _along(model, trajectory).items()}
+
+
+def _along(model: CageModel, trajectory: Trajectory) -> Histories:
+    """Every force and moment at each sample."""
     require_x64()
     position, velocity = relative_state(model, trajectory.state)
     motion = jax.numpy.asarray(np.concatenate([position, velocity], axis=1))
@@ -77,7 +98,8 @@ def cage_forces(model: CageModel, trajectory: Trajectory) -> dict[str, Float[np.
         forces = _forces_at_one_speed(model, speed[0], tau, motion)
     else:
         forces = _forces(model, speed, tau, motion)
-    return {name: np.stack(pair, axis=1) for name, pair in forces._asdict().items()}
+    names = (*FORCES, *(type(law).__name__ for law in model.extra))
+    return {name: forces[name] for name in names}  # programs return a dictionary sorted
 
 
 def film_drag_power(

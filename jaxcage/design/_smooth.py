@@ -87,7 +87,7 @@ def _distance(motion: Float[Array, "n 4"]) -> Float[Array, " n"]:
 
 def _land_force(model: CageModel, speed: float, tau: Array, motion: Array) -> Array:
     cage = model.cage_at(speed)
-    fx, fy = jax.vmap(lambda t, m: cage.forces(t, *m).contact)(tau, motion)
+    fx, fy, _ = jax.vmap(lambda t, m: cage.forces(t, *m)["contact"])(tau, motion)
     return jnp.mean(jnp.sqrt(fx**2 + fy**2 + TOUCH**2) - TOUCH)
 
 

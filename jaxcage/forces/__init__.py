@@ -2,6 +2,9 @@
 
 | module             | responsibility                                                              |
 |--------------------|-----------------------------------------------------------------------------|
+| `_motion`          | what a law sees of the cage and what it returns                             |
+| `_land`            | where the cage is in its guide                                              |
+| `_land_film`       | the film of all lands as a force on the cage                                |
 | `_film`            | short-bearing oil film of the rib lands, three film models, (25)-(28)       |
 | `_finite_film`     | the film of a land of finite width, and how far the short film is from it   |
 | `_reynolds`        | pressure by the Reynolds equation (25), three cavitation conditions         |
@@ -19,7 +22,9 @@
 Frame: x to the right, y up, rotation positive counter-clockwise; forces act on the cage.
 """
 
+from .._parameters import choice as choice, count as count, parameter as parameter
 from ._contact import (
+    ContactForce as ContactForce,
     LandContact as LandContact,
     contact_force as contact_force,
     contact_slopes as contact_slopes,
@@ -27,7 +32,6 @@ from ._contact import (
 )
 from ._film import (
     FilmModel as FilmModel,
-    RibFilm as RibFilm,
     ShortFilm as ShortFilm,
     film_drive as film_drive,
     film_pressure as film_pressure,
@@ -41,16 +45,27 @@ from ._film import (
     supply_force as supply_force,
 )
 from ._finite_film import finite_film_force as finite_film_force, short_film_excess as short_film_excess
-from ._gravity import weight as weight
+from ._gravity import WeightForce as WeightForce, weight as weight
 from ._impact_forcing import (
     PulseTrain as PulseTrain,
+    RollerPassForce as RollerPassForce,
     RollerPassImpact as RollerPassImpact,
+    SynchronousForce as SynchronousForce,
     SynchronousImpact as SynchronousImpact,
     pulse_spectrum as pulse_spectrum,
     pulse_train as pulse_train,
     pulse_train_force as pulse_train_force,
     synchronous_amplitude as synchronous_amplitude,
     synchronous_force as synchronous_force,
+)
+from ._land import Land as Land
+from ._land_film import FilmForce as FilmForce, RibFilm as RibFilm
+from ._motion import (
+    AbstractForce as AbstractForce,
+    AbstractForcing as AbstractForcing,
+    Force as Force,
+    Motion as Motion,
+    Rows as Rows,
 )
 from ._pocket_impact import (
     ImpactHistory as ImpactHistory,
@@ -77,12 +92,14 @@ from ._support import (
     Cross as Cross,
     Cubic as Cubic,
     Support as Support,
+    SupportForce as SupportForce,
     cross_force as cross_force,
     cubic_stiffness as cubic_stiffness,
     spring_force as spring_force,
     support_slopes as support_slopes,
 )
 from ._unbalance import (
+    UnbalanceForce as UnbalanceForce,
     UnbalanceReading as UnbalanceReading,
     effective_eccentricity as effective_eccentricity,
     unbalance_force as unbalance_force,

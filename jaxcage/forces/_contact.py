@@ -12,6 +12,7 @@ from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
+from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows, turned
 from ._smooth import power_10_9, root_9, smooth_plus, smooth_plus_slope
 
 
@@ -41,27 +42,22 @@ def restitution_damping(restitution: Scalar) -> Array:
     return jnp.asarray(-jnp.expm1(-s) / e)
 
 
-def contact_force(
-    penetration: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, approach_speed: Scalar
-) -> Array:
+def contact_force(penetration: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar) -> Array:
     """Normal force [N] of the land contact, never adhesive.
 
-    **Arguments:** penetration p >= 0 [m] (already regularised) and its rate [m/s]; stiffness K [N/m^(10/9)];
-    Hunt-Crossley number chi and the approach speed v_0 [m/s] at which it gives the restitution asked for.
+    **Arguments:** penetration p >= 0 [m] (already regularised) and its rate [m/s]; stiffness K [N/m^(10/9)]; damping
+    chi/v_0 [s/m], the Hunt-Crossley number over the approach speed at which it gives the restitution asked for.
     """
-    loading = 1 + (damping / approach_speed) * rate
+    loading = 1 + damping * rate
     return stiffness * power_10_9(penetration) * smooth_plus(loading, 1e-4)
 
 
-def contact_slopes(
-    penetration: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, approach_speed: Scalar
-) -> tuple[Array, Array]:
+def contact_slopes(penetration: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar) -> tuple[Array, Array]:
     """Derivatives of `contact_force` with respect to penetration [N/m] and its rate [N s/m]."""
-    ratio = damping / approach_speed
-    loading = 1 + ratio * rate
+    loading = 1 + damping * rate
     return (
         stiffness * (10 / 9) * root_9(penetration) * smooth_plus(loading, 1e-4),
-        stiffness * power_10_9(penetration) * smooth_plus_slope(loading, 1e-4) * ratio,
+        stiffness * power_10_9(penetration) * smooth_plus_slope(loading, 1e-4) * damping,
     )
 
 
@@ -77,3 +73,32 @@ class LandContact(eqx.Module):
     smoothing: Scalar = parameter(
         "m", 1e-12, 1e-5, "half width over which contact sets in and film coefficients saturate", default=2e-7
     )
+
+    def at(self, cage: GuidedCage, speed: Scalar) -> "ContactForce":
+        """The contact of `cage` with its guide."""
+        return ContactForce(self.stiffness, restitution_damping(self.restitution) / self.approach_speed)
+
+
+class ContactForce(AbstractForce):
+    """Normal force of the land contact along the line of centres."""
+
+    stiffness: Scalar
+    damping: Scalar
+    """Hunt-Crossley number over the approach speed to which it belongs, chi/v_0 [s/m]."""
+
+    def force(self, motion: Motion) -> Force:
+        at, c = motion.place, motion.land.clearance
+        rate = at.nx * at.vx + at.ny * at.vy
+        normal = contact_force(c * at.excess, c * rate, self.stiffness, self.damping)
+        return -normal * at.nx, -normal * at.ny, 0.0
+
+    def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
+        """Closed form, in the frame (n, t) of the line of centres."""
+        at, c = motion.place, motion.land.clearance
+        rate = c * (at.nx * at.vx + at.ny * at.vy)
+        normal = contact_force(c * at.excess, rate, self.stiffness, self.damping)
+        stiff, damp = contact_slopes(c * at.excess, rate, self.stiffness, self.damping)
+        slip = (at.nx * at.vy - at.ny * at.vx) * at.per_eps
+        of_q = ((-stiff * at.touch, -damp * slip), (0.0, -normal * motion.land.per_clearance * at.per_eps))
+        of_v = ((-damp, 0.0), (0.0, 0.0))
+        return turned(of_q, at.nx, at.ny), turned(of_v, at.nx, at.ny)

@@ -14,11 +14,9 @@ there.
 
 from typing import Literal, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._parameters import choice, count, parameter
 from .._types import Scalar
 from ._smooth import smooth_norm
 
@@ -196,27 +194,3 @@ def film_pressure(
     """
     drive = (omega - 2 * phi_rate) * eps * jnp.sin(alpha) - 2 * eps_rate * jnp.cos(alpha)
     return factor * (0.25 - z * z) * drive / (1 + eps * jnp.cos(alpha)) ** 3
-
-
-class RibFilm(eqx.Module):
-    """The oil film of the guiding lands: how many, how wide, and which film model."""
-
-    land_width: Scalar = parameter("m", 1e-4, 0.05, "width of one guiding land")
-    smoothing: Scalar = parameter(
-        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9
-    )
-    supply_pressure: Scalar = parameter("Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", default=0.0)
-    n_lands: int = count(1, 4, "number of guiding lands, each a film of its own", default=2)
-    model: FilmModel = choice(
-        "fixed_half",
-        "positive_pressure",
-        "full",
-        "finite_length",
-        text="film model: a short film, or the Reynolds equation with its axial term",
-        default="fixed_half",
-    )
-
-    @property
-    def arc(self) -> ShortFilm:
-        """The short film whose pressurised arc this film has: exactly, or as the land gets narrow."""
-        return "positive_pressure" if self.model == "finite_length" else self.model

@@ -8,6 +8,8 @@ from jaxtyping import Array, Float
 
 from .._parameters import count, parameter
 from .._types import Scalar
+from ..bearing import load_distribution
+from ._motion import AbstractForcing, Force, GuidedCage, Motion
 from ._phase import cos_sin
 from ._pocket_impact import PocketImpact, approach_speed
 from ._pulse import pulse_integrals
@@ -31,12 +33,31 @@ class SynchronousImpact(eqx.Module):
     exponent: Scalar = parameter("1", 0.0, 4.0, "power n of speed; 20/19 for a Hertz impact on a stiff bar")
     reference_speed: Scalar = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
 
+    def at(self, cage: GuidedCage, speed: Scalar) -> "SynchronousForce":
+        """The force at cage speed `speed` [rad/s]."""
+        return SynchronousForce(synchronous_amplitude(speed, self.amplitude, self.reference_speed, self.exponent))
+
+
+class SynchronousForce(AbstractForcing):
+    """One horizontal force at cage frequency."""
+
+    amplitude: Scalar
+
+    def force(self, motion: Motion) -> Force:
+        return *synchronous_force(motion.phase, self.amplitude), 0.0
+
 
 class RollerPassImpact(eqx.Module):
     """A pulse Q_cw(t) each time a roller enters or leaves the loaded zone, kept as a Fourier series."""
 
     oscillator: PocketImpact
     harmonics: int = count(1, 128, "harmonics of the roller-pass frequency that are kept", default=48)
+
+    def at(self, cage: GuidedCage, speed: Scalar) -> "RollerPassForce":
+        """The force at cage speed `speed` [rad/s]."""
+        b, zone = cage.bearing, load_distribution(cage.bearing, cage.load)
+        train = pulse_train(self, speed, zone.half_angle, b.n_rollers, b.roller_mass, b.pocket_clearance)
+        return RollerPassForce(train, b.n_rollers)
 
 
 class PulseTrain(NamedTuple):
@@ -111,3 +132,13 @@ def pulse_train_force(tau: Scalar, train: PulseTrain, n_rollers: int) -> tuple[A
         x, y = x + (a_x * c + b_x * s), y + (a_y * c + b_y * s)
         now, before = (2 * first * c - before[0], 2 * first * s - before[1]), now
     return x, y
+
+
+class RollerPassForce(AbstractForcing):
+    """A pulse for each roller."""
+
+    train: PulseTrain
+    n_rollers: int = eqx.field(static=True)
+
+    def force(self, motion: Motion) -> Force:
+        return *pulse_train_force(motion.phase, self.train, self.n_rollers), 0.0

@@ -8,6 +8,7 @@ from jaxtyping import Array
 
 from .._parameters import choice, parameter
 from .._types import Scalar
+from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows
 
 
 Cross = Literal["circulatory", "as_printed"]
@@ -70,3 +71,34 @@ class Support(eqx.Module):
     )
     cross: Cross = choice("circulatory", "as_printed", text="form of the cross-coupling", default="circulatory")
     cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")
+
+    def at(self, cage: GuidedCage, speed: Scalar) -> "SupportForce":
+        """The support of `cage`."""
+        stiffness = (self.stiffness_x + self.stiffness_y) / 2
+        cubic = cubic_stiffness(self.cubic, self.cubic_stiffness, self.cubic_ratio, stiffness, cage.clearance)
+        springs = (self.stiffness_x, self.stiffness_y, cubic, self.cross_stiffness, self.cross_cubic)
+        return SupportForce(*springs, self.damping, self.cross)
+
+
+class SupportForce(AbstractForce):
+    """Springs, cross-coupling and damping."""
+
+    stiffness_x: Scalar
+    stiffness_y: Scalar
+    cubic: Scalar
+    """K_3 [N/m^3]."""
+    cross_stiffness: Scalar
+    cross_cubic: Scalar
+    damping: Scalar
+    cross: Cross = eqx.field(static=True)
+
+    def force(self, motion: Motion) -> Force:
+        x, y, b = motion.x, motion.y, self.damping
+        spring = spring_force(x, y, self.stiffness_x, self.stiffness_y, self.cubic)
+        cross = cross_force(self.cross, x, y, self.cross_stiffness, self.cross_cubic)
+        return spring[0] + cross[0] - b * motion.vx, spring[1] + cross[1] - b * motion.vy, 0.0
+
+    def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
+        springs = (self.stiffness_x, self.stiffness_y, self.cubic, self.cross_stiffness, self.cross_cubic)
+        b = self.damping
+        return support_slopes(self.cross, motion.x, motion.y, *springs), ((-b, 0.0), (0.0, -b))

@@ -6,15 +6,16 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._types import Scalar
+from ._motion import AbstractForcing, Force, Motion
 from ._phase import cos_sin
 
 
 UnbalanceReading = Literal["physical", "as_printed"]
 
 
-def unbalance_force(tau: Scalar, mass: Scalar, eccentricity: Scalar, omega: Scalar) -> tuple[Scalar, Scalar]:
-    """M e omega^2 (cos tau, sin tau) [N], with mass [kg], eccentricity [m], speed [rad/s]."""
-    amplitude = mass * eccentricity * omega**2
+def unbalance_force(tau: Scalar, unbalance: Scalar, omega: Scalar) -> tuple[Scalar, Scalar]:
+    """M e omega^2 (cos tau, sin tau) [N], with M e [kg m] and speed [rad/s]."""
+    amplitude = unbalance * omega**2
     cosine, sine = cos_sin(tau)
     return amplitude * cosine, amplitude * sine
 
@@ -30,3 +31,13 @@ def effective_eccentricity(
     if reading == "physical":
         return jnp.asarray(eccentricity)
     return jnp.asarray(2 * eccentricity / guidance_gap * printed_unit)
+
+
+class UnbalanceForce(AbstractForcing):
+    """Centrifugal force of the mass centre."""
+
+    unbalance: Scalar
+    """Mass times the eccentricity that enters the force, M e [kg m]."""
+
+    def force(self, motion: Motion) -> Force:
+        return *unbalance_force(motion.phase, self.unbalance, motion.cage_speed), 0.0

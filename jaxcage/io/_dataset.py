@@ -38,7 +38,8 @@ _DERIVED: dict[str, tuple[str, ...]] = {
 def to_dataset(sweep: Sweep, model: CageModel | None = None) -> xr.Dataset:
     """A sweep as a labelled data set.
 
-    **Arguments:** the sweep; the model it was made with, whose every parameter then goes along.
+    **Arguments:** the sweep; the model it was made with, whose every parameter then goes along (none with forces of
+    one's own: leave it out).
 
     **Returns:** variables over `speed`, `start`, `revolution`, `component`, `block`, `exponent`
     with units and words; configuration, method and versions in the attributes.

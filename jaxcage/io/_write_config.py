@@ -8,13 +8,18 @@ import equinox as eqx
 from ..models import CageModel
 from ._config import kind_name
 from ._files import replacing
-from ._schema import submodules, values
+from ._schema import ConfigError, submodules, values
 
 
 def configuration(model: CageModel) -> dict[str, Any]:
     """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML
     file.
+
+    **Raises:** `ConfigError` for a model with forces of its user's own, which no table can hold.
     """
+    if model.extra:
+        names = ", ".join(type(law).__name__ for law in model.extra)
+        raise ConfigError(f"Argument `model` must have no forces of your own to be put into a file, but has {names}.")
     return _table(model)
 
 

@@ -12,7 +12,7 @@
 """
 
 from ._cage import CageModel as CageModel
-from ._cage_at_speed import CageAtSpeed as CageAtSpeed, CageForces as CageForces
+from ._cage_at_speed import FORCES as FORCES, CageAtSpeed as CageAtSpeed
 from ._cases import case as case
 from ._constants import CONSTANTS as CONSTANTS, Constants as Constants
 from ._field import (

@@ -2,7 +2,7 @@
 M r_C'' = F_film + F_contact + F_support + F_impact + M e omega^2 (cos tau, sin tau) - M g y.
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
@@ -10,10 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._parameters import choice, parameter
+from .._parameters import choice, parameter, with_numbers
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
 from ..forces import (
+    AbstractForce,
     ElasticRib,
     LandContact,
     RibFilm,
@@ -24,7 +25,7 @@ from ..forces import (
     UnbalanceReading,
     smooth_norm,
 )
-from ._cage_at_speed import CageAtSpeed, ElasticRibLaw, RigidRibLaw
+from ._cage_at_speed import FORCES, CageAtSpeed, ElasticRibLaw, RigidRibLaw
 from ._field import AbstractField, SecondOrderField
 from ._system import AbstractForcedSystem
 
@@ -63,8 +64,19 @@ class CageModel(AbstractForcedSystem):
     unbalance: UnbalanceReading = choice(
         "physical", "as_printed", text="eccentricity as given, or as (20) prints it", default="physical"
     )
+    extra: tuple[AbstractForce, ...] = eqx.field(default=(), converter=with_numbers)
+    """Forces of one's own between land and cage, each a `jaxcage.forces.AbstractForce` named after its class."""
 
     def __check_init__(self) -> None:
+        for name, kinds in PARTS.items():
+            part = getattr(self, name)
+            if isinstance(part, eqx.Module) and type(part) not in kinds:
+                wanted = " or ".join(f"`{kind.__name__}`" for kind in kinds)
+                raise ValueError(
+                    f"Argument `{name}` must be a {wanted}, but is a `{type(part).__name__}`; a force of your own goes "
+                    "into `extra`."
+                )
+        _check_extra(self.extra)
         clearance = self.clearance
         for name, length in (("contact", self.contact.smoothing), ("film", self.film.smoothing)):
             if is_concrete(length, clearance) and np.any(np.asarray(length) > SMOOTHEST * np.asarray(clearance)):
@@ -91,9 +103,10 @@ class CageModel(AbstractForcedSystem):
     @property
     def harmonics(self) -> int:
         """Unbalance and the impact of (15) turn with the cage; rollers pass Z times in a revolution."""
+        own = max((law.harmonics for law in self.extra), default=1)
         if isinstance(self.impact, RollerPassImpact):
-            return self.bearing.n_rollers * self.impact.harmonics
-        return 1
+            return max(own, self.bearing.n_rollers * self.impact.harmonics)
+        return own
 
     def cage_at(self, speed: Scalar) -> CageAtSpeed:
         """The cage's force laws at `speed` [rad/s]."""
@@ -128,6 +141,32 @@ class CageModel(AbstractForcedSystem):
         eps, growth = jax.jvp(lambda *y: jnp.asarray(self.excursion(y)), y, rate)
         width = ONSET_WIDTH * self.contact.smoothing / self.clearance
         return smooth_norm(eps - self.contact.onset, 0.0, width), jnp.abs(growth)
+
+
+PARTS: dict[str, tuple[type, ...]] = {
+    "film": (RibFilm,),
+    "contact": (LandContact,),
+    "support": (Support,),
+    "impact": (SynchronousImpact, RollerPassImpact),
+    "rib": (RigidRib, ElasticRib),
+}
+"""Kinds of each part that a cage knows how to use."""
+
+
+def _check_extra(laws: Any) -> None:
+    """**Raises:** `ValueError` for anything but a tuple of force laws, each with a name of its own."""
+    if not isinstance(laws, tuple) or not all(isinstance(law, AbstractForce) for law in laws):
+        given = ", ".join(type(law).__name__ for law in laws) if isinstance(laws, tuple) else type(laws).__name__
+        raise ValueError(
+            f"Argument `extra` must be a tuple of forces, each a `jaxcage.forces.AbstractForce`, but holds: {given}."
+        )
+    names = [type(law).__name__ for law in laws]
+    taken = [name for i, name in enumerate(names) if name in (*FORCES, *names[:i])]
+    if taken:
+        raise ValueError(
+            f"Argument `extra` must name each force once, beside {', '.join(FORCES)}, but `{taken[0]}` is there twice: "
+            "a force is named after its class, and a subclass gives it another name."
+        )
 
 
 def _worst(length: Scalar | Array, clearance: Scalar | Array) -> tuple[float, float]:

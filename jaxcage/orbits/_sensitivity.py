@@ -66,7 +66,7 @@ class Sensitivity:
     elasticity: dict[str, float]
     """Relative change of the value over the relative change of the parameter."""
     homogeneity: dict[str, float]
-    """Relative residuals of the identities for mass, length and time."""
+    """Relative residuals of the identities for mass, length and time; NaN where a parameter's unit is not known."""
     transversality: float
     """d|mu|/d speed [s] (see `BifurcationPoint`); of a width or limit the smallest one."""
     status: str

@@ -1,5 +1,6 @@
 """Time history, orbit in the clearance circle, and each force, of one trajectory."""
 
+import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +16,7 @@ from ._style import (
     BLUE,
     FORCE_COLOURS,
     GREY,
+    OWN_COLOURS,
     VERMILION,
     axes_or_new,
     dress,
@@ -75,8 +77,10 @@ def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axe
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) part."""
     ax = axes_or_new(ax, height=3.0)
     time = shown("time", trajectory.time)
+    own = itertools.cycle(OWN_COLOURS)
     for name, force in forces.items():
-        ax.plot(time, force[:, axis], color=FORCE_COLOURS.get(name, BLACK), linewidth=0.9, label=name)
+        colour, line = (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
+        ax.plot(time, force[:, axis], color=colour, linestyle=line, linewidth=0.9, label=name)
     ax.set(
         xlabel=quantity("time").label,
         ylabel=f"{('Horizontal', 'Vertical')[axis]} force [N]",

@@ -72,6 +72,8 @@ FORCE_COLOURS = {
     "unbalance": PURPLE,
     "weight": BLACK,
 }
+OWN_COLOURS = (SKY, GREY)
+"""Forces of one's own take them in turn, and a dashed line."""
 
 
 class Halo(withStroke):

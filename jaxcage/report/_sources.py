@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from .._parameters import get, walk
+from .._parameters import EXTRA, get, walk
 from ..models import CageModel
 
 
@@ -79,6 +79,8 @@ def shown(value: float, unit: str) -> tuple[str, float]:
 
 
 def _source(model: CageModel, path: tuple[str, ...], field: dataclasses.Field, table: Mapping[str, Any] | None) -> str:
+    if path[0] == EXTRA:
+        return "a force of your own"
     if table is None:
         for start in (path[:n] for n in range(len(path), 0, -1)):
             if start in _PUBLISHED:

@@ -223,7 +223,9 @@ def _coordinates(study: Study, shapes: dict[str, tuple[tuple[str, ...], str]]) -
 
 def _attributes(study: Study) -> dict[str, Any]:
     described = study.describe()
-    configured = {"configuration": json.dumps(described["system"])} if isinstance(study.system, CageModel) else {}
+    system, configured = study.system, {}
+    if isinstance(system, CageModel) and not system.extra:  # a configuration cannot hold forces of one's own
+        configured = {"configuration": json.dumps(described["system"])}
     return {
         "title": "jaxcage study",
         "fingerprint": study.fingerprint,

@@ -15,8 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
+from ..forces import AbstractForce
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, CageModel
 from ..orbits import pick
@@ -195,14 +197,25 @@ def _start_and_scale(
 
 
 def _described(system: AbstractForcedSystem) -> Any:
-    """The configuration of a cage; of another system its numbers, and the text of its functions."""
+    """The configuration of a cage, with its user's forces; of another system its numbers, and its functions' text."""
     if isinstance(system, CageModel):
         from ..io import configuration  # the core does not load the tables of `io`
 
-        return configuration(system)
-    leaves = jax.tree.leaves(system)
+        own = {type(law).__name__: [*_numbers_and_text(law), *_classes(law)] for law in system.extra}
+        return configuration(replace(system, extra=())) | ({"extra": own} if own else {})
+    return _numbers_and_text(system)
+
+
+def _numbers_and_text(module: eqx.Module) -> list[Any]:
+    leaves = jax.tree.leaves(module)
     numbers = [np.asarray(x).tolist() for x in leaves if eqx.is_array_like(x)]
-    return [str(jax.tree.structure(system)), numbers, [_text(x) for x in leaves if callable(x)]]
+    return [str(jax.tree.structure(module)), numbers, [_text(x) for x in leaves if callable(x)]]
+
+
+def _classes(law: AbstractForce) -> list[str]:
+    """The text of its class and of those between this and ours."""
+    kinds = type(law).__mro__
+    return [_text(kind) for kind in kinds[: kinds.index(AbstractForce)]]
 
 
 def _text(f: Callable[..., Any]) -> str:

@@ -111,7 +111,7 @@ class _Polar:
         self.cross, self.b = float(s.cross_stiffness), float(s.damping)
         law = model.impact
         self.push = float(law.amplitude * (speed / law.reference_speed) ** law.exponent)  # pyright: ignore
-        self.arm = float(model.cage_at(speed).eccentricity)
+        self.arm = float(model.cage_at(speed).law("unbalance").unbalance) / self.m
 
     def film(self, r: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Minus the integral of p n over the half arc behind the line of centres, Simpson's rule."""

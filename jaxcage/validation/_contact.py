@@ -46,7 +46,7 @@ def contact_comparisons() -> list[Comparison]:
 def _impact(restitution: float) -> tuple[float, float, float]:
     """Speed after over speed before, greatest depth [m] and duration [s] of an impact on our contact force."""
     chi = float(restitution_damping(restitution))
-    normal = jax.jit(lambda p, v: contact_force(p, v, STIFFNESS, chi, SPEED))
+    normal = jax.jit(lambda p, v: contact_force(p, v, STIFFNESS, chi / SPEED))
     depth = (MASS * SPEED**2 / STIFFNESS) ** (1 / (EXPONENT + 1))
 
     def rates(_: float, y: np.ndarray | list[float]) -> list[float]:

@@ -1,0 +1,131 @@
+"""The oil film of the guiding lands as a force on the cage.
+
+Beyond the onset of land contact the film keeps the coefficients that it has there: the clearance circle is where they
+would be infinite.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._parameters import choice, count, parameter
+from .._types import Scalar
+from ._film import FilmModel, ShortFilm, film_drive, film_resistance, film_scale, polar_resistance, supply_force
+from ._finite_film import finite_film_force
+from ._land import Place
+from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows, turned
+
+
+class RibFilm(eqx.Module):
+    """The oil film of the guiding lands: how many, how wide, and which film model."""
+
+    land_width: Scalar = parameter("m", 1e-4, 0.05, "width of one guiding land")
+    smoothing: Scalar = parameter(
+        "m", 1e-12, 1e-5, "length that keeps the film differentiable at the centre", default=1e-9
+    )
+    supply_pressure: Scalar = parameter("Pa", 0.0, 1e6, "gauge supply pressure p_0 of (27)", default=0.0)
+    n_lands: int = count(1, 4, "number of guiding lands, each a film of its own", default=2)
+    model: FilmModel = choice(
+        "fixed_half",
+        "positive_pressure",
+        "full",
+        "finite_length",
+        text="film model: a short film, or the Reynolds equation with its axial term",
+        default="fixed_half",
+    )
+
+    @property
+    def arc(self) -> ShortFilm:
+        """The short film whose pressurised arc this film has: exactly, or as the land gets narrow."""
+        return "positive_pressure" if self.model == "finite_length" else self.model
+
+    def at(self, cage: GuidedCage, speed: Scalar) -> "FilmForce":
+        """The film of `cage` in its guide."""
+        c, radius, viscosity = cage.clearance, cage.land_radius, cage.lubricant.dynamic_viscosity
+        return FilmForce(
+            scale=self.n_lands * film_scale(viscosity, radius, self.land_width, c),
+            supply_scale=self.n_lands * radius * self.land_width * self.supply_pressure,
+            drag=self.n_lands * (2 * jnp.pi) * viscosity * radius**3 * self.land_width / c,
+            slenderness=self.land_width / (2 * radius),
+            model=self.model,
+        )
+
+
+class FilmForce(AbstractForce):
+    """Force of the film in all lands."""
+
+    scale: Scalar
+    """S = mu R L (L/c)^2 of all lands [N s]."""
+    supply_scale: Scalar
+    """R L p_0 of all lands [N]."""
+    drag: Scalar
+    """2 pi mu R^3 L/c of all lands [N m s]: the torque per speed of a cage in the middle of its clearance."""
+    slenderness: Scalar
+    """Width over diameter of a land."""
+    model: FilmModel = eqx.field(static=True)
+
+    def force(self, motion: Motion) -> Force:
+        place, blur = motion.place, motion.land.centre_width
+        x, y, omega = place.x, place.y, motion.cage_speed + motion.land_speed
+        px, py = film_drive(x, y, place.vx, place.vy, omega)
+        kept = 1 - place.excess * place.per_eps
+        fx, fy = self._pressed(kept * x, kept * y, place, px, py, omega, blur)
+        arc = "positive_pressure" if self.model == "finite_length" else self.model
+        thrust = supply_force(arc, (place.nx, place.ny), px, py, omega, blur)
+        eps = place.eps - place.excess
+        torque = self.drag / jnp.sqrt(1 - eps * eps) * (motion.cage_speed - motion.land_speed)
+        return fx + self.supply_scale * thrust[0], fy + self.supply_scale * thrust[1], -torque
+
+    def _pressed(
+        self, x: Scalar, y: Scalar, place: Place, px: Scalar, py: Scalar, omega: Scalar, blur: Scalar
+    ) -> tuple[Array, Array]:
+        """Force of the pressure that motion builds up [N], at (x, y) over clearance, for the drive P."""
+        if self.model == "finite_length":
+            fx, fy = finite_film_force(x, y, px, py, omega, self.slenderness, blur)
+            return jnp.asarray(self.scale * fx), jnp.asarray(self.scale * fy)
+        m = film_resistance(self.model, x, y, (place.nx, place.ny), px, py, omega, blur)
+        half = -self.scale / 2
+        return jnp.asarray(half * (m.xx * px + m.xy * py)), jnp.asarray(half * (m.xy * px + m.yy * py))
+
+    def slopes(self, motion: Motion) -> tuple[Rows, Rows] | None:
+        """Closed form for a fixed arc; one solve, differentiated along all four, where the pressure is solved for.
+
+        In the frame (n, t) of the line of centres dn = t (t.u)/eps and dt = -n (t.u)/eps for a displacement u. Exact
+        outside the film's smoothing length of the centre.
+        """
+        if self.model == "positive_pressure":
+            return None
+        if self.model == "finite_length":
+            return self._solved_slopes(motion)
+        place, per_c, omega = motion.place, motion.land.per_clearance, motion.cage_speed + motion.land_speed
+        nx, ny, per_eps = place.nx, place.ny, place.per_eps
+        px, py = film_drive(place.x, place.y, place.vx, place.vy, omega)
+        p_n, p_t = nx * px + ny * py, nx * py - ny * px
+        m = polar_resistance(self.model, place.eps - place.excess)
+        open_ = 1 - place.touch  # how much of a change of eps the film's coefficients see
+        half = -self.scale / 2 * per_c
+        at_centre, turning = p_n * per_eps, p_t * per_eps
+        thrust = self.supply_scale * per_c * per_eps * (2 if self.model == "fixed_half" else 0)
+        of_q = (
+            (
+                half * (open_ * ((m.d_a + m.d_b) * p_n - m.d_g * p_t) + m.g * omega),
+                half * ((m.a + m.b) * omega + m.b * turning + 2 * m.g * at_centre) - thrust,
+            ),
+            (
+                half * (open_ * (m.d_a * p_t - m.d_g * p_n) - m.a * omega),
+                half * (m.b * at_centre - m.g * (2 * turning + omega)),
+            ),
+        )
+        drag = 2 * half
+        of_v = ((drag * (m.a + m.b), -drag * m.g), (-drag * m.g, drag * m.a))
+        return turned(of_q, nx, ny), turned(of_v, nx, ny)
+
+    def _solved_slopes(self, motion: Motion) -> tuple[Rows, Rows]:
+        def held(state: Array) -> Array:
+            x, y, vx, vy = state
+            return jnp.stack(self.force(motion._replace(x=x, y=y, vx=vx, vy=vy))[:2])
+
+        state = jnp.stack([jnp.asarray(s) for s in (motion.x, motion.y, motion.vx, motion.vy)])
+        (a, b), (c, d) = jax.jacfwd(held)(state).reshape(2, 2, 2)
+        return ((a[0], a[1]), (c[0], c[1])), ((b[0], b[1]), (d[0], d[1]))
