@@ -37,7 +37,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     assert (half["lanes"], half["stored"], half["stored_before"], half["chunks"]) == (24, 12, 0, 6)
     assert main([*SMALL, *out]) == 0
     text, said = capsys.readouterr()
-    assert "Lanes: 6 speed x 2 guidance_gap x 2 start" in text and "for 12 lanes" in text
+    assert "Lanes: 6 speed x 2 guidance_gap x 2 start" in text and "Computed: 12 lanes" in text
     assert "left for the other shards" not in said
     whole = document(capsys, *SMALL, *out)
     assert (whole["stored"], whole["stored_before"], whole["lanes_per_second"]) == (24, 24, None)
@@ -111,7 +111,7 @@ SPEED = "--vary speed=9000:12000:3"
         (f"{SPEED} --vary guidance_gap=0.5mm:0.4mm --sample 4", "must ascend"),
         (f"{SPEED} --vary guidance_gap=0.5mm+-0mm --sample 4", "above 0"),
         (f"{SPEED} --vary guidance_gap=0.4mm:0.5mm", "--sample must say how many samples to take of guidance_gap"),
-        (f"{SPEED} --sample 8", "--sample needs a --vary with an interval or a tolerance"),
+        (f"{SPEED} --sample 8", "--sample needs an interval or a tolerance to sample, but 8"),
         (f"{SPEED} --vary eccentricity=0.5mm", "must be smaller than `guidance_gap`"),
         (f"{SPEED} --vary oil=1", "oil must stay from 2 to 10000"),
         ("--vary speed=-3", "speed must stay above 0 rad/s"),
@@ -178,7 +178,7 @@ def test_a_line_a_minute_where_there_is_no_terminal(
     """200 lanes, 50 of them stored before, two a second from then on."""
     clock = [0.0]
     monkeypatch.setattr(_console.time, "monotonic", lambda: clock[0])
-    with _console.progress_with_rate("study x", "lanes", "go on") as bar:
+    with _console.progress("study x", "lanes", "go on") as bar:
         for done in range(50, 201, 10):
             clock[0] = 1000.0 + (done - 50) / 2
             bar("", done, 200)
@@ -221,7 +221,7 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
         ("--points 9x7 --speed 9000", "--speed goes with an --x that is not the speed"),
         ("--points 9x7 --x eccentricity", "--speed must be given for a map over eccentricity"),
         ("--points 9x7 --x eccentricity --speed -1", "--speed must be a speed above 0 rpm, but -1"),
-        ("--points 9x7 --starts 4", "--starts must lie between 1 and 3, but 4"),
+        ("--points 9x7 --starts 4", "--starts must be at most 3, but 4"),
         ("--adaptive", "--adaptive, --refine, --no-curves, --persist, --most and --speed go with --points"),
     ],
 )

@@ -1,17 +1,16 @@
 """`jaxcage reproduce`: the published edges, figures and conclusions beside ours."""
 
-import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from ..bearing import FIGURE_AXES, PUBLISHED_CASES
 from ..models import case
 from ..plotting import new_figure, paper_figures, zoomed_diagram
+from ..report import Table, number
 from ..reproduction import (
     ComparedEdge,
-    Conclusion,
     ReadingResult,
     Runs,
     compare_edges,
@@ -20,60 +19,47 @@ from ..reproduction import (
     try_readings,
     zones_in_range,
 )
-from ._console import progress_in_stages
-from ._inputs import output_folder, save_figure
+from ._job import Job, save_figure
 from ._options import ReproduceOptions
-from ._report import Report, Table, number
+from ._show import Report, chosen
 
 
 QUICK: dict[str, Any] = {"speeds": 126, "discard": 150, "revolutions": 100, "section_revolutions": 504, "orbits": False}
 QUICK_READINGS: dict[str, Any] = {"speeds": 48, "discard": 150, "revolutions": 100}
 
 
-def run(options: ReproduceOptions) -> Report:
+def reproduce(job: Job[ReproduceOptions]) -> Report:
     """Carry out `jaxcage reproduce`."""
-    folder = output_folder(options)
-    began = time.perf_counter()
+    options = job.options
     models = {name: case(name, options.constants) for name in PUBLISHED_CASES}
-    with progress_in_stages("reproduce") as bar:
-        runs = run_all(models, report=bar, **(QUICK if options.quick else {}))
-        drawn = [save_figure(figure, folder / f"{name}.png") for name, figure in paper_figures(runs)]
+    with job.computing() as say:
+        runs = run_all(models, report=say, **(QUICK if options.quick else {}))
         checked = conclusions(runs)
-        read = try_readings(models, report=bar, **(QUICK_READINGS if options.quick else {}))
-    drawn.append(_readings_figure(read, folder))
+        read = try_readings(models, report=say, **(QUICK_READINGS if options.quick else {}))
+    figures = {**dict(paper_figures(runs)), "readings": _readings_figure(read)}
     edges = [row for name in PUBLISHED_CASES for row in _edges(runs, name)]
     ranges = _ranges(runs)
     document = {
-        "quick": options.quick,
-        "constants": options.constants,
+        **chosen(options, "quick constants"),
         "resolution_rpm": float(next(iter(runs.sweeps.values())).resolution_rpm),
-        "edges": [_edge_document(row) for row in edges],
+        "edges": [vars(row) | {"error_percent": row.error_percent} for row in edges],
         "summary": {kind: _summary(edges, kind) for kind in ("chaotic", "synchronous-loss")},
         "zones": {name: len(zones_in_range(z.zones)) for name, z in runs.zones.items()},
         "ranges": ranges,
         "conclusions": [vars(c) for c in checked],
         "readings": [_reading_document(r) for r in read],
-        "figures": drawn,
-        "seconds": round(time.perf_counter() - began, 1),
+        "figures": [
+            str(save_figure(figure, job.folder / f"{name}.png", options.style)) for name, figure in figures.items()
+        ],
     }
     tables = [
         _edges_table(edges, document["resolution_rpm"]),
         _ranges_table(ranges),
-        _conclusions_table(checked),
+        Table("The paper's conclusions", ("claim", "verdict"), [(c.claim, c.verdict) for c in checked]),
         _readings_table(read),
     ]
-    evidence = [f"{c.claim.split('.')[0].split(':')[0]}: {c.evidence}" for c in checked]
-    return Report(
-        document,
-        tables,
-        [
-            "Evidence",
-            *(f"  {line}" for line in evidence),
-            *_notes(document),
-            f"Figures: {folder}",
-            f"Time: {document['seconds']:.1f} s",
-        ],
-    )
+    evidence = [f"  {c.claim.split('.')[0].split(':')[0]}: {c.evidence}" for c in checked]
+    return Report(document, tables, ["Evidence", *evidence, *_notes(document), f"Figures: {job.folder}"])
 
 
 def _edges(runs: Runs, name: str) -> list[ComparedEdge]:
@@ -82,10 +68,6 @@ def _edges(runs: Runs, name: str) -> list[ComparedEdge]:
     if name in runs.loss:
         found += compare_edges(published, runs.loss[name].zones, "synchronous-loss")
     return found
-
-
-def _edge_document(row: ComparedEdge) -> dict[str, Any]:
-    return vars(row) | {"error_percent": row.error_percent}
 
 
 def _summary(edges: list[ComparedEdge], kind: str) -> dict[str, Any]:
@@ -150,19 +132,11 @@ def _ranges_table(ranges: list[dict[str, Any]]) -> Table:
     return Table("Ranges of the strobe points", ("figure", "quantity", "ours", "printed axis", "inside"), rows)
 
 
-def _conclusions_table(checked: list[Conclusion]) -> Table:
-    return Table("The paper's conclusions", ("claim", "verdict"), [(c.claim, c.verdict) for c in checked])
-
-
 def _reading_document(r: ReadingResult) -> dict[str, Any]:
     return {
-        "case": r.reading.case,
-        "question": r.reading.question,
-        "answer": r.reading.answer,
-        "chaotic_share": r.chaotic_share,
-        "zones": r.zones,
+        **chosen(r.reading, "case question answer"),
+        **chosen(r, "chaotic_share zones failed"),
         "edges": {e.edge: e.ours_rpm for e in r.edges},
-        "failed": r.failed,
     }
 
 
@@ -182,7 +156,7 @@ def _readings_table(read: list[ReadingResult]) -> Table:
     return Table("Readings of the paper [rpm]", columns, rows)
 
 
-def _readings_figure(read: list[ReadingResult], folder: Path) -> str:
+def _readings_figure(read: list[ReadingResult]) -> Figure:
     columns = 3
     figure = new_figure(12.0, 2.4 * -(-len(read) // columns))
     cells = figure.subplots(-(-len(read) // columns), columns, sharex=True, squeeze=False).ravel()
@@ -192,7 +166,7 @@ def _readings_figure(read: list[ReadingResult], folder: Path) -> str:
         ax.set_xlabel("")
     for ax in cells[len(read) :]:
         ax.set_visible(False)
-    return save_figure(figure, folder / "readings.png")
+    return figure
 
 
 def _notes(document: dict[str, Any]) -> list[str]:

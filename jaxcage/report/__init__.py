@@ -18,7 +18,12 @@
 """
 
 from ._contact import contact_notes as contact_notes, touching as touching
-from ._findings import AllFailed as AllFailed, Findings as Findings, examine as examine
+from ._findings import (
+    AllFailed as AllFailed,
+    Findings as Findings,
+    examine as examine,
+    require_some as require_some,
+)
 from ._map import (
     RPM as RPM,
     SPEED as SPEED,

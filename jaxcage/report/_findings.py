@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from jaxtyping import Int
 
+from .._errors import NoResult
 from .._parameters import parameter_info, parameters
 from ..analysis import Sweep, Zones, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
-from ..integrate import AbstractMethod
+from ..integrate import OUTCOMES, AbstractMethod
 from ..models import CageModel
 from ..orbits import (
     Curve,
@@ -36,8 +38,18 @@ FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 Progress = Callable[[str, int, int], None]
 
 
-class AllFailed(Exception):
-    """No simulation of the sweep finished: there is nothing to report. Its argument is their number."""
+class AllFailed(NoResult):
+    """No simulation finished: there is nothing to report."""
+
+
+def require_some(outcome: Int[np.ndarray, "..."], where: str = "") -> None:
+    """Stop if all simulations failed.
+
+    **Raises:** `AllFailed`, which says of how many, `where`, and how.
+    """
+    if np.all(outcome != 0):
+        how = ", ".join(sorted({OUTCOMES[code] for code in np.ravel(outcome)}))
+        raise AllFailed(f"All {np.size(outcome)} simulations{where} failed ({how}): try more steps (--steps).")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,8 +132,7 @@ def examine(
             method=sweep_method,
             progress=lambda done, of: say("sweep", done, of),
         )
-    if np.all(swept.failed):
-        raise AllFailed(swept.outcome.size)
+    require_some(swept.outcome)
     with timed("synchronous orbits"):
         first, last = float(speeds[0]), float(speeds[-1])
         found = synchronous_orbits(model, first, last, settled=swept, method=orbit_method, progress=say)

@@ -3,7 +3,7 @@
 import math
 from typing import get_args
 
-from ..bearing import Guidance, LoadDistribution, static_cage_displacement
+from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
 from ..models import CageModel
 from ._table import Table
 
@@ -24,8 +24,9 @@ def displacements(model: CageModel, shared: LoadDistribution) -> dict[str, float
     }
 
 
-def statics_table(model: CageModel, shared: LoadDistribution) -> Table:
-    """What a designer asks of the bearing at rest."""
+def statics_table(title: str, model: CageModel, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
+    """What a designer asks of the bearing at rest, and of its kinematics if a shaft speed [rad/s] is given."""
+    bearing = model.bearing
     rows = [
         ("largest roller load", f"{float(shared.max_load):.1f}", "N"),
         ("shift of the shaft", f"{1e6 * float(shared.shaft_shift):.2f}", "µm"),
@@ -35,6 +36,13 @@ def statics_table(model: CageModel, shared: LoadDistribution) -> Table:
             (f"cage displacement, {guidance.replace('_', ' ')} guidance", f"{1e3 * y:.4f}", "mm")
             for guidance, y in displacements(model, shared).items()
         ),
-        ("cage speed over shaft speed", f"{float(model.bearing.cage_speed_ratio):.4f}", ""),
+        ("cage speed over shaft speed", f"{float(bearing.cage_speed_ratio):.4f}", ""),
     ]
-    return Table(f"At rest under {float(model.load):g} N", ("quantity", "value", "unit"), rows)
+    if shaft_speed is not None:
+        surface = float(raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter))
+        rows += [
+            ("cage speed", f"{float(bearing.cage_speed(shaft_speed)) * 30 / math.pi:.1f}", "rpm"),
+            ("surface speed of the inner raceway", f"{surface:.2f}", "m/s"),
+            ("centrifugal force of a roller", f"{float(bearing.roller_centrifugal_force(shaft_speed)):.1f}", "N"),
+        ]
+    return Table(title, ("quantity", "value", "unit"), rows)

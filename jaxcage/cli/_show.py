@@ -9,12 +9,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..report import Table as Table, number as number
+from ..report import Table
 
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """Result of a command."""
+    """What a command has to say; the runner adds case, time and files."""
 
     document: Mapping[str, Any]
     tables: Sequence[Table] = ()
@@ -22,6 +22,17 @@ class Report:
     """Lines below the tables."""
     failure: str = ""
     """What the command says, with exit status 1, after it has shown a report of something that failed."""
+
+
+def chosen(found: Any, names: str) -> dict[str, Any]:
+    """Some attributes of a result, for a document."""
+    return {name: getattr(found, name) for name in names.split()}
+
+
+def shares_table(title: str, columns: Sequence[str], counts: Mapping[str, int]) -> Table:
+    """How many of each sort there are, and their share of all."""
+    total = sum(counts.values())
+    return Table(title, columns, [(name, str(n), f"{n / total:.1%}") for name, n in counts.items()])
 
 
 def show(report: Report, as_json: bool) -> None:
