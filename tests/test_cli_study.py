@@ -196,7 +196,7 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     monkeypatch.setattr(
         _label_map._Files,
         "write",
-        lambda self, found: (write(self, found), stages.append(self.figure.exists()))[0],
+        lambda self, found: (write(self, found), stages.append(self.job.path(f"{self.stem}.png").exists()))[0],
     )
     small = [*MAP, "--adaptive", "--first", "3000", "--last", "9000", "--out", str(tmp_path)]
     got = document(capsys, *small)
