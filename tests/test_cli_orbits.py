@@ -12,7 +12,6 @@ import jaxcage as jc
 from jaxcage.analysis import Sweep
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import _orbits, main
-from jaxcage.cli._orbits import gradient_document, gradient_table, homogeneity_notes, missing_notes
 from jaxcage.cli._show import plain
 from jaxcage.io import read_columns
 from jaxcage.orbits import (
@@ -30,7 +29,11 @@ from jaxcage.report import (
     coexisting_notes,
     contact_notes,
     edge_table,
+    gradient_document,
+    gradient_table,
+    homogeneity_notes,
     loss_table,
+    missing_notes,
     multiplier_cell,
     orbits_document,
     shown_unit,

@@ -1,20 +1,18 @@
 """What needs no motion of the cage: a file to start from, loads at rest, the impact of one roller."""
 
-from typing import Any
-
 import jax.numpy as jnp
 import numpy as np
 
 from .._errors import InputError
 from ..bearing import load_distribution, raceway_surface_speed
-from ..forces import ImpactHistory, PocketImpact, RollerPassImpact, approach_speed, impact_history
+from ..forces import PocketImpact, RollerPassImpact, approach_speed, impact_history
 from ..io import write_template
-from ..plotting import impact_forces, load_bars, new_figure
-from ..report import Table, displacements, statics_table
+from ..plotting import impact_forces, load_bars
+from ..report import Table, chosen, displacements, impact_document, impact_table, statics_table
 from ..sweeps import rpm
 from ._job import Job
 from ._options import ImpactOptions, InitOptions, StaticsOptions
-from ._show import Report, chosen
+from ._show import Report
 
 
 def init(job: Job[InitOptions]) -> Report:
@@ -39,9 +37,7 @@ def statics(job: Job[StaticsOptions]) -> Report:
         "inner load [N]": np.asarray(shared.inner_loads),
         "outer load [N]": np.asarray(shared.outer_loads),
     }
-    figure = new_figure(7.0, 3.8)
-    load_bars(shared, figure.subplots()).set_title(f"{job.name}, {load:g} N", loc="left", fontsize=11)
-    job.figure(figure)
+    job.draw(lambda ax: load_bars(shared, ax), (7.0, 3.8), f"{job.name}, {load:g} N")
     job.columns(loads)
     document = {
         "load": load,
@@ -76,44 +72,10 @@ def impact(job: Job[ImpactOptions]) -> Report:
     with job.computing():
         v0 = approach_speed(law.approach_ratio, rpm(options.speed), model.bearing.pocket_clearance)
         history = impact_history(law, model.bearing.roller_mass, v0, jnp.asarray(1e-3 * options.duration))
-    figure, at = new_figure(7.0, 4.0), f"_{options.speed:g}rpm"
-    title = f"{job.name}, {options.speed:g} rpm, approach at {float(v0):.3g} m/s"
-    impact_forces(history, figure.subplots()).set_title(title, loc="left", fontsize=11)
-    job.figure(figure, detail=at)
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, approach at {float(v0):.3g} m/s"
+    job.draw(lambda ax: impact_forces(history, ax), (7.0, 4.0), title, detail=at)
     units = {"time": "s", "contact_force": "N", "bar_force": "N", "roller_position": "m", "bar_position": "m"}
     job.columns({f"{n} [{unit}]": np.asarray(getattr(history, n)) for n, unit in units.items()}, detail=at)
-    values = {"approach_speed": float(v0)} | _summary(history)
-    rows = [(text, f"{factor * values[name]:.4g}", unit) for name, (text, factor, unit) in _SHOWN.items()]
-    ends = "yes, give a longer --duration" if values["ends_in_contact"] else "no"
-    rows.append(("still in contact at the end", ends, ""))
-    title = f"Impact in {job.name} at {options.speed:g} rpm"
-    return Report({"speed_rpm": options.speed, **values}, [Table(title, ("quantity", "value", "unit"), rows)])
-
-
-_SHOWN = {
-    "approach_speed": ("approach speed", 1.0, "m/s"),
-    "peak_contact_force": ("peak contact force", 1.0, "N"),
-    "peak_bar_force": ("peak bar force", 1.0, "N"),
-    "lowest_bar_force": ("lowest bar force", 1.0, "N"),
-    "contact_duration": ("time in contact", 1e3, "ms"),
-    "contacts": ("contacts", 1.0, ""),
-    "impulse": ("impulse of the contact force", 1e3, "mN s"),
-}
-"""Words, and factor to the unit that is shown."""
-
-
-def _summary(history: ImpactHistory) -> dict[str, Any]:
-    """Peaks, time in contact and impulse, over the whole history: a bar that swings back may be hit
-    again.
-    """
-    touching = np.asarray(history.contact_force) > 0
-    step = float(history.time[1] - history.time[0])
-    return {
-        "peak_contact_force": float(jnp.max(history.contact_force)),
-        "peak_bar_force": float(jnp.max(history.bar_force)),
-        "lowest_bar_force": float(jnp.min(history.bar_force)),
-        "contact_duration": float(np.sum(touching)) * step,
-        "contacts": int(np.sum(touching[1:] & ~touching[:-1])),
-        "impulse": float(history.impulse),
-        "ends_in_contact": bool(touching[-1]),
-    }
+    values = {"approach_speed": float(v0)} | impact_document(history)
+    table = impact_table(f"Impact in {job.name} at {options.speed:g} rpm", values)
+    return Report({"speed_rpm": options.speed, **values}, [table])

@@ -3,7 +3,6 @@
 import concurrent.futures
 import dataclasses
 import hashlib
-import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from .._parameters import parameter_info, parameters
+from .. import report
 from ..analysis import Sweep, zones
 from ..design import (
     AbstractObjective,
     Optimised,
     Robust,
-    SobolIndices,
-    ToleranceBudget,
     chaotic_width,
     cost,
     global_sensitivity,
@@ -27,21 +24,18 @@ from ..design import (
 )
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
-from ..plotting import design_figure, elasticity_bars, new_figure
-from ..report import Table, number
+from ..plotting import design_figure, elasticity_bars
 from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job
 from ._options import SETTLED, DesignOptions, SensitivityOptions, VaryOptions
-from ._show import Report, chosen
+from ._show import Report
 from ._vary import read_bounds, read_scatter
 
 
 VARY = ("guidance_gap=0.3mm:0.6mm", "eccentricity=5um:60um")
 CHECKED_SPEEDS = 118
 """Every 200 rpm of the usual range."""
-MOST = 8
-"""Parameters listed in a budget."""
 
 
 def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
@@ -54,21 +48,17 @@ def design(job: Job[DesignOptions]) -> Report:
     options = job.options
     vary = read_bounds(options.vary or VARY, job.model)
     scatter = read_scatter(options.scatter, list(vary))
-    width: AbstractObjective = chaotic_width(
-        options.first, options.last, options.speeds, cloud=options.cloud, spread=options.spread, seed=options.seed
-    )
+    range_ = options.first, options.last, options.speeds
+    width: AbstractObjective = chaotic_width(*range_, **job.given("cloud spread seed"))
     if scatter:
-        width = Robust(width, scatter, worst=options.worst, seed=options.seed)
+        width = Robust(width, scatter, **job.given("worst seed"))
     kept = _kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
         found = optimise(
             job.model,
             vary,
             width + options.cost * cost() if options.cost else width,
-            starts=options.starts,
-            scouts=options.scouts,
-            steps=options.steps,
-            seed=options.seed,
+            **job.given("starts scouts steps seed"),
             keep=kept,
             report=lambda step, _: say("search", step, options.steps),
         )
@@ -86,9 +76,9 @@ def design(job: Job[DesignOptions]) -> Report:
     chaotic = {name: zones(swept) for name, swept in checked.items()}
     document = {
         "vary": vary,
-        **chosen(found.best, "objective error at_bound status"),
+        **report.chosen(found.best, "objective error at_bound status"),
         "optimum": found.best.values,
-        "optima": [chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
+        "optima": [report.chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
         "designs_swept": _swept(found, options, width),
         "cost": {name: float(cost().function(model)) for name, model in models.items()},
         "chaotic_rpm": {name: _chaotic_rpm(swept) for name, swept in checked.items()},
@@ -96,7 +86,11 @@ def design(job: Job[DesignOptions]) -> Report:
         "synchronous_loss_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in loss.items()},
         "search_seconds": round(searched, 1),
     }
-    tables = [_parameters_table(job.name, job.model, found, document), _optima_table(found), *_zone_tables(document)]
+    tables = [
+        report.parameters_table(job.name, job.model, found, document),
+        report.optima_table(found),
+        *report.before_and_after_tables(document),
+    ]
     return Report(document, tables, _notes(document, found))
 
 
@@ -133,47 +127,6 @@ def _ends(zone: Any) -> dict[str, Any]:
     return {"onset_rpm": edge(zone.onset), "exit_rpm": edge(zone.exit), "width_rpm": zone.width_rpm}
 
 
-def _parameters_table(name: str, model: CageModel, found: Optimised, document: Mapping[str, Any]) -> Table:
-    info, bounds, before = parameter_info(model), document["vary"], parameters(model)
-    rows = [
-        (n, info[n].unit, f"{float(before[n]):.4g}", f"{value:.4g}", " to ".join(f"{b:.4g}" for b in bounds[n]))
-        for n, value in found.best.values.items()
-    ]
-    for what, unit, form in (("cost", "", ".3f"), ("chaotic_rpm", "rpm", ".0f")):
-        then, now = (format(value, form) for value in document[what].values())
-        rows.append((what.removesuffix("_rpm"), unit, then, now, ""))
-    return Table(f"Design of {name}", ("parameter", "unit", "before", "after", "bounds"), rows)
-
-
-def _optima_table(found: Optimised) -> Table:
-    names = list(found.best.values)
-    rows = [
-        (
-            *(f"{o.values[n]:.4g}" for n in names),
-            f"{o.objective:.0f} ± {o.error:.0f}",
-            str(count),
-            ", ".join(o.at_bound) or "none",
-        )
-        for o, count in found.distinct
-    ]
-    return Table("Optima", (*names, "objective [rpm]", "starts", "at a bound"), rows)
-
-
-def _zone_tables(document: Mapping[str, Any]) -> list[Table]:
-    tables = []
-    for kind in ("chaotic", "synchronous_loss"):
-        found = document[f"{kind}_zones"]
-        rows = [
-            (when, str(i), *map(number, zone.values()))
-            for when, listed in found.items()
-            for i, zone in enumerate(listed, start=1)
-        ]
-        if found:
-            title = f"{kind.replace('_', '-').capitalize()} zones before and after [rpm]"
-            tables.append(Table(title, ("design", "zone", "onset", "exit", "width"), rows))
-    return tables
-
-
 def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
     best = found.best
     return [
@@ -192,7 +145,7 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
     edges, budgets = {}, []
     with job.computing() as say:
         say("Sobol designs", 0, 1)
-        shares = global_sensitivity(job.model, vary, width, samples=options.samples, seed=options.seed)
+        shares = global_sensitivity(job.model, vary, width, **job.given("samples seed"))
         if not options.quick:
             loss = _loss_zones(job.model, options, say)
             say("gradients", 0, 1)
@@ -201,16 +154,15 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
             budgets = [tolerance_budget(s, dict.fromkeys(s.elasticity, relative)) for s in edges.values()]
     job.files["figure"] = None
     if edges:
-        drawn = new_figure(9.0, 2.2 + 1.2 * len(edges))
-        elasticity_bars(list(edges.values()), drawn.subplots())
-        job.figure(drawn)
+        title, size = f"{job.name}: elasticities of the synchronous-loss edges", (9.0, 2.2 + 1.2 * len(edges))
+        job.draw(lambda ax: elasticity_bars(list(edges.values()), ax), size, title)
     document = {
         "vary": vary,
-        "sobol": chosen(shares, "first total first_interval total_interval") | {"designs": shares.evaluations},
+        "sobol": report.chosen(shares, "first total first_interval total_interval") | {"designs": shares.evaluations},
         "tolerance_percent": options.tolerance,
         "edges": [
             {
-                **chosen(b, "edge speed_rpm"),
+                **report.chosen(b, "edge speed_rpm"),
                 "deviation_rpm": b.total_rpm,
                 "by_parameter_rpm": b.deviation_rpm,
                 "elasticity": edges[b.edge].elasticity,
@@ -218,25 +170,6 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
             for b in budgets
         ],
     }
-    return Report(document, [_sobol_table(job.name, shares), *(_budget_table(b, options.tolerance) for b in budgets)])
-
-
-def _sobol_table(name: str, shares: SobolIndices) -> Table:
-    cell = lambda value, pair: f"{value:+.2f} ({pair[0]:+.2f} to {pair[1]:+.2f})"
-    rows = [
-        (n, cell(shares.first[n], shares.first_interval[n]), cell(shares.total[n], shares.total_interval[n]))
-        for n in sorted(shares.total, key=lambda n: -shares.total[n])
-    ]
-    title = f"Chaotic speeds of {name}: shares of the variance over {shares.evaluations} designs (95 % interval)"
-    return Table(title, ("parameter", "alone", "with interactions"), rows)
-
-
-def _budget_table(budget: ToleranceBudget, tolerance: float) -> Table:
-    order = sorted(budget.deviation_rpm.items(), key=lambda item: -item[1])
-    share = lambda d: f"{100 * (d / budget.total_rpm) ** 2:.0f} %"
-    rows = [(n, f"{d:.3g}", share(d)) for n, d in itertools.islice(order, MOST)]
-    title = (
-        f"{budget.edge.capitalize()} at {budget.speed_rpm:.1f} rpm under +-{tolerance:g} % of everything: "
-        f"standard deviation {budget.total_rpm:.3g} rpm"
+    return Report(
+        document, [report.sobol_table(job.name, shares), *(report.budget_table(b, options.tolerance) for b in budgets)]
     )
-    return Table(title, ("parameter", "rpm", "share of variance"), rows)

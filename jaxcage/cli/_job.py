@@ -4,11 +4,12 @@ import contextlib
 import functools
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .._errors import InputError
@@ -16,12 +17,13 @@ from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import check_writable, load_model, replacing, write_columns
 from ..models import CageModel, case
-from ..plotting import Style, restyle
+from ..plotting import Style, new_figure, restyle
+from ..report import chosen
 from ._console import Say, progress, say
-from ._options import CommonOptions, InitOptions, IntegrationOptions, Options
+from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 
 
-Given = TypeVar("Given", bound=CommonOptions | InitOptions, covariant=True)
+Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
 
 class Job(Generic[Given]):
@@ -69,13 +71,36 @@ class Job(Generic[Given]):
         """Since the command began."""
         return time.perf_counter() - self.began
 
+    def saved(self, figure: Figure, path: Path) -> Path:
+        """Write a figure in the style that is asked for."""
+        assert isinstance(self.options, CommonOptions)
+        return save_figure(figure, path, self.options.style)
+
+    def given(self, names: str) -> dict[str, Any]:
+        """Options that go to the library under their own names."""
+        return chosen(self.options, names)
+
     def path(self, ending: str) -> Path:
         """Where a file goes: named after the command and the case."""
         return self.folder / f"{self.command}_{self.name}{ending}"
 
     def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> str:
         """Write a figure, and list it under `key`. **Returns:** its path."""
-        return self.listed(key, save_figure(figure, self.path(f"{detail}.png"), self.options.style))
+        return self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
+
+    def draw(
+        self,
+        draw: Callable[[Axes], Any],
+        size: tuple[float, float],
+        title: str,
+        key: str = "figure",
+        detail: str = "",
+    ) -> None:
+        """Write a figure of one diagram, and list it under `key`."""
+        figure = new_figure(*size)
+        draw(figure.subplots())
+        figure.suptitle(title, fontsize=11)
+        self.figure(figure, key, detail)
 
     def columns(self, columns: Mapping[str, np.ndarray], key: str = "data", detail: str = "") -> str:
         """Write a table of numbers, and list it under `key`. **Returns:** its path."""

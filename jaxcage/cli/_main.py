@@ -15,7 +15,7 @@ from .. import __version__
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError, InputError, NoResult
 from ._console import BAD_INPUT, FAILED, FILES_ARE_WHOLE, INTERRUPTED, OK, leave_at_once_when_interrupted, say
-from ._options import COMMANDS, Command, CommonOptions, InitOptions
+from ._options import COMMANDS, AnyOptions, Command, CommonOptions
 from ._readers import flag
 
 
@@ -55,11 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _carry_out(options: CommonOptions | InitOptions) -> None:
+def _carry_out(options: AnyOptions) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    if not options.no_cache:
+    if isinstance(options, CommonOptions) and not options.no_cache:
         keep_compiled_programs()
     command, place = next((name, place) for name, (kind, place) in COMMANDS.items() if kind is type(options))
     module, function = place.split(".")
@@ -76,12 +76,11 @@ def _carry_out(options: CommonOptions | InitOptions) -> None:
         raise NoResult(report.failure)
 
 
-def _of_options(error: ArgumentError, options: CommonOptions | InitOptions) -> Exception:
+def _of_options(error: ArgumentError, options: AnyOptions) -> Exception:
     """What the library says of its arguments, said of the options they come from; of others it is our mistake."""
-    names = [options.called.get(name, name) for name in error.names]
-    if any(name not in vars(options) for name in names):
-        return RuntimeError(str(error))
-    return InputError(error.about("Option", lambda name: flag(options.called.get(name, name))))
+    option = lambda name: options.called.get(name, name)
+    known = all(option(name) in vars(options) for name in error.names)
+    return InputError(error.about("Option", lambda name: flag(option(name)))) if known else RuntimeError(str(error))
 
 
 def _complete(job: "Job[Any]", report: "Report") -> "Report":

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from .._errors import ArgumentError, NoResult
+from .._errors import ArgumentError, InputError, NoResult
+from .._parameters import parameter_info, parameters
+from ..io import to_si
 from ..orbits import Curve
-from ..plotting import new_figure, stability_map
-from ..report import RPM, SPEED, Axis, Exponents, Table, follow_edges, largest_exponents
+from ..plotting import stability_map
+from ..report import SPEED, Axis, Exponents, Table, chosen, follow_edges, largest_exponents, parameter_axis, speed_axis
 from ..sweeps import rpm
-from ._axes import axes_of
 from ._job import Job
 from ._label_map import label_map_of
 from ._options import MapOptions
@@ -20,7 +22,7 @@ from ._show import Report
 
 def map_of(job: Job[MapOptions]) -> Report:
     """Carry out `jaxcage map`."""
-    options, (x, y) = job.options, axes_of(job)
+    options, (x, y) = job.options, _axes(job)
     own = len(job.model.starts(1.0))
     if options.starts > own:
         raise ArgumentError("starts", said=f"must be at most {own}, but {options.starts} was given.")
@@ -40,9 +42,7 @@ def map_of(job: Job[MapOptions]) -> Report:
                 rpm(options.first, options.last, options.columns),
                 y,
                 options.rows,
-                starts=options.starts,
-                discard=options.discard,
-                revolutions=options.revolutions,
+                **job.given("starts discard revolutions"),
                 method=job.asked,
                 say=say,
             )
@@ -51,6 +51,28 @@ def map_of(job: Job[MapOptions]) -> Report:
     if x.name != SPEED:
         notes.append("Each curve holds at its own edge's speed; figure and exponents are made over speed only.")
     return Report(_document(curves, exponents, x, y) | {"refused": refused}, _tables(job.name, curves, x, y), notes)
+
+
+def _axes(job: Job[MapOptions]) -> tuple[Axis, Axis]:
+    """Both directions."""
+    options, known = job.options, list(parameters(job.model))
+    for option, given, allowed in (("--y", options.y, known), ("--x", options.x, [SPEED, *known])):
+        if given not in allowed:
+            raise InputError(f"Option {option} must be one of {', '.join(allowed)}, but '{given}' was given.")
+    if options.x == options.y:
+        raise InputError(f"Options --x and --y must be two different parameters, but both are {options.x}.")
+    unit, ends = parameter_info(job.model)[options.y].unit, {}
+    for name, text in job.given("lower upper").items():
+        try:
+            ends[name] = None if text is None else to_si(text, unit)
+        except ValueError as error:
+            raise ArgumentError(name, said=f"{error}.") from error
+    y = parameter_axis(job.model, options.y, **ends)
+    return (
+        speed_axis(rpm(options.first), rpm(options.last))
+        if options.x == SPEED
+        else parameter_axis(job.model, options.x)
+    ), y
 
 
 def _write(job: Job[MapOptions], curves: Sequence[Curve], exponents: Exponents | None, x: Axis, y: Axis) -> None:
@@ -66,12 +88,14 @@ def _write(job: Job[MapOptions], curves: Sequence[Curve], exponents: Exponents |
     }
     job.columns(columns, detail=stem)
     if x.name == SPEED:
-        figure = new_figure(10.0, 6.0)
-        axes = stability_map(curves, figure.subplots(), exponents=exponents, y_unit=y.unit, y_factor=y.factor)
-        if exponents is None:
-            axes.set(xlim=(x.lower * x.factor, x.upper * x.factor), ylim=(y.lower * y.factor, y.upper * y.factor))
-        figure.suptitle(f"{job.name}: synchronous-loss edges", fontsize=11)
-        job.figure(figure, detail=stem)
+        xlim, ylim = (x.lower * x.factor, x.upper * x.factor), (y.lower * y.factor, y.upper * y.factor)
+
+        def draw(ax: Axes) -> None:
+            stability_map(curves, ax, exponents=exponents, y_unit=y.unit, y_factor=y.factor)
+            if exponents is None:
+                ax.set(xlim=xlim, ylim=ylim)
+
+        job.draw(draw, (10.0, 6.0), f"{job.name}: synchronous-loss edges", detail=stem)
     if exponents is not None:
         across, upward = np.meshgrid(exponents[0], exponents[1] * y.factor, indexing="ij")
         grid = {x.head: across.ravel(), y.head: upward.ravel(), "largest exponent": exponents[2].ravel()}
@@ -80,22 +104,18 @@ def _write(job: Job[MapOptions], curves: Sequence[Curve], exponents: Exponents |
 
 def _document(curves: Sequence[Curve], exponents: Exponents | None, x: Axis, y: Axis) -> dict[str, Any]:
     """Curves for programs: a speed in rpm, all else in SI units."""
-    to_x = RPM if x.name == SPEED else 1.0
     rows = [
         {
-            "name": c.name,
-            "kind": c.kind,
-            "x": c.x_value * to_x,
+            **chosen(c, "name kind genuine"),
+            "x": x.told(c.x_value),
             "y": c.y_value,
-            "genuine": c.genuine,
-            "special": [{"kind": p.kind, "x": p.x_value * to_x, "y": p.y_value} for p in c.special],
+            "special": [{"kind": p.kind, "x": x.told(p.x_value), "y": p.y_value} for p in c.special],
             "ended": list(c.ended),
         }
         for c in curves
     ]
     grid = exponents and {"x": exponents[0], "y": exponents[1], "largest": exponents[2].T}
-    ranges = {"x_range": [x.lower * to_x, x.upper * to_x], "y_range": [y.lower, y.upper]}
-    return {"x": x.name, "y": y.name, **ranges, "curves": rows, "exponents": grid}
+    return {"x": x.name, "y": y.name, "x_range": x.range, "y_range": y.range, "curves": rows, "exponents": grid}
 
 
 def _tables(name: str, curves: Sequence[Curve], x: Axis, y: Axis) -> list[Table]:

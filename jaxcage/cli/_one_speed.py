@@ -1,35 +1,30 @@
 """What the cage does at one speed: time history with each force, and strobe section."""
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .._errors import NoResult
-from .._glossary import component_names, quantity
 from ..analysis import OrbitMeasures, Sweep, cage_forces, orbit_measures
 from ..integrate import OUTCOMES, simulate
-from ..io import write_trajectory
-from ..plotting import new_figure, simulation_figure, strobe_section
-from ..report import Table, number, require_some
+from ..io import strobe_columns, write_trajectory
+from ..plotting import simulation_figure, strobe_section
+from ..report import Table, chosen, number, require_some
 from ..sweeps import rpm, sweep
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import PoincareOptions, SimulateOptions
-from ._show import Report, chosen
+from ._show import Report
 
 
 def simulate_at(job: Job[SimulateOptions]) -> Report:
     """`jaxcage simulate`: time history, orbit and each force at one speed."""
     options, model = job.options, job.model
     with job.computing():
-        trajectory = simulate(
-            model,
-            rpm(options.speed),
-            revolutions=options.revolutions,
-            discard=options.discard,
-            samples=samples_per_revolution(job.method, 128),
-            method=job.method,
-        )
+        samples = samples_per_revolution(job.method, 128)
+        length = job.given("revolutions discard")
+        trajectory = simulate(model, rpm(options.speed), **length, samples=samples, method=job.method)
     if trajectory.outcome != "successful":
         raise NoResult(f"The simulation at {options.speed:g} rpm failed ({trajectory.outcome}): try more --steps.")
     forces, measures = cage_forces(model, trajectory), orbit_measures(model, trajectory)
@@ -63,26 +58,27 @@ def poincare_at(job: Job[PoincareOptions]) -> Report:
         found = sweep(
             job.model,
             np.array([rpm(options.speed)]),
-            discard=options.discard,
-            revolutions=options.revolutions,
+            **job.given("discard revolutions"),
             blocks=blocks_of(options.revolutions),
             keep=options.revolutions,
             method=job.method,
-            progress=lambda done, total: say("", done, total),
+            progress=partial(say, ""),
         )
     require_some(found.outcome, f" at {options.speed:g} rpm")
-    figure, at = new_figure(6.5, 5.4), f"_{options.speed:g}rpm"
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, {options.revolutions} revolutions"
     names = [f"start {i + 1}: {label}" for i, label in enumerate(found.label[0])]
-    strobe_section(found.strobe[0], figure.subplots(), names=names)
-    figure.suptitle(f"{job.name}, {options.speed:g} rpm, {options.revolutions} revolutions", fontsize=11)
-    job.figure(figure, detail=at)
-    job.columns(_columns(found), detail=at)
+    job.draw(lambda ax: strobe_section(found.strobe[0], ax, names=names), (6.5, 5.4), title, detail=at)
+    job.columns(strobe_columns(found), detail=at)
     starts = _starts(found)
-    error = lambda s: f"{number(s['exponent'], 4)} ± {number(s['standard_error'], 4)}"
-    rows = [(str(s["start"]), s["label"], error(s)) for s in starts]
+    columns = {
+        "start": "{[start]}",
+        "label": "{[label]}",
+        "largest exponent per revolution": lambda s: " ± ".join(
+            number(s[n], 4) for n in ("exponent", "standard_error")
+        ),
+    }
     length = f"{options.discard} + {options.revolutions} revolutions"
-    title = f"Strobe section of {job.name} at {options.speed:g} rpm, {length}"
-    table = Table(title, ("start", "label", "largest exponent per revolution"), rows)
+    table = Table.of(f"Strobe section of {job.name} at {options.speed:g} rpm, {length}", columns, starts)
     return Report({"speed_rpm": options.speed, "starts": starts}, [table])
 
 
@@ -101,15 +97,3 @@ def _starts(found: Sweep) -> list[dict[str, Any]]:
         }
         for i in range(found.strobe.shape[1])
     ]
-
-
-def _columns(found: Sweep) -> dict[str, np.ndarray]:
-    _, starts, keep, dimension = found.strobe.shape
-    states = found.strobe[0].reshape(-1, dimension)
-    first = found.discard + found.revolutions - keep + 1
-    columns = {
-        "start": np.repeat(np.arange(1, starts + 1), keep),
-        "revolution": np.tile(np.arange(first, first + keep), starts),
-    }
-    names = component_names(dimension)
-    return columns | {f"{name} [{quantity(name).unit}]": states[:, i] for i, name in enumerate(names)}

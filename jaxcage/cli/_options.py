@@ -32,8 +32,8 @@ Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class CommonOptions:
-    """What every command takes."""
+class AnyOptions:
+    """What every command has."""
 
     timed: ClassVar[bool] = True
     """Whether the time that the command took is of interest."""
@@ -42,18 +42,24 @@ class CommonOptions:
 
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
-    out: Annotated[str, text("name a folder")] = "out"
-    """Folder for figures and data; it is made if need be."""
-    style: Literal["light", "dark", "print"] = "light"
-    """Style of the figures: for white pages, dark screens, or black-and-white paper."""
-    no_cache: bool = False
-    """Compile everything anew instead of using programs kept from earlier runs."""
 
     def check(self) -> None:
         """Refuse options that do not go together.
 
         **Raises:** `InputError`.
         """
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CommonOptions(AnyOptions):
+    """What every command takes that computes something."""
+
+    out: Annotated[str, text("name a folder")] = "out"
+    """Folder for figures and data; it is made if need be."""
+    style: Literal["light", "dark", "print"] = "light"
+    """Style of the figures: for white pages, dark screens, or black-and-white paper."""
+    no_cache: bool = False
+    """Compile everything anew instead of using programs kept from earlier runs."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -386,24 +392,16 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class InitOptions:
+class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
     timed: ClassVar[bool] = False
-    called: ClassVar[Mapping[str, str]] = {}
-    no_cache: ClassVar[bool] = True
-    style: ClassVar[Literal["light"]] = "light"
 
     path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
     """Where to write it, e.g. my_bearing.toml; an existing file is left alone."""
-    json: bool = False
-    """Print one JSON document on standard output instead of text."""
-
-    def check(self) -> None:
-        """Whatever is given goes together."""
 
 
-COMMANDS: Mapping[str, tuple[type[CommonOptions | InitOptions], str]] = {
+COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "init": (InitOptions, "_bearing.init"),
     "simulate": (SimulateOptions, "_one_speed.simulate_at"),
     "sweep": (SweepOptions, "_sweep.sweep_over_speed"),
@@ -419,7 +417,7 @@ COMMANDS: Mapping[str, tuple[type[CommonOptions | InitOptions], str]] = {
     "impact": (ImpactOptions, "_bearing.impact"),
     "reproduce": (ReproduceOptions, "_reproduce.reproduce"),
     "validate": (ValidateOptions, "_validate.validate"),
-    "report": (ReportOptions, "_page.report"),
+    "report": (ReportOptions, "_page.report_on"),
 }
 """Command -> its options, and the function of this package that carries it out."""
 Command: Any = Union[tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, (kind, _) in COMMANDS.items())]  # noqa: UP007

@@ -6,23 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .. import report
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES
 from ..io import replacing
-from ..report import (
-    Findings,
-    Judged,
-    Table,
-    examine,
-    judge,
-    loss_table,
-    page,
-    read_operating,
-    transient_tables,
-    zone_document,
-    zones_document,
-    zones_table,
-)
 from ..sweeps import rpm
 from ._job import Job, blocks_of
 from ._options import ReportOptions
@@ -33,33 +20,31 @@ SPEEDS, QUICK_SPEEDS = 251, 126
 """Quick reports take as many revolutions: shorter runs miss orbits that attract slowly, and where they are stable."""
 
 
-def report(job: Job[ReportOptions]) -> Report:
+def report_on(job: Job[ReportOptions]) -> Report:
     """Carry out `jaxcage report`."""
     options = job.options
-    operating = read_operating(options.operating)
+    operating = report.read_operating(options.operating)
     if options.operating and not operating:
         raise InputError(f"Option --operating must hold a speed, but '{options.operating}' was given.")
     count = options.count or (QUICK_SPEEDS if options.quick else SPEEDS)
     with job.computing() as say:
-        findings = examine(
+        findings = report.examine(
             job.name,
             job.model,
             job.published,
             speeds=rpm(options.first, options.last, count),
-            discard=options.discard,
-            revolutions=options.revolutions,
+            **job.given("discard revolutions quick"),
             blocks=blocks_of(options.revolutions),
             sweep_method=job.method,
             orbit_method=job.asked,
-            quick=options.quick,
             progress=say,
         )
-    html = page(findings, operating, table=_table(options.case), command=_command(options))
+    html = report.page(findings, operating, table=_table(options.case), command=_command(options))
     path = job.path(".html")
     with replacing(path) as temporary:
         temporary.write_text(html, encoding="utf-8")
     job.listed("report", path)
-    judged = judge(findings, operating)
+    judged = report.judge(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())
     document = _document(findings, judged) | {"failed": failed, "stages": findings.seconds, "bytes": size}
     stages = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in findings.seconds.items())
@@ -79,10 +64,10 @@ def _command(options: ReportOptions) -> str:
     return shlex.join([*parts, *(["--quick"] if options.quick else [])])
 
 
-def _document(findings: Findings, judged: list[Judged]) -> dict[str, Any]:
-    return zones_document(findings.name, findings.zones, findings.published) | {
+def _document(findings: report.Findings, judged: list[report.Judged]) -> dict[str, Any]:
+    return report.zones_document(findings.name, findings.zones, findings.published) | {
         "quick": findings.quick,
-        "synchronous_loss": [zone_document(zone) for zone in findings.loss.zones],
+        "synchronous_loss": [report.zone_document(zone) for zone in findings.loss.zones],
         "operating": [
             {"low_rpm": j.at.low_rpm, "high_rpm": j.at.high_rpm} | {kind: vars(v) for kind, v in j.verdicts.items()}
             for j in judged
@@ -91,17 +76,17 @@ def _document(findings: Findings, judged: list[Judged]) -> dict[str, Any]:
     }
 
 
-def _tables(findings: Findings, judged: list[Judged]) -> list[Table]:
+def _tables(findings: report.Findings, judged: list[report.Judged]) -> list[report.Table]:
     swept = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
     rows = [
         (str(j.at) if i == 0 else "", kind, v.state, str(v))
         for j in judged
         for i, (kind, v) in enumerate(j.verdicts.items())
     ]
-    verdicts = Table("Operating speeds", ("cage speed", "kind of zone", "verdict", "where"), rows)
+    verdicts = report.Table("Operating speeds", ("cage speed", "kind of zone", "verdict", "where"), rows)
     return [
         *([verdicts] if rows else []),
-        loss_table(findings.name, findings.found, findings.loss, findings.published),
-        zones_table(findings.name, findings.zones, findings.published, swept),
-        *transient_tables(findings.name, findings.zones),
+        report.loss_table(findings.name, findings.found, findings.loss, findings.published),
+        report.zones_table(findings.name, findings.zones, findings.published, swept),
+        *report.transient_tables(findings.name, findings.zones),
     ]

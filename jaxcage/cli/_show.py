@@ -24,17 +24,6 @@ class Report:
     """What the command says, with exit status 1, after it has shown a report of something that failed."""
 
 
-def chosen(found: Any, names: str) -> dict[str, Any]:
-    """Some attributes of a result, for a document."""
-    return {name: getattr(found, name) for name in names.split()}
-
-
-def shares_table(title: str, columns: Sequence[str], counts: Mapping[str, int]) -> Table:
-    """How many of each sort there are, and their share of all."""
-    total = sum(counts.values())
-    return Table(title, columns, [(name, str(n), f"{n / total:.1%}") for name, n in counts.items()])
-
-
 def show(report: Report, as_json: bool) -> None:
     """Print a report on standard output: one JSON document, or tables (plain text when piped)."""
     if as_json:

@@ -1,6 +1,7 @@
 """`jaxcage study`: a sweep over any grid or sample of parameters, stored as it goes."""
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +9,12 @@ import numpy as np
 
 from .._errors import InputError
 from ..integrate import OUTCOMES
-from ..report import require_some
+from ..report import require_some, shares_table
 from ..studies import LABELS, Plan, Spread, Study, open_study, run_study, too_short
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of
 from ._options import StudyOptions
-from ._show import Report, shares_table
+from ._show import Report
 from ._vary import read_vary
 
 
@@ -24,23 +25,14 @@ ADVICE = "what is stored stays, and the same command goes on from there"
 
 def study(job: Job[StudyOptions]) -> Report:
     """Carry out `jaxcage study`."""
-    options, blocks = job.options, blocks_of(job.options.revolutions)
-    work = Study(
-        job.model,
-        _plan(job),
-        job.method,
-        options.discard,
-        options.revolutions,
-        blocks,
-        options.exponents,
-        options.strobe,
-    )
+    options = job.options
+    length = job.given("discard revolutions exponents strobe")
+    work = Study(job.model, _plan(job), job.method, blocks=blocks_of(options.revolutions), **length)
     path = job.folder / (options.store or f"study_{job.name}.zarr")
     before, began = _lanes_stored(path), time.perf_counter()
     with job.computing(unit="lanes", advice=ADVICE) as bar:
-        report = lambda done, total: bar("", done, total)
         try:
-            run_study(work, path, options.shard, options.executor, options.scheduler, options.workers, report)
+            run_study(work, path, **job.given("shard executor scheduler workers"), progress=partial(bar, ""))
         except ImportError as error:  # of an extra
             raise InputError(str(error)) from error
     seconds = time.perf_counter() - began
@@ -50,7 +42,7 @@ def study(job: Job[StudyOptions]) -> Report:
         say(f"Warning: {work.plan.size - document['stored']} lanes are left for the other shards.")
     job.listed("store", path)
     shape = " x ".join(f"{n} {axis}" for axis, n in document["axes"].items())
-    table = shares_table(f"Lanes: {shape}", ("label", "lanes", "share"), document["labels"])
+    table = shares_table(f"Lanes: {shape}", "label lanes", document["labels"])
     rate = document["lanes_per_second"]
     notes = [
         f"Failed lanes: {', '.join(f'{n} {what}' for what, n in document['failed'].items()) or 'none'}",

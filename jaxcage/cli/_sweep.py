@@ -2,38 +2,25 @@
 
 import collections
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from .. import report
 from ..analysis import Sweep, Zones, waterfall, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
-from ..orbits import Cascade, Explained, Sensitivity, explain, loss_zones, synchronous_orbits
-from ..plotting import new_figure, sweep_figure, waterfall_map, zoomed_diagram
-from ..report import (
-    Table,
-    contact_notes,
-    edge_slopes,
-    error_cell,
-    loss_table,
-    number,
-    require_some,
-    transient_tables,
-    unsettled_notes,
-    zone_document,
-    zones_document,
-    zones_table,
-)
+from ..orbits import explain, loss_zones, synchronous_orbits
+from ..plotting import sweep_figure, waterfall_map, zoomed_diagram
 from ..sweeps import rpm, sweep
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import SweepOptions, ZonesOptions
-from ._show import Report, chosen, shares_table
+from ._show import Report
 
 
-SHOWN = ("guidance_gap", "eccentricity")
-"""Parameters in the table of elasticities."""
+ENDS = ("onset", "exit")
 
 
 def _swept(job: Job[SweepOptions]) -> Sweep:
@@ -43,16 +30,12 @@ def _swept(job: Job[SweepOptions]) -> Sweep:
         found = sweep(
             job.model,
             rpm(options.first, options.last, options.count),
-            discard=options.discard,
-            revolutions=options.revolutions,
-            confirm=options.confirm,
-            horizon=options.horizon,
-            exponents=options.exponents,
+            **job.given("discard revolutions confirm horizon exponents"),
             blocks=blocks_of(options.revolutions),
             method=job.method,
-            progress=lambda done, total: say("", done, total),
+            progress=partial(say, ""),
         )
-    require_some(found.outcome)
+    report.require_some(found.outcome)
     job.listed("data", save_sweep(job.folder / f"sweep_{job.name}.zarr", found, job.model))
     return found
 
@@ -69,12 +52,12 @@ def sweep_over_speed(job: Job[SweepOptions]) -> Report:
         say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
     warn_of_short(short)
     counts = dict(sorted(collections.Counter(found.label.ravel().tolist()).items()))
-    document = zones_document(job.name, edges, job.published) | _extent(found)
+    document = report.zones_document(job.name, edges, job.published) | _extent(found)
     document |= {"labels": counts, "beyond_clearance": beyond, "too_short": short}
     document["confirmed"] = [each._asdict() for each in found.confirmed]
     speeds, starts = found.outcome.shape
     title = f"Lanes: {speeds} speeds x {starts} starts, {found.length}"
-    tables = [shares_table(title, ("label", "lanes", "share"), counts), *_zone_tables(job, found, edges)]
+    tables = [report.shares_table(title, "label lanes", counts), *_zone_tables(job, found, edges)]
     return Report(document, tables, _sweep_notes(document))
 
 
@@ -85,15 +68,15 @@ def _extent(found: Sweep) -> dict[str, Any]:
     return {
         "speeds": speeds,
         "starts": starts,
-        **chosen(found, "discard revolutions"),
+        **report.chosen(found, "discard revolutions"),
         "failed": {OUTCOMES[code]: n for code, n in sorted(codes.items())},
         "error": float(np.max(found.error[~found.failed])),
     }
 
 
-def _zone_tables(job: Job[SweepOptions], found: Sweep, edges: Zones) -> list[Table]:
+def _zone_tables(job: Job[SweepOptions], found: Sweep, edges: Zones) -> list[report.Table]:
     span = float(found.rpm[0]), float(found.rpm[-1])
-    return [zones_table(job.name, edges, job.published, span), *transient_tables(job.name, edges)]
+    return [report.zones_table(job.name, edges, job.published, span), *report.transient_tables(job.name, edges)]
 
 
 def _sweep_notes(document: Mapping[str, Any]) -> list[str]:
@@ -118,15 +101,11 @@ def _title(job: Job[SweepOptions], found: Sweep) -> str:
 
 def _zoom(job: Job[SweepOptions], found: Sweep, edges: Zones) -> None:
     """The widest closed zone enlarged, with a fifth of its width at either side."""
-    closed = [z for z in edges.zones if z.width_rpm]
-    if closed:
-        zone = max(closed, key=lambda z: z.width_rpm or 0.0)
-        assert zone.onset is not None and zone.exit is not None and zone.width_rpm is not None
-        onset, leaves, width = zone.onset.speed_rpm, zone.exit.speed_rpm, zone.width_rpm
-        figure = new_figure(9.0, 5.0)
-        zoomed_diagram(found, onset - 0.2 * width, leaves + 0.2 * width, ax=figure.subplots())
-        figure.suptitle(f"{_title(job, found)}, widest zone", fontsize=11)
-        job.figure(figure, "zoom", "_zoom")
+    zone = max(edges.zones, key=lambda z: z.width_rpm or 0.0, default=None)
+    if zone and zone.width_rpm and zone.onset and zone.exit:
+        low, high = zone.onset.speed_rpm - 0.2 * zone.width_rpm, zone.exit.speed_rpm + 0.2 * zone.width_rpm
+        title = f"{_title(job, found)}, widest zone"
+        job.draw(lambda ax: zoomed_diagram(found, low, high, ax=ax), (9.0, 5.0), title, "zoom", "_zoom")
 
 
 def _waterfall(job: Job[SweepOptions], found: Sweep) -> None:
@@ -134,11 +113,10 @@ def _waterfall(job: Job[SweepOptions], found: Sweep) -> None:
     if job.options.waterfall:
         speeds = np.linspace(found.speed[0], found.speed[-1], job.options.waterfall)
         samples = samples_per_revolution(job.method)
-        spectra = waterfall(job.model, speeds, component=1, samples=samples, method=job.method)
-        figure = new_figure(9.0, 5.0)
-        waterfall_map(spectra.rpm, spectra.order, spectra.amplitude, figure.subplots())
-        figure.suptitle(f"{_title(job, found)}: spectra of the vertical motion", fontsize=11)
-        job.figure(figure, "waterfall", "_waterfall")
+        s = waterfall(job.model, speeds, component=1, samples=samples, method=job.method)
+        title = f"{_title(job, found)}: spectra of the vertical motion"
+        draw = lambda ax: waterfall_map(s.rpm, s.order, s.amplitude, ax)
+        job.draw(draw, (9.0, 5.0), title, "waterfall", "_waterfall")
 
 
 def zones_over_speed(job: Job[ZonesOptions]) -> Report:
@@ -149,72 +127,24 @@ def zones_over_speed(job: Job[ZonesOptions]) -> Report:
         found = synchronous_orbits(job.model, first, last, settled=swept, method=job.asked, progress=say)
         loss = loss_zones(found)
         explained = explain(zones(swept), found, job.model, job.asked)
-        slopes = {} if job.options.quick else edge_slopes(job.model, loss, explained, job.asked)
+        slopes = {} if job.options.quick else report.edge_slopes(job.model, loss, explained, job.asked)
     edges = explained.zones
-    document = zones_document(job.name, edges, job.published) | _extent(swept)
+    document = report.zones_document(job.name, edges, job.published) | _extent(swept)
+    slopes_of = lambda edge: report.slopes_document(slopes, edge)
     document["synchronous_loss"] = [
-        zone_document(zone) | {f"{end}_gradient": _slopes(slopes, f"zone {i} {end}") for end in ("onset", "exit")}
+        report.zone_document(zone) | {f"{end}_gradient": slopes_of(f"zone {i} {end}") for end in ENDS}
         for i, zone in enumerate(loss.zones, start=1)
     ]
     for i, zone in enumerate(document["zones"], start=1):
-        zone |= _source_document(i, explained, slopes)
+        zone |= report.source_document(i, explained, slopes)
     tables = [
-        loss_table(job.name, found, loss, job.published),
-        *([_elasticities_table(job.name, slopes)] if slopes else []),
+        report.loss_table(job.name, found, loss, job.published),
+        *([report.elasticities_table(job.name, slopes)] if slopes else []),
         *_zone_tables(job, swept, edges),
     ]
-    notes = [*_source_notes(explained), *contact_notes(job.model, loss.edges, job.asked), *unsettled_notes(found)]
-    return Report(document, tables, notes)
-
-
-def _slopes(slopes: Mapping[str, Sensitivity], edge: str) -> dict[str, Any] | None:
-    """The gradient of an edge [rpm per SI unit], None where it was left out."""
-    if edge not in slopes:
-        return None
-    return chosen(slopes[edge], "trusted status error_rpm steps transversality derivative elasticity")
-
-
-def _source_document(i: int, explained: Explained, slopes: Mapping[str, Sensitivity]) -> dict[str, Any]:
-    """What the edges of a chaotic zone were taken from; a bifurcation brings its gradient."""
-    found: dict[str, Any] = {}
-    zone = explained.zones.zones[i - 1]
-    for end, edge in (("onset", zone.onset), ("exit", zone.exit)):
-        source = explained.sources.get(f"zone {i} {end}")
-        found[f"{end}_basis"] = edge and edge.basis
-        found[f"{end}_cascade_rpm"] = _cascade_rpm(source) if isinstance(source, Cascade) else None
-        found[f"{end}_gradient"] = _slopes(slopes, f"chaotic zone {i} {end}")
-    return found
-
-
-def _cascade_rpm(cascade: Cascade) -> list[float]:
-    return [float(p.speed_rpm) for p in cascade.points]
-
-
-def _elasticities_table(name: str, slopes: Mapping[str, Sensitivity]) -> Table:
-    """Relative change of an edge per relative change of the parameter."""
-    rows = [
-        (
-            edge,
-            s.kind,
-            number(s.value_rpm, 2),
-            error_cell(s.error_rpm),
-            *(f"{s.elasticity[n]:+.4f}" for n in SHOWN),
-            s.status,
-        )
-        for edge, s in slopes.items()
+    notes = [
+        *report.source_notes(explained),
+        *report.contact_notes(job.model, loss.edges, job.asked),
+        *report.unsettled_notes(found),
     ]
-    columns = ("edge", "by", "speed [rpm]", "±", *(n.replace("_", " ") for n in SHOWN), "status")
-    return Table(f"Elasticities of the exact edges of {name}", columns, rows)
-
-
-def _source_notes(explained: Explained) -> list[str]:
-    edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
-    statistical = sum(e.basis == "statistical" for e in edges)
-    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]
-    for name, source in explained.sources.items():
-        if isinstance(source, Cascade):
-            doublings = ", ".join(number(rpm, 1) for rpm in _cascade_rpm(source))
-            notes.append(f"Chaotic {name}: limit of the cascade with period doublings at {doublings} rpm")
-        else:
-            notes.append(f"Chaotic {name}: coincides with the {source.kind} at {source.speed_rpm:.2f} rpm")
-    return notes
+    return Report(document, tables, notes)

@@ -10,6 +10,14 @@ from ._show import Report
 
 
 NAME = "VALIDATION.md"
+COLUMNS = {
+    "what": "{.what}",
+    "theirs": "{.theirs:.9g}",
+    "ours": "{.ours:.9g}",
+    "difference": "{.difference:+.1e}",
+    "tolerance": "{.tolerance:.1e}",
+    "": lambda c: "pass" if c.passed else "FAILS",
+}
 
 
 def validate(job: Job[ValidateOptions]) -> Report:
@@ -40,20 +48,5 @@ def validate(job: Job[ValidateOptions]) -> Report:
         "failed": len(failed),
     }
     failure = f"{len(failed)} of {count} comparisons fail, the first of them: {failed[0].what}." if failed else ""
-    tables = [_table(topic, rows) for topic, rows in found.items()]
+    tables = [Table.of(topic.capitalize(), COLUMNS, rows) for topic, rows in found.items()]
     return Report(document, tables, [f"{count - len(failed)} of {count} comparisons pass"], failure)
-
-
-def _table(topic: str, rows: list[Comparison]) -> Table:
-    cells = [
-        (
-            c.what,
-            f"{c.theirs:.9g}",
-            f"{c.ours:.9g}",
-            f"{c.difference:+.1e}",
-            f"{c.tolerance:.1e}",
-            "pass" if c.passed else "FAILS",
-        )
-        for c in rows
-    ]
-    return Table(topic.capitalize(), ("what", "theirs", "ours", "difference", "tolerance", ""), cells)

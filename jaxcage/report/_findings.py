@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Int
 
 from .._errors import NoResult
-from .._parameters import parameter_info, parameters
 from ..analysis import Sweep, Zones, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
 from ..integrate import OUTCOMES, AbstractMethod
@@ -25,14 +24,11 @@ from ..orbits import (
     synchronous_orbits,
 )
 from ..sweeps import sweep
-from ._map import RPM, SPEED, Axis, Exponents, follow_edges, largest_exponents
+from ._map import Axis, Exponents, follow_edges, largest_exponents, parameter_axis, speed_axis
 from ._slopes import edge_slopes
-from ._table import shown_unit
 
 
 MAP_PARAMETER = "guidance_gap"
-BELOW, ABOVE = 0.8, 1.25
-"""Range of the map over the value of its parameter."""
 FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 """Edges that are followed across the map, which takes about a minute each."""
 Progress = Callable[[str, int, int], None]
@@ -159,10 +155,7 @@ def _map(
     quick: bool,
     say: Progress,
 ) -> Map:
-    info, value = parameter_info(model)[MAP_PARAMETER], float(parameters(model)[MAP_PARAMETER])
-    low = max(BELOW * value, info.lower, 1.01 * float(model.eccentricity))
-    axis = Axis(MAP_PARAMETER, low, min(ABOVE * value, info.upper), *shown_unit(info.unit, value))
-    across = Axis(SPEED, float(speeds[0]), float(speeds[-1]), "rpm", RPM)
+    axis, across = parameter_axis(model, MAP_PARAMETER), speed_axis(float(speeds[0]), float(speeds[-1]))
     edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
     curves, refused = follow_edges(model, edges, across, axis, orbit_method, say)
     exponents = largest_exponents(
