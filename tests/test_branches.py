@@ -416,12 +416,12 @@ def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
 
 @pytest.mark.parametrize("first", ["period-doubling", "branch-point"])
 def test_crossings_within_one_step_are_in_order(first):
-    """One at p = 0.02 and one at 0.0204, both between the same two points: only the first is next to stable orbits."""
-    places = [0.02, 0.0204] if first == "period-doubling" else [0.0204, 0.02]
+    """One at p = 0.02 and one at 0.0201, both between the same two points: only the first is next to stable orbits."""
+    places = [0.02, 0.0201] if first == "period-doubling" else [0.0201, 0.02]
     a = (-places[1] - 0.2, -places[0] - 0.2)
     branch = planted_branch(a=a, c=(1.0, 1.0), s=(0.2, 0.2))
     assert branch.special[0].index == branch.special[1].index
-    np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0204], rtol=0, atol=1e-8)
+    np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0201], rtol=0, atol=1e-8)
     assert branch.special[0].kind == first and sorted(kinds(branch)) == ["branch-point", "period-doubling"]
     # Along the critical direction e' = -e^3 and the map is -e / sqrt(1 + 2 T e^2), to third order -e + T e^3.
     doubling = next(p for p in branch.special if p.kind == "period-doubling")

@@ -4,6 +4,7 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 """
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from .._types import Scalar, State
-from ..models import ESCAPE, AbstractField, AbstractForcedSystem
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
 from ._explicit import Stages, chosen, explicit_step
 from ._march import is_elementary, march_with_tangents
 from ._program import Numbers, Sizes
@@ -82,6 +83,25 @@ def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end:
     return jax.lax.stop_gradient(jnp.where(left < 1.0001 * short, left, short))
 
 
+@functools.partial(jax.jit, static_argnums=0)
+def evaluated_often(structure: Structure, numbers: Numbers, tau: Scalar, y: State) -> State:
+    """The field of a structure of (field, system, scale)."""
+    return structure.remake(numbers)[0](tau, y)
+
+
+class _CalledField(AbstractField):
+    """A field that a step evaluates several times, as calls of one function."""
+
+    structure: Structure = eqx.field(static=True)
+    numbers: Numbers
+
+    def __call__(self, tau: Scalar, y: State) -> State:
+        return evaluated_often(self.structure, self.numbers, tau, y)
+
+    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+        return self.structure.remake(self.numbers)[0].linearise(tau, y)
+
+
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
@@ -108,8 +128,8 @@ class KernelStep:
 
     def __call__(self, i: Any, moved: State, watched: Numbers, fixed: Numbers) -> tuple[State, Numbers]:
         phase, h, end, *numbers = fixed
-        pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.remake(numbers)
-        field, system, _ = pieces
+        _, system, _ = self.structure.remake(numbers)
+        field = _CalledField(self.structure, tuple(numbers))
         peak, *clock = watched
         t0 = clock[0] if self.abrupt else phase + i * h
 

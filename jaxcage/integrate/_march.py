@@ -34,7 +34,7 @@ from jax.core import Tracer, eval_jaxpr
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
-from ._program import CONTROL_FLOW, Numbers, Sizes, Step, pieces, program_of
+from ._program import CONTROL_FLOW, Numbers, Sizes, Step, pieces, program_of, undisturbed
 
 
 LARGEST = {False: 2800, True: 12000}
@@ -69,6 +69,7 @@ def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
     traced = eqx.filter_jit(f)
 
     @functools.wraps(f)
+    @undisturbed
     def run(*args: Any, **kwargs: Any) -> Any:
         if jex.core.unsafe_am_i_under_a_jit_DO_NOT_USE():  # pyright: ignore[reportPrivateImportUsage]
             return f(*args, **kwargs)

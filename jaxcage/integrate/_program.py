@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import gc
 import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -21,6 +22,8 @@ What is watched (a maximum, an error estimate) has no derivative. A dataclass is
 arrays: one that equals an earlier one is not traced again."""
 
 CONTROL_FLOW = {"while", "scan", "cond"}
+STAYS_CALL = "evaluated_often"
+"""Name of a function under `jax.jit` that a program calls several times: it is differentiated once for all of them."""
 
 
 class Sizes(NamedTuple):
@@ -48,9 +51,27 @@ class Program(NamedTuple):
         return eval_jaxpr(self.jaxpr, self.consts, *x)
 
 
+def undisturbed(f: Callable[..., Any]) -> Callable[..., Any]:
+    """`f` without Python's garbage collection meanwhile, which walks through all that is being traced again and again:
+    nearly half of the time that tracing takes."""
+
+    @functools.wraps(f)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return f(*args, **kwargs)
+        finally:
+            if collects:
+                gc.enable()
+
+    return run
+
+
 def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
-    """What a step computes; with `rules`, functions that have a derivative of their own stay calls: to be
-    differentiated, for which a program is traced much faster than the code that it came from."""
+    """What a step computes; with `rules`, functions that have a derivative of their own, and those that are evaluated
+    often, stay calls: to be differentiated, for which a program is traced much faster than the code that it came from.
+    """
     write_out: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _written_out
     return write_out(step, sizes, rules)
 
@@ -91,7 +112,7 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
     for e in jaxpr.eqns:
         x = [read(v) for v in e.invars]
         called = next((e.params[k] for k in ("jaxpr", "call_jaxpr") if k in e.params), None)
-        if rules and e.primitive.name == "custom_jvp_call":
+        if rules and (e.primitive.name == "custom_jvp_call" or e.params.get("name") == STAYS_CALL):
             alone = jaxpr.replace(constvars=[], invars=list(_read(e)), eqns=[e], outvars=e.outvars)
             out = eval_jaxpr(alone, [], *map(read, alone.invars))
         elif called is None or e.primitive.name in CONTROL_FLOW:

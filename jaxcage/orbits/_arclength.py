@@ -27,8 +27,9 @@ LANES, FEW = (8, 32), 40
 """Lanes per call: two programs for any number of curves, and work for every core; the second where there are more than
 a few lanes, so that one branch needs the first alone. Up to eight lanes cost what one does: they share the processor's
 instructions."""
-FOLLOWING = 1e-6
-"""Newton's last step while following, in the unknowns' units: points are then good to about its square."""
+FOLLOWING, OF_A_STEP = 1e-6, 1e-5
+"""Newton's last step while following, in the unknowns' units, and over the step's length where that is less: points are
+then good to about its square."""
 ONCE = 1e300
 """The same for a single step: infinity would be no number where an unknown is zero."""
 CORRECTIONS = 8
@@ -38,9 +39,19 @@ VEER = 0.7
 """How far the next step should turn, of the largest angle allowed."""
 GROWTH = 1.8
 """Longest step over the one before."""
+ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
+"""How far a point may be from where its tangent says that it is (see `astray`), in the unknowns' units and over the
+step's length, or over its distance from the prediction: more, and it is on another curve, or there is a bend that was
+not seen."""
+CROSSED, ASIDE = 1e-4, 0.01
+"""A step across which the curve's orientation changes is halved down to this length: two curves that nearly meet look
+as if they crossed to a longer one. Where it changes all the same they do cross, and the step is taken in one from so
+far off: near the crossing tangents are lost to rounding."""
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
+MOVED = 0.1
+"""What half the steps change in a point, over the step's length: more, and what is followed may be their error."""
 
 
 class OnPlane(AbstractEquations):
@@ -49,13 +60,6 @@ class OnPlane(AbstractEquations):
     curve: AbstractEquations
     at: Float[Array, " n"]
     normal: Float[Array, " n"]
-
-    def prepare(self, u: Array, given: Any) -> Any:
-        return self.curve.prepare(u, given)
-
-    def residual(self, u: Array, prepared: Any) -> tuple[Array, Any]:
-        r, aux = self.curve.residual(u, prepared)
-        return jnp.append(r, jnp.dot(self.normal, u - self.at)), aux
 
     def linearised(self, u: Array, given: Any) -> tuple[Array, Array, Any]:
         r, jacobian, aux = self.curve.linearised(u, given)
@@ -84,6 +88,8 @@ class Corrected(NamedTuple):
     error: Any
     """Distance to what half the steps give, and the same over what is allowed (see `AbstractEquations.apart`)."""
     over: Any
+    moved: Any
+    """The same in the unknowns' units."""
 
 
 def _correct(
@@ -95,22 +101,22 @@ def _correct(
         at, normal = plane
         by = jnp.where(half, (steps + 1) // 2, steps)
         last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
-        across, near = OnPlane(curve, at, normal).by_steps(by), tolerance == FOLLOWING
+        across, near = OnPlane(curve, at, normal).by_steps(by), tolerance > TOLERANCE
         u, found = solve(across, given, at, CORRECTIONS, last, skip=skip, near=near)
         jacobian = found.newton.jacobian[:-1]
         whole = jnp.concatenate([jacobian, normal[None]])
         tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
         tangent = tangent / jnp.linalg.norm(tangent)
         fine = found.converged & jnp.all(jnp.isfinite(u)) & jnp.all(jnp.isfinite(tangent))
-        unknown = jnp.full(2, jnp.nan)
+        unknown = jnp.full(3, jnp.nan)
         return (u, tangent), Corrected(u, tangent, jacobian, fine, found.iterations, found.aux, by, *unknown)
 
     return jax.lax.scan(turn, (at, normal), jnp.array([False, True]))[1]
 
 
 _axes = eqx.if_array(0)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, None, None, None)))
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, None, None, None)))
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, 0, None, None)))
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, 0, None, None)))
 
 
 def take(tree: Any, lanes: Any) -> Any:
@@ -160,16 +166,17 @@ def correct(
     at: np.ndarray,
     normal: np.ndarray,
     steps: np.ndarray,
-    tolerance: float = TOLERANCE,
+    tolerance: Any = TOLERANCE,
     measured: bool = False,
 ) -> Corrected:
     """Points of many curves on planes across them.
 
-    **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step; whether
-    errors are wanted too, by one step of Newton's method with half the steps.
+    **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step, of all or
+    each; whether errors are wanted too, by one step of Newton's method with half the steps.
     """
     run = _correct_own if curves.own_given else _correct_shared
     measured = measured and int(curves.counts.last) > 1
+    tolerance = np.broadcast_to(np.asarray(tolerance, dtype=float), len(at))
     chunks = []
     for count in np.unique(steps):  # lanes by as many steps run together
         mine = np.flatnonzero(steps == count)
@@ -178,7 +185,7 @@ def correct(
 
     def part(k: np.ndarray) -> Corrected:
         some = curves.take(k)
-        numbers = (np.asarray(x) for x in (at[k], normal[k], float(tolerance), steps[k[0]], measured))
+        numbers = (np.asarray(x) for x in (at[k], normal[k], tolerance[k], steps[k[0]], measured))
         return jax.tree.map(np.asarray, run(some.equations, some.given, *numbers))
 
     if len(chunks) == 1:
@@ -192,9 +199,11 @@ def correct(
     if not measured:
         return points
     with np.errstate(invalid="ignore"):
-        error, over = curves.equations.apart(points.u - half.u, half.jacobian, points.jacobian)
+        moved = points.u - half.u
+        apart = *curves.equations.apart(moved, half.jacobian, points.jacobian), np.linalg.norm(moved, axis=1)
     lost = ~(half.converged & points.converged)
-    return points._replace(error=np.where(lost, np.inf, error), over=np.where(lost, np.inf, over))
+    error, over, far = (np.where(lost, np.inf, x) for x in apart)
+    return points._replace(error=error, over=over, moved=far)
 
 
 def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0, allowed: float = 1.0) -> Corrected:
@@ -273,6 +282,28 @@ def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple
     return last.u + length * (tangent + square + cube), slope / np.linalg.norm(slope)
 
 
+def astray(
+    got: Corrected, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
+) -> Float[np.ndarray, " lanes"]:
+    """How far points are from where their tangents say that they are.
+
+    What the prediction over `length` from two points `apart` leaves out, a s^2 (s + apart)^2, is nearly as far in the
+    tangent as in the point. Another curve beside this one has its own place, but not the tangent that belongs to it.
+    """
+    turned = got.tangent - normal
+    turned -= np.sum(turned * normal, axis=1, keepdims=True) * normal
+    share = 1 / (2 / length + 2 / (length + apart))
+    return np.linalg.norm(got.u - ahead - share[:, None] * turned, axis=1)
+
+
+def orientation(jacobian: np.ndarray, tangent: np.ndarray) -> Float[np.ndarray, " lanes"]:
+    """Sign of the determinant of a curve's equations with its tangent, the same all along it until it crosses another.
+
+    A branch point changes it, a fold does not.
+    """
+    return np.linalg.slogdet(np.concatenate([jacobian, tangent[:, None]], axis=1))[0]
+
+
 def follow(
     curves: Curves,
     start: Corrected,
@@ -303,6 +334,7 @@ def follow(
     length, count = np.full(lanes, steps.first), np.array(start.steps)
     least, most = int(curves.counts.first), int(curves.counts.last)
     ended = np.where(start.converged, "", "stuck").astype(object)
+    crosses = np.zeros(lanes, dtype=bool)
 
     def go_over(lanes: np.ndarray) -> None:
         """Solve for the last points again, by the steps that hold now."""
@@ -311,26 +343,41 @@ def follow(
         again = correct(curves.take(lanes), u, tangent, count[lanes])
         for k, i in enumerate(lanes):
             if again.converged[k]:
-                points[i][-1] = take(again, np.array(k))._replace(error=points[i][-1].error, over=points[i][-1].over)
+                points[i][-1] = take(again, np.array(k))._replace(
+                    error=points[i][-1].error, over=points[i][-1].over, moved=points[i][-1].moved
+                )
 
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
         last = [points[i][-1] for i in index]
         tangent, before = (np.stack([getattr(p, name) for p in last]) for name in ("tangent", "jacobian"))
-        ways = [predicted(points[i][-1], points[i][-2] if len(points[i]) > 1 else None, length[i]) for i in index]
+        second = [points[i][-2] if len(points[i]) > 1 else None for i in index]
+        ways = [predicted(p, q, length[i]) for p, q, i in zip(last, second, index, strict=True)]
+        apart = [np.inf if q is None else np.linalg.norm(p.u - q.u) for p, q in zip(last, second, strict=True)]
         ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
-        got = correct(curves.take(index), ahead, normal, count[index], FOLLOWING, measured=True)
+        closely = np.clip(OF_A_STEP * length[index], 2 * TOLERANCE, FOLLOWING)
+        got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True)
         turned = np.arccos(np.clip(np.sum(got.tangent * tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
         missed = np.linalg.norm(got.u - ahead, axis=1)
         straight, near = turned < 1, missed < steps.bend * length[index]
         largest = lambda m: np.max(np.abs(m), axis=(1, 2))
         smooth = largest(got.jacobian - before) < steps.swing * (1 + largest(before))
-        good = got.converged & straight & near & smooth
+        off = astray(got, ahead, normal, length[index], np.array(apart))
+        belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length[index]), OF_MISSED * missed)
+        sure = got.converged & straight & near & smooth & belongs
+        same = orientation(got.jacobian, got.tangent) == orientation(before, tangent)
+        good = sure & (same | crosses[index])
         finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)
         for k, i in enumerate(index):
             may = curves.chooses and count[i] < most
-            if may and got.converged[k] and got.over[k] > LOOSE:
+            excess = max(got.over[k] / LOOSE, got.moved[k] / (MOVED * length[i]))
+            if may and got.converged[k] and excess > 1:
                 finer[i] = True
+                continue
+            if sure[k] and not good[k] and length[i] < CROSSED:
+                while len(points[i]) > 1 and np.linalg.norm(points[i][-1].u - got.u[k]) < ASIDE:
+                    points[i].pop()
+                crosses[i], length[i] = True, 2 * ASIDE
                 continue
             if not good[k]:
                 length[i] /= 2 if got.converged[k] else 4
@@ -339,7 +386,8 @@ def follow(
                     ended[i] = "" if may else "stuck"
                 continue
             points[i].append(take(got, np.array(k)))
-            coarser[i] = curves.chooses and count[i] > least and got.over[k] < LOOSE / COARSER
+            crosses[i] &= bool(same[k])
+            coarser[i] = curves.chooses and count[i] > least and excess < 1 / COARSER
             # What a cubic leaves out grows with the fourth power of the step.
             growth = min((AIM / max(missed[k], 1e-12)) ** 0.25, VEER / max(turned[k], 1e-12))
             length[i] = min(steps.longest, length[i] * np.clip(growth, 0.5, GROWTH))

@@ -1,16 +1,17 @@
 """Roots of an orbit's equations, differentiated through the equations that define them, never through the iterations.
 
-With R(u, k) = 0 and k = prepare(u, given), the implicit function theorem gives
+The equations are R(u, k, P, M) = 0 in the unknowns u, with the numbers k(u, given) of the field and image and
+derivative P, M of the return map at (u, k). The implicit function theorem gives, R_x being all that follows from x,
     (R_u + R_k k_u) du = -R_k k_given dgiven.
-The revolutions are differentiated once, with respect to the state and to the few numbers k of the field; how many
-design parameters stand behind these does not matter, and because the tangent is a matrix times dgiven, reverse mode is
-had by transposing that matrix and not by running revolutions backwards. The rule itself is differentiable: second
-derivatives are derivatives of it.
+The map is expanded around (u, k) by one program that serves equations of every kind (`by_columns`); how many design
+parameters stand behind the few numbers k does not matter, and because the tangent is a matrix times dgiven, reverse
+mode is had by transposing that matrix and not by running revolutions backwards. The rule itself is differentiable:
+second derivatives are derivatives of it.
 """
 
 import abc
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -20,22 +21,14 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar
-from ..integrate import StrobeMap
+from ..integrate import StrobeMap, compiled
 from ._newton import DampedNewton, NewtonState
-from ._problem import frozen
+from ._problem import Frame, OrbitProblem, Prepared, ReturnMap, frozen
 from ._steps import GIVEN_UP, Counts
 
 
 class AbstractEquations(eqx.Module):
-    """As many equations as unknowns, split into what is cheap and what runs revolutions."""
-
-    @abc.abstractmethod
-    def prepare(self, u: Float[Array, " n"], given: Any) -> Any:
-        """All that the revolutions need to know of the unknowns and of what is given."""
-
-    @abc.abstractmethod
-    def residual(self, u: Float[Array, " n"], prepared: Any) -> tuple[Float[Array, " n"], Any]:
-        """The equations, and what else is wanted at the root."""
+    """As many equations as unknowns."""
 
     @abc.abstractmethod
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
@@ -54,11 +47,32 @@ class AbstractEquations(eqx.Module):
         """
 
 
-def differentiated(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-    """What `linearised` returns, by differentiating the residual."""
+class AbstractMapEquations(AbstractEquations):
+    """Equations in an orbit's state and more, split into what is cheap and what runs revolutions."""
+
+    problem: eqx.AbstractVar[OrbitProblem]
+    frame: eqx.AbstractVar[Frame]
+
+    @abc.abstractmethod
+    def prepare(self, u: Float[Array, " n"], given: Any) -> Prepared:
+        """All that the revolutions need to know of the unknowns and of what is given."""
+
+    @abc.abstractmethod
+    def closing(
+        self, u: Float[Array, " n"], prepared: Prepared, image: Float[Array, " dim"], columns: Float[Array, "dim c"]
+    ) -> tuple[Float[Array, " n"], Any]:
+        """The equations, with the image of the state and its derivatives (see `ReturnMap.pushed`), and what else is
+        wanted at the root."""
+
+
+def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
+    """What `linearised` returns, by differentiating the equations along each unknown."""
 
     def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
-        r, aux = equations.residual(u, equations.prepare(u, given))
+        prepared = equations.prepare(u, given)
+        strobe, drifts = prepared
+        pushed = ReturnMap(strobe, equations.frame).pushed(u[: equations.frame.scale.size], drifts)
+        r, aux = equations.closing(u, prepared, *pushed)
         return r, (r, aux)
 
     jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
@@ -142,39 +156,58 @@ def settled(
     return u, found
 
 
-def implicit_root(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
-) -> tuple[Float[Array, " n"], Found]:
-    """u with residual(u, prepare(u, given)) = 0 by as many steps as it needs (see `settled`), differentiable with
-    respect to `given` only.
-
-    **Returns:** u, NaN where Newton's method did not get there, and `Found`.
-    """
-    u, found = _root(given, equations=frozen(equations), guess=frozen(guess), counts=counts, at_root=at_root)
-    return jnp.where(found.converged, u, jnp.nan), found
+# --- derivatives ---------------------------------------------------------------------------------------------------
 
 
 @eqx.filter_custom_jvp
-def _root(given: Any, *, equations: AbstractEquations, guess: Array, counts: Counts, at_root: bool) -> Any:
-    return settled(equations, given, guess, counts, at_root)
+def as_root(given: Any, *, equations: AbstractMapEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
+    """u and what else is known at it, as functions of what is given: a root of the equations there."""
+    return u, aux
 
 
-@_root.def_jvp
-def _root_jvp(
-    primals: Any, tangents: Any, *, equations: AbstractEquations, guess: Array, counts: Counts, at_root: bool
-) -> Any:
+@as_root.def_jvp
+def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> Any:
     (given,), (given_dot,) = primals, tangents
-    u, found = _root(given, equations=equations, guess=guess, counts=counts, at_root=at_root)
-    equations = equations.by_steps(found.steps)
-    row = lambda v, g: numbers_of(equations.prepare(v, g))[0]
-    _, remake = numbers_of(equations.prepare(u, given))
-    k, k_dot = eqx.filter_jvp(lambda g: row(u, g), (given,), (given_dot,))
-    residual = lambda x: equations.residual(x[: u.size], remake(x[u.size :]))[0]
-    whole = jax.jacfwd(residual)(jnp.concatenate([u, k]))
-    of_u, of_k = whole[:, : u.size], whole[:, u.size :]
-    k_of_u = jax.jacfwd(lambda v: row(v, given))(u)
-    u_dot = -jnp.linalg.solve(of_u + of_k @ k_of_u, of_k @ k_dot)
-    return (u, found), (u_dot, jax.tree.map(lambda _: None, found))
+    u, aux = as_root(given, equations=equations, u=u, aux=aux)
+    numbers, moving = eqx.filter_jvp(lambda g: _numbers(equations, u, g), (given,), (given_dot,))
+    x = jnp.concatenate([u[: equations.frame.scale.size], numbers.k])
+    around, slopes = by_columns(x, f=Slopes(Push(frozen(numbers.like), equations.frame)))
+    return (u, aux), _moved(equations, u, numbers, around, slopes, moving.k)
+
+
+class _Numbers(NamedTuple):
+    """What is known of the field at a root, or its tangent."""
+
+    k: Float[Array, " k"]
+    of_u: Float[Array, "k n"]
+    like: Prepared
+    """What they are numbers of."""
+
+
+@compiled
+def _numbers(equations: AbstractMapEquations, u: Array, given: Any) -> _Numbers:
+    row = lambda v: numbers_of(equations.prepare(v, given))[0]
+    return _Numbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
+
+
+@compiled
+def _moved(
+    equations: AbstractMapEquations, u: Array, numbers: _Numbers, around: Any, slopes: Any, k_dot: Array
+) -> tuple[Array, Any]:
+    """Derivatives of a root, and of what else is known there, along `k_dot`."""
+    k, k_of_u, like = numbers
+    n, m, remake = equations.frame.scale.size, u.size, numbers_of(like)[1]
+
+    def closing(moved: Array) -> tuple[Array, Any]:
+        """The equations, with the map linear from here."""
+        y = jnp.concatenate([u, k]) + moved
+        off = jnp.concatenate([moved[:n], moved[m:]])
+        return equations.closing(y[:m], remake(y[m:]), *jax.tree.map(lambda p, s: p + s @ off, around, slopes))
+
+    of_r, of_aux = jax.jacfwd(closing)(jnp.zeros(m + k.size))
+    u_dot = -jnp.linalg.solve(of_r[:, :m] + of_r[:, m:] @ k_of_u, of_r[:, m:] @ k_dot)
+    moved = jnp.concatenate([u_dot, k_dot + k_of_u @ u_dot])
+    return u_dot, jax.tree.map(lambda d: d @ moved, of_aux)
 
 
 def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any]]:
@@ -182,7 +215,7 @@ def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any
 
     Of a strobe map these are its field's: system and scale only say how far out a state is and how large an error.
     """
-    numbers, rest = eqx.partition(prepared, jax.tree.map(_numbers, prepared, is_leaf=_is_map))
+    numbers, rest = eqx.partition(prepared, jax.tree.map(_matters, prepared, is_leaf=_is_map))
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: eqx.combine(unravel(row), rest)
 
@@ -191,24 +224,51 @@ def _is_map(node: Any) -> bool:
     return isinstance(node, StrobeMap)
 
 
-def _numbers(node: Any) -> Any:
+def _matters(node: Any) -> Any:
     """Which parts of `node` matter, as a filter of Equinox."""
     if not isinstance(node, StrobeMap):
-        return eqx.is_inexact_array
+        return eqx.is_inexact_array(node)
     return eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
 
 
-@eqx.filter_custom_jvp
-def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any], known: Any) -> Any:
-    """`known`, which is f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode.
+class Push(eqx.Module):
+    """Image of a state and its derivatives, as a function of state and numbers of the field in a row."""
 
-    `f` is a module; what it holds has no derivative. Without derivatives f is not evaluated, nor compiled.
+    like: Prepared
+    frame: Frame
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        n = self.frame.scale.size
+        strobe, drifts = numbers_of(self.like)[1](x[n:])
+        return ReturnMap(strobe, self.frame).pushed(x[:n], drifts)
+
+
+class Slopes(eqx.Module):
+    """A function's value and Jacobian matrix."""
+
+    f: Callable[[Array], Any]
+
+    def __call__(self, x: Array) -> tuple[Any, Any]:
+        slopes, value = jax.jacfwd(lambda x: (self.f(x),) * 2, has_aux=True)(x)
+        return value, slopes
+
+
+@eqx.filter_custom_jvp
+def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any]) -> Any:
+    """f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode, to any order.
+
+    `f` is a module; what it holds has no derivative.
     """
-    return known
+    return _evaluated(f, x)
 
 
 @by_columns.def_jvp
-def _by_columns_jvp(primals: Any, tangents: Any, *, f: Callable[[Array], Any], known: Any) -> Any:
+def _by_columns_jvp(primals: Any, tangents: Any, *, f: Callable[[Array], Any]) -> Any:
     (x,), (x_dot,) = primals, tangents
-    jacobian, value = jax.jacfwd(lambda x: (f(x),) * 2, has_aux=True)(x)
-    return value, jax.tree.map(lambda j: j @ x_dot, jacobian)
+    value, slopes = by_columns(x, f=Slopes(f))
+    return value, jax.tree.map(lambda s: s @ x_dot, slopes)
+
+
+@compiled
+def _evaluated(f: Callable[[Array], Any], x: Array) -> Any:
+    return f(x)

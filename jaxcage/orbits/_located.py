@@ -24,7 +24,11 @@ PART = 1e-3
 CLEAR = 1e-4
 """Orbits are counted by where multipliers are further than this from the unit circle: the others may be on either side
 by rounding, or by what Newton's method left."""
-HALVINGS = 20
+HALVINGS, APART = 20, 1e-7
+"""A step is halved so often, and not below this length in the unknowns' units."""
+NEARLY = 0.1
+"""Part of what a test function changes over the steps beside an extremum that a parabola through three orbits may be
+wrong by there."""
 UNEXPLAINED = "unexplained"
 
 
@@ -95,7 +99,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     """Steps over which a test function has one sign at both ends and, by a parabola through three orbits, the other
-    in between: two special points of a kind, whose effects on the count may cancel."""
+    in between, or nearly: two special points of a kind, whose effects on the count may cancel."""
     if len(row.u) < 3:
         return []
     tests = test_functions(eigenvalues(follower.monodromy(row)))
@@ -109,10 +113,12 @@ def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     slope = chord[:, 1:] - bend * ahead
     with np.errstate(divide="ignore", invalid="ignore"):
         place, extreme = -slope / (2 * bend), f[:, 1:-1] - slope**2 / (4 * bend)
+    change = np.abs(np.diff(f))
+    nearly = NEARLY * np.minimum(change[:, :-1], change[:, 1:])
     found = set()
     for first, inside in enumerate([(-back < place) & (place < 0), (0 < place) & (place < ahead)]):
         one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
-        twice = inside & (one * other > 0) & (extreme * one < 0)
+        twice = inside & (one * other > 0) & (extreme * np.sign(one) < nearly)
         found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}
     return sorted(found)
 
@@ -124,16 +130,19 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         if not gaps:
             break
         length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
-        after = np.array([a + int(np.argmax(length[a:b])) for a, b in gaps])
+        longest = sorted({a + int(np.argmax(length[a:b])) for a, b in gaps})
+        after = np.array([k for k in longest if length[k] > APART], dtype=int)
+        if not after.size:
+            break
         chord = row.u[after + 1] - row.u[after]
         middle, normal = row.u[after] + chord / 2, chord / length[after, None]
         steps = np.maximum(row.steps[after], row.steps[after + 1])
-        got = correct(follower.curves(frame, [lane] * len(gaps)), middle, normal, steps)
+        got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, steps)
         between = np.linalg.norm(got.u - middle, axis=1) < length[after] / 2
         some = np.flatnonzero(got.converged & between)
         if not some.size:
             break
-        blank = got._replace(error=row.error[after], over=row.over[after])
+        blank = got._replace(error=row.error[after], over=row.over[after], moved=row.moved[after])
         row = jax.tree.map(lambda x, y: np.insert(x, after[some] + 1, y[some], axis=0), row, blank)
     return row
 
@@ -145,7 +154,7 @@ def _again(follower: Follower, frame: Frame, row: Corrected, lane: int, gaps: Se
         most = int(follower.counts.last)
         steps = np.full(near.size, min(2 * int(row.steps[near].max()), most))
         got = correct(follower.curves(frame, [lane] * near.size), row.u[near], row.tangent[near], steps)
-        got = got._replace(error=row.error[near], over=row.over[near])
+        got = got._replace(error=row.error[near], over=row.over[near], moved=row.moved[near])
         good = np.flatnonzero(got.converged)
         row = put(row, near[good], take(got, good))
     return row

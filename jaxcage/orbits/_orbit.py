@@ -1,5 +1,6 @@
 """Periodic orbits: fixed points of powers of the strobe map, with their Floquet multipliers."""
 
+import dataclasses
 from typing import Any, Literal, get_args
 
 import equinox as eqx
@@ -10,11 +11,11 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
+from ..integrate import AbstractMethod, FixedSteps, compiled, strobe_map
 from ..models import AbstractForcedSystem
-from ._implicit import AbstractEquations, by_columns, implicit_root, numbers_of
+from ._implicit import AbstractMapEquations, as_root, settled
 from ._liouville import divergence_integral
-from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
 from ._steps import ENOUGH, IMAGE, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
@@ -26,7 +27,7 @@ LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 
 
-class OrbitEquations(AbstractEquations):
+class OrbitEquations(AbstractMapEquations):
     """P(z) = z, and the phase condition of a self-excited orbit: as many equations as unknowns, or, with a parameter of
     the problem free, those of a branch.
     """
@@ -34,17 +35,18 @@ class OrbitEquations(AbstractEquations):
     problem: OrbitProblem
     frame: Frame
 
-    def prepare(self, u: Array, given: Given) -> StrobeMap:
-        return self.problem.prepare(u, given, self.frame)
+    def prepare(self, u: Array, given: Given) -> Prepared:
+        return self.problem.prepare(u, given, self.frame), []
 
-    def residual(self, u: Array, prepared: StrobeMap) -> tuple[Array, None]:
-        return self.problem.residual(u, prepared, self.frame), None
+    def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Array]:
+        """The equations, and the monodromy matrix."""
+        return self.problem.orbit_residual(u[: self.problem.dimension], image, self.frame), columns
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
         problem, frame, n = self.problem, self.frame, self.problem.dimension
         drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
-        image, columns = ReturnMap(self.prepare(u, given), frame).pushed(u[:n], drifts)
+        image, columns = ReturnMap(problem.prepare(u, given, frame), frame).pushed(u[:n], drifts)
         r = problem.orbit_residual(u[:n], image, frame)
         jacobian = columns - jnp.eye(n, u.size)
         if problem.free_speed:
@@ -60,18 +62,6 @@ class OrbitEquations(AbstractEquations):
         image = abs(fine @ moved[..., None])[..., 0].max(-1)
         size = lambda m: abs(m[..., :n, :n]).max((-2, -1))
         return image, image / IMAGE + size(fine - coarse) / (1 + size(fine)) / SLOPE
-
-
-class _Monodromy(eqx.Module):
-    """Derivative of the return map from state and field numbers in a row."""
-
-    like: StrobeMap
-    frame: Frame
-
-    def __call__(self, x: Array) -> Array:
-        n = self.frame.scale.size
-        _, remake = numbers_of(self.like)
-        return ReturnMap(remake(x[n:]), self.frame).pushed(x[:n])[1]
 
 
 class Orbit(eqx.Module):
@@ -193,30 +183,29 @@ def _find(
     speed: Scalar,
     periods: Any,
     revolutions: Any,
-) -> Orbit:
+) -> tuple[Orbit, OrbitEquations, Array]:
+    """The orbit, without derivatives; its equations and unknowns."""
     if revolutions is not None:
         guess = settle(problem, Given(given.system, speed), guess, revolutions, spinning)
     frame = make_frame(problem, given, guess, speed, jnp.ones(0), periods)
     u0 = guess / frame.scale
     if problem.free_speed:
         u0 = jnp.append(u0, 1.0)
-    u, found = implicit_root(OrbitEquations(problem, frame), given, u0, counts, at_root=True)
-    n, problem = problem.dimension, by_steps(problem, found.steps)
-    strobe, z = problem.prepare(u, given, frame), u[:n]
-    at_root = frozen(found.newton)  # image and derivative of the map are those of Newton's last evaluation
-    known = jnp.where(found.converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
-    row = jnp.concatenate([z, numbers_of(strobe)[0]])
-    monodromy = by_columns(row, f=_Monodromy(frozen(strobe), frame), known=known)
-    expected = divergence_integral(frozen(strobe), frozen(problem.state(u, frame)), frame.periods)
-    finite = jnp.where(jnp.isfinite(monodromy), monodromy, 0.0)
-    floor = _resolved(frozen(finite))
-    return Orbit(
-        state=problem.state(u, frame),
-        speed=jnp.asarray(problem.speed(u, given, frame), dtype=float),
-        multipliers=jnp.where(found.converged, sorted_multipliers(finite), jnp.nan),
+    equations = OrbitEquations(problem, frame)
+    u, found = settled(equations, given, u0, counts, at_root=True)
+    u, equations = jnp.where(found.converged, u, jnp.nan), equations.by_steps(found.steps)
+    n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
+    monodromy = jnp.where(found.converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
+    state, speed, multipliers = _place(equations, u, monodromy, given)
+    expected = divergence_integral(equations.problem.prepare(u, given, frame), state, frame.periods)
+    floor = _resolved(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0))
+    orbit = Orbit(
+        state=state,
+        speed=speed,
+        multipliers=multipliers,
         monodromy=monodromy,
         residual=jnp.max(jnp.abs(at_root.residual[:n])),
-        liouville=jnp.maximum(jnp.linalg.slogdet(frozen(monodromy))[1], floor) - jnp.maximum(expected, floor),
+        liouville=jnp.maximum(jnp.linalg.slogdet(monodromy)[1], floor) - jnp.maximum(expected, floor),
         steps=found.steps,
         error=found.error,
         converged=found.converged,
@@ -225,6 +214,16 @@ def _find(
         self_excited=problem.free_speed,
         solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
     )
+    return orbit, equations, u
+
+
+@compiled
+def _place(equations: OrbitEquations, u: Array, monodromy: Array, given: Given) -> tuple[Array, Array, Array]:
+    """State, speed and multipliers of an orbit."""
+    problem, frame = equations.problem, equations.frame
+    finite = jnp.isfinite(monodromy)
+    multipliers = jnp.where(jnp.all(finite), sorted_multipliers(jnp.where(finite, monodromy, 0.0)), jnp.nan)
+    return problem.state(u, frame), jnp.asarray(problem.speed(u, given, frame), dtype=float), multipliers
 
 
 def periodic_orbit(
@@ -268,7 +267,13 @@ def periodic_orbit(
         counts = from_steps(counts, getattr(guess, "steps", None))
         enough = jnp.minimum(counts.last, ENOUGH)
         spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
-        return _find(problem, counts, spinning, given, start, first, jnp.asarray(periods), spin)
+        frozen_ones = frozen((given, start, first))
+        found, equations, u = _find(problem, counts, spinning, *frozen_ones, jnp.asarray(periods), spin)
+        if not is_traced(given):
+            return found
+        u, monodromy = as_root(given, equations=equations, u=u, aux=found.monodromy)
+        state, speed, multipliers = _place(equations, u, monodromy, given)
+        return dataclasses.replace(found, state=state, speed=speed, multipliers=multipliers, monodromy=monodromy)
 
     return that_serves(find, method)
 

@@ -4,10 +4,8 @@ import dataclasses
 from typing import Any, NamedTuple, cast, get_args
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
@@ -16,11 +14,11 @@ from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
 from ._follower import Follower, make_follower, seeds, stable_steps
-from ._implicit import AbstractEquations, Found, differentiated, implicit_root, settled
+from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
 from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._normal_form import KINDS_WITH_ONE, coefficients, criticality
 from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
-from ._problem import Frame, Given, OrbitProblem, ReturnMap, frozen, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 from ._walk import walk
@@ -47,7 +45,7 @@ class Singular(NamedTuple):
     left: Float[Array, " k"]
 
 
-class PointEquations(AbstractEquations):
+class PointEquations(AbstractMapEquations):
     """The orbit's equations and g = 0; a branch point has two more, with an imperfection as unknown."""
 
     problem: OrbitProblem
@@ -56,22 +54,20 @@ class PointEquations(AbstractEquations):
     right: Float[Array, " k"]
     kind: Kind = eqx.field(static=True)
 
-    def prepare(self, u: Array, given: Given) -> Any:
+    def prepare(self, u: Array, given: Given) -> Prepared:
         strobe = self.problem.prepare(u, given, self.frame)
         if self.kind != "branch-point":
-            return strobe, None
-        return strobe, self.problem.drift(u, given, self.frame, self.problem.equations)
+            return strobe, []
+        return strobe, [self.problem.drift(u, given, self.frame, self.problem.equations)]
 
-    def residual(self, u: Array, prepared: Any) -> tuple[Array, Singular]:
-        strobe, drift = prepared
+    def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Singular]:
+        strobe, drifts = prepared
         n, m = self.problem.dimension, self.problem.equations
-        z = u[:n]
-        image, columns = ReturnMap(strobe, self.frame).pushed(z, [] if drift is None else [drift])
-        monodromy = columns[:, :n]
+        z, monodromy = u[:n], columns[:, :n]
         closing = self.problem.orbit_residual(z, image, self.frame)
         g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
         known = Singular(monodromy, q, p)
-        if drift is None:
+        if not drifts:
             return jnp.append(closing, g), known
         return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ columns[:, n]])]), known
 
@@ -242,7 +238,13 @@ def bifurcation(
             problem = OrbitProblem(method, system.dimension, free, (parameter,))
             counts = from_steps(counts, getattr(guess, "steps", None))
             begin = jnp.asarray(speed, dtype=float)
-            return _find_point(problem, counts, given, cast(Kind, kind), state, begin, at, periods, spin)
+            numbers = frozen((given, state, begin, at))
+            found, equations, u, known = _find_point(problem, counts, cast(Kind, kind), *numbers, periods, spin)
+            if not is_traced(given):
+                return found
+            u, _ = as_root(given, equations=equations, u=u, aux=known)
+            place = _place(equations, u, given, found.converged)
+            return dataclasses.replace(found, **dict(zip(("value", "speed", "state"), place, strict=True)))
 
         return that_serves(by, method, MOST_OF_A_POINT)
 
@@ -251,7 +253,7 @@ def bifurcation(
         return make_follower(system, given.speed, parameter, value - away, value + away, period, method)
 
     found = find(start, first, at, spin)
-    if any(isinstance(x, Tracer) for x in jax.tree.leaves((found, given, start))):
+    if is_traced((found, given, start)):
         return found
     if reach and POINT_OUTCOMES[int(found.outcome)] in ("no such point", "other kind"):
         if spin:
@@ -309,17 +311,18 @@ def _read_guess(
 def _find_point(
     problem: OrbitProblem,
     counts: Counts,
-    given: Given,
     kind: Kind,
+    given: Given,
     start: Array,
     speed: Scalar,
     at: Array,
     periods: Array,
     spin: bool,
-) -> BifurcationPoint:
+) -> tuple[BifurcationPoint, PointEquations, Array, Singular]:
+    """The point, without derivatives; its equations, unknowns, and what else is known there."""
     (parameter,) = problem.parameters
-    unit = frozen(jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at)))
-    system, here = with_value(frozen(given.system), frozen(speed), parameter, at)
+    unit = jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at))
+    system, here = with_value(given.system, speed, parameter, at)
     if spin:
         start = settle(problem, Given(system, here), start, SPUN, counts)
     frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
@@ -331,44 +334,56 @@ def _find_point(
         u1, found = settled(OrbitEquations(fixed, frame), Given(system, here), u0, counts)
         u0 = jnp.where(found.converged, u1, u0)
     u0 = jnp.append(u0, at / unit)
-    strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, frozen(given), frame)
+    strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given, frame)
     _, monodromy = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
     a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, frame, left, right, kind)
-    u, found = implicit_root(equations, given, u0, counts, at_root=True)
-    return _describe(equations, u, found, given)
+    u, found = settled(equations, given, u0, counts, at_root=True)
+    u, equations = jnp.where(found.converged, u, jnp.nan), equations.by_steps(found.steps)
+    return _describe(equations, u, found, given), equations, u, found.aux
+
+
+@compiled
+def _place(equations: PointEquations, u: Array, given: Given, converged: Array) -> tuple[Array, Array, Array]:
+    """The parameter's value, speed and state; NaN, and their derivatives too, where there is no such point."""
+    problem, frame = equations.problem, equations.frame
+    keep = lambda x: x * jnp.where(converged, 1.0, jnp.nan)
+    speed = jnp.asarray(problem.speed(u, given, frame), dtype=float)
+    return keep(problem.values(u, frame)[0]), keep(speed), keep(problem.state(u, frame))
 
 
 def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -> BifurcationPoint:
     problem, frame, kind = equations.problem, equations.frame, equations.kind
-    known: Singular = frozen(found.aux)
+    known: Singular = found.aux
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     critical, matches = critical_multiplier(kind, multipliers)
-    rate = critical_rate(kind, problem.equations, frozen(found.newton.jacobian), known, frozen(equations.borders))
-    value = problem.values(u, frame)[0]
+    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, equations.borders)
+    at = problem.values(u, frame)[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
     error = found.error * frame.units[0]
-    moving = error > SETTLED * jnp.maximum(jnp.abs(value), 10 * frame.units[0])
-    tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(frozen(u[problem.equations])), 10.0) < TANGENTIAL
+    moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * frame.units[0])
+    tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.equations]), 10.0) < TANGENTIAL
     kept = jnp.where(moving, 4, jnp.where(tangential, 3, 0))
     outcome = jnp.where(found.converged, jnp.where(matches, kept, 2), 1)
-    keep = lambda x: x * jnp.where((outcome == 0) | (outcome == 3), 1.0, jnp.nan)  # its derivative is NaN too
+    there = (outcome == 0) | (outcome == 3)
+    keep = lambda x: jnp.where(there, x, jnp.nan)
+    value, speed, state = _place(equations, u, given, there)
     direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
     length = jnp.linalg.norm(direction)
     (parameter,) = problem.parameters
     return BifurcationPoint(
-        value=keep(value),
-        error=frozen(error),
+        value=value,
+        error=error,
         steps=found.steps,
-        speed=keep(jnp.asarray(problem.speed(u, given, frame), dtype=float)),
-        state=keep(problem.state(u, frame)),
+        speed=speed,
+        state=state,
         multipliers=jnp.where(found.converged, multipliers, jnp.nan),
         angle=keep(jnp.abs(jnp.angle(critical))),
-        residual=jnp.max(jnp.abs(frozen(found.newton.residual))),
+        residual=jnp.max(jnp.abs(found.newton.residual)),
         transversality=keep(rate / frame.units[0]),
         coefficient=jnp.asarray(jnp.nan),
         coefficient_error=jnp.asarray(jnp.nan),

@@ -9,7 +9,7 @@ derivative with respect to any number of design parameters costs no more than on
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
@@ -40,6 +40,11 @@ def frozen(tree: Any) -> Any:
     return jax.tree.map(lambda x: jax.lax.stop_gradient(x) if isinstance(x, Tracer) else x, tree)
 
 
+def is_traced(tree: Any) -> bool:
+    """Whether anything in it is traced: it may have derivatives."""
+    return any(isinstance(x, Tracer) for x in jax.tree.leaves(tree))
+
+
 class Given(eqx.Module):
     """What derivatives are taken with respect to."""
 
@@ -64,12 +69,6 @@ class ReturnMap(eqx.Module):
     strobe: StrobeMap
     frame: Frame
 
-    def __call__(self, z: Float[Array, " dim"]) -> Float[Array, " dim"]:
-        scale = self.frame.scale
-        y = tuple(z[i] * scale[i] for i in range(z.size))
-        y = jax.lax.fori_loop(0, self.frame.periods, lambda _, y: self.strobe(y).y, y)
-        return jnp.stack(y) / scale
-
     def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
         """The image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each drift
         of the field's numbers (in a column each)."""
@@ -87,6 +86,10 @@ class ReturnMap(eqx.Module):
         y, tangents = jax.lax.fori_loop(0, self.frame.periods, once, start)
         columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
         return jnp.stack(y) / scale, columns / scale[:, None]
+
+
+Prepared: TypeAlias = tuple[StrobeMap, list[Any]]
+"""All that the revolutions of a problem need to know: a strobe map, and drifts of its field's numbers."""
 
 
 class OrbitProblem(eqx.Module):
@@ -143,11 +146,6 @@ class OrbitProblem(eqx.Module):
         if not self.free_speed:
             return closing
         return jnp.append(closing, jnp.dot(z - frame.phase_point, frame.phase_direction))
-
-    def residual(self, u: Float[Array, " n"], strobe: StrobeMap, frame: Frame) -> Float[Array, " equations"]:
-        """The orbit's equations."""
-        z = u[: self.dimension]
-        return self.orbit_residual(z, ReturnMap(strobe, frame)(z), frame)
 
 
 def make_frame(

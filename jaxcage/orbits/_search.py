@@ -1,8 +1,8 @@
 """The synchronous (period-1) orbits of a system over a range of speed, found without a hint of where they are.
 
-Newton's method leads from the ends of simulations on a coarse grid to stable orbits; each is followed both ways by
-arclength, until every orbit that was met lies on a branch that is known. Stable stretches of the branches, bounded by
-bifurcations, are what the synchronous-loss edges are about.
+Newton's method leads from the ends of simulations on a coarse grid, from the system's starts and from their opposites,
+to stable orbits; each is followed both ways by arclength, until every orbit that was met lies on a branch that is
+known. Stable stretches of the branches, bounded by bifurcations, are what the synchronous-loss edges are about.
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ from .._notebook import notebook_html
 from ..analysis import Sweep
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ..sweeps import sweep
+from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, SpecialPoint, follow_both_ways
 from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
@@ -218,15 +218,18 @@ def synchronous_orbits(
 
     **Arguments:** system and range; number of speeds that are simulated from each of the system's starts, and
     revolutions left out; or a sweep that was made before; steps of the continuation, in units of 1/20 of the range.
+    From the opposites of the starts as many speeds are simulated besides: these tell no more than where orbits are.
 
     **Returns:** `SynchronousOrbits`. Stable orbits with a small basin can escape the simulations: `missed` counts those
     that were met but not followed; those that were not met cannot be counted.
     """
     say = progress or (lambda what, done, of: None)
-    if settled is None:
-        settled = sweep(
+
+    def simulate(speeds: np.ndarray, sign: float) -> Sweep:
+        return sweep(
             system,
-            np.linspace(lower, upper, count),
+            speeds,
+            starts=sign * initial_states(system, speeds, None),
             discard=discard,
             revolutions=8,
             blocks=1,
@@ -235,12 +238,16 @@ def synchronous_orbits(
             method=method,
             progress=lambda done, of: say("simulations", done, of),
         )
+
+    settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
+    opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
     follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
     met = _met(settled)
     if met:
         middle = met[len(met) // 2]
         follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])), 1)
-    orbits = waiting = _stable_orbits(follower, settled)
+    orbits = _stable_orbits(follower, settled)
+    waiting = sorted(orbits + _stable_orbits(follower, opposite), key=lambda o: o.speed)
     branches: list[Branch] = []
     for turn in range(ROUNDS):
         if not waiting:

@@ -19,14 +19,14 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..integrate import AbstractMethod, compiled
+from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
 from ._branch import SpecialPoint
 from ._cascade import FEIGENBAUM, Cascade
-from ._implicit import numbers_of
+from ._implicit import Push, Slopes, by_columns, numbers_of
 from ._lens import SPEED
 from ._point import TANGENTIAL, BifurcationPoint, Singular, critical_rate
-from ._problem import Frame, Given, OrbitProblem, ReturnMap, make_frame
+from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
 from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 
@@ -102,18 +102,18 @@ class _Expansion(NamedTuple):
     """dk / d parameter, in the frame's unit."""
 
 
-@compiled
 def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, " n"]) -> _Expansion:
-    n = problem.dimension
+    k, drift, like = _numbers(problem, given, frame, u)
+    x = jnp.concatenate([u[: problem.dimension], k])
+    (image, monodromy), (image_slope, monodromy_slope) = by_columns(x, f=Slopes(Push((like, []), frame)))
+    return _Expansion(image, monodromy, image_slope, monodromy_slope, drift)
+
+
+@compiled
+def _numbers(problem: OrbitProblem, given: Given, frame: Frame, u: Array) -> tuple[Array, Array, StrobeMap]:
+    """The numbers of the field, their drift, and the map that they are numbers of."""
     row = lambda v: numbers_of(problem.prepare(v, given, frame))[0]
-    k, remake = numbers_of(problem.prepare(u, given, frame))
-
-    def both(x: Array) -> tuple[Any, Any]:
-        image, monodromy = ReturnMap(remake(x[n:]), frame).pushed(x[:n])
-        return (image, monodromy), (image, monodromy)
-
-    slopes, values = jax.jacfwd(both, has_aux=True)(jnp.concatenate([u[:n], k]))
-    return _Expansion(values[0], values[1], slopes[0], slopes[1], jax.jacfwd(row)(u)[:, n])
+    return row(u), jax.jacfwd(row)(u)[:, problem.dimension], problem.prepare(u, given, frame)
 
 
 @compiled

@@ -16,6 +16,7 @@ from ._carried import (
 from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
 from ._speed import (
+    initial_states as initial_states,
     make_plan as make_plan,
     require_persist as require_persist,
     rpm as rpm,

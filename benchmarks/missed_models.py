@@ -1,0 +1,483 @@
+"""Oscillators whose special points are known: planted in closed form, or published.
+
+The closed forms come in four kinds. `Curve`: about a driven orbit x' = f(x, p), so that the orbits of the system are
+the zeros of f. `Turning`: two planes that turn about a driven orbit, one by half a turn a revolution, with multipliers
++-exp((g(p) +- r) T). `Kicked`: a map in disguise, its variables held while the copies relax to their image, then the
+other way about, so that the strobe map is known exactly. `Comb`: many copies of one curve close together, all of them
+orbits, on one of which a branch must stay.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from scipy.optimize import brentq, fsolve
+
+import jaxcage as jc
+from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL_LET_GO
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """A special point: its place, how well that is known, and what is known of its criticality."""
+
+    kind: str
+    value: float
+    tolerance: float = 1e-12
+    criticality: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Planted:
+    """A branch to be followed, and what is on it."""
+
+    name: str
+    system: jc.models.AbstractForcedSystem
+    state: tuple[float, ...]
+    value: float
+    lower: float
+    upper: float
+    points: tuple[Point, ...] = ()
+    whole: bool = True
+    """Whether there are no others."""
+    parameter: str = "p"
+    speed: float = 1.1
+    periods: int = 1
+    period: str = "driven"
+    spin: int = 0
+    """Revolutions of the simulation that leads from the state to the first orbit."""
+    lane: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    """A number, by values and states, that is the same all along the branch and another one beside it."""
+
+
+def numbers(**values: Any) -> dict[str, Array]:
+    """Parameters that can be varied."""
+    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
+
+
+class Curve(eqx.Module):
+    """x = X + cos(tau) with X' = sum of c[i, j] X^i p^j."""
+
+    p: Array
+    c: Array
+
+    def __call__(self, tau, y, speed):
+        x = y[0] - jnp.cos(tau)
+        row = self.c @ jnp.stack([jnp.ones_like(self.p), self.p, self.p**2])
+        return (row[0] + x * (row[1] + x * (row[2] + x * row[3])) - speed * jnp.sin(tau),)
+
+
+def curve(
+    name: str, terms: dict[tuple[int, int], float], x: float, p: float, *points: Point, ends=(-1.0, 1.0), lane=None
+) -> Planted:
+    """Zeros of a polynomial, from (x, p)."""
+    c = np.zeros((4, 3))
+    for place, value in terms.items():
+        c[place] = value
+    system = jc.ForcedSystem(Curve(**numbers(p=p, c=c)), dimension=1)
+    about = None if lane is None else lambda value, state: lane(value, state[:, 0] - 1)
+    return Planted(name, system, (1 + x,), p, *ends, points, lane=about)
+
+
+def folds(apart: float) -> Planted:
+    """p + a X - X^3 turns at +-2 (a/3)^(3/2), so far apart."""
+    third = (apart / 4) ** (2 / 3)
+    at = 2 * third**1.5
+    points = Point("fold", -at), Point("fold", at)
+    return curve(
+        f"two folds {apart:.0e} apart", {(0, 1): 1, (1, 0): 3 * third, (3, 0): -1}, -1.0, third * 3 - 1, *points
+    )
+
+
+def imperfect(gap: float, side: int) -> Planted:
+    """gap + p X - X^3: what a pitchfork becomes; one branch passes, the other turns."""
+    turns = () if side > 0 else (Point("fold", 3 * (gap / 2) ** (2 / 3)),)
+    x = float(fsolve(lambda x: gap + 0.5 * x - x**3, side * math.sqrt(0.5), xtol=1e-13)[0])
+    name = f"imperfect pitchfork {gap:.0e}, {'past' if side > 0 else 'turning'}"
+    terms = {(0, 0): gap, (1, 1): 1.0, (3, 0): -1.0}
+    return curve(name, terms, x, 0.5, *turns, lane=lambda p, x: np.sign(x))
+
+
+def crossing(gap: float, side: int) -> Planted:
+    """(X - p) (X - p/5) = +-gap^2: two lines that cross, or nearly."""
+    terms = {(2, 0): -1.0, (1, 1): 1.2, (0, 2): -0.2, (0, 0): side * gap**2}
+    if not gap:
+        return curve("two lines crossing", terms, 0.5, 0.5, Point("branch-point", 0.0))
+    x = 0.3 + math.sqrt(0.04 + side * gap**2)
+    name = f"two lines {gap:.0e} apart, {'passing' if side > 0 else 'turning'}"
+    points = () if side > 0 else (Point("fold", 2.5 * gap),)
+    lane = (lambda p, x: np.sign(x - 0.6 * p)) if side > 0 else (lambda p, x: np.sign(p))
+    return curve(name, terms, x, 0.5, *points, lane=lane)
+
+
+def ring(radius: float) -> Planted:
+    """p^2 + X^2 = r^2."""
+    points = Point("fold", -radius), Point("fold", radius)
+    terms = {(0, 0): -(radius**2), (0, 2): 1.0, (2, 0): 1.0}
+    return curve(f"isola of radius {radius:g}", terms, -radius, 0.0, *points)
+
+
+class Comb(eqx.Module):
+    """x = X + cos(tau), X' = -sin(pi (X - h) / apart) apart / pi, h = tanh(20 p) / 2: orbits at X = h + n apart."""
+
+    p: Array
+    apart: Array
+
+    def __call__(self, tau, y, speed):
+        x = (y[0] - jnp.cos(tau) - jnp.tanh(20 * self.p) / 2) * jnp.pi / self.apart
+        return (-jnp.sin(x) * self.apart / jnp.pi - speed * jnp.sin(tau),)
+
+
+def comb(apart: float) -> Planted:
+    """No special points, and a branch that must not jump."""
+    system = jc.ForcedSystem(Comb(**numbers(p=-0.9, apart=apart)), dimension=1)
+    lane = lambda value, state: np.round((state[:, 0] - 1 - np.tanh(20 * value) / 2) / apart)
+    return Planted(f"branches {apart:.0e} from each other", system, (0.5,), -0.9, -1.0, 1.0, lane=lane)
+
+
+class Turning(eqx.Module):
+    """Two planes about driven orbits, the second turning by half a turn a revolution; in plane i the pair grows with
+    g_i +- sqrt(s_i^2 - b_i^2), g_i = a_i + c_i p + e_i p^2, and with -k_i of the cube."""
+
+    p: Array
+    a: Array
+    c: Array
+    e: Array
+    s: Array
+    b: Array
+    k: Array
+
+    def __call__(self, tau, y, speed):
+        half, side = jnp.cos(tau / 2), jnp.sin(tau / 2)
+        rates = []
+        for i, turn in enumerate((0.0, 0.5)):
+            c, s = (half, side) if turn else (1.0, 0.0)
+            x, v = y[2 * i] - jnp.cos(tau), y[2 * i + 1] - 0.5 * jnp.sin(tau)
+            e, f = c * x + s * v, -s * x + c * v
+            growth = self.a[i] + self.p * (self.c[i] + self.p * self.e[i]) - self.k[i] * (e * e + f * f)
+            de = (growth + self.s[i]) * e - self.b[i] * f
+            df = (growth - self.s[i]) * f + self.b[i] * e
+            spin = turn * speed
+            rates.append(c * de - s * df - spin * v - speed * jnp.sin(tau))
+            rates.append(s * de + c * df + spin * x + 0.5 * speed * jnp.cos(tau))
+        return tuple(rates)
+
+
+def turning(name: str, *points: Point, ends=(-0.2, 0.2), start=-0.19, **given: tuple[float, float]) -> Planted:
+    """Planes as given; the rest is quiet."""
+    settings = dict(a=(-0.3, -0.3), c=(0.0, 0.0), e=(0.0, 0.0), s=(0.05, 0.05), b=(0.0, 0.0), k=(1.0, 1.0)) | given
+    system = jc.ForcedSystem(Turning(**numbers(p=start, **settings)), dimension=4)
+    return Planted(name, system, (1.0, 0.0, 1.0, 0.0), start, *ends, points)
+
+
+LEFT = math.exp(-5.0)
+"""What is left of the distance to its image while a variable of `Kicked` relaxes."""
+
+
+class Kicked(eqx.Module):
+    """x goes to p - x^2 if `delay` is 0, else (x, z) to (p x (1 - z), x): m relaxes to the image of x in the first half
+    of a revolution, and x to m in the second."""
+
+    p: Array
+    delay: Array
+
+    def __call__(self, tau, y, speed):
+        x, z, m, n = y
+        rate = 5.0 * speed * 8 / (3 * jnp.pi)
+        up, down = (rate * jnp.maximum(side * jnp.sin(tau), 0.0) ** 4 for side in (1, -1))
+        image = (1 - self.delay) * (self.p - x * x) + self.delay * self.p * x * (1 - z), self.delay * x
+        return down * (m - x), down * (n - z), up * (image[0] - m), up * (image[1] - n)
+
+
+def kicked_map(y: np.ndarray, p: float, delay: float, times: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """The strobe map and its derivative, exactly."""
+    whole = np.eye(4)
+    keep, go = LEFT * np.eye(2), (1 - LEFT) * np.eye(2)
+    for _ in range(times):
+        x, z = y[:2]
+        image = np.array([p * x * (1 - z), x] if delay else [p - x * x, 0.0])
+        slope = np.array([[p * (1 - z), -p * x], [1.0, 0.0]] if delay else [[-2 * x, 0.0], [0.0, 0.0]])
+        after = go @ image + keep @ y[2:]
+        first = np.block([[np.eye(2), np.zeros((2, 2))], [go @ slope, keep]])
+        y = np.concatenate([go @ after + keep @ y[:2], after])
+        whole = np.block([[keep, go], [np.zeros((2, 2)), np.eye(2)]]) @ first @ whole
+    return y, whole
+
+
+def kicked_point(kind: str, guess: tuple[float, ...], delay: float, times: int, criticality: str = "") -> Point:
+    """Where the exact map has the multiplier, from a guess at (state, p)."""
+
+    def off(u: np.ndarray) -> np.ndarray:
+        y, m = kicked_map(u[:4], u[4], delay, times)
+        if kind != "torus":
+            return np.append(y - u[:4], np.linalg.det(m + (np.eye(4) if kind == "period-doubling" else -np.eye(4))))
+        i, j = np.triu_indices(4, 1)
+        products = np.linalg.det(m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)] - np.eye(6))
+        return np.append(y - u[:4], products)
+
+    found, _, good, why = fsolve(off, guess, xtol=1e-13, full_output=True)
+    assert good == 1 or np.max(np.abs(off(found))) < 1e-11, why
+    return Point(kind, float(found[4]), 1e-9, criticality)
+
+
+def kicked(name: str, delay: float, x: tuple[float, float], p: float, ends, times: int, *wanted) -> Planted:
+    """Orbits of so many revolutions, from near (x, z) at p; special points as (kind, (x, z), p, criticality)."""
+    settled = lambda x, p: fsolve(lambda y: kicked_map(y, p, delay, times)[0] - y, (*x, *x), xtol=1e-13)
+    points = [kicked_point(kind, (*settled(x, q), q), delay, times, sort) for kind, x, q, sort in wanted]
+    system = jc.ForcedSystem(Kicked(**numbers(p=p, delay=delay)), dimension=4, harmonics=4)
+    return Planted(name, system, tuple(settled(x, p).tolist()), p, *ends, tuple(points), periods=times)
+
+
+class Duffing(eqx.Module):
+    """x'' = -d x' + k x - x^3 + p cos(tau)."""
+
+    d: Array
+    k: Array
+    p: Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-self.d * u + self.k * x - x**3 + self.p * jnp.cos(tau),)
+
+
+def duffing(**values: float) -> jc.ForcedOscillator:
+    return jc.ForcedOscillator(Duffing(**numbers(**values)), coordinates=1)
+
+
+class Mathieu(eqx.Module):
+    """x'' + 2 z x' + (p - 2 cos 2t) x + x^3 = 0 with tau = 2t."""
+
+    p: Array
+    z: Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-2 * self.z * u - (self.p - 2 * jnp.cos(tau)) * x - x**3,)
+
+
+def mathieu_edge(sign: int, ends: tuple[float, float], damping: float) -> float:
+    """Where the trace of the undamped equation, at p - z^2, is +-2 cosh(z pi): by Hill's determinant."""
+    n = np.arange(-30, 31)
+
+    def determinant(p: float) -> float:
+        """Of exp((damping + i m) t) times a series in exp(2 i n t), m = 0 for periods of pi and 1 of 2 pi; scaled."""
+        rate = damping + 1j * (2 * n + (sign < 0))
+        diagonal = rate**2 + p - damping**2
+        near = 1.0 / np.abs(diagonal + 1.0)[:, None]
+        rows = np.diag(diagonal) - np.eye(n.size, k=1) - np.eye(n.size, k=-1)
+        return float(np.linalg.det(rows * near).real)
+
+    return float(brentq(determinant, *ends, xtol=1e-14))
+
+
+class Pendulum(eqx.Module):
+    """Taylor's: x'' + 2 b x' + w0^2 sin x = p w0^2 cos(w t) with w = 2 pi, w0 = 1.5 w, b = w0/4."""
+
+    p: Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        natural = 1.5 * speed
+        return (-natural / 2 * u + natural**2 * (self.p * jnp.cos(tau) - jnp.sin(x)),)
+
+
+class VanDerPol(eqx.Module):
+    """x'' - .3 (1 - x^2) x' + x = p cos(tau)."""
+
+    p: Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (0.3 * (1 - x * x) * u - x + self.p * jnp.cos(tau),)
+
+
+class Cycle(eqx.Module):
+    """A circle with the angular velocity 1.3, and beside it a pair that grows with p +- 0.37 i."""
+
+    p: Array
+
+    def __call__(self, tau, y, speed):
+        x, z, u, v = y
+        growth, aside = 0.3 - x * x - z * z, self.p - u * u - v * v
+        return growth * x - 1.3 * z, growth * z + 1.3 * x, aside * u - 0.37 * v, 0.37 * u + aside * v
+
+
+def planted() -> list[Planted]:
+    """All that is known in closed form."""
+    down, up = "subcritical", "supercritical"
+    double = (0.0198, 0.0202)
+    quick = 0.05
+    return [
+        curve("fold", {(0, 1): 1.0, (2, 0): -1.0}, 0.7, 0.49, Point("fold", 0.0)),
+        *(folds(apart) for apart in (2e-2, 2e-3, 2e-4)),
+        curve("cusp, met exactly", {(0, 1): 1.0, (3, 0): -1.0}, -0.9, -0.729),
+        curve("pitchfork", {(1, 1): 1.0, (3, 0): -1.0}, 0.0, -0.9, Point("branch-point", 0.0)),
+        curve(
+            "pitchfork, from the bent side",
+            {(1, 1): 1.0, (3, 0): -1.0},
+            0.7,
+            0.49,
+            Point("branch-point", 0.0),
+            Point("fold", 0.0),
+        ),
+        *(imperfect(gap, side) for gap in (1e-3, 1e-4) for side in (1, -1)),
+        crossing(0.0, 1),
+        *(crossing(gap, side) for gap in (1e-3, 1e-4) for side in (1, -1)),
+        ring(0.3),
+        ring(0.01),
+        *(comb(apart) for apart in (1e-1, 1e-2, 1e-3, 1e-4)),
+        *(
+            turning(
+                f"two flips {2 * half:.0e} apart",
+                *(Point("period-doubling", 0.02 + x) for x in (-half, half)),
+                a=(-0.3, -0.02),
+                c=(0.2, 1.0),
+                s=(0.1, half),
+            )
+            for half in (2e-3, 2e-4, 2e-5)
+        ),
+        *(
+            turning(
+                f"flip and back {2 * half:.0e} on",
+                *(Point("period-doubling", x) for x in (-half, half)),
+                a=(-0.3, -0.1 - 2 * half**2),
+                e=(0.0, 2.0),
+                s=(0.0, 0.1),
+                k=(1.0, -1.0),
+            )
+            for half in (2e-2, 2e-3, 2e-4)
+        ),
+        turning(
+            "two tori 4e-4 apart",
+            Point("torus", double[0], criticality=up),
+            Point("torus", double[1]),
+            a=(-double[0], -double[1]),
+            c=(1.0, 1.0),
+            s=(0.0, 0.0),
+            b=(0.4, 0.3),
+        ),
+        turning("two at -1 at once", Point("unexplained", 0.02), a=(-0.3, -0.02), c=(0.0, 1.0), s=(0.1, 0.0)),
+        turning(
+            "flip and torus at once",
+            Point("period-doubling", 0.05, criticality=down),
+            Point("torus", 0.05, criticality=up),
+            a=(-0.05, -0.15),
+            c=(1.0, 1.0),
+            s=(0.0, 0.1),
+            b=(0.4, 0.0),
+            k=(1.0, -1.0),
+        ),
+        turning(
+            "flip and branch point at once",
+            Point("period-doubling", 0.05, criticality=up),
+            Point("branch-point", 0.05),
+            a=(-0.15, -0.15),
+            c=(1.0, 1.0),
+            s=(0.1, 0.1),
+        ),
+        turning(
+            "torus, subcritical",
+            Point("torus", quick, criticality=down),
+            a=(-quick, -0.3),
+            c=(1.0, 0.0),
+            s=(0.0, 0.1),
+            b=(0.4, 0.0),
+            k=(-1.0, 1.0),
+        ),
+        kicked(
+            "quadratic map",
+            0.0,
+            (0.4, 0.0),
+            0.56,
+            (-0.5, 1.0),
+            1,
+            ("fold", (-0.5, 0.0), -0.24, ""),
+            ("period-doubling", (0.5, 0.0), 0.75, up),
+        ),
+        kicked(
+            "quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25, up)
+        ),
+        kicked(
+            "quadratic map, period 3",
+            0.0,
+            (0.005, 0.0),
+            1.81,
+            (1.75, 1.85),
+            3,
+            ("fold", (0.03, 0.0), 1.8055, ""),
+            ("period-doubling", (-0.044, 0.0), 1.8234, up),
+        ),
+        kicked("delayed logistic map", 1.0, (0.47, 0.47), 1.9, (1.5, 2.3), 1, ("torus", (0.5, 0.5), 2.0, up)),
+        Planted(
+            "limit cycle",
+            jc.ForcedSystem(Cycle(**numbers(p=-0.1)), dimension=4),
+            (math.sqrt(0.3), 0.0, 0.0, 0.0),
+            -0.1,
+            -0.2,
+            0.2,
+            (Point("torus", 0.0),),
+            speed=1.3,
+            period="free",
+        ),
+    ]
+
+
+def published() -> list[Planted]:
+    """Those of which some or all special points are printed, and some of which none is."""
+    of = lambda kind, number, sort="": Point(kind, number.value, number.tolerance, sort)
+    damping, edges = 0.1, ((-0.6, -0.3, 1), (-0.2, 0.0, -1), (1.7, 1.9, -1))
+    thresholds = [
+        Point(kind, mathieu_edge(sign, (low, high), damping), 1e-11, sort)
+        for (low, high, sign), kind, sort in zip(
+            edges,
+            ("branch-point", "period-doubling", "period-doubling"),
+            ("", "subcritical", "supercritical"),
+            strict=True,
+        )
+    ]
+    mathieu = jc.ForcedOscillator(Mathieu(**numbers(p=0.5, z=damping)), coordinates=1)
+    pendulum = jc.ForcedOscillator(Pendulum(**numbers(p=1.06)), coordinates=1)
+    van_der_pol = jc.ForcedOscillator(VanDerPol(**numbers(p=1.2)), coordinates=1)
+    hard = tuple(of("fold", DUFFING_FOLDS[way]) for way in ("up", "down"))
+    first = of("period-doubling", DUFFING_DOUBLINGS[1][1], "supercritical")
+    let_go = of("torus", VAN_DER_POL_LET_GO)
+    speed, settled = {"parameter": "speed", "spin": 300}, {"spin": 300}
+    return [
+        Planted("hardening Duffing", duffing(d=0.1, k=-1.0, p=0.3), (0.9, 0.0), 0.8, 0.5, 2.5, hard, **speed),
+        Planted(
+            "hardening Duffing, slow", duffing(d=0.1, k=-1.0, p=3.0), (1.5, 0.0), 1.1, 0.25, 1.2, (), False, **speed
+        ),
+        Planted("softening well", duffing(d=0.2, k=1.0, p=0.1), (1.1, 0.0), 1.0, 0.5, 2.0, (), False, **speed),
+        Planted(
+            "double well",
+            duffing(d=0.3, k=1.0, p=0.25),
+            (1.0, 0.0),
+            0.25,
+            0.1,
+            0.35,
+            (first,),
+            False,
+            speed=1.2,
+            **settled,
+        ),
+        Planted("Ueda", duffing(d=0.05, k=0.0, p=1.0), (1.0, 0.0), 1.0, 0.1, 12.0, (), False, speed=1.0, **settled),
+        Planted("Mathieu", mathieu, (0.0, 0.0), 0.5, -0.8, 2.5, tuple(thresholds), speed=2.0),
+        Planted(
+            "pendulum",
+            pendulum,
+            (-math.pi / 2, 0.0),
+            1.05,
+            0.9,
+            1.08,
+            (Point("period-doubling", 1.0663, 1e-4),),
+            False,
+            speed=2 * math.pi,
+            **settled,
+        ),
+        Planted("van der Pol", van_der_pol, (0.5, 1.5), 1.2, 0.9, 1.6, (let_go,), False, speed=1.3, **settled),
+    ]
