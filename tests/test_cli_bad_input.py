@@ -49,7 +49,7 @@ COMMANDS = (
         ("sweep 1a --revolutions 37", "--revolutions must be a multiple of 10 above 0, but 37"),
         ("sweep 1a --discard -1", "--discard must be at least 0, but -1 was given"),
         ("sweep 1a --exponents 0", "--exponents must be at least 1, but 0 was given"),
-        ("sweep 1a --exponents 9", "--exponents must lie between 0 and 4, but 9 was given"),
+        ("sweep 1a --exponents 9", "--exponents must be at most 4, but 9 was given"),
         ("sweep 1a --solver euler", "--solver must be one of rodas3, rodas4"),
         ("sweep 1a --steps 0", "--steps` must be at least 1"),
         ("sweep 1a --tolerance 2", "--tolerance must lie between 0 and 1, but 2.0"),

@@ -122,7 +122,7 @@ SPEED = "--vary speed=9000:12000:3"
         (f"{SPEED} --shard half", "but 'half'"),
         (f"{SPEED} --revolutions 37", "--revolutions must be a multiple of 10"),
         (f"{SPEED} --starts 9", "--starts must be at most 3, but 9"),
-        (f"{SPEED} --exponents 9", "--exponents must lie between 0 and 4, but 9"),
+        (f"{SPEED} --exponents 9", "--exponents must be at most 4, but 9"),
         (f"{SPEED} --strobe 301", "--strobe must lie between 0 and the 300 revolutions"),
         (f"{SPEED} --chunk 0", "--chunk must be at least 1, but 0"),
         (f"{SPEED} --seed -1", "--seed"),
@@ -156,6 +156,12 @@ def test_stores_of_others_and_missing_dask_get_one_sentence(
     monkeypatch.setitem(sys.modules, "distributed", None)
     said = refused(capsys, *SMALL, *out, "--executor", "dask")
     assert 'dask.distributed is missing: python -m pip install "jaxcage[dask]"' in said
+
+
+def test_a_scheduler_needs_an_address(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    said = refused(capsys, *SMALL, "--out", str(tmp_path), "--executor", "dask", "--scheduler", "nowhere")
+    assert said == "Option --scheduler must be an address such as tcp://host:8786, but 'nowhere' was given."
 
 
 def test_what_can_be_varied():
@@ -209,6 +215,13 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     assert data["label"].dims == ("speed", "guidance_gap", "start")
     assert int(np.sum(data["label"] >= 0)) == got["computed"]
     np.testing.assert_allclose(data["speed"], jc.rpm(3000, 9000, 9), rtol=1e-14)
+
+
+def test_a_map_of_fewer_points_than_its_coarse_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    small = ["--points", "3x3", "--most", "8", "--adaptive", "--no-curves", "--revolutions", "20"]
+    assert main(["map", "1a", *small, "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "chaotic       0      -\n" in out and "Not complete: with more than --most 8 points" in out
 
 
 @pytest.mark.parametrize(

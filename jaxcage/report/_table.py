@@ -29,7 +29,7 @@ def chosen(found: Any, names: str) -> dict[str, Any]:
 def shares_table(title: str, what: str, counts: Mapping[str, int]) -> Table:
     """How many of each sort there are, and their share of all."""
     total, (sort, unit) = sum(counts.values()), what.split()
-    rows = [(name, str(n), f"{n / total:.1%}") for name, n in counts.items()]
+    rows = [(name, str(n), f"{n / total:.1%}" if total else "-") for name, n in counts.items()]
     return Table(title, (sort, unit, "share"), rows)
 
 

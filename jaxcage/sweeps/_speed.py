@@ -49,7 +49,8 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
             "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
         )
     if not 0 <= exponents <= dimension:
-        raise ArgumentError("exponents", said=f"must lie between 0 and {dimension}, but {exponents} was given.")
+        allowed = f"at most {dimension}" if exponents > 0 else "at least 0"
+        raise ArgumentError("exponents", said=f"must be {allowed}, but {exponents} was given.")
     if revolutions % blocks:
         raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
