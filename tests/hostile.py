@@ -558,7 +558,7 @@ HEAVY = (
     (_design, "optimise"),
     (_design, "global_sensitivity"),
     (_study, "run_study"),
-    (_page, "examine"),
+    (_page.report, "examine"),
     (_reproduce, "run_all"),
     (_bearing, "impact_history"),
     (_bearing, "load_distribution"),

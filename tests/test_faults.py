@@ -132,8 +132,8 @@ COMMANDS = {
 def nothing_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands that get results made by hand."""
     monkeypatch.setattr(_sweep, "sweep", lambda *_, **__: swept(count=26))
-    monkeypatch.setattr(_page, "examine", lambda *_, **__: findings("1a", quick=True))
-    monkeypatch.setattr(_page, "page", lambda *_, **__: "<p>an hour of work</p>\n" * 100)
+    monkeypatch.setattr(_page.report, "examine", lambda *_, **__: findings("1a", quick=True))
+    monkeypatch.setattr(_page.report, "page", lambda *_, **__: "<p>an hour of work</p>\n" * 100)
     monkeypatch.setitem(_validate.TOPICS, "film", lambda: [Comparison("a force", "by hand", 1.0, 1.0, 1e-9)] * 40)
 
 
@@ -265,7 +265,7 @@ def half_written(self, path, **_):
         ctrl_c()
 
 for module, name in ((_sweep, "sweep"), (_orbits, "synchronous_orbits"), (_label_map, "label_map"),
-        (_design, "optimise"), (_study, "run_study"), (_page, "examine")):
+        (_design, "optimise"), (_study, "run_study"), (_page.report, "examine")):
     setattr(module, name, ctrl_c)
 matplotlib.figure.Figure.savefig = half_written
 found = {}

@@ -263,7 +263,7 @@ def test_command(
         asked.update(options)
         return example
 
-    monkeypatch.setattr(_command, "examine", examine)
+    monkeypatch.setattr(_command.report, "examine", examine)
     arguments = ["report", "1a", "--quick", "--operating", "8500, 900 rad/s", "--first", "250 rad/s"]
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
     out, err = capsys.readouterr()
