@@ -222,6 +222,7 @@ def test_a_map_of_fewer_points_than_its_coarse_picture(capsys: pytest.CaptureFix
     assert main(["map", "1a", *small, "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert "chaotic       0      -\n" in out and "Not complete: with more than --most 8 points" in out
+    assert "Data:" not in out
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,8 @@ class Job(Generic[Given]):
         the progress; `unit` and `advice` are as in `progress`.
         """
         _ = self.folder
-        with progress(f"{what or self.command} of {self.name}" if self.name else self.command, unit, advice) as bar:
+        at = f"{what} of {self.name}" if what else f"{self.command} {self.name}".rstrip()
+        with progress(at, unit, advice) as bar:
             yield bar
 
     @property
@@ -84,9 +85,9 @@ class Job(Generic[Given]):
         """Where a file goes: named after the command and the case."""
         return self.folder / f"{self.command}_{self.name}{ending}"
 
-    def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> str:
-        """Write a figure, and list it under `key`. **Returns:** its path."""
-        return self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
+    def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> None:
+        """Write a figure, and list it under `key`."""
+        self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
 
     def draw(
         self,
@@ -102,14 +103,19 @@ class Job(Generic[Given]):
         figure.suptitle(title, fontsize=11)
         self.figure(figure, key, detail)
 
-    def columns(self, columns: Mapping[str, np.ndarray], key: str = "data", detail: str = "") -> str:
-        """Write a table of numbers, and list it under `key`. **Returns:** its path."""
-        return self.listed(key, write_columns(self.path(f"{detail}.csv"), columns))
+    def columns(self, columns: Mapping[str, np.ndarray], key: str = "data", detail: str = "") -> None:
+        """Write a table of numbers, and list it under `key`."""
+        self.listed(key, write_columns(self.path(f"{detail}.csv"), columns))
 
-    def listed(self, key: str, path: Path) -> str:
+    def text(self, text: str, path: Path, key: str) -> None:
+        """Write a page, and list it under `key`."""
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        self.listed(key, path)
+
+    def listed(self, key: str, path: Path) -> None:
         """Show a file at the end."""
         self.files[key] = str(path)
-        return str(path)
 
 
 def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:

@@ -85,6 +85,7 @@ class _Files:
     def __init__(self, job: Job[MapOptions], x: Axis, y: Axis, length: dict[str, int]):
         self.job, self.x, self.y, self.length = job, x, y, length
         self.stem = f"_{x.name}_{y.name}_labels"
+        job.files["data"] = None
 
     def write(self, found: LabelMap) -> None:
         self.draw(found, [])

@@ -9,7 +9,6 @@ from typing import Any
 from .. import report
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES
-from ..io import replacing
 from ..sweeps import rpm
 from ._job import Job, blocks_of
 from ._options import ReportOptions
@@ -40,10 +39,7 @@ def report_on(job: Job[ReportOptions]) -> Report:
             progress=say,
         )
     html = report.page(findings, operating, table=_table(options.case), command=_command(options))
-    path = job.path(".html")
-    with replacing(path) as temporary:
-        temporary.write_text(html, encoding="utf-8")
-    job.listed("report", path)
+    job.text(html, job.path(".html"), "report")
     judged = report.judge(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())
     document = _document(findings, judged) | {"failed": failed, "stages": findings.seconds, "bytes": size}

@@ -1,7 +1,6 @@
 """`jaxcage validate`: our numbers beside independent ones, on the screen and as VALIDATION.md."""
 
 from .._errors import InputError
-from ..io import replacing
 from ..report import Table
 from ..validation import TOPICS, Comparison, page
 from ._job import Job
@@ -33,9 +32,7 @@ def validate(job: Job[ValidateOptions]) -> Report:
             say(topic, i, len(topics))
             found[topic] = TOPICS[topic]()
     command = "jaxcage validate" + (f' --topics "{options.topics}"' if options.topics else "")
-    with replacing(job.folder / NAME) as temporary:
-        temporary.write_text(page(found, f"Made by `{command}`."), encoding="utf-8")
-    job.listed("page", job.folder / NAME)
+    job.text(page(found, f"Made by `{command}`."), job.folder / NAME, "page")
     failed = [c for rows in found.values() for c in rows if not c.passed]
     count = sum(map(len, found.values()))
     document = {

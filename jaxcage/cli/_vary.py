@@ -126,10 +126,7 @@ def _number(name: str, model: CageModel) -> Callable[[str], float]:
 
 
 def _count(text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
+    count = int(text) if text.strip().isdecimal() else 0
     if count < 1:
         raise ValueError(f"must have a number of values above 0 at its end, but has '{text}'.")
     if count > MOST:
