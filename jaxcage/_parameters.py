@@ -17,6 +17,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
+from ._errors import ArgumentError
+
 
 M = TypeVar("M", bound=eqx.Module)
 
@@ -154,7 +156,7 @@ def unit_dimensions(unit: str) -> dict[str, float]:
         for factor in factors.split():
             base, _, power = factor.partition("^")
             if base not in _BASES:
-                raise ValueError(f"Argument `unit` must be made of {', '.join(_BASES)}, but '{unit}' was given.")
+                raise ArgumentError("unit", said=f"must be made of {', '.join(_BASES)}, but '{unit}' was given.")
             exponent = sign * float(Fraction(power.strip("()") or "1"))
             total = [t + exponent * b for t, b in zip(total, _BASES[base], strict=True)]
     return dict(zip(("mass", "length", "time"), total, strict=True))

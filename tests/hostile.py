@@ -29,18 +29,15 @@ import jaxcage as jc
 from jaxcage._parameters import ParameterInfo, walk
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import (
-    _bifurcations,
+    _bearing,
     _design,
-    _impact,
     _label_map,
     _main,
+    _one_speed,
     _options,
-    _poincare,
-    _report_page,
+    _orbits,
+    _page,
     _reproduce,
-    _sensitivity,
-    _simulate,
-    _statics,
     _study,
     _sweep,
     _validate,
@@ -394,10 +391,7 @@ DEFAULT_TABLES = (("rib",), ("bearing", "roller_material"), ("impact", "oscillat
 
 # Command lines.
 
-COMMANDS = {
-    conf.name: (kind, typing.get_type_hints(kind))
-    for kind, conf in (typing.get_args(part) for part in typing.get_args(_options.Command))
-}
+COMMANDS = {name: (kind, typing.get_type_hints(kind)) for name, (kind, _) in _options.COMMANDS.items()}
 """Command -> its options and their types."""
 NAMES = (*(".".join(path[-1:]) for path in FIELDS), "speed", "oil", "support.damping", "film.smoothing")
 SPEEDS = "8500, 8500 rpm, 900 rad/s, 2500, 27500, 12000, 1e-3, 1e308".split(", ")
@@ -557,17 +551,17 @@ def _would_run(*args: Any, **kwargs: Any) -> Any:
 
 HEAVY = (
     (_sweep, "sweep"),
-    (_poincare, "sweep"),
-    (_simulate, "simulate"),
-    (_bifurcations, "synchronous_orbits"),
+    (_one_speed, "sweep"),
+    (_one_speed, "simulate"),
+    (_orbits, "synchronous_orbits"),
     (_label_map, "label_map"),
     (_design, "optimise"),
-    (_sensitivity, "global_sensitivity"),
+    (_design, "global_sensitivity"),
     (_study, "run_study"),
-    (_report_page, "examine"),
+    (_page.report, "examine"),
     (_reproduce, "run_all"),
-    (_impact, "impact_history"),
-    (_statics, "load_distribution"),
+    (_bearing, "impact_history"),
+    (_bearing, "load_distribution"),
 )
 """Where each command begins to compute."""
 
@@ -587,7 +581,7 @@ def without_computing() -> Iterator[list[Any]]:
         stack.enter_context(mock.patch.object(_validate, "TOPICS", dict.fromkeys(_validate.TOPICS, _would_run)))
         stack.enter_context(mock.patch.object(_main, "_parse", parse))
         stack.enter_context(mock.patch.object(_main, "keep_compiled_programs"))
-        stack.enter_context(mock.patch.object(_report_page, "_table"))
+        stack.enter_context(mock.patch.object(_page, "_table"))
         yield understood
 
 
@@ -711,6 +705,8 @@ def check_options(options: Any, line: Line) -> None:
             expected = field.default
         elif hints[field.name] is bool:
             expected = True
+        elif field.name in ("points", "shard"):
+            expected = tuple(int(n) for n in re.split("[xX×/]", texts[-1]))
         elif isinstance(found, tuple):
             expected = tuple(texts)
         elif isinstance(found, str):

@@ -132,14 +132,14 @@ def test_unwritable_output_is_refused_before_the_computation(
 
 
 def test_interruption(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
-    from jaxcage.cli import _statics
+    from jaxcage.cli import _bearing
 
     def interrupted(_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(_statics, "run", interrupted)
+    monkeypatch.setattr(_bearing, "statics", interrupted)
     assert main(["statics", "1a"]) == 130
-    assert capsys.readouterr().err == WHOLE
+    assert capsys.readouterr().err.endswith(f".\n{WHOLE}")
 
 
 def test_interruption_of_a_sweep_does_not_wait_for_its_threads(tmp_path: Path):
@@ -156,11 +156,11 @@ def test_interruption_of_a_sweep_does_not_wait_for_its_threads(tmp_path: Path):
 
 
 def test_errors_of_our_own_are_not_taken_for_bad_input(monkeypatch: pytest.MonkeyPatch):
-    from jaxcage.cli import _statics
+    from jaxcage.cli import _bearing
 
     def broken(_: object) -> None:
         raise ValueError("a mistake in the library")
 
-    monkeypatch.setattr(_statics, "run", broken)
+    monkeypatch.setattr(_bearing, "statics", broken)
     with pytest.raises(ValueError, match="a mistake in the library"):
         main(["statics", "1a"])

@@ -15,7 +15,7 @@ import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import main
-from jaxcage.cli._report import Report, show
+from jaxcage.cli._show import Report, show
 from jaxcage.io import load_sweep, open_sweep, read_columns
 from jaxcage.report import zones_table
 

@@ -58,7 +58,7 @@ def test_sensitivity_shares_the_variance(capsys: pytest.CaptureFixture[str], tmp
     [
         ("design 1a --starts 0", "--starts must be at least 1, but 0 was given"),
         ("design 1a --scouts 1", "--scouts must be at least 2, but 1 was given"),
-        ("design 1a --cloud 5", "`cloud` must be an even number from 4 up, but 5 was given"),
+        ("design 1a --cloud 5", "--cloud must be an even number from 4 up, but 5 was given"),
         ("design 1a --cost nan", "--cost must be at least 0, but nan was given"),
         ("design 1a --last 3000", "the range is 4000 to 3000 rpm"),
         ("design 1a --vary gap=0.3mm:0.6mm", "gap"),

@@ -11,9 +11,8 @@ import pytest
 import jaxcage as jc
 from jaxcage.analysis import Sweep
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.cli import _bifurcations, _gradient, main
-from jaxcage.cli._gradient import gradient_document, gradient_table, homogeneity_notes, missing_notes
-from jaxcage.cli._report import plain
+from jaxcage.cli import _orbits, main
+from jaxcage.cli._show import plain
 from jaxcage.io import read_columns
 from jaxcage.orbits import (
     Branch,
@@ -30,7 +29,11 @@ from jaxcage.report import (
     coexisting_notes,
     contact_notes,
     edge_table,
+    gradient_document,
+    gradient_table,
+    homogeneity_notes,
     loss_table,
+    missing_notes,
     multiplier_cell,
     orbits_document,
     shown_unit,
@@ -230,14 +233,14 @@ def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_mo
 def test_gradient_document_has_the_width_and_the_worst_residuals():
     onset, leaves = edge("zone 1 onset", 7000.0, cage_mass=-0.75), edge("zone 1 exit", 12000.0, cage_mass=-1.0)
     wide = width(onset, leaves, "zone 1 width")
-    document = plain(gradient_document("1a", {"zone 1 onset": onset, "zone 1 exit": leaves}, wide))
+    document = plain(gradient_document({"zone 1 onset": onset, "zone 1 exit": leaves}, wide))
     assert document["width"]["value_rpm"] == pytest.approx(5000)
     assert document["width"]["kind"] == "synchronous-loss"
     assert document["width"]["elasticity"]["cage_mass"] == pytest.approx((-1.0 * 12000 + 0.75 * 7000) / 5000)
     assert document["homogeneity"] == {"mass": 1e-12, "length": 3e-12, "time": 0.0}
     assert document["edges"][0]["trusted"] is True
     assert "length 3.0e-12" in homogeneity_notes(document)[0]
-    without = plain(gradient_document("1a", {}, None))
+    without = plain(gradient_document({}, None))
     assert without["width"] is None and without["homogeneity"]["mass"] is None
 
 
@@ -291,8 +294,8 @@ def test_gradient_command(
         moved = {n: edge(n, float(p.speed_rpm), cage_mass=-0.75, guidance_gap=0.1) for n, p in points.items()}
         return moved | {"zone 2 onset": edge("zone 2 onset", float("nan"), status="no such point")}
 
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: found)
-    monkeypatch.setattr(_gradient, "sensitivities", sensitivities)
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: found)
+    monkeypatch.setattr(_orbits, "sensitivities", sensitivities)
     got = document(capsys, "gradient", "1a", "--out", str(tmp_path))
     assert [(e["name"], e["trusted"]) for e in got["edges"]] == [
         ("zone 1 onset", True),
@@ -313,8 +316,8 @@ def test_gradient_without_an_edge_to_be_trusted_fails(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits
 ):
     lost = {"zone 1 onset": edge("zone 1 onset", 7000.0, status="tangential")}
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: found)
-    monkeypatch.setattr(_gradient, "sensitivities", lambda *_, **__: lost)
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: found)
+    monkeypatch.setattr(_orbits, "sensitivities", lambda *_, **__: lost)
     assert main(["gradient", "1a", "--out", str(tmp_path)]) == 1
     out, err = capsys.readouterr()
     assert out == "" and "No edge is a function of the design here (zone 1 onset: tangential)" in err
@@ -343,7 +346,7 @@ def lines_through(system: Any, point: Any, x: str, y: str, **given: Any) -> Curv
 
 @pytest.fixture
 def map_of_lines(monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits):
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: found)
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: found)
     monkeypatch.setattr("jaxcage.report._map.curve", lines_through)
 
 
@@ -400,7 +403,7 @@ REFUSALS = [
     ("map 1a --y speed", "but 'speed' was given"),
     ("map 1a --x gap", "--x must be one of speed, bore, "),
     ("map 1a --x guidance_gap", "must be two different parameters, but both are guidance_gap"),
-    ("map 1a --rows 1", "--rows must be at least 2, but 1 was given"),
+    ("map 1a --rows 1", "--rows must be 0 or at least 2, but 1 was given"),
     ("map 1a --columns 1", "--columns must be at least 2, but 1 was given"),
     ("map 1a --revolutions 0", "--revolutions must be at least 1, but 0 was given"),
     ("map 1a --starts 0", "--starts must be at least 1, but 0 was given"),
@@ -417,7 +420,7 @@ REFUSALS = [
 def test_bad_input_is_refused_before_the_search(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: str, said: str
 ):
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: pytest.fail("the search was started"))
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: pytest.fail("the search was started"))
     assert main([*arguments.split(), "--out", str(tmp_path / "out")]) == 2
     out, err = capsys.readouterr()
     lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
@@ -436,7 +439,7 @@ def test_search_without_a_result_says_so(
     command: str,
 ):
     nothing = SynchronousOrbits((), (), found.sweep, 0, 2500.0, 27500.0)
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: nothing)
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: nothing)
     assert main([command, "1a", "--out", str(tmp_path)]) == 1
     out, err = capsys.readouterr()
     assert out == ""
@@ -455,7 +458,7 @@ def test_search_without_an_edge_says_so(
 ):
     whole = Stretch(None, None, 18000.0, 27500.0, 0, 0, 3, 3)
     steady = SynchronousOrbits(found.branches[1:], (whole,), found.sweep, 0, 18000.0, 27500.0)
-    monkeypatch.setattr(_bifurcations, "synchronous_orbits", lambda *_, **__: steady)
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: steady)
     assert main([command, "1a", "--out", str(tmp_path)]) == 1
     assert f"between 18000 and 27500 rpm: there is no edge to {what}." in capsys.readouterr().err
 

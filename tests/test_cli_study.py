@@ -37,7 +37,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     assert (half["lanes"], half["stored"], half["stored_before"], half["chunks"]) == (24, 12, 0, 6)
     assert main([*SMALL, *out]) == 0
     text, said = capsys.readouterr()
-    assert "Lanes: 6 speed x 2 guidance_gap x 2 start" in text and "for 12 lanes" in text
+    assert "Lanes: 6 speed x 2 guidance_gap x 2 start" in text and "Computed: 12 lanes" in text
     assert "left for the other shards" not in said
     whole = document(capsys, *SMALL, *out)
     assert (whole["stored"], whole["stored_before"], whole["lanes_per_second"]) == (24, 24, None)
@@ -111,7 +111,7 @@ SPEED = "--vary speed=9000:12000:3"
         (f"{SPEED} --vary guidance_gap=0.5mm:0.4mm --sample 4", "must ascend"),
         (f"{SPEED} --vary guidance_gap=0.5mm+-0mm --sample 4", "above 0"),
         (f"{SPEED} --vary guidance_gap=0.4mm:0.5mm", "--sample must say how many samples to take of guidance_gap"),
-        (f"{SPEED} --sample 8", "--sample needs a --vary with an interval or a tolerance"),
+        (f"{SPEED} --sample 8", "--sample needs an interval or a tolerance to sample, but 8"),
         (f"{SPEED} --vary eccentricity=0.5mm", "must be smaller than `guidance_gap`"),
         (f"{SPEED} --vary oil=1", "oil must stay from 2 to 10000"),
         ("--vary speed=-3", "speed must stay above 0 rad/s"),
@@ -122,7 +122,7 @@ SPEED = "--vary speed=9000:12000:3"
         (f"{SPEED} --shard half", "but 'half'"),
         (f"{SPEED} --revolutions 37", "--revolutions must be a multiple of 10"),
         (f"{SPEED} --starts 9", "--starts must be at most 3, but 9"),
-        (f"{SPEED} --exponents 9", "--exponents must lie between 0 and 4, but 9"),
+        (f"{SPEED} --exponents 9", "--exponents must be at most 4, but 9"),
         (f"{SPEED} --strobe 301", "--strobe must lie between 0 and the 300 revolutions"),
         (f"{SPEED} --chunk 0", "--chunk must be at least 1, but 0"),
         (f"{SPEED} --seed -1", "--seed"),
@@ -158,6 +158,12 @@ def test_stores_of_others_and_missing_dask_get_one_sentence(
     assert 'dask.distributed is missing: python -m pip install "jaxcage[dask]"' in said
 
 
+def test_a_scheduler_needs_an_address(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    said = refused(capsys, *SMALL, "--out", str(tmp_path), "--executor", "dask", "--scheduler", "nowhere")
+    assert said == "Option --scheduler must be an address such as tcp://host:8786, but 'nowhere' was given."
+
+
 def test_what_can_be_varied():
     """Bare speeds are rpm, all else SI or with its unit; grids, lists, single values, intervals and tolerances."""
     given = ["speed=9000:12000:4", "guidance_gap=0.4mm:5e-4", "eccentricity=20um±3um", "oil=32,56.5,78"]
@@ -178,7 +184,7 @@ def test_a_line_a_minute_where_there_is_no_terminal(
     """200 lanes, 50 of them stored before, two a second from then on."""
     clock = [0.0]
     monkeypatch.setattr(_console.time, "monotonic", lambda: clock[0])
-    with _console.progress_with_rate("study x", "lanes", "go on") as bar:
+    with _console.progress("study x", "lanes", "go on") as bar:
         for done in range(50, 201, 10):
             clock[0] = 1000.0 + (done - 50) / 2
             bar("", done, 200)
@@ -196,7 +202,7 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     monkeypatch.setattr(
         _label_map._Files,
         "write",
-        lambda self, found: (write(self, found), stages.append(self.figure.exists()))[0],
+        lambda self, found: (write(self, found), stages.append(self.job.path(f"{self.stem}.png").exists()))[0],
     )
     small = [*MAP, "--adaptive", "--first", "3000", "--last", "9000", "--out", str(tmp_path)]
     got = document(capsys, *small)
@@ -211,6 +217,14 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     np.testing.assert_allclose(data["speed"], jc.rpm(3000, 9000, 9), rtol=1e-14)
 
 
+def test_a_map_of_fewer_points_than_its_coarse_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    small = ["--points", "3x3", "--most", "8", "--adaptive", "--no-curves", "--revolutions", "20"]
+    assert main(["map", "1a", *small, "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "chaotic       0      -\n" in out and "Not complete: with more than --most 8 points" in out
+    assert "Data:" not in out
+
+
 @pytest.mark.parametrize(
     "arguments, said",
     [
@@ -221,7 +235,7 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
         ("--points 9x7 --speed 9000", "--speed goes with an --x that is not the speed"),
         ("--points 9x7 --x eccentricity", "--speed must be given for a map over eccentricity"),
         ("--points 9x7 --x eccentricity --speed -1", "--speed must be a speed above 0 rpm, but -1"),
-        ("--points 9x7 --starts 4", "--starts must lie between 1 and 3, but 4"),
+        ("--points 9x7 --starts 4", "--starts must be at most 3, but 4"),
         ("--adaptive", "--adaptive, --refine, --no-curves, --persist, --most and --speed go with --points"),
     ],
 )

@@ -221,7 +221,7 @@ def test_monsters(tmp_path: Path, given: str, said: str):
         ("sweep 1a --revolutions 1000000000000", "--revolutions must be at most 10000000"),
         ("sweep 1a --steps 1000000000000", "--steps must be at most 10000000"),
         (f"sweep {'x' * 300}", "is unknown: it must be one of 1a"),
-        ("sweep 1a --out=", 'Option --out must name a folder, but is "".'),
+        ("sweep 1a --out=", "Option --out must name a folder, but '' was given."),
         ("study 1a --vary speed=1:2:99999999999", "--vary speed must have at most 10000000 values"),
         ("study 1a --vary speed=1:2:1000 --vary load=1:2:40000", "must make at most 100000000 lanes"),
         ("study 1a --vary speed=8500 --sample 1000000000000", "--sample must be at most"),

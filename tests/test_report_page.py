@@ -14,7 +14,7 @@ from report_example import findings, orbits, swept
 import jaxcage as jc
 from jaxcage._parameters import choice_paths
 from jaxcage.analysis import Edge, Zone, Zones
-from jaxcage.cli import _report_page, main
+from jaxcage.cli import _page as _command, main
 from jaxcage.report import (
     AllFailed,
     Findings,
@@ -263,7 +263,7 @@ def test_command(
         asked.update(options)
         return example
 
-    monkeypatch.setattr(_report_page, "examine", examine)
+    monkeypatch.setattr(_command.report, "examine", examine)
     arguments = ["report", "1a", "--quick", "--operating", "8500, 900 rad/s", "--first", "250 rad/s"]
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
     out, err = capsys.readouterr()

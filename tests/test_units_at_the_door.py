@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from jaxcage.cli._errors import UsageError
+from jaxcage._errors import InputError
 from jaxcage.cli._main import _parse
-from jaxcage.cli._quantities import read_quantity
+from jaxcage.cli._readers import read_quantity
 from jaxcage.io import model_from
 
 
@@ -62,10 +62,10 @@ def test_loads_and_durations_take_units():
     ],
 )
 def test_a_wrong_dimension_gets_one_sentence(arguments: list[str], said: str):
-    with pytest.raises(UsageError) as refusal:
+    with pytest.raises(InputError) as refusal:
         _parse(arguments)
     sentence = str(refusal.value)
-    assert said in sentence and sentence.startswith("Option --") and sentence.endswith("(see jaxcage --help).")
+    assert said in sentence and sentence.startswith("Option --") and sentence.endswith(".")
     assert "\n" not in sentence and "Traceback" not in sentence
 
 

@@ -5,7 +5,7 @@ import pathlib
 import sys
 
 from jaxcage.cli import _main
-from jaxcage.cli._report import Report, plain
+from jaxcage.cli._show import Report, plain
 
 
 def main() -> int:

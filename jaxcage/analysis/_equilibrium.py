@@ -25,6 +25,7 @@ import optimistix as optx
 from jaxtyping import Array, Complex, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._parameters import replace
 from .._types import Scalar
 from ..forces import AbstractForcing, ShortFilm, SynchronousImpact, film_scale, short_film_force
@@ -196,7 +197,7 @@ def film_whirl_speed(model: CageModel) -> Array:
     require_x64()
     film, c = model.film, model.clearance
     if film.model == "full":
-        raise ValueError("Argument `model` must have a half film, but its film model is 'full'.")
+        raise ArgumentError("model", said="must have a half film, but its film model is 'full'.")
     oil = model.lubricant.dynamic_viscosity
     scale = film.n_lands * film_scale(oil, model.land_radius, film.land_width, c)
     unit = jnp.sqrt(model.gravity / c)

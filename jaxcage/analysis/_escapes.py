@@ -11,6 +11,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .._errors import ArgumentError
 from ._labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period
 
 
@@ -87,7 +88,7 @@ def escape_times(
     """
     lanes, blocks = growth.shape
     if not 1 <= confirm < blocks:
-        raise ValueError(f"Argument `confirm` must lie between 1 and the {blocks - 1} blocks before, but is {confirm}.")
+        raise ArgumentError("confirm", said=f"must lie between 1 and the {blocks - 1} blocks before, but is {confirm}.")
     lost = ~np.all(np.isfinite(growth), axis=1) | (np.zeros(lanes, dtype=bool) if failed is None else failed)
     restless = growth > (calm_threshold(block) if threshold is None else threshold)
     last = np.max(np.where(restless, np.arange(1, blocks + 1), 0), axis=1)

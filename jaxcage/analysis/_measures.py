@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..forces import Force
 from ..integrate import Trajectory
@@ -38,7 +39,7 @@ def relative_state(
     """
     dim = model.dimension
     if state.shape[-1] != dim:
-        raise ValueError(f"Argument `state` must have {dim} components, but it has {state.shape[-1]}.")
+        raise ArgumentError("state", said=f"must have {dim} components, but it has {state.shape[-1]}.")
     q, v = state[:, : dim // 2], state[:, dim // 2 :]
     if dim == 4:
         return q, v
@@ -193,9 +194,10 @@ def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
     """
     require_x64()
     if trajectory.outcome != "successful" or len(trajectory.tau) < 3:
-        raise ValueError(
-            "Argument `trajectory` must be a run that succeeded, of at least 3 samples, "
-            f"but this one has {len(trajectory.tau)} and ended with: {trajectory.outcome}."
+        raise ArgumentError(
+            "trajectory",
+            said="must be a run that succeeded, of at least 3 samples, "
+            f"but this one has {len(trajectory.tau)} and ended with: {trajectory.outcome}.",
         )
     position, velocity = relative_state(model, trajectory.state)
     speed, c = trajectory.speed, float(model.clearance)

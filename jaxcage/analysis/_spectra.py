@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from jaxtyping import Complex, Float
 
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import State
 from ..integrate import AbstractMethod, Trajectory, simulate
@@ -55,9 +56,10 @@ def _whole_revolutions(trajectory: Trajectory) -> Float[np.ndarray, "n dim"]:
     """The last samples that make whole revolutions, so that integer orders fall on bins."""
     revolutions = len(trajectory.tau) // trajectory.samples
     if revolutions < 2:
-        raise ValueError(
-            "Argument `trajectory` must last for at least 2 revolutions, "
-            f"but it has {len(trajectory.tau)} samples at {trajectory.samples} per revolution."
+        raise ArgumentError(
+            "trajectory",
+            said="must last for at least 2 revolutions, "
+            f"but it has {len(trajectory.tau)} samples at {trajectory.samples} per revolution.",
         )
     return trajectory.state[-revolutions * trajectory.samples :]
 
@@ -71,7 +73,7 @@ def _transform(
     """
     if window not in get_args(Window):
         choices = ", ".join(get_args(Window))
-        raise ValueError(f"Argument `window` must be one of {choices}, but '{window}' was given.")
+        raise ArgumentError("window", said=f"must be one of {choices}, but '{window}' was given.")
     from scipy.signal import get_window  # takes a second to import
 
     weights = get_window(window, len(signal))

@@ -28,6 +28,7 @@ import numpy as np
 import scipy.special
 from jaxtyping import Float, Shaped
 
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 
 
@@ -182,12 +183,10 @@ def survival(
     **Raises:** `ValueError` for a horizon not beyond t0, and for a t0 or times that do not end a block.
     """
     if not 0 <= t0 < horizon:
-        raise ValueError(f"Argument `t0` must lie between 0 and the horizon of {horizon} revolutions, but is {t0}.")
+        raise ArgumentError("t0", said=f"must lie between 0 and the horizon of {horizon} revolutions, but is {t0}.")
     after = times[np.isfinite(times)]
     if block and np.any(np.concatenate([after, [t0, horizon]]) % block):
-        raise ValueError(
-            f"Arguments `times`, `horizon` and `t0` must be multiples of the block of {block} revolutions."
-        )
+        raise ArgumentError("times", "horizon", "t0", said=f"must be multiples of the block of {block} revolutions.")
     known = times[~np.isnan(times)]
     risk = known[known > t0]
     escaped = risk <= horizon

@@ -17,6 +17,8 @@ have died out.
 import numpy as np
 from jaxtyping import Float
 
+from .._errors import ArgumentError
+
 
 CUT = 10
 """Displacements are formed over lags up to this fraction of the series (one tenth, as advised)."""
@@ -86,9 +88,9 @@ def zero_one(
     """
     n = series.shape[-1]
     if n < SHORTEST:
-        raise ValueError(f"Argument `series` must have at least {SHORTEST} values, but it has {n}.")
+        raise ArgumentError("series", said=f"must have at least {SHORTEST} values, but it has {n}.")
     if frequencies < 1:
-        raise ValueError(f"Argument `frequencies` must be at least 1, but {frequencies} was given.")
+        raise ArgumentError("frequencies", said=f"must be at least 1, but {frequencies} was given.")
     finite = np.all(np.isfinite(series), axis=-1)
     safe = np.where(finite[..., None], series, 0.0)
     size = np.max(np.abs(safe), axis=-1) if scale is None else np.full(finite.shape, float(scale))

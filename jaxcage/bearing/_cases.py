@@ -8,6 +8,8 @@ http://dx.doi.org/10.1155/2016/9120505, open access under the Creative Commons A
 
 import dataclasses
 
+from .._errors import ArgumentError
+
 
 @dataclasses.dataclass(frozen=True)
 class PublishedCase:
@@ -59,7 +61,7 @@ def published_case(name: str) -> PublishedCase:
     **Raises:** `ValueError` that names the cases there are.
     """
     if name not in PUBLISHED_CASES:
-        raise ValueError(f"Argument `name` must be one of {', '.join(PUBLISHED_CASES)}, but {name!r} was given.")
+        raise ArgumentError("name", said=f"must be one of {', '.join(PUBLISHED_CASES)}, but {name!r} was given.")
     return PUBLISHED_CASES[name]
 
 

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._errors import ArgumentError
 from .._parameters import count, parameter
 from .._types import Scalar
 from . import _kinematics as kinematics
@@ -40,9 +41,9 @@ class Bearing(eqx.Module):
         across = self.inner_raceway_diameter, self.roller_diameter
         share = np.sin(np.pi / self.n_rollers)
         if is_concrete(*across) and np.any(sum(map(np.asarray, across)) * share <= np.asarray(self.roller_diameter)):
-            raise ValueError(
-                "Argument `n_rollers` must leave room between the rollers, but "
-                f"{self.n_rollers} rollers overlap on the pitch circle."
+            raise ArgumentError(
+                "n_rollers",
+                said=f"must leave room between the rollers, but {self.n_rollers} rollers overlap on the pitch circle.",
             )
 
     @property

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._errors import ArgumentError
 from .._parameters import parameter
 from .._types import Scalar
 from ._validate import is_concrete, require_positive
@@ -65,8 +66,8 @@ class Lubricant(eqx.Module):
     def __check_init__(self) -> None:
         first, second = self.temperature_1, self.temperature_2
         if is_concrete(first, second) and np.asarray(first) == np.asarray(second):
-            raise ValueError(
-                f"Argument `temperature_2` must differ from `temperature_1`, but both are {float(first):g} K."
+            raise ArgumentError(
+                "temperature_2", said=f"must differ from `temperature_1`, but both are {float(first):g} K."
             )
 
     @property

@@ -8,6 +8,7 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._types import Scalar
 from ._geometry import Bearing
 from ._line_contact import line_contact_approach, raceway_loads_of_all
@@ -84,7 +85,7 @@ def static_cage_displacement(
         return jnp.asarray(shift + guidance_gap / 2)
     if guidance == "roller":
         return jnp.asarray(shift + pocket_clearance)
-    raise ValueError(f"Argument `guidance` must be one of {', '.join(get_args(Guidance))}, but {guidance!r} was given.")
+    raise ArgumentError("guidance", said=f"must be one of {', '.join(get_args(Guidance))}, but {guidance!r} was given.")
 
 
 class _LoadCase(eqx.Module):

@@ -1,17 +1,24 @@
-"""The `jaxcage` command.
+"""The `jaxcage` command: what each command takes, computes and prints.
 
 | module      | responsibility                                                              |
 |-------------|-----------------------------------------------------------------------------|
-| `_main`     | entry point: parse, carry out, exit status                                  |
-| `_options`  | commands and their options, without heavy imports                           |
-| `_errors`   | bad input in one sentence                                                   |
-| `_console`  | progress and warnings on standard error                                     |
-| `_report`   | result as tables or as JSON                                                 |
-| `_inputs`   | case or TOML file, integration method, output folder                        |
-| `_quantities` | options that take a number with a unit                                    |
+| `_main`     | the runner: options, errors, exit status, what is said after every command  |
+| `_options`  | commands, their options, and which go together, without heavy imports       |
+| `_readers`  | texts of the command line to numbers, counts and names                      |
 | `_vary`     | what `--vary NAME=VALUES` says                                              |
-| `_label_map` | `jaxcage map --points`                                                     |
-| `_sweep`, `_zones`, `_poincare`, `_simulate`, `_statics`, `_impact`, `_report_page`, ... | one command each |
+| `_job`      | model, method and output folder that the options ask for; files written     |
+| `_console`  | progress and warnings on standard error                                     |
+| `_show`     | result as tables or as JSON                                                 |
+| `_bearing`  | `init`, `statics`, `impact`                                                 |
+| `_one_speed` | `simulate`, `poincare`                                                     |
+| `_sweep`    | `sweep`, `zones`                                                            |
+| `_orbits`   | `bifurcations`, `gradient`                                                  |
+| `_map`, `_label_map` | `map`, `map --points`                                              |
+| `_design`   | `design`, `sensitivity`                                                     |
+| `_study`, `_page`, `_reproduce`, `_validate` | `study`, `report`, `reproduce`, `validate` |
+
+A command is its options, a function that computes with a `Job` and returns a `Report`, and a line in
+`_options.COMMANDS`. Its tables and documents are made in `jaxcage.report`, for scripts as well.
 """
 
 from ._main import main as main

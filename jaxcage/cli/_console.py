@@ -7,15 +7,19 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import TypeAlias
 
-from ._errors import INTERRUPTED
 
-
-_computing = False
-FILES_ARE_WHOLE = ": files of earlier runs are as they were, and the same command starts over"
-_advice = FILES_ARE_WHOLE
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+"""Exit statuses."""
+FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 60.0
 _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
+_advice: str | None = None
+"""What is said to whoever interrupts the computation; None outside of one."""
+
+Say: TypeAlias = Callable[[str, int, int], None]
+"""Told what is done, how much of it, of how much."""
 
 
 def say(text: str) -> None:
@@ -41,53 +45,33 @@ def leave_at_once_when_interrupted() -> None:
 
 def _on_interruption(number: int, frame: FrameType | None) -> None:
     del number, frame
-    if not _computing:
+    if _advice is None:
         raise KeyboardInterrupt
     if sys.stderr.isatty():
         sys.stderr.write(_SHOW_CURSOR_AND_CLEAR_LINE)
-    say(f"Interrupted{_advice}.")
+    say(f"Interrupted: {_advice}.")
     sys.stderr.flush()
     os._exit(INTERRUPTED)
 
 
 @contextlib.contextmanager
-def progress(text: str) -> Iterator[Callable[[int, int], None] | None]:
-    """Around a computation: a bar that is called with lanes done and lanes in all; None where
-    standard error is not a terminal.
+def progress(text: str, unit: str = "", advice: str = "") -> Iterator[Say]:
+    """Around a computation: a bar that is told what it is at, and does nothing where standard error is not a terminal.
+    One of many minutes counts a `unit`: it gets rate and time left, and without a terminal a line every minute.
     """
-    with progress_in_stages(text) as bar:
-        yield None if bar is None else lambda done, total: bar("", done, total)
-
-
-@contextlib.contextmanager
-def progress_in_stages(text: str, advice: str = "") -> Iterator[Callable[[str, int, int], None] | None]:
-    """As `progress`, but the bar is first told what the computation is at. `advice` is what is said to whoever
-    interrupts it.
-    """
-    global _computing, _advice
-    _computing, _advice = True, f": {advice}" if advice else FILES_ARE_WHOLE
+    global _advice
+    _advice = advice or FILES_ARE_WHOLE
     try:
-        with _bar(text) as bar:
-            yield bar
+        if sys.stderr.isatty():
+            with _bar(text, unit) as bar:
+                yield bar
+        else:
+            yield _line_a_minute(text, unit) if unit else lambda what, done, total: None
     finally:
-        _computing, _advice = False, FILES_ARE_WHOLE
+        _advice = None
 
 
-@contextlib.contextmanager
-def progress_with_rate(text: str, unit: str, advice: str) -> Iterator[Callable[[str, int, int], None]]:
-    """Around a computation of many minutes: a bar with rate and time left; a line every minute where standard error is
-    not a terminal. `advice` is what is said to whoever interrupts it.
-    """
-    global _computing, _advice
-    _computing, _advice = True, f": {advice}"
-    try:
-        with _bar(text, unit) as bar:
-            yield bar or _line_a_minute(text, unit)
-    finally:
-        _computing, _advice = False, FILES_ARE_WHOLE
-
-
-def _line_a_minute(text: str, unit: str) -> Callable[[str, int, int], None]:
+def _line_a_minute(text: str, unit: str) -> Say:
     stage, began, first, said = "", 0.0, 0, 0.0
 
     def report(what: str, done: int, total: int) -> None:
@@ -106,10 +90,7 @@ def _line_a_minute(text: str, unit: str) -> Callable[[str, int, int], None]:
 
 
 @contextlib.contextmanager
-def _bar(text: str, unit: str = "") -> Iterator[Callable[[str, int, int], None] | None]:
-    if not sys.stderr.isatty():
-        yield None
-        return
+def _bar(text: str, unit: str) -> Iterator[Say]:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -121,8 +102,7 @@ def _bar(text: str, unit: str = "") -> Iterator[Callable[[str, int, int], None] 
     )
     from rich.text import Text
 
-    text_column = TextColumn("{task.description}")
-    columns = [text_column, BarColumn(), TaskProgressColumn(), TimeRemainingColumn()]
+    columns = [TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()]
     if unit:
 
         class Rate(TextColumn):

@@ -1,29 +1,35 @@
-"""`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs."""
+"""Designs with fewer chaotic speeds, what that costs, and what each parameter and its tolerance does."""
 
 import concurrent.futures
 import dataclasses
 import hashlib
 import math
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .._parameters import parameter_info, parameters
-from ..analysis import Sweep, Zones, zones
-from ..design import AbstractObjective, Optimised, Optimum, Robust, chaotic_width, cost, optimise
+from .. import report
+from ..analysis import Sweep, zones
+from ..design import (
+    AbstractObjective,
+    Optimised,
+    Robust,
+    chaotic_width,
+    cost,
+    global_sensitivity,
+    optimise,
+    tolerance_budget,
+)
 from ..models import CageModel
-from ..orbits import LossZones
-from ..plotting import design_figure
+from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
+from ..plotting import design_figure, elasticity_bars
 from ..sweeps import rpm, sweep
-from ._console import progress_in_stages
-from ._errors import UsageError, refusing, require_at_least, require_range
-from ._inputs import angular_speed, output_folder, save_figure, subject
-from ._loss import loss_zones_between
-from ._options import DesignOptions
-from ._report import Report, Table, number
+from ._console import Say
+from ._job import Job
+from ._options import SETTLED, DesignOptions, SensitivityOptions, VaryOptions
+from ._show import Report
 from ._vary import read_bounds, read_scatter
 
 
@@ -32,116 +38,81 @@ CHECKED_SPEEDS = 118
 """Every 200 rpm of the usual range."""
 
 
-def run(options: DesignOptions) -> Report:
-    """Carry out `jaxcage design`."""
-    require_range(options.first, options.last)
-    for name, least in (
-        ("starts", 1),
-        ("scouts", options.starts - 1),
-        ("steps", 1),
-        ("speeds", 4),
-        ("cloud", 4),
-        ("seed", 0),
-    ):
-        require_at_least(f"--{name}", getattr(options, name), least)
-    if not 0 <= options.cost < math.inf:
-        raise UsageError(f"Option --cost must be at least 0, but {options.cost:g} was given.")
-    for name, share in (("spread", options.spread), ("worst", options.worst)):
-        if not 0 < share <= 1:
-            raise UsageError(f"Option --{name} must be above 0 and at most 1, but {share:g} was given.")
-    if options.worst != DesignOptions.worst and not options.scatter:
-        raise UsageError("Option --worst goes with --scatter.")
-    about = subject(options)
-    vary = read_bounds(options.vary or VARY, about.model)
+def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
+    first, last = rpm(options.first), rpm(options.last)
+    return loss_zones(synchronous_orbits(model, first, last, discard=SETTLED, progress=say))
+
+
+def design(job: Job[DesignOptions]) -> Report:
+    """`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs."""
+    options = job.options
+    vary = read_bounds(options.vary or VARY, job.model)
     scatter = read_scatter(options.scatter, list(vary))
-    folder = output_folder(options)
-    began = time.perf_counter()
-    with refusing():
-        width: AbstractObjective = chaotic_width(
-            options.first, options.last, options.speeds, cloud=options.cloud, spread=options.spread, seed=options.seed
+    range_ = options.first, options.last, options.speeds
+    width: AbstractObjective = chaotic_width(*range_, **job.given("cloud spread seed"))
+    if scatter:
+        width = Robust(width, scatter, **job.given("worst seed"))
+    kept = _kept_search(job)
+    with job.computing(advice="the same command goes on where the search stopped") as say:
+        found = optimise(
+            job.model,
+            vary,
+            width + options.cost * cost() if options.cost else width,
+            **job.given("starts scouts steps seed"),
+            keep=kept,
+            report=lambda step, _: say("search", step, options.steps),
         )
-        width = Robust(width, scatter, worst=options.worst, seed=options.seed) if scatter else width
-    objective = width + options.cost * cost() if options.cost else width
-    kept = _kept_search(folder, about.name, options)
-    with progress_in_stages(f"design of {about.name}", "the same command goes on where the search stopped") as bar:
-        say = bar or (lambda what, done, of: None)
-        with refusing():
-            found = optimise(
-                about.model,
-                vary,
-                objective,
-                starts=options.starts,
-                scouts=options.scouts,
-                steps=options.steps,
-                seed=options.seed,
-                keep=kept,
-                report=lambda step, _: say("search", step, options.steps),
-            )
-        searched = time.perf_counter() - began
-        models = {"before": about.model, "after": found.best.model}
-        checked = {}
-        for i, (name, model) in enumerate(models.items()):
-            say("fresh sweeps", i, len(models))
-            checked[name] = check(model, options)
-        search = lambda model: loss_zones_between(model, options.first, options.last, say)
-        with concurrent.futures.ThreadPoolExecutor() as pool:  # a search keeps one core busy
-            loss = {} if options.quick else dict(zip(models, pool.map(search, models.values()), strict=True))
-    figure = save_figure(design_figure(found, checked["before"], checked["after"]), folder / f"design_{about.name}.png")
-    chaotic = {name: zones(s) for name, s in checked.items()}
+        searched = job.seconds
+        models = {"before": job.model, "after": found.best.model}
+        say("fresh sweeps", 0, 1)
+        checked = {name: _check(model, options) for name, model in models.items()}
+        loss: dict[str, LossZones] = {}
+        if not options.quick:
+            search = lambda model: _loss_zones(model, options, say)
+            with concurrent.futures.ThreadPoolExecutor() as pool:  # a search keeps one core busy
+                loss = dict(zip(models, pool.map(search, models.values()), strict=True))
+    job.figure(design_figure(found, checked["before"], checked["after"]))
     kept.unlink(missing_ok=True)
+    chaotic = {name: zones(swept) for name, swept in checked.items()}
     document = {
-        "case": about.name,
         "vary": vary,
-        "objective": found.best.objective,
-        "error": found.best.error,
+        **report.chosen(found.best, "objective error at_bound status"),
         "optimum": found.best.values,
-        "at_bound": found.best.at_bound,
-        "status": found.best.status,
-        "optima": [
-            {"values": o.values, "objective": o.objective, "error": o.error, "starts": n, "at_bound": o.at_bound}
-            for o, n in found.distinct
-        ],
+        "optima": [report.chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
         "designs_swept": _swept(found, options, width),
-        "cost": {name: price(model) for name, model in models.items()},
-        "chaotic_rpm": {name: chaotic_rpm(s) for name, s in checked.items()},
+        "cost": {name: float(cost().function(model)) for name, model in models.items()},
+        "chaotic_rpm": {name: _chaotic_rpm(swept) for name, swept in checked.items()},
         "chaotic_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in chaotic.items()},
         "synchronous_loss_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in loss.items()},
         "search_seconds": round(searched, 1),
-        "seconds": round(time.perf_counter() - began, 1),
-        "figure": figure,
     }
     tables = [
-        _parameters_table(about.name, about.model, found.best, document),
-        _optima_table(found),
-        *_zone_tables(chaotic, loss),
+        report.parameters_table(job.name, job.model, found, document),
+        report.optima_table(found),
+        *report.before_and_after_tables(document),
     ]
     return Report(document, tables, _notes(document, found))
 
 
-def _kept_search(folder: Path, name: str, options: DesignOptions) -> Path:
+def _kept_search(job: Job[DesignOptions]) -> Path:
     """File of the search until the command is through; another search has another file."""
-    asked = dataclasses.replace(options, json=False, out="", style="light", no_cache=False, quick=False)
-    return folder / f".design_{name}_{hashlib.sha256(repr(asked).encode()).hexdigest()[:12]}.npz"
+    asked = dataclasses.replace(job.options, json=False, out="", style="light", no_cache=False, quick=False)
+    return job.folder / f".design_{job.name}_{hashlib.sha256(repr(asked).encode()).hexdigest()[:12]}.npz"
 
 
-def check(model: CageModel, options: DesignOptions, count: int = CHECKED_SPEEDS) -> Sweep:
+def _check(model: CageModel, options: DesignOptions) -> Sweep:
     """A sweep with starts that the search did not use, its labels confirmed."""
     rng, c = np.random.default_rng(options.seed + 1), float(model.clearance)
     half = model.dimension // 2
-    size = np.array([c] * half + [0.3 * c * angular_speed(options.first)] * half)
+    size = np.array([c] * half + [0.3 * c * rpm(options.first)] * half)
     starts = [tuple(float(v) for v in 0.6 * size * rng.uniform(-1, 1, size.size)) for _ in range(3)]
-    speeds = rpm(options.first, options.last, count)
+    speeds = rpm(options.first, options.last, CHECKED_SPEEDS)
     return sweep(model, speeds, starts=starts, discard=300, revolutions=200)
 
 
-def chaotic_rpm(found: Sweep) -> float:
+def _chaotic_rpm(found: Sweep) -> float:
     """Speeds at which any start is chaotic, for a while at least, times their spacing [rpm]."""
     return float(np.mean(found.restless) * (found.rpm[-1] - found.rpm[0]))
-
-
-def price(model: CageModel) -> float:
-    """Manufacturing cost, in units of `jaxcage.design.cost`."""
-    return float(cost().function(model))
 
 
 def _swept(found: Optimised, options: DesignOptions, width: AbstractObjective) -> int:
@@ -156,62 +127,49 @@ def _ends(zone: Any) -> dict[str, Any]:
     return {"onset_rpm": edge(zone.onset), "exit_rpm": edge(zone.exit), "width_rpm": zone.width_rpm}
 
 
-def _parameters_table(name: str, model: CageModel, best: Optimum, document: Mapping[str, Any]) -> Table:
-    info, bounds = parameter_info(model), document["vary"]
-    before = parameters(model)
-    rows = [
-        (n, info[n].unit, f"{float(before[n]):.4g}", f"{value:.4g}", " to ".join(f"{b:.4g}" for b in bounds[n]))
-        for n, value in best.values.items()
-    ]
-    for what, unit, form in (("cost", "", ".3f"), ("chaotic_rpm", "rpm", ".0f")):
-        before_after = [format(document[what][k], form) for k in ("before", "after")]
-        rows.append((what.removesuffix("_rpm"), unit, before_after[0], before_after[1], ""))
-    return Table(f"Design of {name}", ("parameter", "unit", "before", "after", "bounds"), rows)
-
-
-def _optima_table(found: Optimised) -> Table:
-    names = list(found.best.values)
-    rows = [
-        (
-            *(f"{o.values[n]:.4g}" for n in names),
-            f"{o.objective:.0f} ± {o.error:.0f}",
-            str(count),
-            ", ".join(o.at_bound) or "none",
-        )
-        for o, count in found.distinct
-    ]
-    return Table("Optima", (*names, "objective [rpm]", "starts", "at a bound"), rows)
-
-
-def _zone_tables(chaotic: Mapping[str, Zones], loss: Mapping[str, LossZones]) -> list[Table]:
-    tables = []
-    kinds: list[tuple[str, Mapping[str, Any]]] = [("Chaotic", chaotic), ("Synchronous-loss", loss)]
-    for kind, found in kinds:
-        rows = [
-            (
-                when,
-                str(i),
-                *(number(None if e is None else e.speed_rpm) for e in (z.onset, z.exit)),
-                number(z.width_rpm),
-            )
-            for when, z_ in found.items()
-            for i, z in enumerate(z_.zones, start=1)
-        ]
-        if found:
-            tables.append(
-                Table(f"{kind} zones before and after [rpm]", ("design", "zone", "onset", "exit", "width"), rows)
-            )
-    return tables
-
-
 def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
     best = found.best
-    bound = f"At a bound: {', '.join(best.at_bound)}." if best.at_bound else "No parameter ended at a bound."
     return [
         f"Search: {best.status}, {len(best.history)} steps, {document['designs_swept']} designs swept in "
         f"{document['search_seconds']:.0f} s",
-        bound,
+        f"At a bound: {', '.join(best.at_bound)}." if best.at_bound else "No parameter ended at a bound.",
         "Zones: a fresh sweep with other starts and finer steps; edges by a search of the synchronous orbits",
-        f"Figure: {document['figure']}",
-        f"Time: {document['seconds']:.1f} s",
     ]
+
+
+def sensitivity(job: Job[SensitivityOptions]) -> Report:
+    """`jaxcage sensitivity`: shares of the chaotic width's variance, and tolerance budgets of the edges."""
+    options = job.options
+    vary = read_bounds(options.vary or VARY, job.model)
+    width = chaotic_width(options.first, options.last, options.speeds)
+    edges, budgets = {}, []
+    with job.computing() as say:
+        say("Sobol designs", 0, 1)
+        shares = global_sensitivity(job.model, vary, width, **job.given("samples seed"))
+        if not options.quick:
+            loss = _loss_zones(job.model, options, say)
+            say("gradients", 0, 1)
+            edges = {n: s for n, s in sensitivities(job.model, loss.edges).items() if s.trusted}
+            relative = options.tolerance / 100 / math.sqrt(3)
+            budgets = [tolerance_budget(s, dict.fromkeys(s.elasticity, relative)) for s in edges.values()]
+    job.files["figure"] = None
+    if edges:
+        title, size = f"{job.name}: elasticities of the synchronous-loss edges", (9.0, 2.2 + 1.2 * len(edges))
+        job.draw(lambda ax: elasticity_bars(list(edges.values()), ax), size, title)
+    document = {
+        "vary": vary,
+        "sobol": report.chosen(shares, "first total first_interval total_interval") | {"designs": shares.evaluations},
+        "tolerance_percent": options.tolerance,
+        "edges": [
+            {
+                **report.chosen(b, "edge speed_rpm"),
+                "deviation_rpm": b.total_rpm,
+                "by_parameter_rpm": b.deviation_rpm,
+                "elasticity": edges[b.edge].elasticity,
+            }
+            for b in budgets
+        ],
+    }
+    return Report(
+        document, [report.sobol_table(job.name, shares), *(report.budget_table(b, options.tolerance) for b in budgets)]
+    )

@@ -1,24 +1,27 @@
-"""The `jaxcage` command: read the options, carry the command out, show its report."""
+"""The `jaxcage` command: read the options, carry the command out, show what it found."""
 
 import contextlib
+import dataclasses
 import gc
 import importlib
 import io
+import itertools
 import os
-import re
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from .._cache import keep_compiled_programs
-from ._console import FILES_ARE_WHOLE, leave_at_once_when_interrupted, say
-from ._errors import BAD_INPUT, FAILED, INTERRUPTED, OK, ComputationError, UsageError
-from ._options import Command, CommonOptions, InitOptions
+from .._errors import ArgumentError, InputError, NoResult
+from ._console import BAD_INPUT, FAILED, FILES_ARE_WHOLE, INTERRUPTED, OK, leave_at_once_when_interrupted, say
+from ._options import COMMANDS, AnyOptions, Command, CommonOptions
+from ._readers import flag
 
 
 if TYPE_CHECKING:
-    from ._report import Report
+    from ._job import Job
+    from ._show import Report
 
 COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
 """Options that tyro takes by itself, and what it asserts of them."""
@@ -38,39 +41,61 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options is not None:
             _carry_out(options)
         return OK
-    except UsageError as error:
+    except InputError as error:
         say(str(error))
         return BAD_INPUT
-    except (ComputationError, OSError) as error:
+    except (NoResult, OSError) as error:
         say(str(error))
         return FAILED
     except MemoryError:
         say("There is not enough memory for this: ask for fewer speeds, lanes or revolutions.")
         return FAILED
     except KeyboardInterrupt:
-        say(f"Interrupted{FILES_ARE_WHOLE}.")
+        say(f"Interrupted: {FILES_ARE_WHOLE}.")
         return INTERRUPTED
 
 
-def _carry_out(options: CommonOptions | InitOptions) -> None:
+def _carry_out(options: AnyOptions) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    if not options.no_cache:
+    if isinstance(options, CommonOptions) and not options.no_cache:
         keep_compiled_programs()
-    implementation = importlib.import_module(f".{options.implementation}", __package__)
-    from ._inputs import figures_in  # with the figures: after the options were understood
+    command, place = next((name, place) for name, (kind, place) in COMMANDS.items() if kind is type(options))
+    module, function = place.split(".")
+    run = getattr(importlib.import_module(f".{module}", __package__), function)
+    from ._job import Job
 
-    with figures_in(options.style):
-        report = implementation.run(options)
+    try:
+        job = Job(command, options)
+        report = _complete(job, run(job))
+    except ArgumentError as error:
+        raise _of_options(error, options) from error
     _print(report, options.json)
     if report.failure:
-        raise ComputationError(report.failure)
+        raise NoResult(report.failure)
+
+
+def _of_options(error: ArgumentError, options: AnyOptions) -> Exception:
+    """What the library says of its arguments, said of the options they come from; of others it is our mistake."""
+    option = lambda name: options.called.get(name, name)
+    known = all(option(name) in vars(options) for name in error.names)
+    return InputError(error.about("Option", lambda name: flag(option(name)))) if known else RuntimeError(str(error))
+
+
+def _complete(job: "Job[Any]", report: "Report") -> "Report":
+    """What is said after every command: the case, how long it took, and what was written."""
+    case = {"case": job.name} if job.name else {}
+    time = {"seconds": round(job.seconds, 2)} if job.options.timed else {}
+    said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
+    files = [f"{key.replace('_', ' ').capitalize()}: {path}" for key, path in job.files.items() if path is not None]
+    document = {**case, **report.document, **time, **job.files}
+    return dataclasses.replace(report, document=document, notes=[*report.notes, *said, *files])
 
 
 def _print(report: "Report", as_json: bool) -> None:
     """Show a report; a standard output that takes nothing is said, as a file that cannot be written is."""
-    from ._report import show
+    from ._show import show
 
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not be text
         sys.stdout.reconfigure(errors="backslashreplace")
@@ -85,11 +110,10 @@ def _print(report: "Report", as_json: bool) -> None:
         ) from error
 
 
-def _parse(arguments: list[str]) -> CommonOptions | InitOptions | None:
+def _parse(arguments: list[str]) -> Any:
     """Options, or None if help or the version was asked for and given.
 
-    **Raises:** `UsageError`: the boxes in which tyro reports errors are boiled down to one
-    sentence.
+    **Raises:** `InputError`.
     """
     import tyro
 
@@ -97,36 +121,33 @@ def _parse(arguments: list[str]) -> CommonOptions | InitOptions | None:
         print(f"jaxcage {__version__}")
         return None
     if len(arguments) > 1 and arguments[0].replace("_", "-") in COMPLETION and arguments[1] not in SHELLS:
-        raise UsageError(
+        raise InputError(
             f"Option {arguments[0]} must be followed by {', '.join(SHELLS)}, but '{arguments[1]}' was given."
         )
     box = io.StringIO()
     config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes)
+    description = "Dynamics of rolling-bearing cages: where they move chaotically."
     try:
         with contextlib.redirect_stderr(box):
-            return tyro.cli(
-                Command,  # pyright: ignore[reportArgumentType]
-                prog="jaxcage",
-                description="Dynamics of rolling-bearing cages: where they move chaotically.",
-                args=arguments,
-                config=config,
-            )
+            options = tyro.cli(Command, prog="jaxcage", description=description, args=arguments, config=config)
     except SystemExit as stop:
         if stop.code in (0, None):
             return None
-        raise UsageError(_sentence(box.getvalue())) from stop
+        raise InputError(_sentence(box.getvalue())) from stop
+    options.check()
+    return options
 
 
 def _sentence(box: str) -> str:
-    """What a box says first, as one sentence.
-
-    The title stands in the upper border, or above a rule where the terminal has no line drawing.
+    """What a box of tyro's says, as one sentence: its parts stand between rules, and the title in the upper border, or
+    above a rule where the terminal has no line drawing.
     """
-    framed = box.lstrip().startswith("╭")
-    lines = [line.strip(" │") for line in box.splitlines() if not line.startswith(("╭", "╰"))]
-    parts = [" ".join(part.split()) for part in re.split(r"\s[─-]{3,}\s", " ".join(lines))]
-    said = [part.rstrip(".") for part in parts if part][0 if framed else 1 :][:2]
-    kept = [part for i, part in enumerate(said) if i == 0 or part.startswith("Available")]
-    sentence = "; ".join(kept) or "The command line was not understood"
-    ours = re.sub(r"^Error parsing (--[\w-]+): (?=must )", r"Option \1 ", sentence)
-    return f"{ours} (see jaxcage --help)."
+    lines = [line.strip(" │") for line in box.splitlines()]
+    is_rule = lambda line: not line.strip("─-╭╮╰╯") or line[0] == "╭"
+    parts = [" ".join(" ".join(part).split()) for rule, part in itertools.groupby(lines, is_rule) if not rule]
+    said, *more = parts if box.startswith("╭") else parts[1:]
+    ours, found, why = said.removeprefix("Error parsing ").partition(": ")
+    if found and why.startswith("must "):
+        return f"Option {ours} {why}"
+    kept = [said, *(part for part in more[:1] if part.startswith("Available"))]
+    return "; ".join(part.rstrip(".") for part in kept) + " (see jaxcage --help)."

@@ -1,29 +1,60 @@
-"""Commands and their options. Nothing heavy is imported here, so that `--help` and typing errors
-answer at once.
+"""Commands and their options: what each may be, and which go together. Nothing heavy is imported here, so that `--help`
+and typing errors answer at once.
 """
 
 import dataclasses
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Union
 
 import tyro
 
-from ._quantities import Milliseconds, OptionalCount, OptionalNewton, OptionalNumber, OptionalRpm, OptionalText, Rpm
+from .._errors import InputError
+from ._readers import is_within, number, text, two, whole
 
 
+SIDE = range(2, 10_001)
+"""Points along one side of a map."""
+_SIDES = f"ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
+_PART = "I/N with I from 1 to N, e.g. 1/4"
 SETTLED = 1000
 """Revolutions after which a lightly damped cage has found its orbit."""
 
+Speed = Annotated[float, number("be a speed above 0 rpm", lambda x: x > 0, "rpm")]
+"""[rpm]."""
+Share = Annotated[float, number("be above 0 and at most 1", lambda x: 0 < x <= 1)]
+FromZero = Annotated[int, whole(0)]
+FromOne = Annotated[int, whole(1)]
+FromTwo = Annotated[int, whole(2)]
+Tens = Annotated[int, whole(10, of=10)]
+"""Revolutions that can be cut into equal blocks, for error bars."""
+OptionalText = Annotated[str | None, text()]
+Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
-@dataclasses.dataclass(frozen=True)
-class CommonOptions:
-    """What every command takes."""
 
-    implementation: ClassVar[str] = ""
-    """Module of this package whose `run` carries the command out."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AnyOptions:
+    """What every command has."""
+
+    timed: ClassVar[bool] = True
+    """Whether the time that the command took is of interest."""
+    called: ClassVar[Mapping[str, str]] = {}
+    """Argument of the library -> option that it comes from, where their names differ."""
 
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
-    out: str = "out"
+
+    def check(self) -> None:
+        """Refuse options that do not go together.
+
+        **Raises:** `InputError`.
+        """
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CommonOptions(AnyOptions):
+    """What every command takes that computes something."""
+
+    out: Annotated[str, text("name a folder")] = "out"
     """Folder for figures and data; it is made if need be."""
     style: Literal["light", "dark", "print"] = "light"
     """Style of the figures: for white pages, dark screens, or black-and-white paper."""
@@ -48,234 +79,265 @@ class IntegrationOptions(Options):
 
     solver: OptionalText = None
     """Integration method: rodas3, rodas4, rk4, newmark, tsit5, kvaerno3, kvaerno5, kencarp4."""
-    steps: OptionalCount = None
+    steps: Annotated[int | None, whole(1)] = None
     """Equal steps per revolution."""
-    tolerance: OptionalNumber = None
+    tolerance: Annotated[float | None, number()] = None
     """Adaptive steps with this tolerance instead of equal ones."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class SweepOptions(IntegrationOptions):
+class _Range(Options):
+    first: Speed = 2500.0
+    """First cage speed [rpm], or with a unit, e.g. "300 rad/s"."""
+    last: Speed = 27500.0
+    """Last cage speed [rpm]."""
+
+    def check(self) -> None:
+        if self.last <= self.first:
+            between = f"{self.first:g} to {self.last:g} rpm"
+            raise InputError(f"Option --last must be above --first, but the range is {between}.")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _Length(Options):
+    discard: FromZero = 300
+    """Revolutions left out at the beginning."""
+    revolutions: Tens = 300
+    """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones."""
 
-    implementation: ClassVar[str] = "_sweep"
-
-    first: Rpm = 2500.0
-    """First cage speed [rpm], or with a unit, e.g. "300 rad/s"."""
-    last: Rpm = 27500.0
-    """Last cage speed [rpm]."""
-    count: int = 251
+    count: FromOne = 251
     """Number of speeds; with one, only the first speed is run."""
-    discard: int = 300
-    """Revolutions left out at the beginning."""
-    revolutions: int = 300
-    """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
     confirm: bool = True
     """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
-    horizon: int = 3000
+    horizon: FromZero = 3000
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 does not ask."""
-    exponents: int = 1
+    exponents: FromOne = 1
     """Number of Lyapunov exponents."""
-    waterfall: int = 0
+    waterfall: FromZero = 0
     """Speeds of a waterfall of spectra of the vertical motion; none by default."""
+
+    def check(self) -> None:
+        if self.count > 1:
+            super().check()
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ZonesOptions(SweepOptions):
     """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones."""
 
-    implementation: ClassVar[str] = "_zones"
-
     quick: bool = False
     """Leave out the gradients of the edges, which take about a minute to compile."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class SearchOptions(IntegrationOptions):
-    """How to search for synchronous orbits: simulations on a grid of speeds, then branches through all they met."""
-
-    first: Rpm = 2500.0
-    """First cage speed [rpm], or with a unit, e.g. "300 rad/s"."""
-    last: Rpm = 27500.0
-    """Last cage speed [rpm]."""
-    count: int = 101
-    """Speeds that are simulated, from three starts each."""
-    discard: int = SETTLED
-    """Revolutions left out at the beginning."""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class BifurcationsOptions(SearchOptions):
+class SearchOptions(_Range, IntegrationOptions):
     """Synchronous orbits over speed: where they are stable, how they lose it, and the zones without one."""
 
-    implementation: ClassVar[str] = "_bifurcations"
+    count: FromTwo = 101
+    """Speeds that are simulated, from three starts each."""
+    discard: FromZero = SETTLED
+    """Revolutions left out at the beginning."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class GradientOptions(SearchOptions):
     """Derivatives of the synchronous-loss edges, and of the width of zone 1, by every parameter."""
 
-    implementation: ClassVar[str] = "_gradient"
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MapOptions(SearchOptions):
     """Stability map: the edges followed in two parameters, over colours of the largest exponent."""
 
-    implementation: ClassVar[str] = "_map"
-
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
     y: str = "guidance_gap"
     """Parameter upwards, any of the model."""
-    lower: str | None = None
+    lower: OptionalText = None
     """Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out."""
-    upper: str | None = None
+    upper: OptionalText = None
     """Highest value of y; 1.25 of its value if left out."""
-    rows: int = 12
+    rows: FromZero = 12
     """Values of y at which the exponent is computed; with 0 it is left out."""
-    columns: int = 50
+    columns: FromTwo = 50
     """Speeds at which the exponent is computed."""
-    revolutions: int = 100
+    revolutions: FromOne = 100
     """Revolutions over which the exponent is computed."""
-    starts: int = 1
+    starts: FromOne = 1
     """Starts of which the largest exponent is taken."""
-    persist: int = 0
+    persist: FromZero = 0
     """With --points: revolutions that chaos must outlast to count; what has died out by then was a transient."""
-    points: OptionalText = None
+    points: Annotated[tuple[int, int] | None, two("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)] = None
     """Instead of rows and columns: a grid of labels, e.g. 300x300, from a coarse picture to the full grid."""
     adaptive: bool = False
     """With --points: only points near a change of label are computed."""
     refine: Literal["chaos", "label"] = "chaos"
     """With --adaptive: follow where chaos begins and ends, or where any label changes."""
-    most: OptionalCount = None
+    most: Annotated[int | None, whole(4)] = None
     """With --points: points computed at most."""
-    speed: OptionalRpm = None
+    speed: Annotated[float | None, number("be a speed above 0 rpm", lambda x: x > 0, "rpm")] = None
     """With --points and another --x than the speed: the speed of all points [rpm]."""
     no_curves: bool = False
     """With --points: do not search for the synchronous-loss edges to draw on top."""
 
+    def check(self) -> None:
+        super().check()
+        given = lambda *names: any(getattr(self, name) != getattr(MapOptions, name) for name in names)
+        if self.points is None:
+            if given("adaptive", "refine", "no_curves", "persist", "most", "speed"):
+                raise InputError(
+                    "Options --adaptive, --refine, --no-curves, --persist, --most and --speed go with --points, "
+                    "e.g. --points 300x300."
+                )
+            if self.rows == 1:
+                raise InputError("Option --rows must be 0 or at least 2, but 1 was given.")
+            return
+        if given("rows", "columns"):
+            raise InputError("Options --rows and --columns do not go with --points, which says how many there are.")
+        if given("refine") and not self.adaptive:
+            raise InputError("Option --refine goes with --adaptive.")
+        if self.revolutions % 10:
+            raise InputError(f"Option --revolutions must be a multiple of 10, but {self.revolutions} was given.")
+        if 0 < self.persist <= self.discard:
+            allowed = f"0 or above the {self.discard} of --discard"
+            raise InputError(f"Option --persist must be {allowed}, but {self.persist} was given.")
+        if (self.x == "speed") != (self.speed is None):
+            wrong = (
+                f"must be given for a map over {self.x}"
+                if self.speed is None
+                else "goes with an --x that is not the speed"
+            )
+            raise InputError(f"Option --speed {wrong}.")
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class StudyOptions(IntegrationOptions):
+class StudyOptions(_Length, IntegrationOptions):
     """A sweep over any grid or sample of parameters, stored as it goes; the same command goes on where one stopped."""
 
-    implementation: ClassVar[str] = "_study"
+    called: ClassVar[Mapping[str, str]] = {"lanes": "chunk", "samples": "sample"}
 
-    vary: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUES")] = ()
+    vary: Annotated[Texts, tyro.conf.arg(metavar="NAME=VALUES")] = ()
     """What to vary, once for each parameter, `speed` among them. A grid: speed=4000rpm:27500rpm:100, or single values:
     oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or within a tolerance: eccentricity=20um+-3um."""
-    sample: int = 0
+    sample: FromZero = 0
     """Number of samples, best a power of 2."""
-    seed: int = 0
+    seed: FromZero = 0
     """Seed of the samples."""
-    starts: OptionalCount = None
+    starts: Annotated[int | None, whole(1)] = None
     """Starts at each point; all of the model's own if left out."""
-    discard: int = 300
-    """Revolutions left out at the beginning."""
-    revolutions: int = 300
-    """Revolutions observed, a multiple of 10 (the error bars come from blocks of them)."""
-    exponents: int = 1
+    exponents: FromOne = 1
     """Number of Lyapunov exponents."""
-    strobe: int = 0
+    strobe: FromZero = 0
     """Strobe states stored of each lane, the last ones."""
-    store: OptionalText = None
+    store: Annotated[str | None, text("name a folder within --out", is_within)] = None
     """Name of the store within the output folder."""
-    chunk: int = 2048
+    chunk: FromOne = 2048
     """Lanes computed and stored together."""
-    shard: str = "1/1"
+    shard: Annotated[tuple[int, int], two("/", _PART, lambda i, n: 1 <= i <= n)] = (1, 1)
     """Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store."""
     executor: Literal["local", "dask"] = "local"
     """Where to run: on all cores of this machine, or on dask.distributed."""
     scheduler: OptionalText = None
     """Address of a dask scheduler, e.g. tcp://host:8786; a cluster on this machine if left out."""
-    workers: OptionalCount = None
+    workers: Annotated[int | None, whole(1)] = None
     """Processes of the cluster on this machine; one a core if left out."""
 
+    def check(self) -> None:
+        if self.executor == "local" and (self.scheduler is not None or self.workers is not None):
+            raise InputError("Options --scheduler and --workers go with --executor dask.")
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class _VaryOptions(Options):
+class VaryOptions(_Range):
     """What may be changed in a design."""
 
-    vary: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=LOWER:UPPER")] = ()
+    vary: Annotated[Texts, tyro.conf.arg(metavar="NAME=LOWER:UPPER")] = ()
     """What may be changed and between which values, once for each parameter, e.g. guidance_gap=0.3mm:0.6mm; the
     guidance gap from 0.3 to 0.6 mm and the eccentricity from 5 to 60 um if left out."""
-    first: Rpm = 4000.0
+    first: Speed = 4000.0
     """First cage speed that matters [rpm], or with a unit."""
-    last: Rpm = 27500.0
+    last: Speed = 27500.0
     """Last cage speed that matters [rpm]."""
-    speeds: int = 48
+    speeds: Annotated[int, whole(4)] = 48
     """Speeds at which a design is judged."""
-    seed: int = 0
+    seed: FromZero = 0
     """Seed of all that is drawn."""
+    quick: bool = False
+    """Leave out the exact edges, of a design before and after or with their tolerance budget."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class DesignOptions(_VaryOptions):
+class DesignOptions(VaryOptions):
     """Make the chaotic speeds few by changing the design: gradient search, checked by a fresh sweep."""
 
-    implementation: ClassVar[str] = "_design"
-
-    cost: float = 1000.0
+    cost: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What one unit of manufacturing cost is worth, in rpm of chaotic speeds; the paper's case 1a costs 2 units."""
-    scatter: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=LAW")] = ()
+    scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()
     """What manufacture makes of a parameter: evenly within a part of it, guidance_gap=10%, or eccentricity=rayleigh.
     The mean over it is then made small."""
-    worst: float = 1.0
+    worst: Share = 1.0
     """With --scatter: mean of this share of the made cages, the worst ones."""
-    starts: int = 3
+    starts: FromOne = 3
     """Searches: one from the design itself, others from the best of the scouts."""
-    scouts: int = 32
+    scouts: FromZero = 32
     """Designs all over the bounds that are looked at beforehand."""
-    steps: int = 12
+    steps: FromOne = 12
     """Steps of each search at most."""
-    cloud: int = 12
+    cloud: Annotated[int, whole(4)] = 12
     """Designs around each one from which its gradient is taken."""
-    spread: float = 0.1
+    spread: Share = 0.1
     """Their scatter, as a part of the distance between the bounds: structure that is finer is smoothed away."""
-    quick: bool = False
-    """Leave out the exact edges before and after."""
+
+    def check(self) -> None:
+        super().check()
+        if self.scouts < self.starts - 1:
+            raise InputError(f"Option --scouts must be at least {self.starts - 1}, but {self.scouts} was given.")
+        if self.worst != DesignOptions.worst and not self.scatter:
+            raise InputError("Option --worst goes with --scatter.")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class SensitivityOptions(_VaryOptions):
+class SensitivityOptions(VaryOptions):
     """What each parameter does to the chaotic speeds over its range, and what tolerances do to the exact edges."""
 
-    implementation: ClassVar[str] = "_sensitivity"
-
-    samples: int = 64
+    samples: FromTwo = 64
     """Base samples of the Sobol indices, a power of 2."""
-    tolerance: float = 5.0
+    tolerance: Annotated[float, number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0
     """Tolerance of every parameter, +- so many percent, evenly used."""
-    quick: bool = False
-    """Leave out the exact edges and their tolerance budget."""
+
+    def check(self) -> None:
+        super().check()
+        if self.samples & (self.samples - 1):
+            raise InputError(f"Option --samples must be a power of 2, but {self.samples} was given.")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PoincareOptions(IntegrationOptions):
+class _AtSpeed(Options):
+    timed: ClassVar[bool] = False
+
+    speed: Speed
+    """Cage speed [rpm], or with a unit, e.g. "900 rad/s"."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PoincareOptions(_AtSpeed, _Length, IntegrationOptions):
     """Strobe section at one speed, from three starts."""
 
-    implementation: ClassVar[str] = "_poincare"
-
-    speed: Rpm
-    """Cage speed [rpm], or with a unit, e.g. "900 rad/s"."""
-    discard: int = 300
-    """Revolutions left out at the beginning."""
-    revolutions: int = 1000
+    revolutions: Tens = 1000
     """Revolutions shown, a multiple of 10 (the error bars come from blocks of them)."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class SimulateOptions(IntegrationOptions):
+class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Time history, orbit and each force at one speed."""
 
-    implementation: ClassVar[str] = "_simulate"
-
-    speed: Rpm
-    """Cage speed [rpm], or with a unit, e.g. "900 rad/s"."""
-    revolutions: int = 20
+    revolutions: FromOne = 20
     """Revolutions recorded."""
-    discard: int = 0
+    discard: FromZero = 0
     """Revolutions left out at the beginning."""
 
 
@@ -283,31 +345,25 @@ class SimulateOptions(IntegrationOptions):
 class StaticsOptions(Options):
     """Load of every roller, loaded zone, static displacement of the cage, kinematics."""
 
-    implementation: ClassVar[str] = "_statics"
+    timed: ClassVar[bool] = False
 
-    load: OptionalNewton = None
+    load: Annotated[float | None, number("be above 0 N", lambda x: x > 0, "N", "own")] = None
     """Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out."""
-    shaft_speed: Rpm = 0.0
+    shaft_speed: Annotated[float, number("be at least 0 rpm", lambda x: x >= 0, "rpm")] = 0.0
     """Shaft speed [rpm], for the centrifugal load of the rollers and for the kinematics."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ImpactOptions(Options):
+class ImpactOptions(_AtSpeed):
     """Impact of one roller on a cage bar: history of both forces."""
 
-    implementation: ClassVar[str] = "_impact"
-
-    speed: Rpm
-    """Cage speed [rpm], or with a unit, e.g. "900 rad/s"."""
-    duration: Milliseconds = 0.6
+    duration: Annotated[float, number("lie between 0 and 1000 ms", lambda x: 0 < x <= 1000, "ms")] = 0.6
     """Length of the history [ms]."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReproduceOptions(CommonOptions):
     """The paper beside this model: edges, figures 5, 7, 8 and 9, conclusions, readings."""
-
-    implementation: ClassVar[str] = "_reproduce"
 
     constants: Literal["identified", "preliminary"] = "identified"
     """Set of constants that the paper does not print."""
@@ -319,63 +375,49 @@ class ReproduceOptions(CommonOptions):
 class ValidateOptions(CommonOptions):
     """Numbers of this package beside printed ones, closed forms and other programs, as VALIDATION.md."""
 
-    implementation: ClassVar[str] = "_validate"
-
     topics: str = ""
     """Topics, e.g. "film, statics"; all of them if left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ReportOptions(IntegrationOptions):
+class ReportOptions(_Length, _Range, IntegrationOptions):
     """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is."""
-
-    implementation: ClassVar[str] = "_report_page"
 
     operating: str = ""
     """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm] or "900 rad/s"."""
-    first: Rpm = 2500.0
-    """First cage speed [rpm], or with a unit, e.g. "300 rad/s"."""
-    last: Rpm = 27500.0
-    """Last cage speed [rpm]."""
-    count: OptionalCount = None
+    count: Annotated[int | None, whole(2)] = None
     """Number of speeds; 251, or 126 with --quick."""
-    discard: OptionalCount = None
-    """Revolutions left out at the beginning; 300 by default."""
-    revolutions: OptionalCount = None
-    """Revolutions observed, a multiple of 10; 300 by default."""
     quick: bool = False
     """Leave out what takes long: gradients, mechanisms of chaotic edges, curves of the map."""
 
 
-@dataclasses.dataclass(frozen=True)
-class InitOptions:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
-    implementation: ClassVar[str] = "_init"
-    no_cache: ClassVar[bool] = True
-    style: ClassVar[Literal["light"]] = "light"
+    timed: ClassVar[bool] = False
 
     path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
     """Where to write it, e.g. my_bearing.toml; an existing file is left alone."""
-    json: bool = False
-    """Print one JSON document on standard output instead of text."""
 
 
-Command = (
-    Annotated[InitOptions, tyro.conf.subcommand("init")]
-    | Annotated[SimulateOptions, tyro.conf.subcommand("simulate")]
-    | Annotated[SweepOptions, tyro.conf.subcommand("sweep")]
-    | Annotated[ZonesOptions, tyro.conf.subcommand("zones")]
-    | Annotated[BifurcationsOptions, tyro.conf.subcommand("bifurcations")]
-    | Annotated[GradientOptions, tyro.conf.subcommand("gradient")]
-    | Annotated[MapOptions, tyro.conf.subcommand("map")]
-    | Annotated[StudyOptions, tyro.conf.subcommand("study")]
-    | Annotated[DesignOptions, tyro.conf.subcommand("design")]
-    | Annotated[SensitivityOptions, tyro.conf.subcommand("sensitivity")]
-    | Annotated[PoincareOptions, tyro.conf.subcommand("poincare")]
-    | Annotated[StaticsOptions, tyro.conf.subcommand("statics")]
-    | Annotated[ImpactOptions, tyro.conf.subcommand("impact")]
-    | Annotated[ReproduceOptions, tyro.conf.subcommand("reproduce")]
-    | Annotated[ValidateOptions, tyro.conf.subcommand("validate")]
-    | Annotated[ReportOptions, tyro.conf.subcommand("report")]
-)
+COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
+    "init": (InitOptions, "_bearing.init"),
+    "simulate": (SimulateOptions, "_one_speed.simulate_at"),
+    "sweep": (SweepOptions, "_sweep.sweep_over_speed"),
+    "zones": (ZonesOptions, "_sweep.zones_over_speed"),
+    "bifurcations": (SearchOptions, "_orbits.bifurcations"),
+    "gradient": (GradientOptions, "_orbits.gradient"),
+    "map": (MapOptions, "_map.map_of"),
+    "study": (StudyOptions, "_study.study"),
+    "design": (DesignOptions, "_design.design"),
+    "sensitivity": (SensitivityOptions, "_design.sensitivity"),
+    "poincare": (PoincareOptions, "_one_speed.poincare_at"),
+    "statics": (StaticsOptions, "_bearing.statics"),
+    "impact": (ImpactOptions, "_bearing.impact"),
+    "reproduce": (ReproduceOptions, "_reproduce.reproduce"),
+    "validate": (ValidateOptions, "_validate.validate"),
+    "report": (ReportOptions, "_page.report_on"),
+}
+"""Command -> its options, and the function of this package that carries it out."""
+Command: Any = Union[tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, (kind, _) in COMMANDS.items())]  # noqa: UP007

@@ -1,70 +1,49 @@
 """`jaxcage validate`: our numbers beside independent ones, on the screen and as VALIDATION.md."""
 
-import time
-from typing import Any
-
-from ..io import replacing
+from .._errors import InputError
+from ..report import Table
 from ..validation import TOPICS, Comparison, page
-from ._console import progress_in_stages
-from ._errors import UsageError
-from ._inputs import output_folder
+from ._job import Job
 from ._options import ValidateOptions
-from ._report import Report, Table
+from ._show import Report
 
 
 NAME = "VALIDATION.md"
+COLUMNS = {
+    "what": "{.what}",
+    "theirs": "{.theirs:.9g}",
+    "ours": "{.ours:.9g}",
+    "difference": "{.difference:+.1e}",
+    "tolerance": "{.tolerance:.1e}",
+    "": lambda c: "pass" if c.passed else "FAILS",
+}
 
 
-def run(options: ValidateOptions) -> Report:
+def validate(job: Job[ValidateOptions]) -> Report:
     """Carry out `jaxcage validate`."""
-    chosen = options.topics.replace(",", " ").split() if options.topics else list(TOPICS)
-    unknown = [t for t in chosen if t not in TOPICS]
-    if unknown or not chosen:
-        given = unknown[0] if unknown else options.topics
-        raise UsageError(f"Option --topics must be made of {', '.join(TOPICS)}, but '{given}' was given.")
-    folder = output_folder(options)
-    began = time.perf_counter()
+    options = job.options
+    topics = options.topics.replace(",", " ").split() if options.topics else list(TOPICS)
+    wrong = [t for t in topics if t not in TOPICS] or ([] if topics else [options.topics])
+    if wrong:
+        raise InputError(f"Option --topics must be made of {', '.join(TOPICS)}, but '{wrong[0]}' was given.")
     found: dict[str, list[Comparison]] = {}
-    with progress_in_stages("validate") as bar:
-        for i, topic in enumerate(chosen):
-            if bar is not None:
-                bar(topic, i, len(chosen))
+    with job.computing() as say:
+        for i, topic in enumerate(topics):
+            say(topic, i, len(topics))
             found[topic] = TOPICS[topic]()
     command = "jaxcage validate" + (f' --topics "{options.topics}"' if options.topics else "")
-    with replacing(folder / NAME) as temporary:
-        temporary.write_text(page(found, f"Made by `{command}`."), encoding="utf-8")
+    job.text(page(found, f"Made by `{command}`."), job.folder / NAME, "page")
     failed = [c for rows in found.values() for c in rows if not c.passed]
     count = sum(map(len, found.values()))
-    document: dict[str, Any] = {
-        "comparisons": [_document(topic, c) for topic, rows in found.items() for c in rows],
+    document = {
+        "comparisons": [
+            {"topic": topic, **vars(c), "difference": c.difference, "passed": c.passed}
+            for topic, rows in found.items()
+            for c in rows
+        ],
         "passed": count - len(failed),
         "failed": len(failed),
-        "page": str(folder / NAME),
-        "seconds": round(time.perf_counter() - began, 1),
     }
-    notes = [
-        f"{document['passed']} of {count} comparisons pass",
-        f"Page: {document['page']}",
-        f"Time: {document['seconds']} s",
-    ]
     failure = f"{len(failed)} of {count} comparisons fail, the first of them: {failed[0].what}." if failed else ""
-    return Report(document, [_table(topic, rows) for topic, rows in found.items()], notes, failure)
-
-
-def _document(topic: str, c: Comparison) -> dict[str, Any]:
-    return {"topic": topic, **vars(c), "difference": c.difference, "passed": c.passed}
-
-
-def _table(topic: str, rows: list[Comparison]) -> Table:
-    cells = [
-        (
-            c.what,
-            f"{c.theirs:.9g}",
-            f"{c.ours:.9g}",
-            f"{c.difference:+.1e}",
-            f"{c.tolerance:.1e}",
-            "pass" if c.passed else "FAILS",
-        )
-        for c in rows
-    ]
-    return Table(topic.capitalize(), ("what", "theirs", "ours", "difference", "tolerance", ""), cells)
+    tables = [Table.of(topic.capitalize(), COLUMNS, rows) for topic, rows in found.items()]
+    return Report(document, tables, [f"{count - len(failed)} of {count} comparisons pass"], failure)

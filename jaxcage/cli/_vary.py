@@ -3,20 +3,21 @@
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
+from .._errors import ArgumentError, InputError
 from .._parameters import parameter_info
 from ..design import Scatter, rayleigh, uniform
 from ..io import configuration, model_from, to_si
 from ..models import CageModel
 from ..studies import OIL, SPEED, Between, Spread, Tolerance, with_values
-from ._errors import MOST, UsageError, refusing
-from ._inputs import angular_speed
-from ._quantities import read_quantity
+from ..sweeps import rpm
+from ._readers import MOST, read_quantity
 
 
-FORMS = "4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um+-3um or 32,56,78"
+FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um+-3um or 32,56,78"
 GRADES = (2.0, 10000.0)
 MOST_CORNERS = 256
 """Combinations of smallest and largest values that are tried out beforehand."""
@@ -27,90 +28,120 @@ Vary = dict[str, np.ndarray | Spread]
 def read_vary(given: Sequence[str], model: CageModel) -> Vary:
     """Every `NAME=VALUES`, in SI units.
 
-    **Raises:** `UsageError`.
+    **Raises:** `InputError`.
     """
-    found: Vary = {}
-    for text in given:
-        name, equals, values = text.partition("=")
-        name = name.strip()
-        if not equals or not values.strip():
-            raise UsageError(f"Option --vary must be NAME=VALUES with values such as {FORMS}, but '{text}' was given.")
-        if name in found:
-            raise UsageError(f"Option --vary must name each parameter once, but {name} was given twice.")
-        found[name] = _read(name, values, model)
+    found = _each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, values: _read(name, values, model))
     if SPEED not in found:
-        raise UsageError("Option --vary must be given for the speed too, e.g. --vary speed=12000rpm.")
+        raise InputError("Option --vary must be given for the speed too, e.g. --vary speed=12000rpm.")
     _check_corners(found, model)
+    return found
+
+
+def read_bounds(given: Sequence[str], model: CageModel) -> dict[str, tuple[float, float]]:
+    """Every `NAME=LOWER:UPPER` of parameters that are to be chosen, in SI units.
+
+    **Raises:** `InputError`.
+    """
+
+    def read(name: str, values: str) -> Between:
+        between = None if name in (SPEED, OIL) else _read(name, values, model)
+        if not isinstance(between, Between):
+            raise ValueError(f"must be a parameter's NAME=LOWER:UPPER, but is {values}.")
+        return between
+
+    found = _each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)
+    _check_corners(found, model)
+    return {name: between.bounds for name, between in found.items()}
+
+
+def read_scatter(given: Sequence[str], names: Sequence[str]) -> dict[str, Scatter]:
+    """Every `NAME=10%` (evenly within so much of the value) or `NAME=rayleigh` of the parameters `names`.
+
+    **Raises:** `InputError`.
+    """
+
+    def read(name: str, law: str) -> Scatter:
+        if name not in names:
+            raise InputError(f"Option --scatter must name one of {', '.join(names)}, but '{name}={law}' was given.")
+        if law == "rayleigh":
+            return rayleigh()
+        try:
+            share = float(law.removesuffix("%")) / 100 if law.endswith("%") else math.nan
+        except ValueError:
+            share = math.nan
+        if not 0 < share < 1:
+            raise ValueError(f"must be a share such as 10% or rayleigh, but '{law}' was given.")
+        return uniform(share)
+
+    return _each("--scatter", given, "NAME=10% or NAME=rayleigh", read)
+
+
+def _each(option: str, given: Sequence[str], form: str, read: Callable[[str, str], Any]) -> dict[str, Any]:
+    """What is read from every `NAME=VALUES`, by name; what it may raise is said of that name."""
+    found: dict[str, Any] = {}
+    for text in given:
+        name, _, values = (part.strip() for part in text.partition("="))
+        if not values:
+            raise InputError(f"Option {option} must be {form}, but '{text}' was given.")
+        if name in found:
+            raise InputError(f"Option {option} must name each parameter once, but {name} was given twice.")
+        try:
+            found[name] = read(name, values)
+        except ArgumentError as error:
+            raise InputError(f"Option {option} {name} {error.said}") from error
+        except InputError:
+            raise
+        except ValueError as error:
+            raise InputError(f"Option {option} {name} {str(error).rstrip('.')}.") from error
     return found
 
 
 def _read(name: str, text: str, model: CageModel) -> np.ndarray | Spread:
     number = _number(name, model)
-    if "+-" in text or "±" in text:
-        value, deviation = text.replace("±", "+-").split("+-", 1)
-        with refusing(f"--vary {name}"):
-            spread = Tolerance(number(value), number(deviation, difference=True))
-        _check_range(name, spread.bounds, model)
-        return spread
     parts = text.split(":")
-    if len(parts) == 2:
-        with refusing(f"--vary {name}"):
-            spread = Between(number(parts[0]), number(parts[1]))
-        _check_range(name, spread.bounds, model)
-        return spread
-    if len(parts) == 3:
-        values = np.linspace(number(parts[0]), number(parts[1]), _count(name, parts[2]))
+    if "+-" in text or "±" in text:
+        found = Tolerance(*map(number, text.replace("±", "+-").split("+-", 1)))
+    elif len(parts) == 2:
+        found = Between(*map(number, parts))
+    elif len(parts) == 3:
+        found = np.linspace(number(parts[0]), number(parts[1]), _count(parts[2]))
     elif len(parts) == 1:
-        values = np.array([number(part) for part in text.split(",")])
+        found = np.array([number(part) for part in text.split(",")])
     else:
-        raise UsageError(f"Option --vary {name} must have values such as {FORMS}, but '{text}' was given.")
-    _check_range(name, values.tolist(), model)
-    if np.unique(values).size < values.size:
-        raise UsageError(f"Option --vary {name} must have distinct values, but '{text}' was given.")
-    return values
+        raise ValueError(f"must have {FORMS}, but '{text}' was given.")
+    _check_range(name, found.bounds if isinstance(found, Spread) else found, model)
+    if isinstance(found, np.ndarray) and np.unique(found).size < found.size:
+        raise ValueError(f"must have distinct values, but '{text}' was given.")
+    return found
 
 
-def _number(name: str, model: CageModel) -> Callable[..., float]:
+def _number(name: str, model: CageModel) -> Callable[[str], float]:
     """How a number of this parameter is read: with its unit, or bare in SI units, a speed in rpm."""
     known = parameter_info(model)
-    if name not in (SPEED, OIL, *known):
-        raise UsageError(f"Option --vary must name one of {', '.join([SPEED, OIL, *known])}, but names '{name}'.")
-    unit = "1" if name == OIL else "" if name == SPEED else known[name].unit
-
-    def number(text: str, difference: bool = False) -> float:
-        del difference
-        try:
-            if name == SPEED:
-                return angular_speed(read_quantity(text.strip(), "rpm"))
-            return to_si(text, unit)
-        except ValueError as error:
-            said = str(error)
-            raise UsageError(f"Option --vary {name} {said if said.startswith('must') else f'{said}.'}") from error
-
-    return number
+    if name == SPEED:
+        return lambda text: rpm(read_quantity(text.strip(), "rpm"))
+    if name not in (OIL, *known):
+        raise InputError(f"Option --vary must name one of {', '.join([SPEED, OIL, *known])}, but names '{name}'.")
+    return lambda text: to_si(text, "1" if name == OIL else known[name].unit)
 
 
-def _count(name: str, text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
+def _count(text: str) -> int:
+    count = int(text) if text.strip().isdecimal() else 0
     if count < 1:
-        raise UsageError(f"Option --vary {name} must have a number of values above 0 at its end, but has '{text}'.")
+        raise ValueError(f"must have a number of values above 0 at its end, but has '{text}'.")
     if count > MOST:
-        raise UsageError(f"Option --vary {name} must have at most {MOST} values, but has '{text}'.")
+        raise ValueError(f"must have at most {MOST} values, but has '{text}'.")
     return count
 
 
-def _check_range(name: str, values: Sequence[float], model: CageModel) -> None:
+def _check_range(name: str, values: Sequence[float] | np.ndarray, model: CageModel) -> None:
     info = parameter_info(model).get(name)
     low, high = (info.lower, info.upper) if info else GRADES if name == OIL else (0.0, math.inf)
     unit = "rad/s" if name == SPEED else "" if info is None or info.unit == "1" else info.unit
+    allowed = "above 0" if name == SPEED else f"from {low:g} to {high:g}"
     for value in values:
-        inside = low <= value <= high and math.isfinite(value) and (name != SPEED or value > 0)
-        if not inside:
-            allowed = "above 0" if name == SPEED else f"from {low:g} to {high:g}"
-            raise UsageError(f"Option --vary {name} must stay {allowed} {unit}".rstrip() + f", but holds {value:g}.")
+        if not (low <= value <= high and math.isfinite(value) and (name != SPEED or value > 0)):
+            raise ValueError(f"must stay {allowed} {unit}".rstrip() + f", but holds {value:g}.")
 
 
 def _check_corners(vary: Vary, model: CageModel) -> None:
@@ -122,49 +153,7 @@ def _check_corners(vary: Vary, model: CageModel) -> None:
     }
     for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):
         corner = dict(zip(ends, map(float, values), strict=True))
-        with refusing("--vary"):
-            model_from(configuration(with_values(model, corner)))  # pyright: ignore[reportArgumentType]
-
-
-def read_bounds(given: Sequence[str], model: CageModel) -> dict[str, tuple[float, float]]:
-    """Every `NAME=LOWER:UPPER` of parameters that are to be chosen, in SI units.
-
-    **Raises:** `UsageError`.
-    """
-    found: dict[str, tuple[float, float]] = {}
-    for text in given:
-        name, _, values = text.partition("=")
-        if values.count(":") != 1 or name.strip() in (SPEED, OIL):
-            raise UsageError(f"Option --vary must be a parameter's NAME=LOWER:UPPER, but '{text}' was given.")
-        if name.strip() in found:
-            raise UsageError(f"Option --vary must name each parameter once, but {name.strip()} was given twice.")
-        spread = _read(name.strip(), values, model)
-        assert isinstance(spread, Between)
-        found[name.strip()] = spread.bounds
-    _check_corners({name: Between(*bounds) for name, bounds in found.items()}, model)
-    return found
-
-
-def read_scatter(given: Sequence[str], names: Sequence[str]) -> dict[str, Scatter]:
-    """Every `NAME=10%` (evenly within so much of the value) or `NAME=rayleigh` of the parameters `names`.
-
-    **Raises:** `UsageError`.
-    """
-    found: dict[str, Scatter] = {}
-    for text in given:
-        name, _, law = (part.strip() for part in text.partition("="))
-        if name not in names:
-            raise UsageError(f"Option --scatter must name one of {', '.join(names)}, but '{text}' was given.")
-        if name in found:
-            raise UsageError(f"Option --scatter must name each parameter once, but {name} was given twice.")
-        if law == "rayleigh":
-            found[name] = rayleigh()
-            continue
         try:
-            share = float(law.removesuffix("%")) / 100 if law.endswith("%") else math.nan
-        except ValueError:
-            share = math.nan
-        if not 0 < share < 1:
-            raise UsageError(f"Option --scatter must be like {name}=10% or {name}=rayleigh, but '{text}' was given.")
-        found[name] = uniform(share)
-    return found
+            model_from(configuration(with_values(model, corner)))  # pyright: ignore[reportArgumentType]
+        except ValueError as error:
+            raise InputError(f"Option --vary: {error}") from error

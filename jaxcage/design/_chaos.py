@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit, ndtri
 
+from .._errors import ArgumentError
 from ..analysis import CHAOS_THRESHOLD
 from ..integrate import AbstractMethod
 from ..sweeps import rpm, sweep_designs
@@ -49,10 +50,10 @@ class ChaosMeasure(AbstractObjective):
 
     def __post_init__(self):
         if self.cloud < 4 or self.cloud % 2:
-            raise ValueError(f"Argument `cloud` must be an even number from 4 up, but {self.cloud} was given.")
+            raise ArgumentError("cloud", said=f"must be an even number from 4 up, but {self.cloud} was given.")
         if not self.spread > 0 or not self.softness > 0:
             given = f"{self.spread} and {self.softness}"
-            raise ValueError(f"Arguments `spread` and `softness` must be positive, but {given} were given.")
+            raise ArgumentError("spread", "softness", said=f"must be positive, but {given} were given.")
 
     @property
     def resolution_rpm(self) -> float:
@@ -138,7 +139,7 @@ def chaotic_share(spectrum: Sequence[tuple[float, float, float]], count: int = 1
     rows = sorted(spectrum)
     ends = [x for first, last, _ in rows for x in (first, last)]
     if not rows or any(b <= a for a, b in zip(ends[:-1], ends[1:], strict=True)):
-        raise ValueError(f"Argument `spectrum` must hold ranges that ascend and do not overlap, but is {spectrum}.")
+        raise ArgumentError("spectrum", said=f"must hold ranges that ascend and do not overlap, but is {spectrum}.")
     speeds = np.concatenate([rpm(first, last, count) for first, last, _ in rows])
     hours = np.repeat([h for *_, h in rows], count)
     return ChaosMeasure(speeds, hours / hours.sum(), **options)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from .._errors import ArgumentError
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..orbits import Point
@@ -22,7 +23,7 @@ class FollowedEdges:
     def __init__(self, points: Mapping[str, Point], method: AbstractMethod | None = None):
         """**Arguments:** bifurcations by name (`LossZones.edges`), as found in the design a search begins with."""
         if not points:
-            raise ValueError("Argument `points` must hold at least one edge, but it is empty.")
+            raise ArgumentError("points", said="must hold at least one edge, but it is empty.")
         self.points, self.method = dict(points), method
         self._tracked: TrackedEdges | None = None
         self._space: DesignSpace | None = None

@@ -15,6 +15,7 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -150,7 +151,7 @@ def fit_edges(
     tracked = TrackedEdges(systems, unknowns, [e.case for e in measured], points, place, method)
     if not np.all(np.isfinite(tracked(first).rpm)):
         gone = [f"{e.case} {e.name}" for e, w in zip(measured, tracked(first).rpm, strict=True) if not np.isfinite(w)]
-        raise ValueError(f"Argument `points` must be bifurcations at `start`, but of {', '.join(gone)} none was found.")
+        raise ArgumentError("points", said=f"must be bifurcations at `start`, but of {', '.join(gone)} none was found.")
     speeds = differentiable(tracked, len(measured), len(unknowns), LOST)
     target, sigma = (jnp.array([getattr(e, n) for e in measured]) for n in ("rpm", "uncertainty_rpm"))
     expected = [(i, *u.prior_place) for i, u in enumerate(unknowns) if u.prior_place is not None]
@@ -176,8 +177,8 @@ def _check(
     start: Mapping[str, float],
 ) -> None:
     if len(points) != len(measured) or not measured:
-        raise ValueError(
-            f"Argument `points` must hold one point per edge, but {len(points)}, {len(measured)} were given."
+        raise ArgumentError(
+            "points", said=f"must hold one point per edge, but {len(points)}, {len(measured)} were given."
         )
     for edge in measured:
         if edge.kind != "synchronous-loss":

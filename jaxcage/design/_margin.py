@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp, softmax
 
+from .._errors import ArgumentError
 from ..integrate import AbstractMethod
 from ..orbits import LeadingMultiplier, leading_multiplier
 from ._objective import AbstractObjective, DesignSpace, Measured
@@ -30,7 +31,7 @@ class StabilityMargin(AbstractObjective):
     def __post_init__(self):
         if len(self.speeds) != len(self.guesses) or not len(self.speeds):
             given = f"{len(self.guesses)} for {len(self.speeds)} speeds"
-            raise ValueError(f"Argument `guesses` must hold a state for each speed, but there are {given}.")
+            raise ArgumentError("guesses", said=f"must hold a state for each speed, but there are {given}.")
         self._known: dict[bytes, tuple[np.ndarray, list[LeadingMultiplier]]] = {}
 
     def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .._errors import ArgumentError
 from ..analysis import Edge, Zone
 
 
@@ -25,9 +26,9 @@ class MeasuredEdge:
 
     def __post_init__(self):
         if not re.fullmatch(r"zone [1-9]\d* (onset|exit)", self.name):
-            raise ValueError(f"Argument `name` must be like 'zone 1 onset' or 'zone 2 exit', but is '{self.name}'.")
+            raise ArgumentError("name", said=f"must be like 'zone 1 onset' or 'zone 2 exit', but is '{self.name}'.")
         if self.kind not in ("synchronous-loss", "chaotic"):
-            raise ValueError(f"Argument `kind` must be synchronous-loss or chaotic, but is '{self.kind}'.")
+            raise ArgumentError("kind", said=f"must be synchronous-loss or chaotic, but is '{self.kind}'.")
         if not (np.isfinite([self.rpm, self.uncertainty_rpm]).all() and min(self.rpm, self.uncertainty_rpm) > 0):
             given = f"{self.rpm} and {self.uncertainty_rpm}"
             raise ValueError(f"Speed and uncertainty of an edge must be positive numbers, but {given} were given.")

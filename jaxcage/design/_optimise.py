@@ -20,6 +20,7 @@ import optax
 from jaxtyping import Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError, InputError
 from .._parameters import parameters
 from ..models import AbstractForcedSystem
 from ._objective import AbstractObjective, DesignSpace, Measured
@@ -179,16 +180,16 @@ def _first_places(
 ) -> Float[np.ndarray, "starts n"]:
     if isinstance(starts, np.ndarray):
         if starts.ndim != 2 or starts.shape[1] != len(space.unknowns) or not np.all((starts >= 0) & (starts <= 1)):
-            raise ValueError("Argument `starts` must hold places between 0 and 1, one column for each parameter.")
+            raise ArgumentError("starts", said="must hold places between 0 and 1, one column for each parameter.")
         return np.clip(starts, INSIDE, 1 - INSIDE)
     if starts < 1:
-        raise ValueError(f"Argument `starts` must be at least 1, but {starts} was given.")
+        raise ArgumentError("starts", said=f"must be at least 1, but {starts} was given.")
     own = space.place
     if not np.all((own >= 0) & (own <= 1)):
         outside = ", ".join(n for n, p in zip(space.names, own, strict=True) if not 0 <= p <= 1)
-        raise ValueError(f"The design itself must lie within the bounds, but {outside} does not.")
+        raise InputError(f"The design itself must lie within the bounds, but {outside} does not.")
     if scouts and scouts < starts - 1:
-        raise ValueError(f"Argument `scouts` must be 0 or at least {starts - 1}, but {scouts} was given.")
+        raise ArgumentError("scouts", said=f"must be 0 or at least {starts - 1}, but {scouts} was given.")
     count = max(scouts, starts - 1)
     from scipy.stats import qmc  # takes half a second to load
 
@@ -265,9 +266,9 @@ class _Kept:
             with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
                 kept = dict(file)
         except (ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise ValueError(f"Argument `keep` must be a file of this search, but {self.path} is none.") from error
+            raise InputError(f"'{self.path}' must be a file of this search, but is none: remove it.") from error
         if str(kept.get("what")) != self.what:
-            raise ValueError(f"Argument `keep` must be a file of this search, but {self.path} is of another one.")
+            raise InputError(f"'{self.path}' must be a file of this search, but is of another one: remove it.")
         leaves, tree = jax.tree.flatten(state)
         state = jax.tree.unflatten(tree, [jnp.asarray(kept[f"leaf_{i}"]) for i in range(len(leaves))])
         rows = [[_read(row) for row in h] for h in json.loads(str(kept["history"]))]

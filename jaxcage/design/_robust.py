@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from jaxtyping import Float
 
+from .._errors import ArgumentError, InputError
 from ._objective import AbstractObjective, DesignSpace, Measured
 
 
@@ -43,12 +44,12 @@ class Robust(AbstractObjective):
     def __post_init__(self):
         if self.draws < 2 or not 0 < self.worst <= 1:
             given = f"{self.draws} and {self.worst}"
-            raise ValueError(f"`draws` must be at least 2 and `worst` within (0, 1], but {given} were given.")
+            raise ArgumentError("draws", "worst", said=f"must be at least 2 and within (0, 1], but {given} were given.")
 
     def factors(self, space: DesignSpace) -> Float[np.ndarray, "draws n"]:
         """Made over nominal value of each parameter that varies."""
         if missing := [name for name in self.scatter if name not in space.names]:
-            raise ValueError(f"Scatter of `{missing[0]}` must be of one of {', '.join(space.names)}.")
+            raise InputError(f"Scatter of `{missing[0]}` must be of one of {', '.join(space.names)}.")
         from scipy.stats import qmc  # takes half a second to load
 
         sample = qmc.Sobol(len(space.names), rng=self.seed).random_base2(int(np.ceil(np.log2(self.draws))))

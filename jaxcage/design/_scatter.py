@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
+from .._errors import ArgumentError, InputError
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
 from ._objective import AbstractObjective, DesignSpace, Measured
@@ -53,12 +54,12 @@ def global_sensitivity(
     """
     space = DesignSpace.of(system, vary)
     if samples < 2 or samples & (samples - 1):
-        raise ValueError(f"Argument `samples` must be a power of 2, but {samples} was given.")
+        raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
 
     def evaluate(x: np.ndarray) -> np.ndarray:
         found = np.array(objective.values(space, x.T))
         if not np.all(np.isfinite(found)):
-            raise ValueError(
+            raise InputError(
                 f"The objective could not be had in {np.sum(~np.isfinite(found))} of {found.size} designs."
             )
         return found[None]
@@ -110,9 +111,9 @@ def tolerance_budget(edge: Sensitivity, deviation: Mapping[str, float]) -> Toler
     """
     for name, d in deviation.items():
         if name not in edge.elasticity:
-            raise ValueError(f"Tolerance of `{name}` must be of one of {', '.join(edge.elasticity)}.")
+            raise InputError(f"Tolerance of `{name}` must be of one of {', '.join(edge.elasticity)}.")
         if not d >= 0:
-            raise ValueError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
+            raise InputError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
     moved = {n: abs(edge.elasticity[n]) * d * edge.value_rpm for n, d in deviation.items()}
     return ToleranceBudget(edge.name, edge.value_rpm, moved)
 

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..analysis import CHAOS_THRESHOLD, Sweep, Zone, zones
 from ..integrate import AbstractMethod
@@ -129,12 +130,12 @@ def screen(
     """
     require_x64()
     if by not in ("motion", "edges"):
-        raise ValueError(f"Argument `by` must be motion or edges, but '{by}' was given.")
+        raise ArgumentError("by", said=f"must be motion or edges, but '{by}' was given.")
     check_unknowns(systems, unknowns)
     rpm = np.asarray(speeds, dtype=float) * 30 / np.pi
     edges = {case: of_case(measured, case) for case in systems}
     if empty := [case for case, own in edges.items() if not own]:
-        raise ValueError(f"Argument `measured` must hold an edge of every case, but none of {', '.join(empty)}.")
+        raise ArgumentError("measured", said=f"must hold an edge of every case, but none of {', '.join(empty)}.")
     targets = {case: _Target.of(own, rpm) for case, own in edges.items()}
     tried: list[Candidate] = []
 

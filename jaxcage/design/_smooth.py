@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._errors import ArgumentError
 from .._parameters import parameters
 from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, CageModel
@@ -59,7 +60,7 @@ def regular_motion(
     **Raises:** `ValueError` for a measure that is not offered.
     """
     if measure not in MEASURES:
-        raise ValueError(f"Argument `measure` must be one of {', '.join(MEASURES)}, but '{measure}' was given.")
+        raise ArgumentError("measure", said=f"must be one of {', '.join(MEASURES)}, but '{measure}' was given.")
 
     def value(model: CageModel) -> Array:
         orbit = periodic_orbit(model, speed, guess=guess, method=method)

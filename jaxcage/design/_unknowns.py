@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from .._errors import ArgumentError, InputError
 from .._parameters import parameter_paths, replace
 from ..models import AbstractForcedSystem
 
@@ -29,11 +30,11 @@ class Unknown:
 
     def __post_init__(self):
         if self.scale not in ("log", "linear"):
-            raise ValueError(f"Argument `scale` must be log or linear, but '{self.scale}' was given.")
+            raise ArgumentError("scale", said=f"must be log or linear, but '{self.scale}' was given.")
         if not (np.isfinite([self.lower, self.upper]).all() and self.lower < self.upper):
-            raise ValueError(f"Bounds of `{self.name}` must ascend, but {self.lower} and {self.upper} were given.")
+            raise InputError(f"Bounds of `{self.name}` must ascend, but {self.lower} and {self.upper} were given.")
         if self.scale == "log" and self.lower <= 0:
-            raise ValueError(f"Bounds of `{self.name}` must be positive on a log scale, but {self.lower} was given.")
+            raise InputError(f"Bounds of `{self.name}` must be positive on a log scale, but {self.lower} was given.")
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -69,12 +70,12 @@ def check_unknowns(systems: Mapping[str, AbstractForcedSystem], unknowns: Sequen
     """**Raises:** `ValueError` for no unknowns, one named twice, or a parameter that a system does not have."""
     names = [u.name for u in unknowns]
     if not names or len(set(names)) < len(names):
-        raise ValueError(f"Argument `unknowns` must name each unknown once, but names {', '.join(names) or 'none'}.")
+        raise ArgumentError("unknowns", said=f"must name each unknown once, but names {', '.join(names) or 'none'}.")
     for case, system in systems.items():
         known = parameter_paths(system)
         for target in (t for u in unknowns for t in u.targets):
             if target not in known:
-                raise ValueError(f"Unknown `{target}` must be a parameter of case {case}: {', '.join(known)}.")
+                raise InputError(f"Unknown `{target}` must be a parameter of case {case}: {', '.join(known)}.")
 
 
 def values_at(unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]) -> dict[str, float]:

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Int
 
+from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._explicit import ClassicalRK4
@@ -101,7 +102,7 @@ def run_steps(
     """
     if isinstance(steps, int) and isinstance(parts, int):
         if steps % parts:
-            raise ValueError(f"Argument `parts` must divide the {steps} steps per revolution, but it is {parts}.")
+            raise ArgumentError("parts", said=f"must divide the {steps} steps per revolution, but it is {parts}.")
         multiple = math.gcd(steps // parts, 4)
     pieces = (field, system, scale)
     if can_be_kernel(solver):
@@ -161,7 +162,7 @@ class FixedSteps(AbstractMethod):
 
     def __check_init__(self):
         if isinstance(self.steps, int) and self.steps < 1:
-            raise ValueError(f"Argument `steps` must be at least 1 per revolution, but {self.steps} was given.")
+            raise ArgumentError("steps", said=f"must be at least 1 per revolution, but {self.steps} was given.")
 
     def advance(
         self,
@@ -249,7 +250,7 @@ def make_fixed(solver: str, steps: int) -> FixedSteps:
     **Raises:** `ValueError` for a name that is not known.
     """
     if solver not in _FIXED:
-        raise ValueError(f"Argument `solver` must be one of {', '.join(_FIXED)}, but '{solver}' was given.")
+        raise ArgumentError("solver", said=f"must be one of {', '.join(_FIXED)}, but '{solver}' was given.")
     return FixedSteps(_FIXED[solver](), steps)
 
 
@@ -269,9 +270,9 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
     if tolerance is None:
         return make_fixed(solver, DEFAULT_STEPS if steps is None else steps)
     if solver not in _ADAPTIVE:
-        raise ValueError(f"Argument `solver` must be one of {', '.join(_ADAPTIVE)}, but '{solver}' was given.")
+        raise ArgumentError("solver", said=f"must be one of {', '.join(_ADAPTIVE)}, but '{solver}' was given.")
     if steps is not None:
-        raise ValueError("Arguments `steps` and `tolerance` must not both be given: steps are fixed or adaptive.")
+        raise ArgumentError("steps", "tolerance", said="must not both be given: steps are fixed or adaptive.")
     if not 0 < tolerance < 1:
-        raise ValueError(f"Argument `tolerance` must lie between 0 and 1, but {tolerance} was given.")
+        raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
     return AdaptiveSteps(_ADAPTIVE[solver](), tolerance, tolerance)

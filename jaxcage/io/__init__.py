@@ -8,13 +8,15 @@
 | `_write_config` | `CageModel` to nested mapping or TOML                                     |
 | `_template`     | a commented TOML file to start from                                       |
 | `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
-| `_csv`          | time histories as CSV                                                     |
+| `_csv`          | time histories, strobe points and branches as CSV                         |
 | `_files`        | whole files or none; is a folder writable                                 |
 """
 
 from ._config import load_model as load_model, model_from as model_from
 from ._csv import (
+    branch_columns as branch_columns,
     read_columns as read_columns,
+    strobe_columns as strobe_columns,
     trajectory_columns as trajectory_columns,
     write_columns as write_columns,
     write_trajectory as write_trajectory,

@@ -1,13 +1,15 @@
-"""Time histories as CSV: one column per quantity, its unit in the head."""
+"""Time histories, strobe points and branches as CSV: one column per quantity, its unit in the head."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Shaped
 
 from .._glossary import component_names, quantity
+from ..analysis import Sweep
 from ..integrate import Trajectory
+from ..orbits import Branch
 from ._files import replacing
 
 
@@ -51,3 +53,33 @@ def write_trajectory(
 ) -> Path:
     """Write a trajectory, with the forces on the cage if given, as CSV in SI units."""
     return write_columns(path, trajectory_columns(trajectory, forces))
+
+
+def strobe_columns(found: Sweep) -> dict[str, Shaped[np.ndarray, " points"]]:
+    """Strobe points of all starts of a sweep at its first speed, in SI units."""
+    _, starts, keep, dimension = found.strobe.shape
+    states = found.strobe[0].reshape(-1, dimension)
+    first = found.discard + found.revolutions - keep + 1
+    columns = {
+        "start": np.repeat(np.arange(1, starts + 1), keep),
+        "revolution": np.tile(np.arange(first, first + keep), starts),
+    }
+    names = component_names(dimension)
+    return columns | {f"{name} [{quantity(name).unit}]": states[:, i] for i, name in enumerate(names)}
+
+
+def branch_columns(branches: Sequence[Branch]) -> dict[str, Shaped[np.ndarray, " orbits"]]:
+    """All orbits of branches over speed: which branch, speed, state and multipliers."""
+    count = branches[0].state.shape[1]
+    joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])
+    columns = {
+        "branch": joined(np.full(b.value.size, i) for i, b in enumerate(branches)),
+        "speed [rpm]": joined(b.speed_rpm for b in branches),
+        "stable": joined(b.stable for b in branches),
+    }
+    for k, name in enumerate(component_names(count)):
+        columns[f"{name} [{quantity(name).unit}]"] = joined(b.state[:, k] for b in branches)
+    for k in range(count):
+        columns[f"multiplier {k + 1} (real part)"] = joined(np.real(b.multipliers[:, k]) for b in branches)
+        columns[f"multiplier {k + 1} (imaginary part)"] = joined(np.imag(b.multipliers[:, k]) for b in branches)
+    return columns

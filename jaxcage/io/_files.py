@@ -7,6 +7,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from .._errors import InputError
+
 
 @contextlib.contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
@@ -68,5 +70,5 @@ def check_writable(folder: str | Path) -> Path:
             pass
     except OSError as error:
         why = reason(error)
-        raise ValueError(f"Output folder '{folder}' must be a folder that can be written to, but: {why}.") from error
+        raise InputError(f"Output folder '{folder}' must be a folder that can be written to, but: {why}.") from error
     return path

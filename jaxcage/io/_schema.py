@@ -11,6 +11,7 @@ from typing import Any
 
 import equinox as eqx
 
+from .._errors import InputError
 from .._parameters import ParameterInfo
 from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
 from ._units import printable, shown, to_si
@@ -25,7 +26,7 @@ KINDS: dict[str, type[eqx.Module]] = {
 """Names in a configuration for the laws between which a table chooses with `kind`."""
 
 
-class ConfigError(ValueError):
+class ConfigError(InputError):
     """A configuration that is refused; the message is one sentence that names the key and what it
     may be.
     """

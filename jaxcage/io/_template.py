@@ -4,6 +4,7 @@ import contextlib
 from pathlib import Path
 from string import Template
 
+from .._errors import InputError
 from ..forces import SynchronousImpact
 from ..models import case
 
@@ -50,14 +51,14 @@ def write_template(path: str | Path) -> Path:
     """
     target, text = Path(path), template()
     if target.suffix.lower() != ".toml":
-        raise ValueError(f"File '{path}' must end in .toml, so that the commands take it for a description.")
+        raise InputError(f"File '{path}' must end in .toml, so that the commands take it for a description.")
     try:
         with open(target, "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise ValueError(f"File '{path}' must be a new one, but is there already and is left as it is.") from None
+        raise InputError(f"File '{path}' must be a new one, but is there already and is left as it is.") from None
     except OSError as error:
         with contextlib.suppress(OSError):  # half a file would stand in the way of the next try
             target.unlink()
-        raise ValueError(f"File '{path}' must be in a folder that can be written to, but: {error.strerror}.") from error
+        raise InputError(f"File '{path}' must be in a folder that can be written to, but: {error.strerror}.") from error
     return target

@@ -45,7 +45,7 @@ from ._orbit_diagram import (
     sweep_figure as sweep_figure,
     zoomed_diagram as zoomed_diagram,
 )
-from ._paper import paper_figures as paper_figures
+from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
 from ._section import strobe_section as strobe_section
 from ._stability_map import stability_map as stability_map
 from ._statics import load_bars as load_bars

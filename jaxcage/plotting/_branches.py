@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.transforms import offset_copy
 from scipy.optimize import isotonic_regression
 
+from .._errors import ArgumentError
 from .._glossary import component_names, quantity
 from ..analysis import Sweep
 from ..orbits import Branch, SpecialPoint
@@ -85,7 +86,7 @@ def branch_diagram(
     """
     if not branches or any(b.parameter != "speed" for b in branches):
         given = ", ".join(b.parameter for b in branches) or "no branch"
-        raise ValueError(f"Argument `branches` must hold branches over speed, but {given} was given.")
+        raise ArgumentError("branches", said=f"must hold branches over speed, but {given} was given.")
     ax = axes_or_new(ax, 9.0, 5.0)
     name = component_names(branches[0].state.shape[-1])[component]
     paths = [(b.periods, *polyline(b, component)) for b in branches]

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from .._errors import ArgumentError
 from ..orbits import Sensitivity
 from ._style import BAND, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new
 
@@ -25,7 +26,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     **Raises:** `ValueError` if there is no sensitivity.
     """
     if not sensitivities:
-        raise ValueError("Argument `sensitivities` must hold at least one sensitivity, but it is empty.")
+        raise ArgumentError("sensitivities", said="must hold at least one sensitivity, but it is empty.")
     names = _largest(sensitivities, most)
     count = len(sensitivities)
     ax = axes_or_new(ax, 9.0, 1.2 + len(names) * (0.1 + 0.125 * count))

@@ -1,6 +1,6 @@
 """The paper's figures 5, 7, 8 and 9 with what this model gives."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from .._glossary import quantity
 from ..bearing import FIGURE_AXES, PUBLISHED_CASES
 from ..forces import PocketImpact, approach_speed, impact_history
-from ..reproduction import SECTION_RPM, Runs
+from ..reproduction import SECTION_RPM, ReadingResult, Runs
 from ..sweeps import rpm
 from ._impact import impact_forces
 from ._marks import mark_published
@@ -84,4 +84,18 @@ def _sections(runs: Runs) -> Figure:
     for ax in cells[len(runs.sections) :]:
         ax.set_visible(False)
     figure.suptitle(f"Fig. 9: strobe sections at {SECTION_RPM:.0f} rpm; dotted, the axes printed", fontsize=11)
+    return figure
+
+
+def readings_figure(read: Sequence[ReadingResult]) -> Figure:
+    """The orbit diagram of each reading of the paper."""
+    columns = 3
+    figure = new_figure(12.0, 2.4 * -(-len(read) // columns))
+    cells = figure.subplots(-(-len(read) // columns), columns, sharex=True, squeeze=False).ravel()
+    for ax, r in zip(cells, read, strict=False):
+        zoomed_diagram(r.sweep, 4000.0, 27500.0, 1, ax)
+        ax.set_title(f"{r.reading.case}, {r.reading.question}: {r.reading.answer}", loc="left", fontsize=9)
+        ax.set_xlabel("")
+    for ax in cells[len(read) :]:
+        ax.set_visible(False)
     return figure

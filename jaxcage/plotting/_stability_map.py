@@ -7,6 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.transforms import Bbox
 
+from .._errors import ArgumentError
 from .._glossary import quantity
 from ..orbits import Curve
 from ._branches import mark_of, runs
@@ -48,7 +49,7 @@ def stability_map(
     others = {c.y for c in curves}
     if any(c.x != "speed" for c in curves) or len(others) > 1:
         given = ", ".join(sorted({f"{c.y} over {c.x}" for c in curves}))
-        raise ValueError(f"Argument `curves` must all be of one parameter over speed, but {given} was given.")
+        raise ArgumentError("curves", said=f"must all be of one parameter over speed, but {given} was given.")
     ax = axes_or_new(ax, 9.0, 5.0)
     if exponents is not None:
         _colour_exponents(ax, exponents, y_factor)

@@ -5,20 +5,34 @@
 | `_table`         | tables of texts                                                             |
 | `_zone_tables`   | chaotic zones beside published ones                                         |
 | `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
-| `_slopes`        | sensitivities of every exact edge                                           |
+| `_slopes`        | how every exact edge answers to the design                                  |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
-| `_statics`       | statics as a table                                                          |
+| `_statics`       | statics and the impact of a roller as tables                                |
 | `_operating`     | operating speeds against zones                                              |
 | `_sources`       | every parameter with its unit and where its value comes from                |
 | `_findings`      | everything that a page shows, computed                                      |
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
+| `_design_tables` | designs and their tolerances                                                |
+| `_paper_tables`  | the paper's results beside ours                                             |
 | `_page_tables`   | tables that no command prints                                               |
 | `_page`          | the page                                                                    |
 """
 
 from ._contact import contact_notes as contact_notes, touching as touching
-from ._findings import AllFailed as AllFailed, Findings as Findings, examine as examine
+from ._design_tables import (
+    before_and_after_tables as before_and_after_tables,
+    budget_table as budget_table,
+    optima_table as optima_table,
+    parameters_table as parameters_table,
+    sobol_table as sobol_table,
+)
+from ._findings import (
+    AllFailed as AllFailed,
+    Findings as Findings,
+    examine as examine,
+    require_some as require_some,
+)
 from ._map import (
     RPM as RPM,
     SPEED as SPEED,
@@ -27,6 +41,8 @@ from ._map import (
     Say as Say,
     follow_edges as follow_edges,
     largest_exponents as largest_exponents,
+    parameter_axis as parameter_axis,
+    speed_axis as speed_axis,
 )
 from ._operating import (
     Operating as Operating,
@@ -46,10 +62,38 @@ from ._orbit_tables import (
     unsettled_notes as unsettled_notes,
 )
 from ._page import Judged as Judged, judge as judge, page as page
-from ._slopes import edge_slopes as edge_slopes
+from ._paper_tables import (
+    compared_table as compared_table,
+    ranges_table as ranges_table,
+    readings_table as readings_table,
+)
+from ._slopes import (
+    EXIT as EXIT,
+    ONSET as ONSET,
+    edge_slopes as edge_slopes,
+    elasticities_table as elasticities_table,
+    gradient_document as gradient_document,
+    gradient_table as gradient_table,
+    homogeneity_notes as homogeneity_notes,
+    missing_notes as missing_notes,
+    slopes_document as slopes_document,
+    source_document as source_document,
+    source_notes as source_notes,
+)
 from ._sources import parameter_rows as parameter_rows
-from ._statics import displacements as displacements, statics_table as statics_table
-from ._table import Table as Table, number as number, shown_unit as shown_unit
+from ._statics import (
+    displacements as displacements,
+    impact_document as impact_document,
+    impact_table as impact_table,
+    statics_table as statics_table,
+)
+from ._table import (
+    Table as Table,
+    chosen as chosen,
+    number as number,
+    shares_table as shares_table,
+    shown_unit as shown_unit,
+)
 from ._zone_tables import (
     transient_tables as transient_tables,
     zone_document as zone_document,

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from jaxtyping import Int
 
-from .._parameters import parameter_info, parameters
+from .._errors import NoResult
 from ..analysis import Sweep, Zones, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
-from ..integrate import AbstractMethod
+from ..integrate import OUTCOMES, AbstractMethod
 from ..models import CageModel
 from ..orbits import (
     Curve,
@@ -23,21 +24,28 @@ from ..orbits import (
     synchronous_orbits,
 )
 from ..sweeps import sweep
-from ._map import RPM, SPEED, Axis, Exponents, follow_edges, largest_exponents
+from ._map import Axis, Exponents, follow_edges, largest_exponents, parameter_axis, speed_axis
 from ._slopes import edge_slopes
-from ._table import shown_unit
 
 
 MAP_PARAMETER = "guidance_gap"
-BELOW, ABOVE = 0.8, 1.25
-"""Range of the map over the value of its parameter."""
 FOLLOWED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 """Edges that are followed across the map, which takes about a minute each."""
 Progress = Callable[[str, int, int], None]
 
 
-class AllFailed(Exception):
-    """No simulation of the sweep finished: there is nothing to report. Its argument is their number."""
+class AllFailed(NoResult):
+    """No simulation finished: there is nothing to report."""
+
+
+def require_some(outcome: Int[np.ndarray, "..."], where: str = "") -> None:
+    """Stop if all simulations failed.
+
+    **Raises:** `AllFailed`, which says of how many, `where`, and how.
+    """
+    if np.all(outcome != 0):
+        how = ", ".join(sorted({OUTCOMES[code] for code in np.ravel(outcome)}))
+        raise AllFailed(f"All {np.size(outcome)} simulations{where} failed ({how}): try more steps (--steps).")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,8 +128,7 @@ def examine(
             method=sweep_method,
             progress=lambda done, of: say("sweep", done, of),
         )
-    if np.all(swept.failed):
-        raise AllFailed(swept.outcome.size)
+    require_some(swept.outcome)
     with timed("synchronous orbits"):
         first, last = float(speeds[0]), float(speeds[-1])
         found = synchronous_orbits(model, first, last, settled=swept, method=orbit_method, progress=say)
@@ -148,10 +155,7 @@ def _map(
     quick: bool,
     say: Progress,
 ) -> Map:
-    info, value = parameter_info(model)[MAP_PARAMETER], float(parameters(model)[MAP_PARAMETER])
-    low = max(BELOW * value, info.lower, 1.01 * float(model.eccentricity))
-    axis = Axis(MAP_PARAMETER, low, min(ABOVE * value, info.upper), *shown_unit(info.unit, value))
-    across = Axis(SPEED, float(speeds[0]), float(speeds[-1]), "rpm", RPM)
+    axis, across = parameter_axis(model, MAP_PARAMETER), speed_axis(float(speeds[0]), float(speeds[-1]))
     edges = {} if quick else {name: edge for name, edge in loss.edges.items() if name in FOLLOWED}
     curves, refused = follow_edges(model, edges, across, axis, orbit_method, say)
     exponents = largest_exponents(

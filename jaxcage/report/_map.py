@@ -8,15 +8,19 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .._parameters import replace
+from .._errors import ArgumentError
+from .._parameters import parameter_info, parameters, replace
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Curve, SpecialPoint, bifurcation, curve
 from ..sweeps import cores, sweep
+from ._table import shown_unit
 
 
 SPEED = "speed"
 RPM = 30 / math.pi
+BELOW, ABOVE = 0.8, 1.25
+"""Range of a parameter over its value, unless told otherwise."""
 Exponents: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Speeds [rpm], values of y [SI], largest exponent at each."""
 Say: TypeAlias = Callable[[str, int, int], None]
@@ -36,6 +40,15 @@ class Axis:
     """From SI to that unit."""
 
     @property
+    def range(self) -> list[float]:
+        """For programs: a speed in rpm, all else in SI units."""
+        return [self.told(self.lower), self.told(self.upper)]
+
+    def told(self, value: Any) -> Any:
+        """A value for programs."""
+        return value * RPM if self.name == SPEED else value
+
+    @property
     def head(self) -> str:
         """Head of a column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
@@ -43,6 +56,34 @@ class Axis:
     def cell(self, value: float) -> str:
         """A value for a table."""
         return f"{value * self.factor:.2f}" if self.name == SPEED else f"{value * self.factor:.6g}"
+
+
+def speed_axis(lower: float, upper: float) -> Axis:
+    """Speeds [rad/s], shown in rpm."""
+    return Axis(SPEED, lower, upper, "rpm", RPM)
+
+
+def parameter_axis(model: CageModel, name: str, lower: float | None = None, upper: float | None = None) -> Axis:
+    """A parameter between two values [SI], by default a fifth below to a quarter above its own.
+
+    **Raises:** `ArgumentError` for a range that is not allowed, or does not hold the value itself.
+    """
+    info, value = parameter_info(model)[name], float(parameters(model)[name])
+    least = max(info.lower, 1.01 * float(model.eccentricity)) if name == "guidance_gap" else info.lower
+    around = sorted((BELOW * value, ABOVE * value))
+    low, high = (
+        (max(around[0], least) if lower is None else lower),
+        (min(around[1], info.upper) if upper is None else upper),
+    )
+    unit = "" if info.unit == "1" else f" {info.unit}"
+    for argument, given in (("lower", low), ("upper", high)):
+        if not info.lower <= given <= info.upper:
+            allowed = f"a value of {name} from {info.lower:g} to {info.upper:g}{unit}"
+            raise ArgumentError(argument, said=f"must be {allowed}, but {given:g}{unit} was given.")
+    if not low < value < high:
+        wanted = f"must have {name} = {value:g}{unit} between them"
+        raise ArgumentError("lower", "upper", said=f"{wanted}, but the range is {low:g} to {high:g}{unit}.")
+    return Axis(name, low, high, *shown_unit(info.unit, value))
 
 
 def follow_edges(

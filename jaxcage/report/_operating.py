@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .._errors import ArgumentError
 from ..analysis import Edge, Sweep, Zone, Zones
 from ..io import to_si
 
@@ -54,7 +55,7 @@ class Verdict:
 def read_operating(text: str) -> list[Operating]:
     """Speeds and ranges such as `8500, 12000-15000` or `900 rad/s, 1200 to 1500 rad/s`, in rpm if nothing else is said.
 
-    **Raises:** `ValueError` with what follows the option's name.
+    **Raises:** `ValueError`, one sentence.
     """
     return [_read_one(part) for part in text.split(",") if part.strip()]
 
@@ -62,18 +63,23 @@ def read_operating(text: str) -> list[Operating]:
 def _read_one(part: str) -> Operating:
     match = _RANGE.fullmatch(part)
     if match is None:
-        raise ValueError(f'must be speeds and ranges like "8500, 12000-15000 rpm", but "{part.strip()}" was given.')
+        raise ArgumentError(
+            "operating", said=f'must be speeds and ranges like "8500, 12000-15000 rpm", but "{part.strip()}" was given.'
+        )
     low, unit, high, other = match.groups()
     unit = unit or other or "rpm"
     try:
         first = to_si(f"{low} {unit}", "rpm")
         last = first if high is None else to_si(f"{high} {other or unit}", "rpm")
     except ValueError as error:
-        raise ValueError(
-            f'must be speeds in rpm, or with a unit such as "900 rad/s", but "{part.strip()}" {error}.'
+        raise ArgumentError(
+            "operating",
+            said=f'must be speeds in rpm, or with a unit such as "900 rad/s", but "{part.strip()}" {error}.',
         ) from None
     if not 0 < first <= last < math.inf:
-        raise ValueError(f'must be speeds above 0 and ranges that grow, but "{part.strip()}" was given.')
+        raise ArgumentError(
+            "operating", said=f'must be speeds above 0 and ranges that grow, but "{part.strip()}" was given.'
+        )
     return Operating(first, last)
 
 

@@ -76,7 +76,7 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
     span = float(swept.rpm[0]), float(swept.rpm[-1])
     what = f"Case {name}" if findings.published is not None else name
     drawn = pictures(findings, [j.at for j in judged])
-    slopes = slope_tables(findings)
+    slopes, statics, at_rest = slope_tables(findings), findings.statics, f"At rest under {float(model.load):g} N"
     context: dict[str, Any] = {
         "title": f"{what}: where the cage moves chaotically",
         "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage"
@@ -98,7 +98,7 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
             f"Not followed: {n} ({why})." for n, why in (findings.map.refused if findings.map else {}).items()
         ],
         "slope_tables": slopes,
-        "statics": None if findings.statics is None else statics_table(model, findings.statics),
+        "statics": None if statics is None else statics_table(at_rest, model, statics),
         "warnings": design_rule_violations(model.bearing, model.guidance_gap),
         "parameters": [
             (group, list(rows))
@@ -112,7 +112,7 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
         "date": datetime.date.today().isoformat(),
     }
     there = {"operating": bool(judged), "map": "map" in drawn, "gradients": bool(slopes)}
-    there["statics"] = findings.statics is not None
+    there["statics"] = statics is not None
     return context | {"sections": [(k, text) for k, text in _SECTIONS.items() if there.get(k, True)]}
 
 

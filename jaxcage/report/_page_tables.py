@@ -13,11 +13,11 @@ from ..orbits import Sensitivity
 from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
+from ._slopes import FIRST
 from ._sources import shown
 from ._table import Table, number
 
 
-FIRST = ("guidance_gap", "eccentricity")
 MOST = 14
 """Parameters in a table of elasticities."""
 

@@ -1,8 +1,20 @@
-"""How every exact edge answers to the design."""
+"""How every exact edge answers to the design, as documents and as tables."""
 
+from collections.abc import Mapping
+from typing import Any
+
+from .._parameters import parameter_info, parameters
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
+from ._orbit_tables import error_cell
+from ._table import Table, chosen, number
+
+
+FIRST = ("guidance_gap", "eccentricity")
+"""Rows that are always on top."""
+ONSET, EXIT = "zone 1 onset", "zone 1 exit"
+EXPECTED = (ONSET, EXIT, "zone 2 onset")
 
 
 def edge_slopes(
@@ -14,3 +26,101 @@ def edge_slopes(
         of = limit_sensitivity if isinstance(source, Cascade) else sensitivity
         slopes[f"chaotic {name}"] = of(model, source, f"chaotic {name}", method)  # pyright: ignore[reportArgumentType]
     return slopes
+
+
+def slopes_document(slopes: Mapping[str, Sensitivity], edge: str) -> dict[str, Any] | None:
+    """The gradient of an edge [rpm per SI unit] for programs, None where it was left out."""
+    names = "trusted status error_rpm steps transversality derivative elasticity"
+    return chosen(slopes[edge], names) if edge in slopes else None
+
+
+def elasticities_table(name: str, slopes: Mapping[str, Sensitivity]) -> Table:
+    """Relative change of each edge per relative change of the parameters that are always on top."""
+    columns = {
+        "edge": lambda item: item[0],
+        "by": "{0[1].kind}",
+        "speed [rpm]": lambda item: number(item[1].value_rpm, 2),
+        "±": lambda item: error_cell(item[1].error_rpm),
+        **{n.replace("_", " "): f"{{0[1].elasticity[{n}]:+.4f}}" for n in FIRST},
+        "status": "{0[1].status}",
+    }
+    return Table.of(f"Elasticities of the exact edges of {name}", columns, slopes.items())
+
+
+def gradient_document(edges: Mapping[str, Sensitivity], wide: Sensitivity | None) -> dict[str, Any]:
+    """Derivatives [rpm per SI unit] and elasticities for programs; null where the edge was not found again."""
+    names = "name kind error_rpm steps trusted status transversality derivative elasticity"
+    trusted = [edge.homogeneity for edge in edges.values() if edge.trusted]
+    return {
+        "edges": [{"speed_rpm": edge.value_rpm} | chosen(edge, names) for edge in edges.values()],
+        "width": wide and chosen(wide, "name kind value_rpm error_rpm derivative elasticity"),
+        "homogeneity": {
+            base: max((abs(h[base]) for h in trusted), default=None) for base in ("mass", "length", "time")
+        },
+    }
+
+
+def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Table:
+    """One edge or width: guidance gap and eccentricity on top, then by elasticity; what does not move it is counted."""
+    slope, change = sensitivity.derivative, sensitivity.elasticity
+    moving = [n for n in slope if slope[n] != 0.0 or n in FIRST]
+    order = sorted(moving, key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])))
+    info, value = parameter_info(model), parameters(model)
+    unit = lambda n: "" if info[n].unit == "1" else info[n].unit
+    rows = [(n, f"{float(value[n]):.6g}", unit(n), f"{slope[n]:+.6g}", _elasticity_cell(change[n])) for n in order]
+    at = f"{sensitivity.value_rpm:.3f} ± {error_cell(sensitivity.error_rpm)} rpm"
+    title = f"{sensitivity.name.capitalize()} of {name}: {at}, {sensitivity.kind}"
+    still = len(slope) - len(moving)
+    columns = ("parameter", "value", "unit", "rpm per unit", "elasticity")
+    return Table(title + (f"; {still} other parameters do not move it" if still else ""), columns, rows)
+
+
+def _elasticity_cell(value: float) -> str:
+    """An elasticity to six decimals; what they would hide as zero is shown by its size."""
+    if value == 0.0:
+        return "0"
+    return f"{value:+.6f}" if abs(value) >= 5e-7 else f"{value:+.0e}"
+
+
+def missing_notes(edges: Mapping[str, Sensitivity]) -> list[str]:
+    """One line for each edge that one would expect and that is not there, or not to be trusted."""
+    notes = [f"There is no {name} in the range." for name in EXPECTED if name not in edges]
+    notes += [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
+    if not all(name in edges and edges[name].trusted for name in (ONSET, EXIT)):
+        notes.append("Without both edges zone 1 has no width.")
+    return notes
+
+
+def homogeneity_notes(document: Mapping[str, Any]) -> list[str]:
+    """By how much the gradients break the scaling that units impose."""
+    rows = ", ".join(f"{base} {residual:.1e}" for base, residual in document["homogeneity"].items())
+    return [f"Homogeneity, largest relative residual: {rows}"]
+
+
+def source_document(i: int, explained: Explained, slopes: Mapping[str, Sensitivity]) -> dict[str, Any]:
+    """What the edges of a chaotic zone were taken from; a bifurcation brings its gradient."""
+    found: dict[str, Any] = {}
+    zone = explained.zones.zones[i - 1]
+    for end, edge in (("onset", zone.onset), ("exit", zone.exit)):
+        source = explained.sources.get(f"zone {i} {end}")
+        found[f"{end}_basis"] = edge and edge.basis
+        found[f"{end}_cascade_rpm"] = _cascade_rpm(source) if isinstance(source, Cascade) else None
+        found[f"{end}_gradient"] = slopes_document(slopes, f"chaotic zone {i} {end}")
+    return found
+
+
+def _cascade_rpm(cascade: Cascade) -> list[float]:
+    return [float(p.speed_rpm) for p in cascade.points]
+
+
+def source_notes(explained: Explained) -> list[str]:
+    edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
+    statistical = sum(e.basis == "statistical" for e in edges)
+    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]
+    for name, source in explained.sources.items():
+        if isinstance(source, Cascade):
+            doublings = ", ".join(number(rpm, 1) for rpm in _cascade_rpm(source))
+            notes.append(f"Chaotic {name}: limit of the cascade with period doublings at {doublings} rpm")
+        else:
+            notes.append(f"Chaotic {name}: coincides with the {source.kind} at {source.speed_rpm:.2f} rpm")
+    return notes

@@ -1,9 +1,14 @@
-"""Statics as a table: load of the rollers, loaded zone, resting place of the cage."""
+"""Statics and the impact of a roller as tables."""
 
 import math
-from typing import get_args
+from collections.abc import Mapping
+from typing import Any, get_args
 
-from ..bearing import Guidance, LoadDistribution, static_cage_displacement
+import jax.numpy as jnp
+import numpy as np
+
+from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
+from ..forces import ImpactHistory
 from ..models import CageModel
 from ._table import Table
 
@@ -24,8 +29,9 @@ def displacements(model: CageModel, shared: LoadDistribution) -> dict[str, float
     }
 
 
-def statics_table(model: CageModel, shared: LoadDistribution) -> Table:
-    """What a designer asks of the bearing at rest."""
+def statics_table(title: str, model: CageModel, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
+    """What a designer asks of the bearing at rest, and of its kinematics if a shaft speed [rad/s] is given."""
+    bearing = model.bearing
     rows = [
         ("largest roller load", f"{float(shared.max_load):.1f}", "N"),
         ("shift of the shaft", f"{1e6 * float(shared.shaft_shift):.2f}", "µm"),
@@ -35,6 +41,49 @@ def statics_table(model: CageModel, shared: LoadDistribution) -> Table:
             (f"cage displacement, {guidance.replace('_', ' ')} guidance", f"{1e3 * y:.4f}", "mm")
             for guidance, y in displacements(model, shared).items()
         ),
-        ("cage speed over shaft speed", f"{float(model.bearing.cage_speed_ratio):.4f}", ""),
+        ("cage speed over shaft speed", f"{float(bearing.cage_speed_ratio):.4f}", ""),
     ]
-    return Table(f"At rest under {float(model.load):g} N", ("quantity", "value", "unit"), rows)
+    if shaft_speed is not None:
+        surface = float(raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter))
+        rows += [
+            ("cage speed", f"{float(bearing.cage_speed(shaft_speed)) * 30 / math.pi:.1f}", "rpm"),
+            ("surface speed of the inner raceway", f"{surface:.2f}", "m/s"),
+            ("centrifugal force of a roller", f"{float(bearing.roller_centrifugal_force(shaft_speed)):.1f}", "N"),
+        ]
+    return Table(title, ("quantity", "value", "unit"), rows)
+
+
+_SHOWN = {
+    "approach_speed": ("approach speed", 1.0, "m/s"),
+    "peak_contact_force": ("peak contact force", 1.0, "N"),
+    "peak_bar_force": ("peak bar force", 1.0, "N"),
+    "lowest_bar_force": ("lowest bar force", 1.0, "N"),
+    "contact_duration": ("time in contact", 1e3, "ms"),
+    "contacts": ("contacts", 1.0, ""),
+    "impulse": ("impulse of the contact force", 1e3, "mN s"),
+}
+"""Words, and factor to the unit that is shown."""
+
+
+def impact_document(history: ImpactHistory) -> dict[str, Any]:
+    """Peaks, time in contact and impulse, over the whole history: a bar that swings back may be hit
+    again.
+    """
+    touching = np.asarray(history.contact_force) > 0
+    step = float(history.time[1] - history.time[0])
+    return {
+        "peak_contact_force": float(jnp.max(history.contact_force)),
+        "peak_bar_force": float(jnp.max(history.bar_force)),
+        "lowest_bar_force": float(jnp.min(history.bar_force)),
+        "contact_duration": float(np.sum(touching)) * step,
+        "contacts": int(np.sum(touching[1:] & ~touching[:-1])),
+        "impulse": float(history.impulse),
+        "ends_in_contact": bool(touching[-1]),
+    }
+
+
+def impact_table(title: str, values: Mapping[str, Any]) -> Table:
+    """An impact in words; `values` are those of its document, and the speed of approach."""
+    rows = [(text, f"{factor * values[name]:.4g}", unit) for name, (text, factor, unit) in _SHOWN.items()]
+    ends = "yes, give a longer --duration" if values["ends_in_contact"] else "no"
+    return Table(title, ("quantity", "value", "unit"), [*rows, ("still in contact at the end", ends, "")])

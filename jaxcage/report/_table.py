@@ -2,7 +2,8 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 
 @dataclasses.dataclass(frozen=True)
@@ -12,6 +13,24 @@ class Table:
     title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
+
+    @classmethod
+    def of(cls, title: str, columns: Mapping[str, str | Callable[[Any], str]], found: Iterable[Any]) -> "Table":
+        """A row for each thing `found`; a column says how its texts are made of it, by a format or a function."""
+        cell = lambda how, one: how.format(one) if isinstance(how, str) else how(one)
+        return cls(title, tuple(columns), [tuple(cell(how, one) for how in columns.values()) for one in found])
+
+
+def chosen(found: Any, names: str) -> dict[str, Any]:
+    """Some attributes of a result by name."""
+    return {name: getattr(found, name) for name in names.split()}
+
+
+def shares_table(title: str, what: str, counts: Mapping[str, int]) -> Table:
+    """How many of each sort there are, and their share of all."""
+    total, (sort, unit) = sum(counts.values()), what.split()
+    rows = [(name, str(n), f"{n / total:.1%}" if total else "-") for name, n in counts.items()]
+    return Table(title, (sort, unit, "share"), rows)
 
 
 def number(value: float | None, digits: int = 0, nothing: str = "-") -> str:

@@ -9,6 +9,17 @@
 """
 
 from ._conclusions import Conclusion as Conclusion, conclusions as conclusions
-from ._edges import ComparedEdge as ComparedEdge, compare_edges as compare_edges, zones_in_range as zones_in_range
+from ._edges import (
+    ComparedEdge as ComparedEdge,
+    compare_edges as compare_edges,
+    summary as summary,
+    zones_in_range as zones_in_range,
+)
 from ._readings import READINGS as READINGS, ReadingResult as ReadingResult, try_readings as try_readings
-from ._runs import SECTION_RPM as SECTION_RPM, Runs as Runs, run_all as run_all
+from ._runs import (
+    SECTION_RPM as SECTION_RPM,
+    Runs as Runs,
+    edges_of as edges_of,
+    ranges_of as ranges_of,
+    run_all as run_all,
+)

@@ -2,6 +2,9 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 from ..analysis import Zone
 from ..bearing import PublishedCase
@@ -62,3 +65,15 @@ def compare_edges(published: PublishedCase, zones: Sequence[Zone], kind: str) ->
         )
         for m, edge in zip(measured, found, strict=True)
     ]
+
+
+def summary(edges: Sequence[ComparedEdge], kind: str) -> dict[str, Any]:
+    """How many of the published edges were found, how many within 10 %, and the median error."""
+    own = [row for row in edges if row.kind == kind]
+    errors = np.array([abs(row.error_percent) for row in own if row.error_percent is not None])
+    return {
+        "published": len(own),
+        "found": int(errors.size),
+        "within_10_percent": int(np.sum(errors <= 10)),
+        "median_error_percent": float(np.median(errors)) if errors.size else None,
+    }

@@ -2,14 +2,16 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..analysis import Sweep, Zones, zones
-from ..bearing import PUBLISHED_SPEED_RANGE_RPM
+from ..bearing import FIGURE_AXES, PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, synchronous_orbits
 from ..sweeps import rpm, sweep_designs
+from ._edges import ComparedEdge, compare_edges
 
 
 SECTION_RPM = 8500.0
@@ -80,3 +82,37 @@ def run_all(
         for (name, model), start in zip(models.items(), first, strict=True)
     }
     return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections)
+
+
+def edges_of(runs: Runs, name: str) -> list[ComparedEdge]:
+    """The published edges of a case beside those of both kinds."""
+    published = PUBLISHED_CASES[name]
+    found = compare_edges(published, runs.zones[name].zones, "chaotic")
+    if name in runs.loss:
+        found += compare_edges(published, runs.loss[name].zones, "synchronous-loss")
+    return found
+
+
+def ranges_of(runs: Runs) -> list[dict[str, Any]]:
+    """Ranges of the strobe points beside the limits of the printed axes, which are not ranges of the motion."""
+    found = []
+    for name, figure, low, high in (("fig. 7", "7", 2500.0, 27500.0), ("fig. 8a", "8a", 7000.0, 22000.0)):
+        ys = [
+            s.strobe[(s.rpm >= low) & (s.rpm <= high)][..., 1]
+            for c, s in runs.sweeps.items()
+            if figure == "7" or c[0] == "1"
+        ]
+        found.append(_range(name, "vertical displacement", "mm", figure, np.concatenate([1e3 * y.ravel() for y in ys])))
+    sections = np.concatenate([s.strobe[0, 0] for s in runs.sections.values()])
+    half = sections.shape[-1] // 2
+    found.append(_range("fig. 9", "vertical displacement", "mm", "9", 1e3 * sections[:, 1]))
+    found.append(_range("fig. 9", "vertical velocity", "mm/s", "9", 1e3 * sections[:, 1 + half]))
+    return found
+
+
+def _range(name: str, quantity: str, unit: str, figure: str, values: np.ndarray) -> dict[str, Any]:
+    axis = next(a for a in FIGURE_AXES if a.figure == figure and a.quantity == quantity)
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    inside = axis.lower <= low and high <= axis.upper
+    printed = {"axis_lower": axis.lower, "axis_upper": axis.upper, "inside": inside}
+    return {"figure": name, "quantity": quantity, "unit": unit, "lower": low, "upper": high, **printed}

@@ -14,6 +14,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool, Int
 
+from .._errors import ArgumentError
+
 
 Points = Int[np.ndarray, "points 2"]
 Evaluate = Callable[[Points], Int[np.ndarray, " points"]]
@@ -82,9 +84,9 @@ def refine(
     """
     stride = first_stride(shape) if first is None else first
     if min(shape) < 2:
-        raise ValueError(f"Argument `shape` must be at least 2 x 2, but {shape[0]} x {shape[1]} was given.")
+        raise ArgumentError("shape", said=f"must be at least 2 x 2, but {shape[0]} x {shape[1]} was given.")
     if stride < 1 or stride & (stride - 1):
-        raise ValueError(f"Argument `first` must be a power of 2, but {stride} was given.")
+        raise ArgumentError("first", said=f"must be a power of 2, but {stride} was given.")
     label = np.full(shape, UNKNOWN, dtype=np.int32)
     left = label.size if most is None else most
 

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from .._cache import keep_compiled_programs
+from .._errors import ArgumentError
 from ..sweeps import cores
 from ._study import Results, Study
 
@@ -97,7 +98,12 @@ def _compute(packed: bytes, chunk: int, fingerprint: str) -> Results:
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     distributed = import_distributed()
     if scheduler is not None:
-        with distributed.Client(scheduler, timeout=f"{WAIT_S}s") as client:
+        try:
+            there = distributed.Client(scheduler, timeout=f"{WAIT_S}s")
+        except ValueError as error:
+            said = f"must be an address such as tcp://host:8786, but '{scheduler}' was given."
+            raise ArgumentError("scheduler", said=said) from error
+        with there as client:
             client.wait_for_workers(1, timeout=WAIT_S)
             yield client
         return

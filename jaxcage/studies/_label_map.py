@@ -3,12 +3,13 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .._checks import require_x64
+from .._parameters import parameter_info
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ..sweeps import require_persist
@@ -16,6 +17,9 @@ from ._adaptive import AdaptiveGrid, Points, refine
 from ._plan import LANES, Plan
 from ._study import LABELS, PENDING, SPEED, Study, too_short
 
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 KINDS = ("calm", "chaotic", "failed")
 """What a point counts as: chaotic if any of its starts is, else failed if any has or is inaccurate, else calm."""
@@ -55,6 +59,23 @@ class LabelMap:
     def kind(self) -> Int[np.ndarray, "x y"]:
         """What each point counts as, a place in `KINDS`; points that were left out take that of the nearest one."""
         return kinds(self.label)[self.grid.nearest]
+
+    def dataset(self, system: AbstractForcedSystem) -> "xr.Dataset":
+        """Labels and largest exponents of all starts over both parameters, for xarray."""
+        import xarray as xr
+
+        info = parameter_info(system)
+        unit = lambda name: {"units": "rad/s" if name == SPEED else info[name].unit}
+        codes = [PENDING, *range(len(LABELS))]
+        flags: dict[str, Any] = {"flag_values": codes, "flag_meanings": " ".join(["pending", *LABELS])}
+        dims = (self.x, self.y, "start")
+        return xr.Dataset(
+            {
+                "label": (dims, self.label, {"long_name": "what each lane does", **flags}),
+                "largest_exponent": (dims, self.largest_exponent, {"units": "1"}),
+            },
+            coords={self.x: (self.x, self.x_value, unit(self.x)), self.y: (self.y, self.y_value, unit(self.y))},
+        )
 
     def __str__(self) -> str:
         known = self.grid.known

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from .._errors import ArgumentError
 from ._vary import Spread
 
 
@@ -44,18 +45,24 @@ class Plan:
         for name, values in self.grid.items():
             distinct = np.unique(values).size == np.size(values) > 0
             if np.ndim(values) != 1 or not distinct or not np.all(np.isfinite(values)):
-                raise ValueError(f"Argument `vary` must hold distinct numbers for {name}, but {values} was given.")
+                raise ArgumentError("vary", said=f"must hold distinct numbers for {name}, but {values} was given.")
         if both := set(self.grid) & set(self.sampled):
-            raise ValueError(f"Argument `vary` must name each parameter once, but names {', '.join(both)} twice.")
-        if bool(self.sampled) != (self.samples > 0):
-            raise ValueError(
-                f"Argument `samples` must be above 0 if and only if parameters are sampled, but is {self.samples} "
-                f"for {len(self.sampled)} of them."
+            raise ArgumentError("vary", said=f"must name each parameter once, but names {', '.join(both)} twice.")
+        if self.sampled and self.samples < 1:
+            names = ", ".join(self.sampled)
+            raise ArgumentError(
+                "samples", said=f"must say how many samples to take of {names}, but {self.samples} was given."
+            )
+        if self.samples and not self.sampled:
+            raise ArgumentError(
+                "samples", said=f"needs an interval or a tolerance to sample, but {self.samples} was given."
             )
         if self.seed < 0 or self.starts < 1 or self.lanes < 1:
-            raise ValueError(
-                "Arguments `seed`, `starts` and `lanes` must be at least 0, 1 and 1, but are "
-                f"{self.seed}, {self.starts} and {self.lanes}."
+            raise ArgumentError(
+                "seed",
+                "starts",
+                "lanes",
+                said=f"must be at least 0, 1 and 1, but are {self.seed}, {self.starts} and {self.lanes}.",
             )
 
     @property

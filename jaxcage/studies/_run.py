@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ..sweeps import Progress
@@ -102,9 +103,9 @@ def run_study(
     """Compute what the store at `path` lacks; arguments as for `study`."""
     i, n = shard
     if not 1 <= i <= n:
-        raise ValueError(f"Argument `shard` must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
+        raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
     if executor not in ("local", "dask"):
-        raise ValueError(f"Argument `executor` must be local or dask, but {executor!r} was given.")
+        raise ArgumentError("executor", said=f"must be local or dask, but {executor!r} was given.")
     if executor == "dask":
         from ._dask import chunks_on_dask as computed  # needs an extra
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._errors import ArgumentError
 from .._glossary import component_names, quantity
 from .._parameters import parameter_info
 from ..integrate import OUTCOMES
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class OtherStudy(ValueError):
+class OtherStudy(ArgumentError):
     """A store that belongs to another study; the message says in what they differ."""
 
 
@@ -111,13 +112,14 @@ def _group(path: Path, mode: Any) -> Any:
 
 def _check_same(path: Path, study: Study) -> None:
     if not (path / "zarr.json").is_file():
-        raise OtherStudy(f"Argument `store` must be a new folder or the store of this study, but '{path}' is neither.")
+        raise OtherStudy("store", said=f"must be a new folder or the store of this study, but '{path}' is neither.")
     attributes = _group(path, "r").attrs
     if attributes.get("fingerprint") == study.fingerprint:
         return
     theirs, ours = json.loads(str(attributes.get("study", "{}"))), json.loads(json.dumps(study.describe()))
     different = ", ".join(_differences(theirs, ours)) or "its lanes"
-    raise OtherStudy(f"The store '{path}' holds another study, which differs in {different}: choose another folder.")
+    other = f"'{path}' holds another study, which differs in {different}: choose another folder."
+    raise OtherStudy("store", said=f"must be a new folder or the store of this study, but {other}")
 
 
 def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._errors import ArgumentError
 from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
@@ -58,7 +59,7 @@ class Study:
 
     def __post_init__(self):
         if SPEED not in self.plan.names:
-            raise ValueError("Argument `vary` must hold the speed: a single value is enough.")
+            raise ArgumentError("vary", said="must hold the speed: a single value is enough.")
         for name in self.plan.names:
             if name == OIL and isinstance(self.system, CageModel):
                 continue
@@ -66,12 +67,12 @@ class Study:
                 pick(self.system, name)
         own = len(self.system.starts(1.0))
         if self.plan.starts > own:
-            raise ValueError(f"Argument `starts` must be at most {own}, but {self.plan.starts} was given.")
+            raise ArgumentError("starts", said=f"must be at most {own}, but {self.plan.starts} was given.")
         if self.exponents < 1:
-            raise ValueError(f"Argument `exponents` must be at least 1, but {self.exponents} was given.")
+            raise ArgumentError("exponents", said=f"must be at least 1, but {self.exponents} was given.")
         if not 0 <= self.strobe <= self.revolutions:
-            raise ValueError(
-                f"Argument `strobe` must lie between 0 and the {self.revolutions} revolutions, but is {self.strobe}."
+            raise ArgumentError(
+                "strobe", said=f"must lie between 0 and the {self.revolutions} revolutions, but is {self.strobe}."
             )
         self._watch  # refuses impossible counts
 

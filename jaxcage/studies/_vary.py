@@ -6,6 +6,8 @@ import math
 import numpy as np
 from jaxtyping import Float
 
+from .._errors import ArgumentError
+
 
 SIGMAS = 3.0
 """Standard deviations from the nominal value to either end of a tolerance, as in a capable production."""
@@ -22,8 +24,8 @@ class Between:
 
     def __post_init__(self):
         if not (math.isfinite(self.lower) and math.isfinite(self.upper) and self.lower < self.upper):
-            raise ValueError(
-                f"Arguments `lower` and `upper` must ascend, but {self.lower:g} and {self.upper:g} were given."
+            raise ArgumentError(
+                "lower", "upper", said=f"must ascend, but {self.lower:g} and {self.upper:g} were given."
             )
 
     @property
@@ -51,9 +53,10 @@ class Tolerance:
 
     def __post_init__(self):
         if not (math.isfinite(self.value) and math.isfinite(self.deviation) and self.deviation > 0):
-            raise ValueError(
-                "Arguments `value` and `deviation` must be a number and one above 0, but "
-                f"{self.value:g} and {self.deviation:g} were given."
+            raise ArgumentError(
+                "value",
+                "deviation",
+                said=f"must be a number and one above 0, but {self.value:g} and {self.deviation:g} were given.",
             )
 
     @property

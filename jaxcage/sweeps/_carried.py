@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Sweep
 from ..integrate import AbstractMethod, controlled
@@ -78,7 +79,7 @@ def run_up_down_designs(
     speed = checked_speeds(speeds)
     chosen = controlled() if method is None else method
     if not systems:
-        raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
+        raise ArgumentError("systems", said="must hold at least one system, but it is empty.")
     plan = make_plan(discard, revolutions, blocks, keep, exponents, systems[0].dimension)
     starts = None if start is None else [start]
     fresh = np.stack([initial_states(s, speed, starts)[:, 0] for s in systems])  # systems, speeds, dim

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
 from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
@@ -72,7 +73,7 @@ class Designs(eqx.Module):
             return cls(systems[0], 1)
         arrays, rests = zip(*(eqx.partition(_numbers(s), eqx.is_array) for s in systems), strict=True)
         if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
-            raise ValueError("Argument `systems` must hold systems that differ in their numbers only.")
+            raise ArgumentError("systems", said="must hold systems that differ in their numbers only.")
         return cls(eqx.combine(jax.tree.map(lambda *x: jnp.stack(x), *arrays), rests[0]), len(systems))
 
     def strobe(self, method: AbstractMethod, lane: Part) -> StrobeMap:

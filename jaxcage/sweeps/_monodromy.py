@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from ..integrate import AbstractMethod, compiled, controlled, revolution
 from ..models import AbstractForcedSystem
 from ._engine import Designs, Part, over_lanes, run_parts
@@ -44,9 +45,10 @@ def monodromy(
     speed, state = np.asarray(speeds, dtype=float), np.asarray(states, dtype=float)
     systems = list(system) if isinstance(system, Sequence) else [system]
     if speed.ndim != 1 or state.shape != (speed.size, systems[0].dimension):
-        raise ValueError(
-            f"Argument `states` must hold {systems[0].dimension} numbers for each of the {speed.size} speeds, but has "
-            f"shape {state.shape}."
+        raise ArgumentError(
+            "states",
+            said=f"must hold {systems[0].dimension} numbers for each of the {speed.size} speeds, but has "
+            f"shape {state.shape}.",
         )
     place = np.zeros(speed.size, int) if which is None else np.asarray(which, int)
     designs, chosen = Designs.of(systems), controlled() if method is None else method

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Confirmation, Observation, Plan, Sweep
 from ..integrate import AbstractMethod, controlled, finer
@@ -33,37 +34,39 @@ def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> 
 def checked_speeds(speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]) -> np.ndarray:
     speed = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speed.size == 0:
-        raise ValueError("Argument `speeds` must hold at least one speed, but it is empty.")
+        raise ArgumentError("speeds", said="must hold at least one speed, but it is empty.")
     if not np.all(np.isfinite(speed)) or np.any(speed <= 0):
         bad = speed[~(np.isfinite(speed) & (speed > 0))][0]
-        raise ValueError(f"Argument `speeds` must be positive and finite, but it holds {bad} rad/s.")
+        raise ArgumentError("speeds", said=f"must be positive and finite, but it holds {bad} rad/s.")
     if np.any(np.diff(speed) <= 0):
-        raise ValueError("Argument `speeds` must be in ascending order without repetition, but it is not.")
+        raise ArgumentError("speeds", said="must be in ascending order without repetition, but it is not.")
     return speed
 
 
 def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
     if discard < 0 or revolutions < 1:
-        raise ValueError(
-            f"Arguments `discard` and `revolutions` must be at least 0 and 1, but are {discard} and {revolutions}."
+        raise ArgumentError(
+            "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
         )
     if not 0 <= exponents <= dimension:
-        raise ValueError(f"Argument `exponents` must lie between 0 and {dimension}, but {exponents} was given.")
+        allowed = f"at most {dimension}" if exponents > 0 else "at least 0"
+        raise ArgumentError("exponents", said=f"must be {allowed}, but {exponents} was given.")
     if revolutions % blocks:
-        raise ValueError(f"Argument `blocks` must divide the {revolutions} revolutions, but it is {blocks}.")
+        raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
     return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
 def require_persist(persist: int, discard: int, exponents: int, blocks: int) -> None:
     """**Raises:** `ValueError`, also where no lane could be called chaotic for want of an exponent or its error."""
     if persist and persist <= discard:
-        raise ValueError(
-            f"Argument `persist` must be 0 or above the {discard} revolutions discarded, but is {persist}."
+        raise ArgumentError(
+            "persist", said=f"must be 0 or above the {discard} revolutions discarded, but is {persist}."
         )
     if persist and (exponents < 1 or blocks < 2):
-        raise ValueError(
-            "Argument `persist` needs an exponent and its error, from at least 1 of `exponents` and 2 `blocks`, "
-            f"but they are {exponents} and {blocks}."
+        raise ArgumentError(
+            "persist",
+            said="needs an exponent and its error, from at least 1 of `exponents` and 2 `blocks`, "
+            f"but they are {exponents} and {blocks}.",
         )
 
 
@@ -143,7 +146,7 @@ def sweep_designs(
     speed = checked_speeds(speeds)
     chosen = controlled() if method is None else method
     if not systems:
-        raise ValueError("Argument `systems` must hold at least one system, but it is empty.")
+        raise ArgumentError("systems", said="must hold at least one system, but it is empty.")
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
     y0 = np.stack([initial_states(s, speed, starts) for s in systems])  # systems, speeds, starts, dim
@@ -238,13 +241,13 @@ def initial_states(
     wanted = f"states of {system.dimension} numbers"
     if isinstance(starts, np.ndarray):
         if starts.ndim != 3 or starts.shape[::2] != (speed.size, system.dimension):
-            raise ValueError(
-                f"Argument `starts` must hold {wanted} for each of {speed.size} speeds, but has shape {starts.shape}."
+            raise ArgumentError(
+                "starts", said=f"must hold {wanted} for each of {speed.size} speeds, but has shape {starts.shape}."
             )
         return starts
     rows = [np.array([float(c) for c in y]) for y in starts]
     if not rows or any(row.shape != (system.dimension,) for row in rows):
-        raise ValueError(f"Argument `starts` must hold {wanted}, but holds {starts}.")
+        raise ArgumentError("starts", said=f"must hold {wanted}, but holds {starts}.")
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), system.dimension)).copy()
 
 

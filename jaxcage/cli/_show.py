@@ -9,12 +9,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..report import Table as Table, number as number
+from ..report import Table
 
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """Result of a command."""
+    """What a command has to say; the runner adds case, time and files."""
 
     document: Mapping[str, Any]
     tables: Sequence[Table] = ()

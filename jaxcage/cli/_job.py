@@ -1,0 +1,161 @@
+"""What a command has to work with: its options, the model and methods they ask for, and a folder to write to."""
+
+import contextlib
+import functools
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .._errors import InputError
+from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
+from ..integrate import AbstractMethod, FixedSteps, controlled, method
+from ..io import check_writable, load_model, replacing, write_columns
+from ..models import CageModel, case
+from ..plotting import Style, new_figure, restyle
+from ..report import chosen
+from ._console import Say, progress, say
+from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
+
+
+Given = TypeVar("Given", bound=AnyOptions, covariant=True)
+
+
+class Job(Generic[Given]):
+    """A command that is being carried out."""
+
+    def __init__(self, command: str, options: Given):
+        """**Raises:** `InputError` for a model or method that cannot be had."""
+        self.command, self.options, self.began = command, options, time.perf_counter()
+        self.name = ""
+        """Name of the case, or of the TOML file without its ending and with `_` for what no figure can show."""
+        self.files: dict[str, str | None] = {}
+        """What was written, by the key under which it is listed; None for what was asked for and could not be made."""
+        self.asked: AbstractMethod | None = None
+        """Integration method, if any option says how to integrate."""
+        if isinstance(options, IntegrationOptions):
+            self.asked = _method(options)
+        if isinstance(options, Options):
+            self.name, self.model, self.published = _subject(options.case)
+
+    model: CageModel
+    published: PublishedCase | None
+
+    @property
+    def method(self) -> AbstractMethod:
+        """Integration method of sweeps, whose steps are controlled unless the options ask for something else."""
+        return controlled() if self.asked is None else self.asked
+
+    @functools.cached_property
+    def folder(self) -> Path:
+        """The folder to write to, tried out."""
+        assert isinstance(self.options, CommonOptions)
+        return check_writable(self.options.out)
+
+    @contextlib.contextmanager
+    def computing(self, what: str = "", unit: str = "", advice: str = "") -> Iterator[Say]:
+        """Around a computation: nothing is computed for minutes that cannot be written. Yields what is to be told of
+        the progress; `unit` and `advice` are as in `progress`.
+        """
+        _ = self.folder
+        at = f"{what} of {self.name}" if what else f"{self.command} {self.name}".rstrip()
+        with progress(at, unit, advice) as bar:
+            yield bar
+
+    @property
+    def seconds(self) -> float:
+        """Since the command began."""
+        return time.perf_counter() - self.began
+
+    def saved(self, figure: Figure, path: Path) -> Path:
+        """Write a figure in the style that is asked for."""
+        assert isinstance(self.options, CommonOptions)
+        return save_figure(figure, path, self.options.style)
+
+    def given(self, names: str) -> dict[str, Any]:
+        """Options that go to the library under their own names."""
+        return chosen(self.options, names)
+
+    def path(self, ending: str) -> Path:
+        """Where a file goes: named after the command and the case."""
+        return self.folder / f"{self.command}_{self.name}{ending}"
+
+    def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> None:
+        """Write a figure, and list it under `key`."""
+        self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
+
+    def draw(
+        self,
+        draw: Callable[[Axes], Any],
+        size: tuple[float, float],
+        title: str,
+        key: str = "figure",
+        detail: str = "",
+    ) -> None:
+        """Write a figure of one diagram, and list it under `key`."""
+        figure = new_figure(*size)
+        draw(figure.subplots())
+        figure.suptitle(title, fontsize=11)
+        self.figure(figure, key, detail)
+
+    def columns(self, columns: Mapping[str, np.ndarray], key: str = "data", detail: str = "") -> None:
+        """Write a table of numbers, and list it under `key`."""
+        self.listed(key, write_columns(self.path(f"{detail}.csv"), columns))
+
+    def text(self, text: str, path: Path, key: str) -> None:
+        """Write a page, and list it under `key`."""
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        self.listed(key, path)
+
+    def listed(self, key: str, path: Path) -> None:
+        """Show a file at the end."""
+        self.files[key] = str(path)
+
+
+def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
+    """Write a figure, whole or not at all."""
+    with replacing(path) as temporary:
+        restyle(figure, style).savefig(temporary, dpi=figure.dpi)
+    return path
+
+
+def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None]:
+    """Name and model of a case or TOML file; a broken design rule is said on standard error."""
+    if given in PUBLISHED_CASES:
+        name, model, published = given, case(given), PUBLISHED_CASES[given]
+    elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
+        stem = Path(given).stem
+        name = "".join(c if c.isprintable() and c != "$" else "_" for c in stem)  # as matplotlib shows it
+        model, published = load_model(given), None
+    else:
+        known = ", ".join(PUBLISHED_CASES)
+        raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
+    broken = design_rule_violations(model.bearing, model.guidance_gap)
+    if broken:
+        say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
+    return name, model, published
+
+
+def _method(options: IntegrationOptions) -> AbstractMethod | None:
+    if options.solver is None and options.steps is None and options.tolerance is None:
+        return None
+    named = {} if options.solver is None else {"solver": options.solver}
+    return method(**named, steps=options.steps, tolerance=options.tolerance)
+
+
+def samples_per_revolution(chosen: AbstractMethod, most: int = 64) -> int:
+    """Samples that a method can give: of equal steps, they must divide the number."""
+    if not isinstance(chosen, FixedSteps):
+        return most
+    return max(n for n in range(1, min(most, chosen.steps) + 1) if chosen.steps % n == 0)
+
+
+def blocks_of(revolutions: int) -> int:
+    """Blocks for error bars, into which a multiple of 10 can be cut."""
+    return 10 if revolutions % 20 else 20

@@ -1,0 +1,99 @@
+"""What the cage does at one speed: time history with each force, and strobe section."""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .._errors import NoResult
+from ..analysis import OrbitMeasures, Sweep, cage_forces, orbit_measures
+from ..integrate import OUTCOMES, simulate
+from ..io import strobe_columns, write_trajectory
+from ..plotting import simulation_figure, strobe_section
+from ..report import Table, chosen, number, require_some
+from ..sweeps import rpm, sweep
+from ._job import Job, blocks_of, samples_per_revolution
+from ._options import PoincareOptions, SimulateOptions
+from ._show import Report
+
+
+def simulate_at(job: Job[SimulateOptions]) -> Report:
+    """`jaxcage simulate`: time history, orbit and each force at one speed."""
+    options, model = job.options, job.model
+    with job.computing():
+        samples = samples_per_revolution(job.method, 128)
+        length = job.given("revolutions discard")
+        trajectory = simulate(model, rpm(options.speed), **length, samples=samples, method=job.method)
+    if trajectory.outcome != "successful":
+        raise NoResult(f"The simulation at {options.speed:g} rpm failed ({trajectory.outcome}): try more --steps.")
+    forces, measures = cage_forces(model, trajectory), orbit_measures(model, trajectory)
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, {options.revolutions} revolutions"
+    job.figure(simulation_figure(trajectory, forces, float(model.clearance), title), detail=at)
+    job.listed("data", write_trajectory(job.path(f"{at}.csv"), trajectory, forces))
+    document = {
+        "speed_rpm": options.speed,
+        "revolutions": options.revolutions,
+        **chosen(trajectory, "outcome peak error"),
+        "measures": dataclasses.asdict(measures),
+    }
+    error = f"Error of a revolution: at most {trajectory.error:.0e} of the clearance"
+    return Report(document, [Table(title, ("measure", "value", "unit"), _rows(measures))], [error])
+
+
+def _rows(measures: OrbitMeasures) -> list[tuple[str, str, str]]:
+    """Measures with their own words; lengths in millimetres."""
+    shown = {"1": ("", 1.0), "m": ("mm", 1e3)}
+    rows = []
+    for field in dataclasses.fields(measures):
+        unit, factor = shown.get(field.metadata["unit"], (field.metadata["unit"], 1.0))
+        rows.append((field.metadata["text"], f"{factor * getattr(measures, field.name):.4g}", unit))
+    return rows
+
+
+def poincare_at(job: Job[PoincareOptions]) -> Report:
+    """`jaxcage poincare`: strobe section at one speed, from all starts."""
+    options = job.options
+    with job.computing() as say:
+        found = sweep(
+            job.model,
+            np.array([rpm(options.speed)]),
+            **job.given("discard revolutions"),
+            blocks=blocks_of(options.revolutions),
+            keep=options.revolutions,
+            method=job.method,
+            progress=partial(say, ""),
+        )
+    require_some(found.outcome, f" at {options.speed:g} rpm")
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, {options.revolutions} revolutions"
+    names = [f"start {i + 1}: {label}" for i, label in enumerate(found.label[0])]
+    job.draw(lambda ax: strobe_section(found.strobe[0], ax, names=names), (6.5, 5.4), title, detail=at)
+    job.columns(strobe_columns(found), detail=at)
+    starts = _starts(found)
+    columns = {
+        "start": "{[start]}",
+        "label": "{[label]}",
+        "largest exponent per revolution": lambda s: " ± ".join(
+            number(s[n], 4) for n in ("exponent", "standard_error")
+        ),
+    }
+    length = f"{options.discard} + {options.revolutions} revolutions"
+    table = Table.of(f"Strobe section of {job.name} at {options.speed:g} rpm, {length}", columns, starts)
+    return Report({"speed_rpm": options.speed, "starts": starts}, [table])
+
+
+def _starts(found: Sweep) -> list[dict[str, Any]]:
+    """For every start its label, exponent, and strobe points (Y, Y')."""
+    half = found.strobe.shape[-1] // 2
+    return [
+        {
+            "start": i + 1,
+            "label": str(found.label[0, i]),
+            "outcome": OUTCOMES[found.outcome[0, i]],
+            "exponent": float(found.exponents[0, i, 0]),
+            "standard_error": float(found.standard_error[0, i, 0]),
+            "y_C": found.strobe[0, i, :, 1],
+            "vy_C": found.strobe[0, i, :, 1 + half],
+        }
+        for i in range(found.strobe.shape[1])
+    ]

@@ -1,0 +1,88 @@
+"""`jaxcage report`: one page about a design."""
+
+import shlex
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import report
+from .._errors import InputError
+from ..bearing import PUBLISHED_CASES
+from ..sweeps import rpm
+from ._job import Job, blocks_of
+from ._options import ReportOptions
+from ._show import Report
+
+
+SPEEDS, QUICK_SPEEDS = 251, 126
+"""Quick reports take as many revolutions: shorter runs miss orbits that attract slowly, and where they are stable."""
+
+
+def report_on(job: Job[ReportOptions]) -> Report:
+    """Carry out `jaxcage report`."""
+    options = job.options
+    operating = report.read_operating(options.operating)
+    if options.operating and not operating:
+        raise InputError(f"Option --operating must hold a speed, but '{options.operating}' was given.")
+    count = options.count or (QUICK_SPEEDS if options.quick else SPEEDS)
+    with job.computing() as say:
+        findings = report.examine(
+            job.name,
+            job.model,
+            job.published,
+            speeds=rpm(options.first, options.last, count),
+            **job.given("discard revolutions quick"),
+            blocks=blocks_of(options.revolutions),
+            sweep_method=job.method,
+            orbit_method=job.asked,
+            progress=say,
+        )
+    html = report.page(findings, operating, table=_table(options.case), command=_command(options))
+    job.text(html, job.path(".html"), "report")
+    judged = report.judge(findings, operating)
+    failed, size = int(findings.sweep.failed.sum()), len(html.encode())
+    document = _document(findings, judged) | {"failed": failed, "stages": findings.seconds, "bytes": size}
+    stages = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in findings.seconds.items())
+    notes = [f"Failed simulations: {failed}", f"Stages: {stages}", f"Size: {size / 1e6:.1f} MB"]
+    return Report(document, _tables(findings, judged), notes)
+
+
+def _table(case: str) -> Mapping[str, Any] | None:
+    """What the TOML file says, None for a published case."""
+    return None if case in PUBLISHED_CASES else tomllib.loads(Path(case).read_text(encoding="utf-8"))
+
+
+def _command(options: ReportOptions) -> str:
+    """The command line as a shell takes it, without folders."""
+    parts = ["jaxcage", "report", Path(options.case).name]
+    parts += ["--operating", options.operating] if options.operating else []
+    return shlex.join([*parts, *(["--quick"] if options.quick else [])])
+
+
+def _document(findings: report.Findings, judged: list[report.Judged]) -> dict[str, Any]:
+    return report.zones_document(findings.name, findings.zones, findings.published) | {
+        "quick": findings.quick,
+        "synchronous_loss": [report.zone_document(zone) for zone in findings.loss.zones],
+        "operating": [
+            {"low_rpm": j.at.low_rpm, "high_rpm": j.at.high_rpm} | {kind: vars(v) for kind, v in j.verdicts.items()}
+            for j in judged
+        ],
+        "elasticities": {name: s.elasticity for name, s in findings.slopes.items() if s.trusted},
+    }
+
+
+def _tables(findings: report.Findings, judged: list[report.Judged]) -> list[report.Table]:
+    swept = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
+    rows = [
+        (str(j.at) if i == 0 else "", kind, v.state, str(v))
+        for j in judged
+        for i, (kind, v) in enumerate(j.verdicts.items())
+    ]
+    verdicts = report.Table("Operating speeds", ("cage speed", "kind of zone", "verdict", "where"), rows)
+    return [
+        *([verdicts] if rows else []),
+        report.loss_table(findings.name, findings.found, findings.loss, findings.published),
+        report.zones_table(findings.name, findings.zones, findings.published, swept),
+        *report.transient_tables(findings.name, findings.zones),
+    ]

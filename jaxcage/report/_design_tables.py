@@ -1,0 +1,77 @@
+"""Designs and their tolerances as tables."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from .._parameters import parameter_info, parameters
+from ..design import Optimised, SobolIndices, ToleranceBudget
+from ..models import CageModel
+from ._table import Table, number
+
+
+MOST = 8
+"""Parameters listed in a budget."""
+
+
+def parameters_table(name: str, model: CageModel, found: Optimised, document: Mapping[str, Any]) -> Table:
+    """What was varied, what it costs and what it brings, before and after; `document` is the command's."""
+    info, bounds, before = parameter_info(model), document["vary"], parameters(model)
+    rows = [
+        (n, info[n].unit, f"{float(before[n]):.4g}", f"{value:.4g}", " to ".join(f"{b:.4g}" for b in bounds[n]))
+        for n, value in found.best.values.items()
+    ]
+    for what, unit, form in (("cost", "", ".3f"), ("chaotic_rpm", "rpm", ".0f")):
+        then, now = (format(value, form) for value in document[what].values())
+        rows.append((what.removesuffix("_rpm"), unit, then, now, ""))
+    return Table(f"Design of {name}", ("parameter", "unit", "before", "after", "bounds"), rows)
+
+
+def optima_table(found: Optimised) -> Table:
+    """The distinct optima, the best first."""
+    columns = {
+        **{name: f"{{0[0].values[{name}]:.4g}}" for name in found.best.values},
+        "objective [rpm]": "{0[0].objective:.0f} ± {0[0].error:.0f}",
+        "starts": "{[1]}",
+        "at a bound": lambda item: ", ".join(item[0].at_bound) or "none",
+    }
+    return Table.of("Optima", columns, found.distinct)
+
+
+def before_and_after_tables(document: Mapping[str, Any]) -> list[Table]:
+    """Zones of both kinds before and after."""
+    tables = []
+    for kind in ("chaotic", "synchronous_loss"):
+        found = document[f"{kind}_zones"]
+        rows = [
+            (when, str(i), *map(number, zone.values()))
+            for when, listed in found.items()
+            for i, zone in enumerate(listed, start=1)
+        ]
+        if found:
+            title = f"{kind.replace('_', '-').capitalize()} zones before and after [rpm]"
+            tables.append(Table(title, ("design", "zone", "onset", "exit", "width"), rows))
+    return tables
+
+
+def sobol_table(name: str, shares: SobolIndices) -> Table:
+    """What each parameter does to the chaotic speeds, alone and with the others."""
+    cell = lambda value, pair: f"{value:+.2f} ({pair[0]:+.2f} to {pair[1]:+.2f})"
+    columns = {
+        "parameter": str,
+        "alone": lambda n: cell(shares.first[n], shares.first_interval[n]),
+        "with interactions": lambda n: cell(shares.total[n], shares.total_interval[n]),
+    }
+    title = f"Chaotic speeds of {name}: shares of the variance over {shares.evaluations} designs (95 % interval)"
+    return Table.of(title, columns, sorted(shares.total, key=lambda n: -shares.total[n]))
+
+
+def budget_table(budget: ToleranceBudget, tolerance: float) -> Table:
+    """Which tolerances [%] move an edge most."""
+    order = sorted(budget.deviation_rpm.items(), key=lambda item: -item[1])
+    share = lambda item: f"{100 * (item[1] / budget.total_rpm) ** 2:.0f} %"
+    columns = {"parameter": "{[0]}", "rpm": "{[1]:.3g}", "share of variance": share}
+    title = (
+        f"{budget.edge.capitalize()} at {budget.speed_rpm:.1f} rpm under +-{tolerance:g} % of everything: "
+        f"standard deviation {budget.total_rpm:.3g} rpm"
+    )
+    return Table.of(title, columns, order[:MOST])
