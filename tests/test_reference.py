@@ -82,7 +82,7 @@ def test_pulses_of_rollers():
     model = jc.replace(jc.case("1a"), impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))
     phases = np.linspace(0, 2 * np.pi / 13, 50)
     at = lambda speed, tau: model.cage_at(speed).forces(tau, 0.0, 0.0, 0.0, 0.0)["impact"][:2]
-    force = eqx.filter_jit(lambda speed: jax.vmap(lambda tau: at(speed, tau))(phases))
+    force = eqx.filter_jit(lambda speed: jax.vmap(lambda tau: at(speed, tau))(jnp.asarray(phases)))
     for speed in (300.0, 2880.0):
         found, theirs = np.stack(force(jnp.asarray(speed)), axis=1), reference.field(model, speed)
         expected = np.array([theirs.impact(tau) for tau in phases])

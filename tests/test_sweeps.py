@@ -160,7 +160,7 @@ def test_simulation_and_sweep_agree():
         ({"speeds": np.array([2.0, 1.0])}, "ascending"),
         ({"discard": -1}, "at least 0 and 1"),
         ({"revolutions": 0}, "at least 0 and 1"),
-        ({"exponents": 3}, "between 0 and 2"),
+        ({"exponents": 3}, "at most 2"),
         ({"blocks": 7}, "divide"),
         ({"starts": []}, "states of 2 numbers"),
         ({"starts": [(1.0,)]}, "states of 2 numbers"),
