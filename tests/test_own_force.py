@@ -129,7 +129,8 @@ def test_an_orbit_moves_with_a_drag_as_differences_say():
         model = jc.replace(OWN, **{"extra.ViscousDrag.coefficient": coefficient})
         return jc.periodic_orbit(model, SPEED, guess=orbit, method=method).state
 
-    slope = jax.jacfwd(state)(SHARE)
+    slope = jax.jacfwd(state)(SHARE)  # a Python number, as a user writes it
+    np.testing.assert_allclose(jax.grad(lambda c: state(c)[0])(SHARE), slope[0], rtol=1e-9)
     differences = (state(SHARE + 3e-4) - state(SHARE - 3e-4)) / 6e-4
     np.testing.assert_allclose(slope, differences, atol=1e-6 * float(jnp.max(jnp.abs(slope))))
 

@@ -17,6 +17,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
+from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
@@ -159,16 +160,22 @@ def settled(
 # --- derivatives ---------------------------------------------------------------------------------------------------
 
 
-@eqx.filter_custom_jvp
 def as_root(given: Any, *, equations: AbstractMapEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
     """u and what else is known at it, as functions of what is given: a root of the equations there."""
+    # `jax.grad` of a Python number traces a number that is no array, and that a filter of arrays would not see
+    given = jax.tree.map(lambda x: jnp.asarray(x) if isinstance(x, Tracer) else x, given)
+    return _as_root(given, equations=equations, u=u, aux=aux)
+
+
+@eqx.filter_custom_jvp
+def _as_root(given: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> tuple[Array, Any]:
     return u, aux
 
 
-@as_root.def_jvp
+@_as_root.def_jvp
 def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> Any:
     (given,), (given_dot,) = primals, tangents
-    u, aux = as_root(given, equations=equations, u=u, aux=aux)
+    u, aux = _as_root(given, equations=equations, u=u, aux=aux)
     numbers, moving = eqx.filter_jvp(lambda g: _numbers(equations, u, g), (given,), (given_dot,))
     x = jnp.concatenate([u[: equations.frame.scale.size], numbers.k])
     around, slopes = by_columns(x, f=Slopes(Push(frozen(numbers.like), equations.frame)))
