@@ -62,15 +62,14 @@ def counted(
         return _open(chosen), _counts(first, most, 1.0)
     if not isinstance(method, FixedSteps):
         return method, _counts(1, 1, 0.0)
-    steps = method.steps if isinstance(method.steps, int) else 0
-    return (_open(method), _counts(max(steps // 2, 1), steps, 0.0)) if steps else (method, _counts(1, 1, 0.0))
+    return _open(method), _counts(jnp.maximum(method.steps // 2, 1), method.steps, 0.0)
 
 
 def _open(method: FixedSteps) -> FixedSteps:
     return FixedSteps(method.solver, jnp.asarray(1, int))
 
 
-def _counts(first: int, last: int, tolerance: float) -> Counts:
+def _counts(first: Any, last: Any, tolerance: float) -> Counts:
     return Counts(jnp.asarray(first, int), jnp.asarray(last, int), jnp.asarray(tolerance))
 
 
