@@ -201,10 +201,10 @@ def replace(module: M, **values: PyTree) -> M:
     for name, value in values.items():
         if not any(name in known for known in (parts, leaves, choices)):
             known = ", ".join([*leaves, *choices, *sorted(parts)])
-            raise ValueError(f"Argument `{name}` must name a part of the model, one of: {known}.")
+            raise ArgumentError(name, said=f"must name a part of the model, one of: {known}.")
         offered = fields[choices[name]].metadata.get("choice") if name in choices else None
         if offered and value not in offered:
-            raise ValueError(f"Argument `{name}` must be one of {', '.join(offered)}, but {value!r} was given.")
+            raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
     if exchanged := {name: values[name] for name in parts if name in values}:
         module = _with_parts(module, exchanged)
     changed = [name for name in leaves if name in values and name not in parts]

@@ -215,6 +215,11 @@ def test_scatter_laws():
     assert ray.std() == pytest.approx(np.sqrt(4 / np.pi - 1), rel=5e-3)  # of a Rayleigh distribution with mean 1
 
 
+def test_a_scatter_of_all_and_more_is_refused():
+    with pytest.raises(ValueError, match="Argument `half_width` must be at least 0 and below 1, but 3 was given."):
+        jc.design.uniform(3.0)
+
+
 @pytest.mark.parametrize(
     "make, words",
     [

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import OUTCOMES
 from ._labels import closing_period, label_lanes, too_few_revolutions
@@ -128,7 +129,7 @@ class Sweep:
         **Raises:** `ValueError` where lanes were not followed.
         """
         if self.escape is None:
-            raise ValueError("Argument `horizon` of the sweep must be given for this, but lanes were not followed.")
+            raise ArgumentError("horizon", said="of the sweep must be given for this, but lanes were not followed.")
         begin = self.discard + self.revolutions % LIFE_BLOCK  # of whole blocks
         times = self.escape[max(i - 1, 0) : i + 2].ravel() - begin
         return survival(np.maximum(times, 0.0), self.horizon - begin, block=LIFE_BLOCK)

@@ -14,7 +14,9 @@ Scatter = Callable[[Float[np.ndarray, " draws"]], Float[np.ndarray, " draws"]]
 
 
 def uniform(half_width: float) -> Scatter:
-    """Made value over nominal one, evenly within +-`half_width`, from evenly drawn numbers between 0 and 1."""
+    """Made value over nominal one, evenly within +-`half_width`, below 1, from evenly drawn numbers between 0 and 1."""
+    if not 0 <= half_width < 1:
+        raise ArgumentError("half_width", said=f"must be at least 0 and below 1, but {half_width:g} was given.")
     return lambda q: 1 + half_width * (2 * q - 1)
 
 

@@ -13,6 +13,8 @@ from jaxtyping import Float
 from numpy.polynomial import Polynomial, legendre
 from scipy.special import roots_jacobi
 
+from .._errors import ArgumentError
+
 
 class AxialProfiles(NamedTuple):
     """Integrals over half a land, eta from 0 to 1, of the symmetric basis functions."""
@@ -36,7 +38,7 @@ def axial_profiles(count: int) -> AxialProfiles:
     **Raises:** `ValueError` for a count outside 1 to 8.
     """
     if not 1 <= count <= 8:
-        raise ValueError(f"Argument `count` must lie between 1 and 8, but {count} was given.")
+        raise ArgumentError("count", said=f"must lie between 1 and 8, but {count} was given.")
     points = roots_jacobi(2 * count - 1, 2, 2)[0]
     points[count - 1] = 0.0
     wall = Polynomial([1.0, 0.0, -1.0])

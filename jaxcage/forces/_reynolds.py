@@ -33,6 +33,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from .._errors import ArgumentError
 from .._types import Scalar
 from ._axial import axial_profiles
 from ._ring import solve_ring
@@ -149,7 +150,7 @@ def film_pressure_field(
     **Raises:** `ValueError` for fewer than 8 stations.
     """
     if stations < 8:
-        raise ValueError(f"Argument `stations` must be at least 8, but {stations} was given.")
+        raise ArgumentError("stations", said=f"must be at least 8, but {stations} was given.")
     cell, axial, follow = 2 * np.pi / stations, axial_profiles(profiles), grooves is None
     at = _stations(x, y, cell * np.arange(stations), follow)
     face = _stations(x, y, cell * (np.arange(stations) + 0.5), follow)

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
 from ._method import AbstractMethod, AdaptiveSteps, FixedSteps, Stretch, make_fixed, run_steps
@@ -259,8 +260,8 @@ def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] =
     **Raises:** `ValueError` for an error that is not positive, a ladder of fewer than two rungs, or an unknown solver.
     """
     if len(ladder) < 2 or any(int(steps) < 1 for _, steps in ladder):
-        raise ValueError(f"Argument `ladder` must have two or more pairs of a solver and its steps, but is {ladder}.")
+        raise ArgumentError("ladder", said=f"must have two or more pairs of a solver and its steps, but is {ladder}.")
     if not error > 0:
-        raise ValueError(f"Argument `error` must be positive, but {error} was given.")
+        raise ArgumentError("error", said=f"must be positive, but {error} was given.")
     groups = itertools.groupby(ladder, key=lambda pair: pair[0])
     return _ladder([(make_fixed(name, 1).solver, [int(n) for _, n in rungs]) for name, rungs in groups], error)

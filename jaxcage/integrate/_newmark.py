@@ -13,6 +13,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import SecondOrderField
 
@@ -39,7 +40,7 @@ class NewmarkBeta(dfx.AbstractSolver):
     def init(self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any) -> None:
         del terms, t0, t1, y0
         if not isinstance(args, SecondOrderField):
-            raise ValueError("Argument `args` must be a `SecondOrderField`: Newmark's method needs accelerations.")
+            raise ArgumentError("args", said="must be a `SecondOrderField`: Newmark's method needs accelerations.")
 
     def step(
         self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any, solver_state: None, made_jump: Any

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
+from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import AbstractField
 from ._explicit import combine
@@ -128,7 +129,7 @@ class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     def init(self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any) -> _SolverState:
         del terms, t0, t1, y0
         if not isinstance(args, AbstractField):
-            raise ValueError("Argument `args` must be the field to integrate, but it is not an `AbstractField`.")
+            raise ArgumentError("args", said="must be the field to integrate, but it is not an `AbstractField`.")
         return None
 
     def step(

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
 from ..models import AbstractForcedSystem
@@ -93,24 +94,26 @@ def _run(
 def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> State:
     y0 = system.starts(jnp.asarray(speed))[0] if start is None else start
     if len(y0) != system.dimension:
-        raise ValueError(f"Argument `start` must be a state of {system.dimension} numbers, but has {len(y0)}.")
+        raise ArgumentError("start", said=f"must be a state of {system.dimension} numbers, but has {len(y0)}.")
     return tuple(jnp.asarray(c, dtype=float) for c in y0)
 
 
 def _check(speed: float, revolutions: int, samples: int, discard: int = 0) -> None:
     if not (np.isfinite(speed) and speed > 0):
-        raise ValueError(f"Argument `speed` must be positive and finite, but {speed} rad/s was given.")
+        raise ArgumentError("speed", said=f"must be positive and finite, but {speed} rad/s was given.")
     if revolutions < 1 or samples < 1 or discard < 0:
-        raise ValueError(
-            "Arguments `revolutions`, `samples` and `discard` must be at least 1, 1 and 0, but are "
-            f"{revolutions}, {samples} and {discard}."
+        raise ArgumentError(
+            "revolutions",
+            "samples",
+            "discard",
+            said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
         )
 
 
 def _method(method: AbstractMethod | None, samples: int) -> ControlledSteps:
     if isinstance(method, FixedSteps) and method.steps % samples:
-        raise ValueError(
-            f"Argument `samples` must divide the {method.steps} steps per revolution of the method, but is {samples}."
+        raise ArgumentError(
+            "samples", said=f"must divide the {method.steps} steps per revolution of the method, but is {samples}."
         )
     return stated(controlled() if method is None else method)
 

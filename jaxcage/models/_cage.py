@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._errors import ArgumentError
 from .._parameters import choice, parameter, with_numbers
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
@@ -72,18 +73,18 @@ class CageModel(AbstractForcedSystem):
             part = getattr(self, name)
             if isinstance(part, eqx.Module) and type(part) not in kinds:
                 wanted = " or ".join(f"`{kind.__name__}`" for kind in kinds)
-                raise ValueError(
-                    f"Argument `{name}` must be a {wanted}, but is a `{type(part).__name__}`; a force of your own goes "
-                    "into `extra`."
+                raise ArgumentError(
+                    name,
+                    said=f"must be a {wanted}, but is a `{type(part).__name__}`; a force of your own goes in `extra`.",
                 )
         _check_extra(self.extra)
         clearance = self.clearance
         for name, length in (("contact", self.contact.smoothing), ("film", self.film.smoothing)):
             if is_concrete(length, clearance) and np.any(np.asarray(length) > SMOOTHEST * np.asarray(clearance)):
                 given, room = (1e3 * a for a in _worst(length, clearance))
-                raise ValueError(
-                    f"Argument `{name}.smoothing` must be at most a tenth of the clearance, {room:g} mm, but is "
-                    f"{given:g} mm."
+                raise ArgumentError(
+                    f"{name}.smoothing",
+                    said=f"must be at most a tenth of the clearance, {room:g} mm, but is {given:g} mm.",
                 )
 
     @property
@@ -157,15 +158,18 @@ def _check_extra(laws: Any) -> None:
     """**Raises:** `ValueError` for anything but a tuple of force laws, each with a name of its own."""
     if not isinstance(laws, tuple) or not all(isinstance(law, AbstractForce) for law in laws):
         given = ", ".join(type(law).__name__ for law in laws) if isinstance(laws, tuple) else type(laws).__name__
-        raise ValueError(
-            f"Argument `extra` must be a tuple of forces, each a `jaxcage.forces.AbstractForce`, but holds: {given}."
+        raise ArgumentError(
+            "extra", said=f"must be a tuple of forces, each a `jaxcage.forces.AbstractForce`, but holds: {given}."
         )
     names = [type(law).__name__ for law in laws]
     taken = [name for i, name in enumerate(names) if name in (*FORCES, *names[:i])]
     if taken:
-        raise ValueError(
-            f"Argument `extra` must name each force once, beside {', '.join(FORCES)}, but `{taken[0]}` is there twice: "
-            "a force is named after its class, and a subclass gives it another name."
+        raise ArgumentError(
+            "extra",
+            said=(
+                f"must name each force once, beside {', '.join(FORCES)}, but `{taken[0]}` is there twice: "
+                "a force is named after its class, and a subclass gives it another name."
+            ),
         )
 
 

@@ -9,6 +9,7 @@ micrometres; with the fixed half film, the synchronous impact, a rigid rib and c
 import dataclasses
 from typing import Literal, get_args
 
+from .._errors import ArgumentError
 from ..forces import UnbalanceReading
 
 
@@ -82,5 +83,5 @@ def constants(name: str) -> Constants:
     """
     if name not in CONSTANTS:
         known = ", ".join(get_args(ConstantsName))
-        raise ValueError(f"Argument `constants` must be one of {known}, but '{name}' was given.")
+        raise ArgumentError("constants", said=f"must be one of {known}, but '{name}' was given.")
     return CONSTANTS[name]

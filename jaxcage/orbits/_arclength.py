@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
 from ._astray import ASIDE, CROSSED, judged
@@ -240,9 +241,12 @@ class Steps:
 
     def __post_init__(self):
         if not 0 < self.shortest <= self.first <= self.longest:
-            raise ValueError(
-                "Argument `steps` must have 0 < shortest <= first <= longest, but has "
-                f"{self.shortest:g}, {self.first:g} and {self.longest:g}."
+            raise ArgumentError(
+                "steps",
+                said=(
+                    "must have 0 < shortest <= first <= longest, but has "
+                    f"{self.shortest:g}, {self.first:g} and {self.longest:g}."
+                ),
             )
 
 

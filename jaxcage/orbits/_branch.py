@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod
@@ -177,18 +178,18 @@ def branch(
     """
     require_x64()
     if not lower < upper:
-        raise ValueError(f"Argument `upper` must be above `lower`, but they are {upper:g} and {lower:g}.")
+        raise ArgumentError("upper", said=f"must be above `lower`, but they are {upper:g} and {lower:g}.")
     known_speed: Any = getattr(orbit, "speed", speed)
     state, at = orbit if isinstance(orbit, tuple) else (orbit.state, value_of(system, known_speed, parameter))
     known_speed = at if parameter == SPEED else known_speed
     if known_speed is None:
-        raise ValueError(f"Argument `speed` must be given where the parameter is `{parameter}`, but it is not.")
+        raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
     state = guess_state(system, known_speed, state)
     count = int(getattr(orbit, "periods", periods))
     (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], count, steps)
     if found is None:
-        raise ValueError(f"Argument `orbit` must be near a periodic orbit, but none is near it at {float(at):g}.")
+        raise ArgumentError("orbit", said=f"must be near a periodic orbit, but none is near it at {float(at):g}.")
     return found
 
 
@@ -212,8 +213,8 @@ def branches(
     """
     require_x64()
     if not systems or len(systems) != len(orbits):
-        raise ValueError(
-            f"Arguments `systems` and `orbits` must be as many, above 0, but are {len(systems)} and {len(orbits)}."
+        raise ArgumentError(
+            "systems", "orbits", said=f"must be as many, above 0, but are {len(systems)} and {len(orbits)}."
         )
     starts = []
     for system, orbit in zip(systems, orbits, strict=True):

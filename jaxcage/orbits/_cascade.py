@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -90,7 +91,7 @@ def doubled_branch(
     """
     require_x64()
     if point.kind != "period-doubling":
-        raise ValueError(f"Argument `point` must be a period doubling, but it is a {point.kind}.")
+        raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
     at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
@@ -107,7 +108,7 @@ def doubled_branch(
             break
         amplitude /= 4
     else:
-        raise ValueError(f"Argument `point` must be a period doubling, but no doubled branch begins at {at:g}.")
+        raise ArgumentError("point", said=f"must be a period doubling, but no doubled branch begins at {at:g}.")
     stop = lambda lane, points: until_doubling and bool(_doubling(follower, points[-1]) < 0)
     (trace,) = follow(curves, start, steps=steps, inside=follower.inside, stop=stop)
     (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, compiled, strobe_map
 from ..models import AbstractForcedSystem
@@ -39,7 +40,7 @@ def coexisting_orbits(
     """
     require_x64()
     if count < 1:
-        raise ValueError(f"Argument `count` must be at least 1, but {count} was given.")
+        raise ArgumentError("count", said=f"must be at least 1, but {count} was given.")
     scale = np.array([float(c) for c in system.scale(speed)])
     own = np.array([[float(c) for c in y] for y in system.starts(speed)])
     random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int, Shaped
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -105,14 +106,14 @@ def curve(
     """
     require_x64()
     if point.kind not in ("period-doubling", "torus", "fold"):
-        raise ValueError(f"Argument `point` must be a period-doubling, torus or fold, but it is a {point.kind}.")
+        raise ArgumentError("point", said=f"must be a period-doubling, torus or fold, but it is a {point.kind}.")
     if not (lower < upper and x_lower < x_upper):
-        raise ValueError("Arguments `lower` and `upper`, `x_lower` and `x_upper` must be in ascending order.")
+        raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
     tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), is_free(period), method)
     start, curves = tracer.start(point)
     if not bool(start.converged[0]):
-        raise ValueError(
-            f"Argument `point` must be a {point.kind} of the system, but Newton's method finds none there."
+        raise ArgumentError(
+            "point", said=f"must be a {point.kind} of the system, but Newton's method finds none there."
         )
     both = turned(take(start, np.zeros(2, dtype=int)), np.array([1.0, -1.0]))
     up, down = follow(

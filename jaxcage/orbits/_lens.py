@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._errors import ArgumentError
 from .._parameters import get, parameter_paths
 from ..models import AbstractForcedSystem
 
@@ -45,7 +46,7 @@ def pick(system: AbstractForcedSystem, parameter: Parameter) -> Callable[[Any], 
     paths = parameter_paths(system) or _by_field_name(system)
     if parameter not in paths:
         known = ", ".join([SPEED, *paths])
-        raise ValueError(f"Argument `parameter` must be one of {known}, but '{parameter}' was given.")
+        raise ArgumentError("parameter", said=f"must be one of {known}, but '{parameter}' was given.")
     path = paths[parameter]
     return lambda s: get(s, path)
 

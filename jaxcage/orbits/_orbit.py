@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, FixedSteps, compiled, strobe_map
@@ -281,7 +282,7 @@ def periodic_orbit(
 def is_free(period: str) -> bool:
     """Whether the period of an orbit is unknown."""
     if period not in get_args(Period):
-        raise ValueError(f"Argument `period` must be one of driven, free, but '{period}' was given.")
+        raise ArgumentError("period", said=f"must be one of driven, free, but '{period}' was given.")
     return period == "free"
 
 
@@ -291,7 +292,7 @@ def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Any) -> Floa
         guess = system.starts(speed)[0]
     state = guess.state if isinstance(guess, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in guess])
     if state.shape != (system.dimension,):
-        raise ValueError(
-            f"Argument `guess` must be a state of {system.dimension} numbers, but has shape {state.shape}."
+        raise ArgumentError(
+            "guess", said=f"must be a state of {system.dimension} numbers, but has shape {state.shape}."
         )
     return jax.lax.stop_gradient(state)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
@@ -225,9 +226,9 @@ def bifurcation(
     """
     require_x64()
     if not reach >= 0:
-        raise ValueError(f"Argument `reach` must be at least 0, but {reach:g} was given.")
+        raise ArgumentError("reach", said=f"must be at least 0, but {reach:g} was given.")
     if kind not in get_args(Kind):
-        raise ValueError(f"Argument `kind` must be one of {', '.join(KINDS)}, but '{kind}' was given.")
+        raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
@@ -303,7 +304,7 @@ def _read_guess(
     if parameter == SPEED:
         known_speed = at
     if known_speed is None:
-        raise ValueError(f"Argument `speed` must be given where the parameter is `{parameter}`, but it is not.")
+        raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     return guess_state(system, known_speed, state), known_speed, frozen(jnp.asarray(at, dtype=float)), spin
 
 

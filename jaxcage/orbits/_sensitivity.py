@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, StrobeMap, compiled
@@ -224,7 +225,7 @@ def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMetho
     steps."""
     require_x64()
     if point.kind == "branch-point":
-        raise ValueError("Argument `point` must be a period-doubling, torus or fold, but it is a branch-point.")
+        raise ArgumentError("point", said="must be a period-doubling, torus or fold, but it is a branch-point.")
     edge = _located(system, point, method)
     return edge.speed if edge.status == "converged" else float("nan")
 
@@ -310,7 +311,7 @@ def limit_sensitivity(
     **Raises:** `ValueError` for a cascade over another parameter than speed, or of fewer than two points.
     """
     if len(cascade.points) < 2 or any(p.parameter != SPEED for p in cascade.points):
-        raise ValueError(f"Argument `cascade` must have two points over speed, but has {len(cascade.points)}.")
+        raise ArgumentError("cascade", said=f"must have two points over speed, but has {len(cascade.points)}.")
     before, last = (sensitivity(system, p, name, method) for p in cascade.points[-2:])
     return _combined(name, "period-doubling", ((1 + 1 / (FEIGENBAUM - 1), last), (-1 / (FEIGENBAUM - 1), before)))
 
