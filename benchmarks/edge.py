@@ -17,7 +17,7 @@ from .problem import CASE
 EDGE = "zone 1 exit"
 
 
-def search(lower_rpm: float, upper_rpm: float) -> tuple[jc.orbits.SpecialPoint, float]:
+def search(lower_rpm: float, upper_rpm: float) -> tuple[jc.orbits.Point, float]:
     """The edge among the synchronous orbits between two speeds, and the seconds it took to find, compiling included."""
     begin = time.perf_counter()
     orbits = jc.synchronous_orbits(jc.case(CASE, "preliminary"), jc.rpm(lower_rpm), jc.rpm(upper_rpm))
@@ -31,7 +31,7 @@ def twice(name: str, run: Callable[[], Any]) -> dict[str, float]:
     return {f"{name}_compile": max(first - second, 0.0), name: second}
 
 
-def solve_and_differentiate(point: jc.orbits.SpecialPoint) -> dict[str, float]:
+def solve_and_differentiate(point: jc.orbits.Point) -> dict[str, float]:
     """The edge solved for again, and solved for together with its derivatives by every parameter."""
     model = jc.case(CASE, "preliminary")
     parts = twice("solve", lambda: edge_speed(model, point))

@@ -57,7 +57,7 @@ def followed(model: jc.CageModel) -> dict[tuple[float, float], jc.orbits.Sensiti
             assert last.state is not None, f"the period doubling ends before {design}"
             steps = {"guidance_gap": (design[0] - near[0]) / SUBSTEPS, "eccentricity": (design[1] - near[1]) / SUBSTEPS}
             rpm = last.value_rpm + sum(last.derivative[n] * d for n, d in steps.items())
-            guess = jc.orbits.Located("period-doubling", float(jc.rpm(rpm)), last.state)
+            guess = jc.orbits.Point("period-doubling", float(jc.rpm(rpm)), last.state)
             last = jc.sensitivity(jc.replace(model, guidance_gap=gap, eccentricity=e), guess)
         found[design] = last
     return {design: found[design] for design in DESIGNS}
@@ -77,7 +77,7 @@ def main() -> None:
     names = {d: f"{1e3 * d[0]:.2f} mm, {1e6 * d[1]:.0f} um" for d in edges}
     models = {names[d]: jc.replace(model, guidance_gap=d[0], eccentricity=d[1]) for d in edges}
     points = [
-        jc.orbits.Located("period-doubling", float(jc.rpm(s.value_rpm)), np.asarray(s.state)) for s in edges.values()
+        jc.orbits.Point("period-doubling", float(jc.rpm(s.value_rpm)), np.asarray(s.state)) for s in edges.values()
     ]
     rng, fits, began = np.random.default_rng(0), [], time.perf_counter()
     for draw in range(options.draws):

@@ -57,10 +57,10 @@ def models(cases: list[str]) -> dict[str, jc.CageModel]:
     return found
 
 
-def located(model: jc.CageModel) -> dict[str, jc.orbits.Located]:
+def located(model: jc.CageModel) -> dict[str, jc.orbits.Point]:
     """Ends of the synchronous-loss zones, at the default steps."""
     edges = jc.loss_zones(jc.synchronous_orbits(model, float(jc.rpm(4000)), float(jc.rpm(27500)))).edges
-    return {n: jc.orbits.Located(p.kind, p.speed, p.state) for n, p in edges.items() if p.kind != "branch-point"}
+    return {n: jc.orbits.Point(p.kind, p.speed, p.state) for n, p in edges.items() if p.kind != "branch-point"}
 
 
 def starts(model: jc.CageModel, speed: float) -> list[tuple[float, ...]]:

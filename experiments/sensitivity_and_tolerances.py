@@ -45,7 +45,7 @@ solved = []
 for _ in range(small(60, 2)):
     changed = {name: now[name] * (1 + 0.05 * rng.uniform(-1, 1)) for name in varied}
     guess = exact.value_rpm * (1 + sum(exact.elasticity[n] * (v / now[n] - 1) for n, v in changed.items())) * np.pi / 30
-    found = jc.sensitivity(jc.replace(model, **changed), jc.orbits.Located(edge.kind, guess, exact.state))
+    found = jc.sensitivity(jc.replace(model, **changed), jc.orbits.Point(edge.kind, guess, exact.state))
     solved.append(found.value_rpm)
 solved = np.array(solved)
 print(

@@ -38,9 +38,9 @@ from .models import (
     case as case,
 )
 from .orbits import (
-    BifurcationPoint as BifurcationPoint,
     Branch as Branch,
     Orbit as Orbit,
+    Point as Point,
     bifurcation as bifurcation,
     branch as branch,
     curve as curve,

@@ -8,8 +8,8 @@ from jaxcage.orbits import (
     Branch,
     Curve,
     Explained,
+    Point,
     Sensitivity,
-    SpecialPoint,
     Stretch,
     SynchronousOrbits,
     loss_zones,
@@ -27,14 +27,13 @@ def settled(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.full(points.shape, 512), np.full(points.shape, 1e-7)
 
 
-def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> SpecialPoint:
+def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> Point:
     """A bifurcation of a 4-dimensional system."""
     others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
     mu = np.array([critical, *others, 0.1], dtype=complex)
     state = np.array([1e-5, 2e-5, 0.1, 0.2])
-    return SpecialPoint(
-        kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge, steps=1024, error=1e-4 * PER_RPM
-    )
+    known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
+    return Point(kind, rpm * PER_RPM, state, **known)
 
 
 def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.Sweep:

@@ -18,8 +18,8 @@ from jaxcage.orbits import (
     Branch,
     CodimensionTwo,
     Curve,
+    Point,
     Sensitivity,
-    SpecialPoint,
     Stretch,
     SynchronousOrbits,
     loss_zones,
@@ -49,25 +49,16 @@ PERIOD_DOUBLING_RPM = 12355.535
 """Period doubling of case 1a, found by the search over the whole range and by Newton's method."""
 
 
-def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> SpecialPoint:
+def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> Point:
     others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
     multipliers = np.array([critical, *others, 0.1], dtype=complex)
     state = np.array([1e-5, 2e-5, 0.1, 0.2])
-    return SpecialPoint(
-        kind,
-        rpm * PER_RPM,
-        rpm * PER_RPM,
-        state,
-        multipliers,
-        np.zeros(4),
-        index,
-        edge,
-        steps=1024,
-        error=1e-4 * PER_RPM,
-    )
+    outcome = 5 if kind == "unexplained" else 0  # `unexplained`, `converged`
+    known = dict(multipliers=multipliers, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=outcome)
+    return Point(kind, rpm * PER_RPM, state, **known)
 
 
-def branch(rpm: np.ndarray, stable: np.ndarray, *special: SpecialPoint, height: float = 2e-5) -> Branch:
+def branch(rpm: np.ndarray, stable: np.ndarray, *special: Point, height: float = 2e-5) -> Branch:
     state = np.tile([1e-5, height, 0.1, 0.2], (rpm.size, 1))
     size = np.where(stable, 0.5, 1.5)[:, None]
     mu = size * np.array([1.0, 0.5, 0.4, 0.1], dtype=complex)
@@ -290,7 +281,7 @@ def test_bifurcations_of_a_narrow_range(capsys: pytest.CaptureFixture[str], tmp_
 def test_gradient_command(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits
 ):
-    def sensitivities(system: Any, points: dict[str, SpecialPoint], method: Any) -> dict[str, Sensitivity]:
+    def sensitivities(system: Any, points: dict[str, Point], method: Any) -> dict[str, Sensitivity]:
         moved = {n: edge(n, float(p.speed_rpm), cage_mass=-0.75, guidance_gap=0.1) for n, p in points.items()}
         return moved | {"zone 2 onset": edge("zone 2 onset", float("nan"), status="no such point")}
 
@@ -474,10 +465,7 @@ def test_edges_whose_orbit_touches_the_land_are_named():
     for name, (rpm, scaled) in (("zone 1 exit", CLEAR), ("zone 2 onset", TOUCHES)):
         speed = rpm * np.pi / 30
         state = np.array(scaled) * [float(c) for c in model.scale(speed)]
-        ones, zeros = np.ones(4, dtype=complex), np.zeros(4)
-        edges[name] = SpecialPoint(
-            "torus", speed, speed, state, ones, zeros, 0, True, steps=8192, error=0.3 * np.pi / 30
-        )
+        edges[name] = Point("torus", speed, state, steps=8192, error=0.3 * np.pi / 30)
     (sentence,) = contact_notes(model, edges, method)
     assert sentence.startswith(
         "Zone 2 onset: its orbit touches the land (eps 0.977, contact from 0.97); by half of its "

@@ -10,7 +10,7 @@ from helpers import in_other_units
 
 import jaxcage as jc
 from jaxcage._parameters import parameter_info
-from jaxcage.orbits import SpecialPoint, edge_speed, sensitivity, width
+from jaxcage.orbits import Point, edge_speed, sensitivity, width
 
 
 CASE = jc.case("1a", "preliminary")
@@ -47,7 +47,7 @@ def point(kind, speed_factor=1.0, state_factors=(1.0, 1.0)):
     rpm, state = STATES[kind]
     speed = jc.rpm(rpm) * speed_factor
     scaled = np.array(state) * np.repeat(state_factors, 2)
-    return SpecialPoint(kind, speed, speed, scaled, np.ones(4, dtype=complex), np.zeros(4), 0, True)
+    return Point(kind, speed, scaled)
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +171,7 @@ def test_edge_that_is_not_there():
     """A fold is asked for where the pair leaves as a torus: no number is better than a wrong one."""
     rpm, state = STATES["torus"]
     speed = jc.rpm(rpm)
-    wrong = SpecialPoint("fold", speed, speed, np.array(state), np.ones(4, dtype=complex), np.zeros(4), 0, True)
+    wrong = Point("fold", speed, np.array(state))
     assert np.isnan(edge_speed(CASE, wrong))
     lost = sensitivity(CASE, wrong)
     assert lost.status == "no such point" and not lost.trusted

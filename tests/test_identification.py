@@ -57,7 +57,7 @@ def located():
     for g in FORCING:
         for name, kind, table in (("onset", "fold", FOLD), ("exit", "period-doubling", DOUBLING)):
             speed, state = table[g]
-            point = jc.orbits.Located(kind, speed, np.array(state), 1)
+            point = jc.orbits.Point(kind, speed, np.array(state), 1)
             exact = jc.sensitivity(cases()[f"g={g}"], point, method=METHOD)
             assert exact.trusted
             found.append((f"g={g}", f"zone 1 {name}", point._replace(speed=exact.value_rpm * np.pi / 30), exact))

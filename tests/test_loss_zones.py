@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.orbits import SpecialPoint, Stretch, SynchronousOrbits
+from jaxcage.orbits import Point, Stretch, SynchronousOrbits
 from jaxcage.validation._literature import DUFFING_FOLDS
 
 
@@ -19,18 +19,8 @@ CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0}
 def special(rpm, kind="fold"):
     pair = [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5]
     speed = rpm * PER_RPM
-    return SpecialPoint(
-        kind,
-        speed,
-        speed,
-        np.zeros(2),
-        np.array(pair, dtype=complex),
-        np.zeros(2),
-        0,
-        True,
-        steps=1024,
-        error=1e-4 * PER_RPM,
-    )
+    known = dict(multipliers=np.array(pair, dtype=complex), index=0, edge=True, steps=1024, error=1e-4 * PER_RPM)
+    return Point(kind, speed, np.zeros(2), **known, outcome=0)
 
 
 def stretch(lower, upper, family=0, met=10, first=None, open_below=False, open_above=False, kinds=("fold", "torus")):

@@ -33,8 +33,8 @@ def differences(objective, space, place, step=1e-4):
 @pytest.fixture(scope="module")
 def edges():
     points = {
-        "zone 1 onset": jc.orbits.Located("fold", FOLD[G][0], np.array(FOLD[G][1])),
-        "zone 1 exit": jc.orbits.Located("period-doubling", DOUBLING[G][0], np.array(DOUBLING[G][1])),
+        "zone 1 onset": jc.orbits.Point("fold", FOLD[G][0], np.array(FOLD[G][1])),
+        "zone 1 exit": jc.orbits.Point("period-doubling", DOUBLING[G][0], np.array(DOUBLING[G][1])),
     }
     return jc.design.FollowedEdges(points, METHOD)
 

@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 import jaxcage as jc
 from jaxcage.forces import AbstractForce, AbstractForcing, parameter
 from jaxcage.io import ConfigError, configuration, save_model, to_dataset
-from jaxcage.orbits import Located, edge_speed
+from jaxcage.orbits import Point, edge_speed
 from jaxcage.plotting import force_history
 
 
@@ -135,7 +135,7 @@ def test_an_orbit_moves_with_a_drag_as_differences_say():
     np.testing.assert_allclose(slope, differences, atol=1e-6 * float(jnp.max(jnp.abs(slope))))
 
 
-TORUS = Located("torus", float(jc.rpm(11023.07)), np.array([1.33877e-5, -5.11828e-5, 0.520974, 0.0221109]))
+TORUS = Point("torus", float(jc.rpm(11023.07)), np.array([1.33877e-5, -5.11828e-5, 0.520974, 0.0221109]))
 """An edge of case 1a, as `test_edges_of_the_cage` has it."""
 
 

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from test_io_dataset import sweep_of
 
-from jaxcage.orbits import Branch, CodimensionTwo, Curve, Sensitivity, SpecialPoint
+from jaxcage.orbits import Branch, CodimensionTwo, Curve, Point, Sensitivity
 from jaxcage.plotting import (
     branch_diagram,
     elasticity_bars,
@@ -29,12 +29,11 @@ PER_RPM = np.pi / 30
 CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0, "branch-point": 1.0}
 
 
-def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> SpecialPoint:
+def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> Point:
     mu = np.array([CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5, 0.2, 0.1], dtype=complex)
     state = np.array([0.0, y, 0.0, 0.0])
-    return SpecialPoint(
-        kind, rpm * PER_RPM, rpm * PER_RPM, state, mu, np.zeros(4), index, edge, steps=1024, error=1e-4 * PER_RPM
-    )
+    known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
+    return Point(kind, rpm * PER_RPM, state, **known)
 
 
 def branch_of(rpm: np.ndarray, y: np.ndarray, stable: np.ndarray, points=(), periods: int = 1, mu=None) -> Branch:

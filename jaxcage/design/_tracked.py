@@ -5,6 +5,7 @@ the new constants in as many parts as it needs. The derivatives come from the im
 """
 
 import concurrent.futures
+import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ..orbits import Located, Point, Sensitivity, sensitivity
+from ..orbits import Point, Sensitivity, sensitivity
 from ._unknowns import Unknown, slope_in_place, with_values
 
 
@@ -37,7 +38,7 @@ class _Anchor(NamedTuple):
     """A place at which all edges are known."""
 
     place: np.ndarray
-    last: list[Located]
+    last: list[Point]
     slope: np.ndarray
 
 
@@ -56,7 +57,7 @@ class TrackedEdges:
         """**Arguments:** the cases; what is unknown; for each edge its case and the bifurcation that it is, as found
         with the unknowns at `place`."""
         self.systems, self.unknowns, self.cases, self.method = systems, tuple(unknowns), tuple(cases), method
-        last = [Located(str(p.kind), float(p.speed), np.asarray(p.state), int(p.periods), int(p.steps)) for p in points]
+        last = [Point(str(p.kind), float(p.speed), np.asarray(p.state), int(p.periods), int(p.steps)) for p in points]
         self._anchors = [_Anchor(np.asarray(place, dtype=float), last, np.zeros((len(points), len(self.unknowns))))]
         self._solved: list[str] = []
         self._known: dict[bytes, Edges] = {}
@@ -86,7 +87,7 @@ class TrackedEdges:
         )
         if np.all(np.isfinite(edges.rpm)):
             last = [
-                now._replace(speed=s.value_rpm * np.pi / 30, state=s.state, steps=s.steps)
+                dataclasses.replace(now, speed=s.value_rpm * np.pi / 30, state=s.state, steps=s.steps)
                 for now, s in zip(near.last, found, strict=True)
             ]
             self._anchors.append(_Anchor(place, last, edges.slope))
@@ -95,7 +96,7 @@ class TrackedEdges:
     def _follow(
         self,
         case: str,
-        last: Located,
+        last: Point,
         slope: np.ndarray,
         start: np.ndarray,
         place: np.ndarray,
@@ -103,7 +104,7 @@ class TrackedEdges:
     ) -> Sensitivity:
         """One edge at `place`, from where it was `last` found, with the unknowns at `start` and with that slope."""
         self._solved.append(case)
-        guess = last._replace(speed=last.speed + float(slope @ (place - start)) * np.pi / 30)
+        guess = dataclasses.replace(last, speed=last.speed + float(slope @ (place - start)) * np.pi / 30)
         model = with_values({case: self.systems[case]}, self.unknowns, place)[case]
         found = sensitivity(model, guess, method=self.method)
         if np.isfinite(found.value_rpm) or halvings == 0:
@@ -112,7 +113,7 @@ class TrackedEdges:
         half = self._follow(case, last, slope, start, middle, halvings - 1)
         if not np.isfinite(half.value_rpm):
             return found
-        nearer = last._replace(speed=half.value_rpm * np.pi / 30, state=half.state, steps=half.steps)
+        nearer = dataclasses.replace(last, speed=half.value_rpm * np.pi / 30, state=half.state, steps=half.steps)
         return self._follow(
             case, nearer, slope_in_place(self.unknowns, half.derivative, middle), middle, place, halvings - 1
         )

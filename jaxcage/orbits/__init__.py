@@ -11,7 +11,8 @@
 | `_liouville`   | the determinant that every monodromy matrix must have                              |
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
 | `_walk`        | a bifurcation looked for along the branch of its orbits                            |
-| `_point`       | bifurcation points                                                                 |
+| `_point`       | a bifurcation: solved for, met on a branch, or known from elsewhere                |
+| `_bifurcation` | bifurcation points solved for                                                      |
 | `_astray`      | steps that lead to another curve, told from their ends                             |
 | `_arclength`   | pseudo-arclength continuation of many curves at a time                             |
 | `_illinois`    | where a function along a curve vanishes                                            |
@@ -29,7 +30,8 @@
 """
 
 from ._arclength import Steps as Steps
-from ._branch import Branch as Branch, SpecialPoint as SpecialPoint, branch as branch, branches as branches
+from ._bifurcation import bifurcation as bifurcation
+from ._branch import Branch as Branch, branch as branch, branches as branches
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
 from ._coexisting import coexisting_orbits as coexisting_orbits
 from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve
@@ -38,15 +40,13 @@ from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._mechanism import Explained as Explained, explain as explain
 from ._multiplier import LeadingMultiplier as LeadingMultiplier, leading_multiplier as leading_multiplier
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
-from ._point import BifurcationPoint as BifurcationPoint, bifurcation as bifurcation
+from ._point import Point as Point
 from ._search import (
     Stretch as Stretch,
     SynchronousOrbits as SynchronousOrbits,
     synchronous_orbits as synchronous_orbits,
 )
 from ._sensitivity import (
-    Located as Located,
-    Point as Point,
     Sensitivity as Sensitivity,
     edge_speed as edge_speed,
     limit_sensitivity as limit_sensitivity,

@@ -28,82 +28,12 @@ from ._follower import (
     turned,
 )
 from ._lens import SPEED, Parameter, value as value_of
-from ._located import UNEXPLAINED, Seen, account
-from ._normal_form import coefficients, criticality
+from ._located import Seen, account
+from ._normal_form import coefficients
 from ._orbit import guess_state
+from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point
 from ._problem import Frame, Given
 from ._steps import SETTLED
-
-
-CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
-"""The multiplier that each kind is about, where it is real."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class SpecialPoint:
-    """A bifurcation on a branch."""
-
-    kind: str
-    """`period-doubling`, `torus`, `fold` or `branch-point`; `unexplained` where the number of unstable multipliers
-    changes and no bifurcation is found: there is one that was missed, or the branch is not one."""
-    value: float
-    """Value of the parameter [SI]; NaN where it did not settle."""
-    speed: float
-    """Speed [rad/s]."""
-    state: Float[np.ndarray, " dim"]
-    """State of the orbit at phase 0 [SI]."""
-    multipliers: Complex[np.ndarray, " dim"]
-    direction: Float[np.ndarray, " dim"]
-    """Critical direction in the state [SI]; zero for a torus."""
-    index: int
-    """The branch's point before it."""
-    edge: bool
-    """Whether a stable orbit is on one side of it."""
-    parameter: str = SPEED
-    periods: int = 1
-    """Revolutions after which the orbit closes."""
-    steps: int = 0
-    """Steps per revolution; 0 where they are not known."""
-    error: float = float("nan")
-    """Distance of the value to that by half the steps [SI], infinite where these do not find it; of something
-    unexplained how far away it may be."""
-
-    coefficient: float = float("nan")
-    """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
-    (see `_normal_form`), which tells the `criticality`; NaN for others and for self-excited orbits."""
-    coefficient_error: float = float("nan")
-
-    @property
-    def criticality(self) -> str:
-        """`supercritical`, `subcritical` or, where the coefficient may be zero, `unknown`; nothing without one."""
-        return criticality(self.kind, self.coefficient, self.coefficient_error)
-
-    @property
-    def speed_rpm(self) -> float:
-        """Speed in revolutions per minute."""
-        return self.speed * 30 / np.pi
-
-    @property
-    def error_rpm(self) -> float:
-        """Error of a speed in revolutions per minute."""
-        return self.error * 30 / np.pi
-
-    @property
-    def status(self) -> str:
-        """`converged`, `unexplained`, or `not converged` where it is elsewhere by half the steps."""
-        if self.kind == UNEXPLAINED:
-            return self.kind
-        return "converged" if np.isfinite(self.value) else "not converged"
-
-    @property
-    def critical(self) -> complex:
-        """The multiplier on the unit circle, with a positive imaginary part."""
-        target = CRITICAL.get(self.kind)
-        mu = self.multipliers
-        if target is None:
-            mu = mu[np.imag(mu) > 0] if self.kind == "torus" else mu
-            return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
-        return complex(mu[np.argmin(np.abs(mu - target))])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,7 +49,7 @@ class Branch:
     """States at phase 0 [SI]."""
     multipliers: Complex[np.ndarray, "points dim"]
     stable: Bool[np.ndarray, " points"]
-    special: tuple[SpecialPoint, ...]
+    special: tuple[Point, ...]
     """Bifurcations, in order along the branch."""
     periods: int
     ended: tuple[str, str]
@@ -346,23 +276,26 @@ def _branch(
         # Of several between two points, the outer ones only are next to orbits whose stability is known.
         edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
         at = float(p.u[-1] * follower.unit)
-        lost = float("nan") if kind != UNEXPLAINED and error > SETTLED * max(abs(at), follower.unit) else 1.0
+        settled = NOT_CONVERGED if error > SETTLED * max(abs(at), follower.unit) else FOUND
+        outcome = NOT_EXPLAINED if kind == UNEXPLAINED else settled
+        known = float("nan") if outcome == NOT_CONVERGED else 1.0
         special.append(
-            SpecialPoint(
+            Point(
                 kind=kind,
-                value=at * lost,
-                speed=float(speed(p.u)) * lost,
+                speed=float(speed(p.u)) * known,
                 state=p.u[:n] * scale,
-                multipliers=mu,
-                direction=direction * scale,
-                index=k,
-                edge=edge,
-                parameter=name,
                 periods=int(frame.periods),
                 steps=int(p.steps),
+                parameter=name,
+                value=at * known,
                 error=error,
+                multipliers=mu,
+                direction=direction * scale,
                 coefficient=cubic[0],
                 coefficient_error=cubic[1],
+                outcome=outcome,
+                index=int(k),
+                edge=edge,
             )
         )
     return Branch(

@@ -12,10 +12,10 @@ from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
-from ._branch import Branch, SpecialPoint, describe
+from ._branch import Branch, describe
 from ._follower import Follower, eigenvalues, make_follower
 from ._lens import SPEED, Parameter
-from ._point import BifurcationPoint
+from ._point import Point
 from ._singularity import test_functions
 
 
@@ -27,7 +27,7 @@ SMALLEST_AMPLITUDE = 1e-5
 class Cascade:
     """Period doublings of orbits of period 1, 2, 4, ... times the first one's."""
 
-    points: tuple[SpecialPoint | BifurcationPoint, ...]
+    points: tuple[Point, ...]
     """Fewer than asked for where the doubled branch was lost or does not double again."""
     limit: float
     """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
@@ -66,7 +66,7 @@ def extrapolated(values: tuple[float, ...]) -> tuple[float, float]:
 
 def doubled_branch(
     system: AbstractForcedSystem,
-    point: SpecialPoint | BifurcationPoint,
+    point: Point,
     parameter: Parameter = SPEED,
     *,
     lower: float,
@@ -121,7 +121,7 @@ def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
 
 def cascade(
     system: AbstractForcedSystem,
-    point: SpecialPoint | BifurcationPoint,
+    point: Point,
     parameter: Parameter = SPEED,
     *,
     lower: float,

@@ -16,13 +16,13 @@ from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Curves, Steps, follow, settle_on, stack, take
-from ._branch import SpecialPoint
+from ._bifurcation import PointEquations, critical_matrix
 from ._follower import eigenvalues, turned
 from ._illinois import zeros
 from ._lens import SPEED, value as value_of
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
-from ._point import BifurcationPoint, PointEquations, critical_matrix
+from ._point import Point
 from ._problem import Given, OrbitProblem, ReturnMap, make_frame
 from ._singularity import Kind, null_vectors
 from ._steps import ENOUGH, Counts, by_steps, counted
@@ -78,7 +78,7 @@ class Curve:
 
 def curve(
     system: AbstractForcedSystem,
-    point: SpecialPoint | BifurcationPoint,
+    point: Point,
     x: str = SPEED,
     y: str = "guidance_gap",
     *,

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
 from ._follower import Follower, eigenvalues, unstable_count
 from ._illinois import LOCATED, zeros
+from ._point import UNEXPLAINED
 from ._problem import Frame
 from ._singularity import matches, test_functions
 from ._steps import MOST_OF_A_POINT, POINT
@@ -30,7 +31,6 @@ HALVINGS, APART = 20, 1e-7
 NEARLY = 0.1
 """A parabola through three points may be wrong about an extremum by this part of what the function changes over the
 steps beside it, and about its place by this part of a step."""
-UNEXPLAINED = "unexplained"
 
 
 class Seen(NamedTuple):

@@ -18,7 +18,7 @@ import numpy as np
 
 from .._notebook import notebook_html
 from ..analysis import CLOSE_BELOW_RPM, Edge, Zone
-from ._branch import SpecialPoint
+from ._point import Point
 from ._search import Stretch, SynchronousOrbits
 
 
@@ -28,7 +28,7 @@ class LossZones:
 
     zones: tuple[Zone, ...]
     """Ascending; an edge is None where the zone runs past the range."""
-    edges: dict[str, SpecialPoint]
+    edges: dict[str, Point]
     """Edges by name: `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ..."""
     coexisting: dict[str, list[Any]]
     """Orbits at each edge: branch, whether stable, state [SI], multipliers."""
@@ -107,7 +107,7 @@ def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch,
     tops = [None, *(g.high for g in groups)]
     bottoms = [*(g.low for g in groups), None]
     zones: list[Zone] = []
-    edges: dict[str, SpecialPoint] = {}
+    edges: dict[str, Point] = {}
     for before, after in zip(tops, bottoms, strict=True):
         onset = None if before is None else before.upper
         leaves = None if after is None else after.lower
@@ -119,16 +119,16 @@ def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch,
         for name, point in (("onset", onset), ("exit", leaves)):
             if point is not None:
                 edges[f"zone {len(zones)} {name}"] = point
-    coexisting = {name: found.coexisting(p.speed) for name, p in edges.items()}
+    coexisting = {name: found.coexisting(float(p.speed)) for name, p in edges.items()}
     return LossZones(tuple(zones), edges, coexisting, principal, close)
 
 
-def _share(found: SynchronousOrbits, onset: SpecialPoint | None, leaves: SpecialPoint | None) -> float:
+def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
     """Share of the simulations inside a zone that did not settle on a synchronous orbit; NaN if there are none."""
     rpm = found.sweep.rpm
     inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
     return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
 
 
-def _edge(point: SpecialPoint | None) -> Edge | None:
-    return None if point is None else Edge(point.speed_rpm, point.error_rpm, "synchronous-loss", point.kind, "located")
+def _edge(point: Point | None) -> Edge | None:
+    return None if point is None else point.as_edge("synchronous-loss")

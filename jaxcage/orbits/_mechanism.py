@@ -7,8 +7,8 @@ import numpy as np
 from ..analysis import Edge, Zone, Zones
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._branch import SpecialPoint
 from ._cascade import Cascade, cascade
+from ._point import Point
 from ._search import SynchronousOrbits
 
 
@@ -22,7 +22,7 @@ class Explained:
     """Chaotic zones with the mechanisms of their edges, and what these were taken from."""
 
     zones: Zones
-    sources: dict[str, SpecialPoint | Cascade]
+    sources: dict[str, Point | Cascade]
     """By edge, e.g. `zone 1 exit`: what the edge coincides with. Other edges stay statistical."""
 
 
@@ -38,7 +38,7 @@ def explain(
 
     **Returns:** `Explained`; edges that coincide with nothing that was located are left as they were.
     """
-    sources: dict[str, SpecialPoint | Cascade] = {}
+    sources: dict[str, Point | Cascade] = {}
     changed: list[Zone] = []
     for number, zone in enumerate(zones.zones, start=1):
         ends = {}
@@ -60,7 +60,7 @@ def _source(
     found: SynchronousOrbits,
     system: AbstractForcedSystem,
     method: AbstractMethod | None,
-) -> SpecialPoint | Cascade | None:
+) -> Point | Cascade | None:
     """What lies within `near` of an edge at `rpm`, whose calm side is above or below it."""
     ends = [s.upper if calm < 0 else s.lower for s in found.stretches]
     points = [p for p in ends if p is not None]
@@ -72,18 +72,17 @@ def _source(
     doublings = [p for p in points if p.kind == "period-doubling" and beyond(p)]
     reach = 2 * CASCADE_REACH_RPM * np.pi / 30
     for point in sorted(doublings, key=away):
-        tried = cascade(
-            system, point, lower=point.speed - reach, upper=point.speed + reach, levels=CASCADE_LEVELS, method=method
-        )
+        speed = float(point.speed)
+        tried = cascade(system, point, lower=speed - reach, upper=speed + reach, levels=CASCADE_LEVELS, method=method)
         if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - rpm) <= near:
             return tried
     return None
 
 
-def _taken(edge: Edge, source: SpecialPoint | Cascade) -> Edge:
+def _taken(edge: Edge, source: Point | Cascade) -> Edge:
     """The chaotic edge at the place of what it coincides with."""
     if isinstance(source, Cascade):
         per_rpm = 30 / np.pi
         limit, error = source.limit * per_rpm, source.error * per_rpm
         return Edge(limit, error, edge.kind, "period-doubling", "cascade")
-    return Edge(source.speed_rpm, source.error_rpm, edge.kind, source.kind, "located")
+    return source.as_edge(edge.kind)

@@ -1,167 +1,114 @@
-"""Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
-
-import dataclasses
-from typing import Any, NamedTuple, cast, get_args
+"""A bifurcation of a periodic orbit: solved for, met on a branch, or known from elsewhere."""
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
-from .._checks import require_x64
-from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, compiled
-from ..models import AbstractForcedSystem
-from ._follower import Follower, make_follower, seeds, stable_steps
-from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
-from ._lens import SPEED, Parameter, value as value_of, with_value
-from ._normal_form import KINDS_WITH_ONE, coefficients, criticality
-from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
-from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
-from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
-from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
-from ._walk import walk
+from ..analysis import Edge
+from ._lens import SPEED
+from ._normal_form import criticality
 
 
-POINT_OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged")
-"""How a search for a bifurcation point ended, in the order of the codes: converged; Newton's method found no point;
-it found one at which the multipliers are not those of the kind asked for (a neutral saddle instead of a torus
-bifurcation); or one at which the multiplier hardly crosses, so that its place is not a function of the design; or one
-that is elsewhere by half the steps."""
+Numbers = np.ndarray | Array
 
-TANGENTIAL = 1e-2
-"""A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
-ON_CIRCLE = 1e-5
-SPUN = 200
-"""Revolutions of the simulation that finds an orbit."""
+UNEXPLAINED = "unexplained"
+OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged", UNEXPLAINED, "given")
+"""What is known of a point, in the order of the codes: converged; Newton's method found no point; it found one at which
+the multipliers are not those of the kind asked for (a neutral saddle instead of a torus bifurcation); or one at which
+the multiplier hardly crosses, so that its place is not a function of the design; or one that is elsewhere by half the
+steps; the number of unstable multipliers changes and no bifurcation is found; not solved for yet."""
+FOUND, NO_SUCH_POINT, OTHER_KIND, TANGENT, NOT_CONVERGED, NOT_EXPLAINED, GIVEN = range(len(OUTCOMES))
 
-
-class Singular(NamedTuple):
-    """What is known at the root beside the unknowns."""
-
-    monodromy: Float[Array, "dim dim"]
-    right: Float[Array, " k"]
-    left: Float[Array, " k"]
+CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
+"""The multiplier that each kind is about, where it is real."""
 
 
-class PointEquations(AbstractMapEquations):
-    """The orbit's equations and g = 0; a branch point has two more, with an imperfection as unknown."""
+class Point(eqx.Module):
+    """A bifurcation of a periodic orbit. Where none was found its numbers are NaN and `status` says so.
 
-    problem: OrbitProblem
-    frame: Frame
-    left: Float[Array, " k"]
-    right: Float[Array, " k"]
-    kind: Kind = eqx.field(static=True)
-
-    def prepare(self, u: Array, given: Given) -> Prepared:
-        strobe = self.problem.prepare(u, given, self.frame)
-        if self.kind != "branch-point":
-            return strobe, []
-        return strobe, [self.problem.drift(u, given, self.frame, self.problem.equations)]
-
-    def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Singular]:
-        strobe, drifts = prepared
-        n, m = self.problem.dimension, self.problem.equations
-        z, monodromy = u[:n], columns[:, :n]
-        closing = self.problem.orbit_residual(z, image, self.frame)
-        g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
-        known = Singular(monodromy, q, p)
-        if not drifts:
-            return jnp.append(closing, g), known
-        return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ columns[:, n]])]), known
-
-    def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
-        return differentiated(self, u, given)
-
-    def by_steps(self, steps: Any) -> "PointEquations":
-        return eqx.tree_at(lambda e: e.problem, self, by_steps(self.problem, steps))
-
-    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """By the change of the parameters, a unit of which is a tenth of their size."""
-        m = self.problem.equations
-        shift = abs(moved[..., m : m + len(self.problem.parameters)]).max(-1)
-        return shift, shift / (10 * POINT)
-
-    @property
-    def borders(self) -> tuple[Array, Array]:
-        return self.left, self.right
-
-
-def critical_matrix(
-    problem: OrbitProblem, kind: Kind, strobe: StrobeMap, z: Array, monodromy: Array, frame: Frame
-) -> Float[Array, "k k"]:
-    """The matrix that is singular at the bifurcation.
-
-    A self-excited orbit always has a multiplier 1; at its fold the derivative of its own equations is singular, in
-    which the flow and the phase condition border M - I.
+    Kind, speed and state are enough to start Newton's method from.
     """
-    a = singular_matrix(kind, monodromy)
-    if not problem.free_speed or kind in ("period-doubling", "torus"):
-        return a
-    y = tuple(z[i] * frame.scale[i] for i in range(z.size))
-    flow = jnp.stack([jnp.asarray(c) for c in strobe.field(jnp.zeros(()), y)]) / frame.scale
-    return jnp.block([[a, flow[:, None]], [frame.phase_direction[None, :], jnp.zeros((1, 1))]])
 
-
-class BifurcationPoint(eqx.Module):
-    """A bifurcation of a periodic orbit. Where none was found its numbers are NaN and `status` says so."""
-
-    value: Float[Array, ""]
-    """Value of the parameter [SI]; differentiable."""
-    error: Float[Array, ""]
-    """Distance of the value to that by half the steps [SI]; NaN where the method has no number of steps."""
-    steps: Int[Array, ""]
-    """Steps per revolution."""
-    speed: Float[Array, ""]
+    kind: str = eqx.field(static=True)
+    """`period-doubling`, `torus`, `fold` or `branch-point`; on a branch also `unexplained`: the number of unstable
+    multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one."""
+    speed: Scalar
     """Speed [rad/s]; differentiable."""
-    state: Float[Array, " dim"]
+    state: Float[Numbers, " dim"]
     """State of the orbit at phase 0 [SI]; differentiable."""
-    multipliers: Complex[Array, " dim"]
+    periods: Int[Array, ""] | int = 1
+    """Revolutions after which the orbit closes."""
+    steps: Int[Array, ""] | int = 0
+    """Steps per revolution; 0 where they are not known."""
+    parameter: str = eqx.field(static=True, default=SPEED)
+    value: Scalar = float("nan")
+    """Value of the parameter [SI], which may be the speed; differentiable."""
+    error: Scalar = float("nan")
+    """Distance of the value to that by half the steps [SI], infinite where these do not find it, NaN where the method
+    has no number of steps; of something unexplained how far away it may be."""
+    multipliers: Complex[Numbers, " multipliers"] = eqx.field(default_factory=lambda: np.zeros(0, dtype=complex))
     """Floquet multipliers, the largest first."""
-    angle: Float[Array, ""]
-    """Angle [rad] of the critical multiplier: pi at a period doubling, 0 at a fold."""
-    residual: Float[Array, ""]
+    direction: Float[Numbers, " coordinates"] = eqx.field(default_factory=lambda: np.zeros(0))
+    """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
+    residual: Scalar = float("nan")
     """Largest component of the equations, in units of the system's scale."""
-    transversality: Float[Array, ""]
+    transversality: Scalar = float("nan")
     """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
-    p dP/d parameter of the map along the critical direction, with p q = 1."""
-    coefficient: Float[Array, ""]
+    p dP/d parameter of the map along the critical direction, with p q = 1. On a branch it is not computed."""
+    coefficient: Scalar = float("nan")
     """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
     (see `_normal_form`), which tells the `criticality`; NaN for others, for self-excited orbits and under `jit`,
     `vmap` and `grad`."""
-    coefficient_error: Float[Array, ""]
-    direction: Float[Array, " dim"]
-    """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
-    outcome: Int[Array, ""]
-    """Code: place in `POINT_OUTCOMES`."""
-    iterations: Int[Array, ""]
-    periods: Int[Array, ""]
-    kind: str = eqx.field(static=True)
-    parameter: str = eqx.field(static=True)
+    coefficient_error: Scalar = float("nan")
+    outcome: Int[Array, ""] | int = GIVEN
+    """Code: place in `OUTCOMES`."""
+    iterations: Int[Array, ""] | int = 0
+    index: int = eqx.field(static=True, default=-1)
+    """Of a point on a branch: the branch's orbit before it."""
+    edge: bool = eqx.field(static=True, default=False)
+    """Of a point on a branch: whether a stable orbit is on one side of it."""
     looked: str = eqx.field(static=True, default="")
     """Where it was looked for, if Newton's method did not find it from the guess and neither did the branch."""
 
+    def __post_init__(self) -> None:
+        if self.parameter == SPEED:
+            self.value = self.speed
+
     @property
-    def speed_rpm(self) -> Float[Array, ""]:
+    def speed_rpm(self) -> Scalar:
         """Speed in revolutions per minute."""
-        return self.speed * 30 / jnp.pi
+        return self.speed * 30 / np.pi
 
     @property
-    def error_rpm(self) -> Float[Array, ""]:
+    def error_rpm(self) -> Scalar:
         """Error of a speed in revolutions per minute."""
-        return self.error * 30 / jnp.pi
+        return self.error * 30 / np.pi
 
     @property
-    def converged(self) -> Bool[Array, ""]:
+    def converged(self) -> Bool[Array, ""] | bool:
         """Whether a point of the kind asked for was found."""
-        return (self.outcome == 0) | (self.outcome == 3)
+        return (self.outcome == FOUND) | (self.outcome == TANGENT)
 
     @property
-    def trusted(self) -> Bool[Array, ""]:
+    def trusted(self) -> Bool[Array, ""] | bool:
         """Whether its place is a function of the design: found, and crossed at a finite rate."""
-        return self.outcome == 0
+        return self.outcome == FOUND
+
+    @property
+    def critical(self) -> complex:
+        """The multiplier on the unit circle, with a positive imaginary part."""
+        target, mu = CRITICAL.get(self.kind), np.asarray(self.multipliers)
+        if target is not None:
+            return complex(mu[np.argmin(np.abs(mu - target))])
+        mu = mu[np.imag(mu) > 0] if self.kind == "torus" else mu
+        return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
+
+    @property
+    def angle(self) -> float:
+        """Angle [rad] of the critical multiplier, pi at a period doubling; NaN where no point was found."""
+        return abs(float(np.angle(self.critical))) if bool(self.converged) else float("nan")
 
     @property
     def criticality(self) -> str:
@@ -170,14 +117,20 @@ class BifurcationPoint(eqx.Module):
 
     @property
     def status(self) -> str:
-        """One of `POINT_OUTCOMES`."""
-        return POINT_OUTCOMES[int(self.outcome)]
+        """One of `OUTCOMES`."""
+        return OUTCOMES[int(self.outcome)]
+
+    def as_edge(self, kind: str) -> Edge:
+        """The edge of a zone that it is: `chaotic` or `synchronous-loss`."""
+        return Edge(float(self.speed_rpm), float(self.error_rpm), kind, self.kind, "located")
 
     def __str__(self) -> str:
+        if int(self.outcome) == GIVEN:
+            return f"{self.kind} near {float(self.speed_rpm):.3f} rpm, not solved for yet"
         if not bool(self.converged):
             looked = f"; {self.looked}" if self.looked else ""
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
-        angle = f", angle {float(self.angle) * 180 / jnp.pi:.2f} deg" if self.kind == "torus" else ""
+        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "torus" else ""
         error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         sort = f"{self.criticality} " if self.criticality else ""
         return (
@@ -187,256 +140,3 @@ class BifurcationPoint(eqx.Module):
         )
 
     _repr_html_ = notebook_html
-
-
-def bifurcation(
-    system: AbstractForcedSystem,
-    kind: str,
-    guess: Any,
-    parameter: Parameter = SPEED,
-    *,
-    speed: Scalar | None = None,
-    periods: Any = None,
-    period: str = "driven",
-    reach: float | int = 0.1,
-    method: AbstractMethod | None = None,
-) -> BifurcationPoint:
-    """The bifurcation of `kind` near `guess`, where `parameter` is free.
-
-    Where Newton's method finds none, the branch of orbits through `guess` is followed both ways to the nearest.
-
-    **Arguments:**
-
-    - `kind`: `period-doubling`, `torus` (Neimark-Sacker), `fold`, or `branch-point` (pitchfork or transcritical, which
-        only systems with a symmetry have).
-    - `guess`: a value of the parameter [SI], whose orbit is then found by simulation; an `Orbit`, `BifurcationPoint` or
-        special point of a branch; or a pair (state, value of the parameter).
-    - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
-    - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
-    - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
-    - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
-    - `reach`: how far the branch is followed, in parts of the parameter's value (of 1 where that is 0); 0 for not at
-        all, as under `jit`, `vmap` and `grad`, where nothing is known of what Newton's method finds.
-
-    **Returns:** `BifurcationPoint`; it does not raise if there is none, but says where it looked. Works under `jit` and
-    `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`, by the implicit
-    function theorem.
-
-    **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
-    """
-    require_x64()
-    if not reach >= 0:
-        raise ArgumentError("reach", said=f"must be at least 0, but {reach:g} was given.")
-    if kind not in get_args(Kind):
-        raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
-    free = is_free(period)
-    start, first, at, spin = _read_guess(system, guess, parameter, speed)
-    given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
-    periods = jnp.asarray(getattr(guess, "periods", 1) if periods is None else periods)
-
-    def find(state: Any, speed: Any, at: Any, spin: bool) -> BifurcationPoint:
-        def by(method: AbstractMethod, counts: Counts) -> BifurcationPoint:
-            problem = OrbitProblem(method, system.dimension, free, (parameter,))
-            counts = from_steps(counts, getattr(guess, "steps", None))
-            begin = jnp.asarray(speed, dtype=float)
-            numbers = frozen((given, state, begin, at))
-            found, equations, u, known = _find_point(problem, counts, cast(Kind, kind), *numbers, periods, spin)
-            if not is_traced(given):
-                return found
-            u, _ = as_root(given, equations=equations, u=u, aux=known)
-            place = _place(equations, u, given, found.converged)
-            return dataclasses.replace(found, **dict(zip(("value", "speed", "state"), place, strict=True)))
-
-        return that_serves(by, method, MOST_OF_A_POINT)
-
-    def around(value: float, part: float) -> Follower:
-        away = part * (abs(value) or 1.0)
-        return make_follower(system, given.speed, parameter, value - away, value + away, period, method)
-
-    found = find(start, first, at, spin)
-    if is_traced((found, given, start)):
-        return found
-    if reach and POINT_OUTCOMES[int(found.outcome)] in ("no such point", "other kind"):
-        if spin:
-            here, turning = with_value(system, first, parameter, at)
-            start = periodic_orbit(
-                here, turning, int(periods), guess=start, revolutions=SPUN, period=period, method=method
-            ).state
-        there, looked = walk(around(float(at), float(reach)), (np.asarray(start), float(at)), int(periods), kind)
-        if there is not None:
-            looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
-            again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
-            found = again if bool(again.converged) else found
-        found = found if bool(found.converged) else dataclasses.replace(found, looked=looked)
-    classed = bool(found.converged) and not free and kind in KINDS_WITH_ONE
-    return _classed(found, around(float(found.value), 0.1)) if classed else found
-
-
-def _classed(point: BifurcationPoint, follower: Follower) -> BifurcationPoint:
-    """The point with the coefficient of its normal form."""
-    place = np.asarray(point.state), float(point.value)
-    frame = follower.frame(point.state, place[1], int(point.periods))
-    again = lambda follower: seeds(follower, frame, [place], int(point.steps))
-    orbit = again(follower)
-    if not orbit.converged[0]:
-        follower = stable_steps(follower, place, int(point.periods))
-        orbit = again(follower)
-    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size)[0]
-    return dataclasses.replace(point, coefficient=jnp.asarray(found[0]), coefficient_error=jnp.asarray(found[1]))
-
-
-def _read_guess(
-    system: AbstractForcedSystem, guess: Any, parameter: Parameter, speed: Scalar | None
-) -> tuple[Array, Any, Array, bool]:
-    """State, speed, value of the parameter, and whether the state is to be found by simulation."""
-    spin = False
-    known_speed = getattr(guess, "speed", speed)
-    if hasattr(guess, "state"):
-        state = guess.state
-        at = getattr(guess, "value", None)
-        if at is None or getattr(guess, "parameter", parameter) != parameter:
-            at = value_of(system, known_speed, parameter)
-    elif isinstance(guess, tuple):
-        state, at = guess
-    else:
-        spin, at = True, guess
-        state = None
-    if parameter == SPEED:
-        known_speed = at
-    if known_speed is None:
-        raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
-    return guess_state(system, known_speed, state), known_speed, frozen(jnp.asarray(at, dtype=float)), spin
-
-
-@compiled
-def _find_point(
-    problem: OrbitProblem,
-    counts: Counts,
-    kind: Kind,
-    given: Given,
-    start: Array,
-    speed: Scalar,
-    at: Array,
-    periods: Array,
-    spin: bool,
-) -> tuple[BifurcationPoint, PointEquations, Array, Singular]:
-    """The point, without derivatives; its equations, unknowns, and what else is known there."""
-    (parameter,) = problem.parameters
-    unit = jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at))
-    system, here = with_value(given.system, speed, parameter, at)
-    if spin:
-        start = settle(problem, Given(system, here), start, SPUN, counts)
-    frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
-    u0 = start / frame.scale
-    if problem.free_speed:
-        u0 = jnp.append(u0, 1.0)
-    if spin:  # on the orbit itself, if there is one here
-        fixed = OrbitProblem(problem.method, problem.dimension, problem.free_speed, ())
-        u1, found = settled(OrbitEquations(fixed, frame), Given(system, here), u0, counts)
-        u0 = jnp.where(found.converged, u1, u0)
-    u0 = jnp.append(u0, at / unit)
-    strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given, frame)
-    _, monodromy = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
-    a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
-    left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
-    if kind == "branch-point":
-        u0 = jnp.append(u0, 0.0)
-    equations = PointEquations(problem, frame, left, right, kind)
-    u, found = settled(equations, given, u0, counts, at_root=True)
-    u, equations = jnp.where(found.converged, u, jnp.nan), equations.by_steps(found.steps)
-    return _describe(equations, u, found, given), equations, u, found.aux
-
-
-@compiled
-def _place(equations: PointEquations, u: Array, given: Given, converged: Array) -> tuple[Array, Array, Array]:
-    """The parameter's value, speed and state; NaN, and their derivatives too, where there is no such point."""
-    problem, frame = equations.problem, equations.frame
-    keep = lambda x: x * jnp.where(converged, 1.0, jnp.nan)
-    speed = jnp.asarray(problem.speed(u, given, frame), dtype=float)
-    return keep(problem.values(u, frame)[0]), keep(speed), keep(problem.state(u, frame))
-
-
-def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -> BifurcationPoint:
-    problem, frame, kind = equations.problem, equations.frame, equations.kind
-    known: Singular = found.aux
-    finite = jnp.all(jnp.isfinite(known.monodromy))
-    multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
-    critical, matches = critical_multiplier(kind, multipliers)
-    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, equations.borders)
-    at = problem.values(u, frame)[0]
-    # In the parameter's unit the guess is 10; the value itself may be zero.
-    error = found.error * frame.units[0]
-    moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * frame.units[0])
-    tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.equations]), 10.0) < TANGENTIAL
-    kept = jnp.where(moving, 4, jnp.where(tangential, 3, 0))
-    outcome = jnp.where(found.converged, jnp.where(matches, kept, 2), 1)
-    there = (outcome == 0) | (outcome == 3)
-    keep = lambda x: jnp.where(there, x, jnp.nan)
-    value, speed, state = _place(equations, u, given, there)
-    direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
-    length = jnp.linalg.norm(direction)
-    (parameter,) = problem.parameters
-    return BifurcationPoint(
-        value=value,
-        error=error,
-        steps=found.steps,
-        speed=speed,
-        state=state,
-        multipliers=jnp.where(found.converged, multipliers, jnp.nan),
-        angle=keep(jnp.abs(jnp.angle(critical))),
-        residual=jnp.max(jnp.abs(found.newton.residual)),
-        transversality=keep(rate / frame.units[0]),
-        coefficient=jnp.asarray(jnp.nan),
-        coefficient_error=jnp.asarray(jnp.nan),
-        direction=keep(direction / jnp.where(length > 0, length, 1.0) * frame.scale),
-        outcome=outcome,
-        iterations=found.iterations,
-        periods=frame.periods,
-        kind=kind,
-        parameter=parameter if isinstance(parameter, str) else "parameter",
-    )
-
-
-def critical_multiplier(kind: Kind, multipliers: Complex[Array, " dim"]) -> tuple[Array, Array]:
-    """The multiplier that a bifurcation of `kind` is about, and whether it is where that kind has it."""
-    mu = multipliers
-    if kind == "torus":
-        complex_pair = jnp.abs(mu.imag) > 1e-9
-        off = jnp.where(complex_pair, jnp.abs(jnp.abs(mu) - 1), jnp.inf)
-    else:
-        target = -1.0 if kind == "period-doubling" else 1.0
-        off = jnp.abs(mu - target)
-    i = jnp.argmin(off)
-    # A double multiplier is only known to the square root of rounding.
-    return mu[i], off[i] < jnp.sqrt(ON_CIRCLE)
-
-
-def critical_rate(kind: Kind, equations: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
-    """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
-
-    At a fold, where it is infinite, the drift of the map along the critical direction instead.
-
-    **Arguments:** kind; number of the orbit's own equations; derivative of all equations at the point; null vectors;
-    the left and right border.
-    """
-    m = equations
-    of_orbit, drift = jacobian[:m, :m], jacobian[:m, m]
-    overlap = known.left @ known.right
-    if kind == "fold":
-        return jnp.abs(known.left[:m] @ drift / overlap)
-    g = jacobian[m]
-    if kind == "branch-point":
-        return _branching_rate(m, jacobian, known, borders) / jnp.abs(overlap)
-    along = g[:m] @ -jnp.linalg.solve(of_orbit, drift) + g[m]
-    rate = -along / overlap
-    return rate / 2 if kind == "torus" else -rate
-
-
-def _branching_rate(m: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
-    """Branches leave along a x^2 + 2 b x y + c y^2 = 0, x along the critical direction and y the parameter."""
-    of_orbit, drift, g, h = jacobian[:m, :m], jacobian[:m, m], jacobian[m], jacobian[m + 1]
-    left, right = borders
-    whole = jnp.block([[of_orbit, left[:, None]], [right[None, :], jnp.zeros((1, 1))]])
-    w = jnp.linalg.solve(whole, jnp.append(-drift, 0.0))[:m]
-    a, b, c = g[:m] @ known.right[:m], g[:m] @ w + g[m], h[:m] @ w + h[m]
-    return jnp.sqrt(jnp.maximum(b**2 + a * c, 0.0))

@@ -18,9 +18,10 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
-from ._branch import Branch, SpecialPoint, follow_both_ways
+from ._branch import Branch, follow_both_ways
 from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
 from ._lens import SPEED
+from ._point import Point
 
 
 ROUND = 4
@@ -37,8 +38,8 @@ Progress = Callable[[str, int, int], None]
 class Stretch:
     """A stable part of a branch of synchronous orbits; an end is None where it leaves the range or was left."""
 
-    lower: SpecialPoint | None
-    upper: SpecialPoint | None
+    lower: Point | None
+    upper: Point | None
     lower_rpm: float
     upper_rpm: float
     branch: int
@@ -57,7 +58,7 @@ class Stretch:
     @property
     def error_rpm(self) -> float:
         """By how much the width is not known: what half the steps change in its ends [rpm]."""
-        return sum((p.error_rpm for p in (self.lower, self.upper) if p is not None), 0.0)
+        return sum((float(p.error_rpm) for p in (self.lower, self.upper) if p is not None), 0.0)
 
     @property
     def confirmed(self) -> bool:
@@ -86,12 +87,12 @@ class SynchronousOrbits:
     upper_rpm: float
 
     @property
-    def edges(self) -> tuple[SpecialPoint, ...]:
+    def edges(self) -> tuple[Point, ...]:
         """Bifurcations at which a stable synchronous orbit ends, by speed."""
         return _distinct([p for s in self.stretches for p in (s.lower, s.upper) if p is not None])
 
     @property
-    def points(self) -> tuple[SpecialPoint, ...]:
+    def points(self) -> tuple[Point, ...]:
         """All bifurcations on all branches, by speed."""
         return _distinct([p for b in self.branches for p in b.special])
 
@@ -101,7 +102,7 @@ class SynchronousOrbits:
         return sum(p.status == "not converged" for b in self.branches for p in b.special)
 
     @property
-    def unexplained(self) -> tuple[SpecialPoint, ...]:
+    def unexplained(self) -> tuple[Point, ...]:
         """Where the stability of an orbit changes and no bifurcation is found: none of these is in `points`."""
         return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
 
@@ -162,7 +163,7 @@ def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_P
         rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
         if rpm[0] > rpm[-1]:
             points, rpm, state = points[::-1], rpm[::-1], state[::-1]
-        low, high = (float(r) if p is None else p.speed_rpm for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
+        low, high = (float(r if p is None else p.speed_rpm) for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
         stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
         found.append(_Piece(stretch, rpm, state))
     return found
@@ -191,9 +192,9 @@ def _merged(pieces: Sequence[_Piece], scale: Callable[[float], np.ndarray]) -> l
     return whole
 
 
-def _distinct(points: Sequence[SpecialPoint]) -> tuple[SpecialPoint, ...]:
+def _distinct(points: Sequence[Point]) -> tuple[Point, ...]:
     """Points by speed, those met twice taken once."""
-    kept: list[SpecialPoint] = []
+    kept: list[Point] = []
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
         apart = lambda q: max(1e-6 * p.value, p.error + q.error) if p.error + q.error >= 0 else 1e-6 * p.value
         same = lambda q: q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)

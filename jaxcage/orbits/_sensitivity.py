@@ -8,7 +8,7 @@ These hold for every kind of edge and test a gradient without any reference.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -22,11 +22,11 @@ from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
-from ._branch import SpecialPoint
+from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import Push, Slopes, by_columns, numbers_of
 from ._lens import SPEED
-from ._point import TANGENTIAL, BifurcationPoint, Singular, critical_rate
+from ._point import Point
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
 from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
@@ -37,22 +37,6 @@ POLISHING = 6
 POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
 """Newton's steps end below the first, must be below the second, and may lead no further than the third, in units of the
 system's scale and of a tenth of the speed."""
-
-
-class Located(NamedTuple):
-    """A bifurcation over speed known from elsewhere, to start Newton's method from."""
-
-    kind: str
-    speed: float
-    """[rad/s]."""
-    state: Float[np.ndarray, " dim"]
-    """State of the orbit at phase 0 [SI]."""
-    periods: int = 1
-    steps: int = 0
-    """Steps per revolution that were right nearby; 0 where they are not known."""
-
-
-Point: TypeAlias = SpecialPoint | BifurcationPoint | Located
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +53,7 @@ class Sensitivity:
     homogeneity: dict[str, float]
     """Relative residuals of the identities for mass, length and time; NaN where a parameter's unit is not known."""
     transversality: float
-    """d|mu|/d speed [s] (see `BifurcationPoint`); of a width or limit the smallest one."""
+    """d|mu|/d speed [s] (see `Point`); of a width or limit the smallest one."""
     status: str
     state: Float[np.ndarray, " dim"] | None = None
     """State of the orbit at phase 0 [SI]; of a width or limit None."""
@@ -297,7 +281,7 @@ def _homogeneity(system: AbstractForcedSystem, elasticity: Mapping[str, float]) 
 
 
 def sensitivities(
-    system: AbstractForcedSystem, points: Mapping[str, SpecialPoint], method: AbstractMethod | None = None
+    system: AbstractForcedSystem, points: Mapping[str, Point], method: AbstractMethod | None = None
 ) -> dict[str, Sensitivity]:
     """The sensitivity of each named edge."""
     return {name: sensitivity(system, point, name, method) for name, point in points.items()}

@@ -9,16 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._arclength import Corrected, Steps, follow, take
-from ._branch import SpecialPoint, describe, joined
+from ._branch import describe, joined
 from ._follower import Follower, Start, seeds, stable_steps, turned
 from ._lens import SPEED
 from ._located import brackets, count_of
+from ._point import Point
 
 
 WALK = Steps(first=0.05, longest=0.25, most=250)
 
 
-def walk(follower: Follower, start: Start, periods: int, kind: str) -> tuple[SpecialPoint | None, str]:
+def walk(follower: Follower, start: Start, periods: int, kind: str) -> tuple[Point | None, str]:
     """The nearest bifurcation of `kind` on the branch through an orbit, by the parameter.
 
     **Arguments:** follower over the range that is searched; an orbit; revolutions after which it closes; kind.

@@ -12,7 +12,7 @@ from scipy.optimize import isotonic_regression
 from .._errors import ArgumentError
 from .._glossary import component_names, quantity
 from ..analysis import Sweep
-from ..orbits import Branch, SpecialPoint
+from ..orbits import Branch, Point
 from ._orbit_diagram import label_speed, orbit_diagram
 from ._style import (
     BLACK,
@@ -147,7 +147,7 @@ def polyline(branch: Branch, component: int) -> tuple[np.ndarray, np.ndarray, np
     return x, y, pieces
 
 
-def _share(branch: Branch, point: SpecialPoint) -> float:
+def _share(branch: Branch, point: Point) -> float:
     """How far a special point is from the branch's point before it to the one after it."""
     scale = np.ptp(branch.state, axis=0) + 1e-300
     before, after = branch.state[point.index] / scale, branch.state[point.index + 1] / scale
@@ -178,14 +178,14 @@ def runs(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, 
     return np.where(index < 0, np.nan, x[index]), np.where(index < 0, np.nan, y[index])
 
 
-def _mark_points(ax: Axes, points: Sequence[SpecialPoint], component: int, factor: float) -> None:
+def _mark_points(ax: Axes, points: Sequence[Point], component: int, factor: float) -> None:
     for kind in [*MARKS, *sorted({p.kind for p in points} - set(MARKS))]:
         mark = mark_of(kind)
         for edge in (True, False):
             mine = [p for p in points if p.kind == kind and p.edge == edge]
             if not mine:
                 continue
-            x, y = [p.speed_rpm for p in mine], [float(p.state[component]) * factor for p in mine]
+            x, y = [float(p.speed_rpm) for p in mine], [float(p.state[component]) * factor for p in mine]
             style: dict[str, Any] = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
             if edge:
                 style |= {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 5.0}
@@ -203,7 +203,7 @@ def _mark_points(ax: Axes, points: Sequence[SpecialPoint], component: int, facto
         ax.plot([], [], **style, label="hollow: unstable on both sides")
 
 
-def _write_above(ax: Axes, points: Iterable[SpecialPoint]) -> None:
+def _write_above(ax: Axes, points: Iterable[Point]) -> None:
     """Kind and speed of points in a row above the frame, moved apart, with lines to where they belong.
 
     Points that are written alike, as on branches that share a part, are written once; where there is no room for all,

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from .._glossary import quantity
-from ..orbits import Branch, SpecialPoint
+from ..orbits import Branch, Point
 from ._branches import mark_of, move_apart, words
 from ._style import BLACK, BLUE, GREY, Halo, axes_or_new
 
@@ -56,7 +56,7 @@ def _shown(mu: np.ndarray) -> np.ndarray:
     return (np.abs(np.real(mu)) <= REACH) & (np.abs(np.imag(mu)) <= REACH)
 
 
-def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
+def _mark_critical(ax: Axes, points: Sequence[Point]) -> None:
     named = {p.kind: p for p in sorted(points, key=lambda p: p.edge)}
     for p in sorted(points, key=lambda p: p.edge):
         mark, mu = mark_of(p.kind), p.critical
@@ -78,12 +78,12 @@ def _mark_critical(ax: Axes, points: Sequence[SpecialPoint]) -> None:
         ax.legend(**place, frameon=False, fontsize=8, handletextpad=0.1, columnspacing=1.0)
 
 
-def _text(point: SpecialPoint) -> str:
+def _text(point: Point) -> str:
     filled, hollow = _GLYPHS.get(mark_of(point.kind).marker, "✚✛")
     return f"{filled if point.edge else hollow} {mark_of(point.kind).short} {point.speed_rpm:.0f}"
 
 
-def _write_column(ax: Axes, points: Sequence[SpecialPoint], side: int) -> None:
+def _write_column(ax: Axes, points: Sequence[Point], side: int) -> None:
     """Points with a real multiplier, all at the same place, one beneath the other; edges are the first to be named."""
     points = sorted(points, key=lambda p: (not p.edge, p.speed_rpm))
     rows = [_text(p) for p in points[:_ROWS]] + ([f"+ {len(points) - _ROWS} more"] if len(points) > _ROWS else [])
@@ -98,7 +98,7 @@ def _write_column(ax: Axes, points: Sequence[SpecialPoint], side: int) -> None:
         ax.text(side * 1.09, -0.06, "\n".join(rows), color=mark_of(points[0].kind).colour, **style, zorder=6)
 
 
-def _write_around(ax: Axes, points: Sequence[SpecialPoint]) -> None:
+def _write_around(ax: Axes, points: Sequence[Point]) -> None:
     """Points with complex multipliers, outside the circle beside their place, moved apart."""
     frame = ax.get_window_extent()
     gap = 1.3 * _LABEL_SIZE * ax.figure.dpi / 72 * 2 * REACH / min(frame.width, frame.height)

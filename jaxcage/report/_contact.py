@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from .._types import Scalar
 from ..integrate import AbstractMethod, method as make_method, strobe_map
 from ..models import CageModel
-from ..orbits import SpecialPoint
+from ..orbits import Point
 
 
 STEPS = 4096
@@ -27,7 +27,7 @@ def _largest_eps(
     return jnp.asarray(strobe_map(model, speed, method)(tuple(state[i] for i in range(state.size))).peak)
 
 
-def touching(model: CageModel, edges: Mapping[str, SpecialPoint], method: AbstractMethod | None) -> dict[str, float]:
+def touching(model: CageModel, edges: Mapping[str, Point], method: AbstractMethod | None) -> dict[str, float]:
     """Largest eps of the synchronous orbits at those edges at which it is beyond the onset of contact."""
     chosen = make_method(steps=STEPS) if method is None else method
     largest = {
@@ -37,7 +37,7 @@ def touching(model: CageModel, edges: Mapping[str, SpecialPoint], method: Abstra
     return {name: eps for name, eps in largest.items() if eps > float(model.contact.onset)}
 
 
-def contact_notes(model: CageModel, edges: Mapping[str, SpecialPoint], method: AbstractMethod | None) -> list[str]:
+def contact_notes(model: CageModel, edges: Mapping[str, Point], method: AbstractMethod | None) -> list[str]:
     """A sentence for each edge whose orbit touches the land."""
     onset = float(model.contact.onset)
     return [

@@ -12,7 +12,7 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters, replace
 from ..integrate import AbstractMethod
 from ..models import CageModel
-from ..orbits import Curve, SpecialPoint, bifurcation, curve
+from ..orbits import Curve, Point, bifurcation, curve
 from ..sweeps import cores, sweep
 from ._table import shown_unit
 
@@ -87,7 +87,7 @@ def parameter_axis(model: CageModel, name: str, lower: float | None = None, uppe
 
 
 def follow_edges(
-    model: CageModel, edges: Mapping[str, SpecialPoint], x: Axis, y: Axis, method: AbstractMethod | None, say: Say
+    model: CageModel, edges: Mapping[str, Point], x: Axis, y: Axis, method: AbstractMethod | None, say: Say
 ) -> tuple[list[Curve], dict[str, str]]:
     """A curve through each named edge, and why where there is none."""
     curves, refused = [], {}

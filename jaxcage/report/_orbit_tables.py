@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from .._types import Scalar
 from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
-from ..orbits import LossZones, SpecialPoint, Stretch, SynchronousOrbits
+from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
 from ._table import Table, number
 from ._zone_tables import Span, published_zones, zone_document
 
@@ -16,7 +17,7 @@ from ._zone_tables import Span, published_zones, zone_document
 AT_LIMIT_RPM = 1e-6
 
 
-def angle_deg(point: SpecialPoint) -> float:
+def angle_deg(point: Point) -> float:
     """Angle [deg] of the critical multiplier: 180 at a period doubling, 0 at a fold."""
     exact = {"period-doubling": 180.0, "fold": 0.0, "branch-point": 0.0}
     return exact.get(point.kind, abs(math.degrees(np.angle(point.critical))))
@@ -27,7 +28,7 @@ def pairs(multipliers: Sequence[complex] | np.ndarray) -> list[list[float]]:
     return [[float(mu.real), float(mu.imag)] for mu in multipliers]
 
 
-def point_document(point: SpecialPoint, branch: int | None) -> dict[str, Any]:
+def point_document(point: Point, branch: int | None) -> dict[str, Any]:
     """A bifurcation for programs."""
     return {
         "kind": point.kind,
@@ -43,7 +44,7 @@ def point_document(point: SpecialPoint, branch: int | None) -> dict[str, Any]:
     }
 
 
-def branch_of(found: SynchronousOrbits, point: SpecialPoint) -> int | None:
+def branch_of(found: SynchronousOrbits, point: Point) -> int | None:
     """Number of the branch that a point is on."""
     return next((i for i, b in enumerate(found.branches) if any(p is point for p in b.special)), None)
 
@@ -164,7 +165,7 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
     named = lambda p: next((name for name, q in loss.edges.items() if q is p), "-")
     rows = [
         (
-            number(p.speed_rpm, 3),
+            number(float(p.speed_rpm), 3),
             error_cell(p.error_rpm),
             f"{p.criticality} {p.kind}".strip(),
             multiplier_cell(p),
@@ -178,9 +179,9 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
     return Table(f"Ends of the stable synchronous orbits of {name}", columns, rows or [("none", *6 * ("-",))])
 
 
-def error_cell(error_rpm: float) -> str:
+def error_cell(error_rpm: Scalar) -> str:
     """The error of a speed; `-` where the method has no number of steps that could be halved."""
-    return "-" if math.isnan(error_rpm) else f"{error_rpm:.1g}"
+    return "-" if math.isnan(error_rpm) else f"{float(error_rpm):.1g}"
 
 
 def unsettled_notes(found: SynchronousOrbits) -> list[str]:
@@ -191,12 +192,12 @@ def unsettled_notes(found: SynchronousOrbits) -> list[str]:
         if not s.confirmed:
             notes.append(f"Not confirmed: the stretch from {number(s.lower_rpm, 2)} rpm is narrower than its error")
     for p in found.unexplained:
-        place = f"{number(p.speed_rpm, 3)} ± {error_cell(p.error_rpm)} rpm on branch {branch_of(found, p)}"
+        place = f"{number(float(p.speed_rpm), 3)} ± {error_cell(p.error_rpm)} rpm on branch {branch_of(found, p)}"
         notes.append(f"Unexplained: the stability changes at {place}, and no bifurcation was found there")
     return notes
 
 
-def multiplier_cell(point: SpecialPoint) -> str:
+def multiplier_cell(point: Point) -> str:
     """The critical multiplier; of a complex pair both."""
     mu = point.critical
     return f"{mu.real:.4f} ± {mu.imag:.4f}i" if point.kind == "torus" else f"{mu.real:.4f}"
@@ -209,7 +210,7 @@ def coexisting_notes(loss: LossZones) -> list[str]:
         point = loss.edges[name]
         others: list[np.ndarray] = []
         for state in (state for _, stable, state, _ in orbits if stable):
-            if not any(_same(state, known) for known in (point.state, *others)):
+            if not any(_same(state, known) for known in (np.asarray(point.state), *others)):
                 others.append(state)
         if others:
             orbit = "another synchronous orbit is" if len(others) == 1 else f"{len(others)} other ones are"

@@ -118,7 +118,7 @@ def _slope_of_the_first_doubling() -> Duffing:
     orbit = periodic_orbit(system, 1.2, 1, guess=(1.0, 0.0), revolutions=400, method=FINE)
 
     def force(system: ForcedOscillator) -> jax.Array:
-        return bifurcation(system, "period-doubling", orbit, "g", speed=1.2, method=FINE).value
+        return jnp.asarray(bifurcation(system, "period-doubling", orbit, "g", speed=1.2, method=FINE).value)
 
     law = eqx.filter_grad(force)(system).acceleration
     assert isinstance(law, Duffing)
