@@ -86,7 +86,7 @@ def scaled(factors):
     return outputs(replace(bearing, **values), 4450.0 * factors[0], 1256.6 * factors[1])
 
 
-@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("mode", [jax.jacfwd, pytest.param(jax.jacrev, marks=pytest.mark.wide)])
 def test_gradients_against_central_differences(mode):
     ones, step = jnp.ones(6), 1e-4
     gradient = jax.jit(mode(scaled))(ones)

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import wide_but
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
@@ -377,6 +378,7 @@ def assert_same_sets(found, exact, rtol):
     assert np.max(np.min(away, axis=1)) < rtol
 
 
+@pytest.mark.wide
 def test_torus_of_a_planted_orbit():
     """The pair exp((p - 0.03 +- 0.4i) T) crosses at p = 0.03; the real pair of the other block stays inside."""
     settings = dict(a=(-0.03, -0.3), c=(1.0, 0.2), s=(0.0, 0.1), b=(0.4, 0.0))
@@ -401,7 +403,7 @@ QUIET = {
 }
 
 
-@pytest.mark.parametrize("name", QUIET)
+@pytest.mark.parametrize("name", wide_but(QUIET, "neutral saddle"))
 def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     branch = planted_branch(**QUIET[name])
     exact = planted_multipliers(branch, **QUIET[name])
@@ -490,6 +492,7 @@ class VanDerPol(eqx.Module):
         return (u, self.mu * (1 - x * x) * u - x)
 
 
+@pytest.mark.wide
 def test_branch_of_a_self_excited_system_over_its_damping():
     """Periods of van der Pol's limit cycle at mu = 0.1 and 1, and its multiplier, by DOP853."""
     system = jc.ForcedSystem(VanDerPol(**numbers(mu=0.3)), dimension=2)

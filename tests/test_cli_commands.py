@@ -271,6 +271,7 @@ def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], 
     assert ("zoom" in found) == bool(closed)
 
 
+@pytest.mark.wide
 def test_programs_kept_on_disk_are_used_again_without_a_word(tmp_path: Path):
     """XLA's loader calls its own tuning flags errors on some processors: nobody should see that."""
     options = ["--speed", "8500", "--discard", "10", "--revolutions", "10", "--out", str(tmp_path)]

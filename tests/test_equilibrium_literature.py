@@ -227,7 +227,7 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     assert float(equilibrium(model, 1.01 * speed).growth_rate) > 0.03
 
 
-@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
+@pytest.mark.parametrize("film", ["fixed_half", pytest.param("positive_pressure", marks=pytest.mark.wide)])
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
     """A push of 1e-3 c, within 1 % of the threshold: rate, and whirl between 0.500 and 0.524."""
@@ -304,6 +304,7 @@ def test_light_support_adds_its_stiffness_to_the_eigenvalues():
     np.testing.assert_allclose(np.sort(np.abs(at.eigenvalues.imag))[::2], expected, rtol=1e-6)
 
 
+@pytest.mark.wide
 def test_gradient_of_the_growth_rate_is_that_of_differences():
     model, speed = cage_in_film(cage_mass=0.1), 450.0
     rate = lambda v: equilibrium(replace(model, guidance_gap=v), speed).growth_rate

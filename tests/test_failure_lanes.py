@@ -133,6 +133,7 @@ def test_failed_lanes_whatever_is_observed(exponents):
     assert np.all(np.isfinite(mixed.exponents[0, 0]))
 
 
+@pytest.mark.wide
 def test_bad_start_fails_alone_with_adaptive_steps():
     settings = dict(discard=1, revolutions=2, blocks=2, keep=2)
     settings |= dict(method=method("rodas3", tolerance=1e-5))

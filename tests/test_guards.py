@@ -147,7 +147,9 @@ def _thrown() -> tuple[np.ndarray, Any]:
     return speed, tuple(jnp.asarray(row) for row in rows)
 
 
-@pytest.mark.parametrize("solver, steps", [("rk4", 16), ("rk4", 128), ("newmark", 64), ("rodas3", 32)])
+@pytest.mark.parametrize(
+    "solver, steps", [("rk4", 16), ("rk4", 128), pytest.param("newmark", 64, marks=pytest.mark.wide), ("rodas3", 32)]
+)
 def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageModel, solver: str, steps: int):
     """With steps too large by far for the contact: a lane is refused, or tells how far out the farthest of its steps
     was, which is compared with here for four of them at a time.
@@ -241,6 +243,7 @@ def test_short_studies_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert "Warning: 2 labels rest on too few revolutions: choose more --revolutions." in capsys.readouterr().err
 
 
+@pytest.mark.wide
 def test_adaptive_steps_tell_how_far_the_cage_went():
     """Not only where it ended: it bounces off the rib within the revolution."""
     run = lambda method: raw_sweep(

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import even, raw_sweep, raw_sweeps
+from helpers import even, raw_sweep, raw_sweeps, wide_but
 
 import jaxcage as jc
 from jaxcage.integrate import (
@@ -47,6 +47,7 @@ STATES = STATES * np.stack([CLEARANCE * np.array([1, 1, w, w]) for w in SPEEDS])
 
 
 slow = functools.partial(pytest.param, marks=pytest.mark.slow)
+wide = functools.partial(pytest.param, marks=pytest.mark.wide)
 
 
 def lane_state(states):
@@ -353,7 +354,7 @@ def by_solver(chosen, speed, y, direction):
     return jax.jvp(image, (y,), (direction,))
 
 
-@pytest.mark.parametrize("name", ["rk4", "tsit5", "rodas3", "rodas4"])
+@pytest.mark.parametrize("name", wide_but(["rk4", "tsit5", "rodas3", "rodas4"], "rk4", "rodas4"))
 def test_kernels_give_the_strobe_map_and_its_derivative(name):
     """Two programs for one method: the loop of kernels, and the solver's own step under `jax.jvp`."""
     chosen = method(name, steps=256)
@@ -501,6 +502,7 @@ def one_revolution(speeds, states, chosen):
     )
 
 
+@pytest.mark.wide
 def test_controlled_steps_reach_1e_4_of_the_clearance(attractor):
     """The default of sweeps, over states on the attractors of case 1a, against 8192 steps."""
     speeds, states = attractor
@@ -641,6 +643,7 @@ def test_results_do_not_depend_on_chunks_cores_or_lane_order(monkeypatch):
             np.testing.assert_array_equal(getattr(got, field), getattr(expected, field), err_msg=f"{chunk} {field}")
 
 
+@pytest.mark.wide
 def test_several_designs_in_one_batch_give_what_each_gives_alone():
     models = [MODEL, jc.replace(MODEL, guidance_gap=0.5e-3), jc.case("2b", "preliminary")]
     speeds = jc.rpm(8000, 24000, 5)
@@ -698,7 +701,7 @@ def on_device(solver, tangents, **options):
 
 
 @pytest.mark.parametrize(
-    "solver, tangents", [(ClassicalRK4(), 0), slow(ClassicalRK4(), 2), (Rodas3(), 0), slow(Rodas4(), 0)]
+    "solver, tangents", [(ClassicalRK4(), 0), slow(ClassicalRK4(), 2), wide(Rodas3(), 0), slow(Rodas4(), 0)]
 )
 def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
     run, numbers, step, sizes = on_device(solver, tangents, interpret=True)

@@ -137,6 +137,7 @@ def test_statistical_slopes_are_within_their_errors():
     assert np.all(np.abs(truth.slope) > 3 * truth.slope_error)
 
 
+@pytest.mark.wide
 def test_statistical_slopes_satisfy_homogeneity():
     """Units of mass, length and time: sum a_i p_i dW/dp_i is 0, 0 and -W, within the error, whatever the reference."""
     system = double_well()

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import wide_but
 
 import jaxcage as jc
 
@@ -91,6 +92,7 @@ def test_scaling_identities_of_an_orbit(name):
     np.testing.assert_allclose(number, zero, atol=1e-9)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", ORBITS)
 def test_hessian_of_state_and_multipliers(name):
     theta, guess = ORBITS[name]
@@ -105,6 +107,7 @@ def test_hessian_of_state_and_multipliers(name):
 HESSIAN = jax.jit(jax.jacfwd(jax.jacrev(orbit_numbers)))
 
 
+@pytest.mark.wide
 def test_batches_equal_loops():
     theta, guess = DOUBLE_WELL
     thetas = jnp.asarray(theta + 0.01 * np.outer(np.arange(-2.0, 3.0), [0, 1, 1, 1, -1, -1, 1]))
@@ -168,7 +171,7 @@ def found():
     return points
 
 
-@pytest.mark.parametrize("kind", POINTS)
+@pytest.mark.parametrize("kind", wide_but(POINTS, "torus", "fold"))
 def test_gradient_of_a_point(kind, found):
     theta, (_, guess) = POINTS[kind][1], found[kind]
     gradient = EDGE_GRADIENT(jnp.asarray(theta), kind, guess)
@@ -196,6 +199,7 @@ def test_scaling_identities_of_a_point(kind, found):
     assert abs(total + force) < 1e-9
 
 
+@pytest.mark.wide
 def test_hessian_of_a_period_doubling(found):
     """Against differences of gradients; with the force as b^(-1/2), d2g/db2 = 3 g/(4 b^2)."""
     theta, (point, guess) = DOUBLE_WELL[0], found["period-doubling"]

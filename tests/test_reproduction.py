@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers import wide_but
 
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone
@@ -135,7 +136,11 @@ def test_a_cubic_term_that_falls_with_the_gap_is_that_of_the_narrow_gap():
     assert float(at(wide) / at(narrow)) == pytest.approx((0.45 / 0.60) ** 2, rel=1e-12)
 
 
-@pytest.mark.parametrize("reading", READINGS, ids=lambda r: f"{r.case}-{r.question}-{r.answer}")
+@pytest.mark.parametrize(
+    "reading",
+    wide_but(READINGS, *(r for r in READINGS if r.question in ("as the cases have it", "rib") and r.case == "1a")),
+    ids=lambda r: f"{r.case}-{r.question}-{r.answer}",
+)
 def test_every_reading_can_be_taken(reading):
     model = reading.model(jc.case(reading.case))
     assert model.dimension == (8 if reading.answer == "elastic" else 4)

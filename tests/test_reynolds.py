@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import raw_sweep
+from helpers import raw_sweep, wide_but
 
 import jaxcage as jc
 from jaxcage.forces import (
@@ -69,7 +69,7 @@ def sommerfeld(eps: float, half: bool) -> np.ndarray:
     return np.array([-12 * eps**2 / ((2 + eps**2) * (1 - eps**2)), tangential / 2])
 
 
-@pytest.mark.parametrize("cavitation", ["full", "guembel"])
+@pytest.mark.parametrize("cavitation", wide_but(["full", "guembel"], "full"))
 @pytest.mark.parametrize("eps", [0.3, 0.7])
 def test_long_limit_in_closed_form(cavitation: str, eps: float):
     """The ends take off a share of the order of 1/lambda."""
@@ -319,6 +319,7 @@ def test_film_of_the_cage_has_the_dimension_of_a_force(base: str, power: int):
     np.testing.assert_allclose(np.array(there), np.array(here) * factor**power, rtol=1e-9)
 
 
+@pytest.mark.wide
 def test_simulation_and_sweep_of_narrow_lands_are_those_of_the_short_film(tmp_path):
     """Through TOML: with lands of 0.5 mm both films give the same motion; a sweep goes where the simulation goes."""
     text = 'base = "1a"\n[film]\nland_width = "0.5 mm"\nmodel = "{}"\n'

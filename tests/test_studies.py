@@ -178,6 +178,7 @@ def test_killed_at_random_and_resumed(whole: Path, tmp_path: Path):
     assert contents(store) == contents(whole)
 
 
+@pytest.mark.wide
 def test_dask_survives_a_worker_and_finds_the_same(whole: Path, tmp_path: Path):
     """Two worker processes; one is killed as soon as the first chunk is done."""
     pytest.importorskip("distributed", reason="dask.distributed is not installed")

@@ -69,7 +69,7 @@ def test_an_exponent_on_a_soft_support_is_that_of_the_motion():
     assert beside.apart <= beside.stated < 0.1
 
 
-@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("wide", [False, pytest.param(True, marks=pytest.mark.wide)])
 def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
     finished = 0
     for seed in range(3):
@@ -96,6 +96,7 @@ def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
             assert np.array_equal(getattr(here, name), getattr(there, name)), name
 
 
+@pytest.mark.wide
 def test_the_section_of_lanes_finds_nothing_wrong():
     assert truth.main(["--quick", "--lanes", "--kinds", "cases"]) == []
 
@@ -115,6 +116,7 @@ def spindle() -> jc.CageModel:
     return model_from(given)
 
 
+@pytest.mark.wide
 def test_forces_of_a_bearing_of_ones_own_are_those_of_the_reference():
     model = spindle()
     settled = jc.simulate(model, jc.rpm(9000), revolutions=1, discard=60)

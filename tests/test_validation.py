@@ -68,6 +68,7 @@ def test_two_grooves_whirl_near_half_speed():
     assert all(0.45 < float(grooved_whirl(eps).whirl_ratio) < 0.52 for eps in (0.03, 0.04))
 
 
+@pytest.mark.wide
 def test_cascade_of_the_driven_pendulum():
     rows = pendulum_comparisons((1, 2, 4, 8))
     assert len(rows) == 4 and failures(rows) == []
