@@ -96,6 +96,7 @@ def test_gradients_against_central_differences(mode):
     np.testing.assert_allclose(gradient, difference, rtol=3e-5, atol=0)
 
 
+@pytest.mark.wide
 def test_second_derivative_against_difference_of_gradients():
     def shift(load):
         return jb.load_distribution(jb.nu2310(), load, 100.0).shaft_shift * 1e6

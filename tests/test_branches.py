@@ -432,7 +432,10 @@ def test_crossings_within_one_step_are_in_order(first):
     assert [p.edge for p in branch.special] == [True, False]
 
 
-@pytest.mark.parametrize("kind, block", [("period-doubling", dict(s=(0.1, 0.0002))), ("torus", dict(b=(0.4, 0.3)))])
+@pytest.mark.parametrize(
+    "kind, block",
+    [("period-doubling", dict(s=(0.1, 0.0002))), pytest.param("torus", dict(b=(0.4, 0.3)), marks=pytest.mark.wide)],
+)
 def test_two_crossings_of_one_kind_within_a_step(kind, block):
     """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""
     places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)

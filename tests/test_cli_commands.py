@@ -21,7 +21,7 @@ from jaxcage.report import zones_table
 
 
 TINY = ["--first", "12000", "--last", "13000", "--count", "3", "--discard", "20", "--revolutions"]
-TINY += ["20", "--horizon", "0", "--solver", "rodas4", "--steps", "64"]
+TINY += ["20", "--horizon", "0", "--solver", "rk4", "--steps", "256"]
 PNG = b"\x89PNG\r\n"
 
 
@@ -53,6 +53,7 @@ ZONE_KEYS = {
 }
 
 
+@pytest.mark.wide
 def test_zones(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "zones", "1a", *TINY, "--out", str(tmp_path))
     assert found["case"] == "1a"
@@ -99,7 +100,7 @@ def test_sweep_prints_the_zone_table_beside_the_published_edges(capsys: pytest.C
 
 
 def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    arguments = ["--speed", "15000", "--discard", "20", "--revolutions", "20", "--steps", "256"]
+    arguments = ["--speed", "15000", "--discard", "20", "--revolutions", "20", "--solver", "rk4", "--steps", "256"]
     found = document(capsys, "poincare", "1a", *arguments, "--out", str(tmp_path))
     assert [start["start"] for start in found["starts"]] == [1, 2, 3]
     columns = read_columns(found["data"])
@@ -263,7 +264,7 @@ def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], 
         "0",
     ]
     found = document(
-        capsys, "sweep", "1a", *tiny, "--solver", "rodas4", "--steps", "64", "--waterfall", "3", "--out", str(tmp_path)
+        capsys, "sweep", "1a", *tiny, "--solver", "rk4", "--steps", "256", "--waterfall", "3", "--out", str(tmp_path)
     )
     assert is_png(found["waterfall"]) and is_png(found["figure"])
     assert all(z["kind"] == "synchronous-loss" for z in found["synchronous"])

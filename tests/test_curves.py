@@ -72,6 +72,7 @@ def test_folds_of_the_hardening_duffing_end_in_a_cusp(fold):
     np.testing.assert_allclose(product, np.exp(-0.1 * 2 * np.pi / curve.x_value), rtol=1e-5)
 
 
+@pytest.mark.wide
 def test_fold_curve_is_made_of_folds(fold):
     """Each is found again on its own, without the curve."""
     curve = jc.curve(duffing(), fold, "speed", "g", lower=0.2, upper=0.4, x_lower=1.0, x_upper=3.0, method=METHOD)
@@ -193,6 +194,7 @@ def test_torus_curve_passes_resonances():
     assert set(curve.criticality) == {"supercritical"}
 
 
+@pytest.mark.wide
 def test_torus_curve_turns_subcritical_at_a_chenciner_point():
     """The amplitude changes by -cube |z|^3: exact."""
     system = jc.ForcedSystem(Planted(**numbers(a=0.1, b=0.35, s=0.0, turn=0.0, cube=0.7)), dimension=2)
@@ -222,6 +224,7 @@ class Flip(eqx.Module):
         return (*turned, -0.7 * f + 0.6 * e * e)
 
 
+@pytest.mark.wide
 def test_period_doubling_curve_turns_subcritical_at_a_generalised_flip():
     """On the centre manifold f = 0.6 e^2 / 0.7, so that over a period e grows by (g + 0.3 / 0.7) T e^3: exact."""
     system = jc.ForcedSystem(Flip(**numbers(p=-0.1, g=0.2)), dimension=3)

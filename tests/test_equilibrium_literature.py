@@ -227,7 +227,8 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     assert float(equilibrium(model, 1.01 * speed).growth_rate) > 0.03
 
 
-@pytest.mark.parametrize("film", ["fixed_half", pytest.param("positive_pressure", marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
     """A push of 1e-3 c, within 1 % of the threshold: rate, and whirl between 0.500 and 0.524."""
@@ -313,6 +314,7 @@ def test_gradient_of_the_growth_rate_is_that_of_differences():
     assert float(jax.grad(rate)(gap)) == pytest.approx(float(difference), rel=1e-6)
 
 
+@pytest.mark.wide
 def test_elastic_rib_sinks_under_both_weights_and_the_cage_with_it():
     model = case("1a", "preliminary")
     rib = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e7, 50.0)))

@@ -139,6 +139,7 @@ def test_an_edge_that_vanishes_stops_the_step_and_not_the_search(located):
     assert fit.chi_square > 100  # no damping makes these edges: the misfit says so
 
 
+@pytest.mark.wide
 def test_slopes_are_those_of_differences(located):
     cases_, points = [c for c, *_ in located], [p for _, _, p, _ in located]
     place = np.array([u.place(TRUTH[u.name]) for u in BOUNDS])

@@ -302,6 +302,7 @@ def test_revolutions_in_other_units(kind, design, speed, cage, rib, scales):
     np.testing.assert_allclose(found, end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
 
 
+@pytest.mark.wide
 @random(15)
 @given(speeds, between(0.95, 1.05), units)
 def test_exponents_in_other_units(speed, gap, scales):
@@ -314,6 +315,7 @@ def test_exponents_in_other_units(speed, gap, scales):
     np.testing.assert_allclose(there.last / there.scale, here.last / here.scale, rtol=0, equal_nan=False, atol=1e-7)
 
 
+@pytest.mark.wide
 @random(12)
 @given(between(jc.rpm(14000.0), jc.rpm(19000.0)), units)
 def test_orbits_in_other_units(speed, scales):
@@ -395,6 +397,7 @@ def smooth_motions(count):
             yield model, speed, start
 
 
+@pytest.mark.wide
 def test_work_is_the_change_of_energy():
     """Motion and quadrature are of fourth order: with twice the steps the defect falls to a sixteenth."""
     for motion in smooth_motions(10):

@@ -162,6 +162,7 @@ def test_energy_balance_of_a_synchronous_orbit():
     assert m.whirl_ratio == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.wide
 def test_forces_vanish_in_sum_at_the_equilibrium():
     model = replace(case("1a", "preliminary"), amplitude=0.0, eccentricity=0.0)
     q = np.asarray(equilibrium(model, SPEED).coordinates)

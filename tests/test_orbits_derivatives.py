@@ -171,7 +171,7 @@ def found():
     return points
 
 
-@pytest.mark.parametrize("kind", wide_but(POINTS, "torus", "fold"))
+@pytest.mark.parametrize("kind", wide_but(POINTS, "fold"))
 def test_gradient_of_a_point(kind, found):
     theta, (_, guess) = POINTS[kind][1], found[kind]
     gradient = EDGE_GRADIENT(jnp.asarray(theta), kind, guess)
@@ -211,6 +211,7 @@ def test_hessian_of_a_period_doubling(found):
     assert abs(hessian[b, b] - 0.75 * point.value) < 1e-9
 
 
+@pytest.mark.wide
 def test_state_and_speed_at_a_point_are_differentiable(found):
     theta, (_, guess) = HARDENING[0], found["fold"]
 
@@ -223,6 +224,7 @@ def test_state_and_speed_at_a_point_are_differentiable(found):
     np.testing.assert_allclose(slope[2], slope[3], rtol=0, atol=1e-14)
 
 
+@pytest.mark.wide
 def test_directional_derivative_and_batch_of_points(found):
     """A tangent through the design and the speed at once, in a batch."""
     theta, (_, guess) = DOUBLE_WELL[0], found["period-doubling"]
