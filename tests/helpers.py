@@ -11,7 +11,8 @@ import pint
 import pytest
 
 import jaxcage as jc
-from jaxcage._parameters import get, parameter_info, parameter_paths
+from jaxcage import parameter_info
+from jaxcage._parameters import get, parameter_paths
 
 
 UNITS = pint.UnitRegistry()

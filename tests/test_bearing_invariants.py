@@ -8,7 +8,7 @@ import pint
 import pytest
 
 import jaxcage.bearing as jb
-from jaxcage._parameters import parameter_info, parameters, replace
+from jaxcage import parameter_info, parameters, replace
 
 
 def distribution(clearance=40e-6, load=4450.0, centrifugal=0.0, angle=-np.pi / 2):

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 import jaxcage as jc
 from jaxcage.orbits._normal_form import around, coefficient, critical_vectors, criticality
-from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
+from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
 METHOD = jc.method("rodas4", steps=256)

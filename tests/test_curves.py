@@ -13,7 +13,7 @@ from helpers import wide_but
 from scipy.interpolate import CubicSpline
 
 import jaxcage as jc
-from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS
+from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS
 
 
 METHOD = jc.method("rk4", steps=256)

@@ -9,7 +9,7 @@ import pytest
 from helpers import in_other_units, wide_but
 
 import jaxcage as jc
-from jaxcage._parameters import parameter_info
+from jaxcage import parameter_info
 from jaxcage.orbits import SpecialPoint, edge_speed, sensitivity, width
 
 

@@ -14,9 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcage._parameters import replace
-from jaxcage.analysis._equilibrium import (
-    LARGEST_WHIRLING,
+from jaxcage import replace
+from jaxcage.analysis import (
     attitude_angle,
     dimensional,
     eccentricity_ratio,
@@ -24,14 +23,15 @@ from jaxcage.analysis._equilibrium import (
     film_coefficients,
     film_whirl_speed,
     load_number,
+    orbit_measures,
     stability_chart,
     whirl_threshold,
 )
-from jaxcage.analysis._measures import orbit_measures
+from jaxcage.analysis._equilibrium import LARGEST_WHIRLING
 from jaxcage.forces import ElasticRib, RibFilm, film_scale
 from jaxcage.integrate import simulate
 from jaxcage.models import case
-from jaxcage.validation._literature import SHORT_BEARING
+from jaxcage.validation import SHORT_BEARING
 
 
 # eps, N, angle [deg], Kxx, Kxy, Kyx, Kyy, Cxx, Cxy = Cyx, Cyy, omega sqrt(c/g), whirl ratio

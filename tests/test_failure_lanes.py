@@ -13,8 +13,7 @@ import pytest
 from jaxcage.analysis import Plan
 from jaxcage.integrate import OUTCOMES, method
 from jaxcage.models import case
-from jaxcage.sweeps import sweep
-from jaxcage.sweeps._engine import run_lanes
+from jaxcage.sweeps import run_lanes, sweep
 
 
 MODEL = case("1a", "preliminary")

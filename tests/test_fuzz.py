@@ -20,7 +20,7 @@ import hostile
 
 import jaxcage as jc
 from jaxcage.cli import _sweep, main
-from jaxcage.design._objective import DesignSpace
+from jaxcage.design import DesignSpace
 from jaxcage.design._optimise import _Kept
 from jaxcage.io import (
     ConfigError,

@@ -20,8 +20,7 @@ import jaxcage as jc
 from jaxcage import _checks
 from jaxcage.analysis import label_lanes, too_few_revolutions
 from jaxcage.cli import main
-from jaxcage.integrate import OUTCOMES
-from jaxcage.integrate._results import outcome_code
+from jaxcage.integrate import OUTCOMES, outcome_code
 
 
 def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:

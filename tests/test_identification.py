@@ -14,8 +14,9 @@ from helpers import raw_sweep
 import jaxcage as jc
 from jaxcage._parameters import parameter
 from jaxcage.analysis import Edge, Zone
+from jaxcage.design import matched
 from jaxcage.design._fit import NORMAL_95, determined
-from jaxcage.design._measured import inside_zones, matched
+from jaxcage.design._measured import inside_zones
 
 
 METHOD = jc.method("rk4", steps=64)

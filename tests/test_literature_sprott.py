@@ -10,7 +10,7 @@ import pytest
 from helpers import raw_sweep
 
 import jaxcage as jc
-from jaxcage.validation._literature import LORENZ, LORENZ_DIMENSION, ROESSLER, Number
+from jaxcage.validation import LORENZ, LORENZ_DIMENSION, ROESSLER, Number
 
 
 def lorenz(rho):

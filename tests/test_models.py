@@ -9,7 +9,8 @@ import pytest
 from helpers import wide_but
 
 import jaxcage as jc
-from jaxcage._parameters import get, parameter_paths, parameters
+from jaxcage import parameters
+from jaxcage._parameters import get, parameter_paths
 
 
 MODELS = {

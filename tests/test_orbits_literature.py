@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 import jaxcage as jc
-from jaxcage.validation._literature import (
+from jaxcage.validation import (
     DUFFING_DOUBLINGS,
     DUFFING_FOLDS,
     DUFFING_SLOPES,

@@ -16,7 +16,7 @@ import jaxcage as jc
 from jaxcage.integrate import FixedSteps, strobe_map
 from jaxcage.io import load_model, write_template
 from jaxcage.orbits import Located, SynchronousOrbits, edge_speed, sensitivity
-from jaxcage.validation._literature import DUFFING_DOUBLINGS
+from jaxcage.validation import DUFFING_DOUBLINGS
 
 
 RPM = np.pi / 30

@@ -12,7 +12,7 @@ from helpers import wide_but
 from jaxcage.integrate import method
 from jaxcage.models import ForcedOscillator, ForcedSystem
 from jaxcage.sweeps import sweep
-from jaxcage.validation._literature import EXPONENTS
+from jaxcage.validation import EXPONENTS
 
 
 COEXISTING = "Duffing x'' + .15 x' - x + x^3 = .3 cos t"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers import wide_but
 
+from jaxcage.validation import DUFFING_DOUBLINGS, EXPONENTS
 from jaxcage.validation._finite_volumes import equations, film_pressure, full_bearing
-from jaxcage.validation._literature import DUFFING_DOUBLINGS, EXPONENTS
 from jaxcage.validation._shooting import UEDA, doubling, duffing, largest_exponent, pendulum
 from jaxcage.validation._statics import load_integral
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.studies import LABELS, PENDING, found_share, kinds, refine
-from jaxcage.studies._adaptive import UNKNOWN, AdaptiveGrid, changes, first_stride
+from jaxcage.studies import LABELS, PENDING, AdaptiveGrid, found_share, kinds, refine
+from jaxcage.studies._adaptive import UNKNOWN, changes, first_stride
 
 
 SIDE = 300

@@ -9,7 +9,7 @@ from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.models import FirstOrderField
-from jaxcage.validation._literature import DUFFING_FOLDS
+from jaxcage.validation import DUFFING_FOLDS
 
 
 def duffing(tau, q, v, speed):

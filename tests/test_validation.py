@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from jaxcage.cli import main
-from jaxcage.validation import TOPICS, Comparison, page
+from jaxcage.validation import FEIGENBAUM, TOPICS, Comparison, page
 from jaxcage.validation._bifurcations import pendulum_comparisons
 from jaxcage.validation._film import (
     FULL_BEARINGS,
@@ -16,7 +16,6 @@ from jaxcage.validation._film import (
     lund_thomsen_comparisons,
     nicholas_comparisons,
 )
-from jaxcage.validation._literature import FEIGENBAUM
 
 
 def made(theirs=1.0, ours=1.004, tolerance=0.005):
