@@ -83,6 +83,7 @@ class Pendulum(eqx.Module):
         return (-natural / 2 * u + natural**2 * (self.g * jnp.cos(tau) - jnp.sin(x)),)
 
 
+@pytest.mark.wide
 def test_period_doubling_from_beyond_a_superstable_orbit():
     """Newton's method finds nothing from an orbit with the multiplier .18: the branch leads there (SciPy's DOP853 and
     bisection put it at 1.08208437)."""
@@ -223,6 +224,7 @@ def test_another_kind_than_asked(name):
     assert np.isnan(point.value) and not bool(point.trusted)
 
 
+@pytest.mark.wide
 def test_multiplier_one_that_is_no_fold():
     """A pitchfork is crossed by its orbit: as a fold its place is ill-determined, and must not be trusted."""
     assert not bool(point_of("fold", s=0.3, turn=0.0).trusted)
@@ -332,6 +334,7 @@ def test_cage_in_contact_with_its_land(name):
     np.testing.assert_allclose(orbit.monodromy / size, jnp.stack(columns, -1) / size, rtol=0, atol=1e-7)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", CONTACT)
 def test_multipliers_of_a_cage_in_contact_are_trusted(name):
     """One multiplier is below 1e-17 of the largest: the determinant is lost to rounding, the others are not."""

@@ -44,13 +44,10 @@ def starts(count, seed=0):
     return [tuple(map(float, s)) for s in np.random.default_rng(seed).uniform(-1, 1, (count, 2))]
 
 
-DUFFING = "Duffing x'' + .25 x' - x + x^3 = .4 cos t"
-
-
 # Law and frequency of the drive by name in the table of numbers.
 LITERATURE = {
     "Ueda x'' + .05 x' + x^3 = 7.5 sin t": (ueda, 1.0),
-    DUFFING: (duffing(0.25, 0.4), 1.0),
+    "Duffing x'' + .25 x' - x + x^3 = .4 cos t": (duffing(0.25, 0.4), 1.0),
     "pendulum x'' + .05 x' + sin x = .6 cos .7t": (pendulum(0.05, 0.6), 0.7),
     "Duffing x'' + .3 x' - x + x^3 = .5 cos 1.2t": (duffing(0.3, 0.5), 1.2),
     COEXISTING: (duffing(0.15, 0.3), 1.0),
@@ -58,7 +55,8 @@ LITERATURE = {
 }
 
 
-@pytest.mark.parametrize("name", wide_but(LITERATURE, DUFFING))
+@pytest.mark.wide
+@pytest.mark.parametrize("name", LITERATURE)
 def test_largest_exponent_of_chaotic_oscillators(name):
     law, omega = LITERATURE[name]
     known = EXPONENTS[name]
@@ -114,7 +112,7 @@ def linear(zeta, natural):
     return acceleration
 
 
-@pytest.mark.parametrize("omega", [0.4, 1.7])
+@pytest.mark.parametrize("omega", [0.4, pytest.param(1.7, marks=pytest.mark.wide)])
 def test_multipliers_of_the_linear_oscillator_underdamped(omega):
     """exp((-z +- i sqrt(1 - z^2)) w_0 T): both exponents are -z w_0 T in the mean."""
     zeta, natural = 0.05, 1.3
@@ -126,6 +124,7 @@ def test_multipliers_of_the_linear_oscillator_underdamped(omega):
     assert np.all(result.label == "periodic-1")
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("omega", [0.9, 3.0])
 def test_multipliers_of_the_linear_oscillator_overdamped(omega):
     """Real multipliers exp((-z +- sqrt(z^2 - 1)) w_0 T), one exponent each."""
@@ -149,6 +148,7 @@ def test_steady_state_of_the_linear_oscillator():
     np.testing.assert_allclose(result.last, at, atol=1e-9)
 
 
+@pytest.mark.wide
 def test_first_order_form_gives_the_same_strobe_states():
     """A `ForcedSystem` of the same Duffing oscillator, on its way to periodic motion."""
     law = duffing(0.25, 0.1)

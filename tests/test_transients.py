@@ -589,6 +589,7 @@ def test_crisis_of_uedas_oscillator(chaotic_starts):
     assert -fit[0] == pytest.approx(expected, abs=0.2)
 
 
+@pytest.mark.wide
 def test_crisis_with_four_times_the_steps(chaotic_starts):
     coarse, fine = (lives((13.42,), chaotic_starts, steps, 1000)[0] for steps in (512, 2048))
     steps = compare(coarse, fine)
