@@ -95,7 +95,7 @@ def places(node: ast.AST) -> Iterator[ast.AST]:
     """Nodes of a module that can be made wrong, in the order of the text."""
     if isinstance(node, (ast.Raise, ast.JoinedStr, ast.Import, ast.ImportFrom)):
         return  # what is said, and to whom
-    if fault(node) is not None:
+    if can_be_wrong(node):
         yield node
     for name, value in ast.iter_fields(node):
         if name not in NOT_CODE:
@@ -104,24 +104,34 @@ def places(node: ast.AST) -> Iterator[ast.AST]:
                     yield from places(child)
 
 
-def fault(node: ast.AST) -> ast.AST | None:
-    """The node made wrong, or nothing if it is of no kind that can be."""
+def can_be_wrong(node: ast.AST) -> bool:
+    if isinstance(node, ast.Compare):
+        return type(node.ops[0]) in FLIPS
+    if isinstance(node, (ast.BinOp, ast.BoolOp)):
+        return type(node.op) in FLIPS
+    if isinstance(node, ast.UnaryOp):
+        return isinstance(node.op, (ast.Not, ast.USub))
+    return isinstance(node, ast.IfExp) or isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def fault(node: ast.AST) -> ast.AST:
+    """The node made wrong."""
     wrong = copy.deepcopy(node)
-    if isinstance(wrong, ast.Compare) and type(wrong.ops[0]) in FLIPS:
+    if isinstance(wrong, ast.Compare):
         wrong.ops[0] = FLIPS[type(wrong.ops[0])]()
         return wrong
-    if isinstance(wrong, (ast.BinOp, ast.BoolOp)) and type(wrong.op) in FLIPS:
+    if isinstance(wrong, (ast.BinOp, ast.BoolOp)):
         wrong.op = FLIPS[type(wrong.op)]()
         return wrong
-    if isinstance(wrong, ast.UnaryOp) and isinstance(wrong.op, (ast.Not, ast.USub)):
+    if isinstance(wrong, ast.UnaryOp):
         return wrong.operand
-    if isinstance(wrong, ast.Constant) and type(wrong.value) in (int, float):
+    if isinstance(wrong, ast.Constant):
+        assert isinstance(wrong.value, (int, float))
         wrong.value = 2 * wrong.value if wrong.value and isinstance(wrong.value, float) else wrong.value + 1
         return wrong
-    if isinstance(wrong, ast.IfExp):
-        wrong.body, wrong.orelse = wrong.orelse, wrong.body
-        return wrong
-    return None
+    assert isinstance(wrong, ast.IfExp)
+    wrong.body, wrong.orelse = wrong.orelse, wrong.body
+    return wrong
 
 
 def mutant(source: str, index: int) -> tuple[int, str, str, str]:
@@ -129,12 +139,10 @@ def mutant(source: str, index: int) -> tuple[int, str, str, str]:
     tree = ast.parse(source)
     node = list(places(tree))[index]
     assert isinstance(node, ast.expr) and node.end_lineno is not None and node.end_col_offset is not None
-    changed = fault(node)
-    assert changed is not None
     lines = source.splitlines(keepends=True)
     start = sum(len(x.encode()) for x in lines[: node.lineno - 1]) + node.col_offset
     end = sum(len(x.encode()) for x in lines[: node.end_lineno - 1]) + node.end_col_offset
-    new = f"({ast.unparse(changed)})"
+    new = f"({ast.unparse(fault(node))})"
     text = source.encode()
     return node.lineno, ast.unparse(node), new, (text[:start] + new.encode() + text[end:]).decode()
 

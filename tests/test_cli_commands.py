@@ -237,17 +237,23 @@ def test_help_of_every_command(capsys: pytest.CaptureFixture[str]):
     assert "CASE" not in text and "--quick" in text and "--json" in text
 
 
+@pytest.mark.wide
 def test_as_a_module_from_a_shell(tmp_path: Path):
     command = [sys.executable, "-m", "jaxcage", "statics", "1a", "--json", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert json.loads(done.stdout)["case"] == "1a"
-    wrong = subprocess.run([*command[:4], "4z"], capture_output=True, text=True, check=False)
+
+
+def test_status_of_a_mistake_in_a_shell():
+    command = [sys.executable, "-m", "jaxcage", "statics", "4z"]
+    wrong = subprocess.run(command, capture_output=True, text=True, check=False)
     assert wrong.returncode == 2
     assert wrong.stdout == ""
     assert wrong.stderr.count("\n") == 1
 
 
+@pytest.mark.wide
 def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     tiny = [
         "--first",

@@ -101,6 +101,7 @@ def test_absurd_speed_in_a_sweep():
     assert np.isnan(mixed.chaotic_share[2]) and not np.any(np.isnan(mixed.chaotic_share[:2]))
 
 
+@pytest.mark.wide
 def test_lanes_without_damping_leave_the_model():
     """No damping, a coupling that pumps and a weak contact: whirl grows until it is outside."""
     where = lambda m: (

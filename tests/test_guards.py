@@ -147,7 +147,13 @@ def _thrown() -> tuple[np.ndarray, Any]:
 
 
 @pytest.mark.parametrize(
-    "solver, steps", [("rk4", 16), ("rk4", 128), pytest.param("newmark", 64, marks=pytest.mark.wide), ("rodas3", 32)]
+    "solver, steps",
+    [
+        ("rk4", 16),
+        ("rk4", 128),
+        pytest.param("newmark", 64, marks=pytest.mark.wide),
+        pytest.param("rodas3", 32, marks=pytest.mark.wide),
+    ],
 )
 def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageModel, solver: str, steps: int):
     """With steps too large by far for the contact: a lane is refused, or tells how far out the farthest of its steps

@@ -90,7 +90,7 @@ def test_a_march_is_its_steps_one_by_one_in_one_lane_and_in_many():
         np.testing.assert_allclose(got, expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("order, tolerance", [(1, 1e-12), (2, 1e-10), (3, 1e-8)])
+@pytest.mark.parametrize("order, tolerance", [(1, 1e-12), (2, 1e-10), wide(3, 1e-8)])
 def test_derivatives_of_a_march_of_any_order(order, tolerance):
     """Against the same steps without the primitive; lanes outside the derivative and inside."""
     few = functools.partial(by_march, count=12), functools.partial(by_loop, count=12)
@@ -389,7 +389,7 @@ def test_first_order_systems_and_oscillators_run_as_kernels():
     np.testing.assert_allclose(ends[0][1], ends[1][1], atol=1e-7)
 
 
-@pytest.mark.parametrize("film", ["fixed_half", "full"])
+@pytest.mark.parametrize("film", wide_but(["fixed_half", "full"], "fixed_half"))
 @pytest.mark.parametrize("cross", ["circulatory", "as_printed"])
 def test_analytic_slopes_of_the_cage_against_autodiff(film, cross):
     model = jc.replace(MODEL, supply_pressure=2e4, restitution=0.6, cross_cubic=1e9)
@@ -417,6 +417,7 @@ def test_the_positive_pressure_film_is_left_to_autodiff():
 # --- the evaluator of orbits ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.wide
 def test_one_program_serves_all_numbers_of_steps():
     y = tuple(jnp.asarray(STATES[3]))
 

@@ -142,6 +142,7 @@ def test_forces_of_a_simulation_are_its_acceleration():
     np.testing.assert_allclose(total, MASS * acceleration, atol=2e-3 * size)
 
 
+@pytest.mark.wide
 def test_energy_balance_of_a_synchronous_orbit():
     """On a closed orbit the impacts and the unbalance put in what film and support take out."""
     model, speed = case("1a", "preliminary"), 16000 * np.pi / 30

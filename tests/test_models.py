@@ -88,6 +88,7 @@ def test_strobe_map_derivatives_match_finite_differences(name: str):
     assert np.sum(np.max(np.abs(exact), axis=0) > 1e-5) >= 10
 
 
+@pytest.mark.wide
 def test_stiff_heavy_rib_is_the_rigid_rib():
     """Same cage, rib on a spring of 1e10 N/m: the strobe state agrees to the rib's static deflection."""
     model, speed = jc.case("1a", "preliminary"), jnp.asarray(1500.0)
@@ -165,7 +166,7 @@ def test_dimensionless_groups_have_no_dimension(base: str):
     assert float(here["speed"]) == pytest.approx(1000 * np.sqrt(0.45e-3 / 9.81))
 
 
-@pytest.mark.parametrize("harmonics", [1, 5])
+@pytest.mark.parametrize("harmonics", [pytest.param(1, marks=pytest.mark.wide), 5])
 @pytest.mark.parametrize("name", ["rigid", "elastic", "roller-pass"])
 def test_harmonics_are_where_the_spectrum_of_the_forcing_ends(name: str, harmonics: int):
     model = MODELS[name]()

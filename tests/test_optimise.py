@@ -158,6 +158,7 @@ def test_tolerance_budget_is_the_root_of_squares():
         jc.design.tolerance_budget(edge, {"heat": 0.1})
 
 
+@pytest.mark.wide
 def test_pareto_front_of_two_parabolas():
     """(x - 0.3)^2 and (x - 0.8)^2 trade off along sqrt(f) + sqrt(g) = 0.5."""
     f, g = (jc.design.Smooth(lambda s, c=c: (jc.parameters(s)["damping"] - c) ** 2) for c in (0.3, 0.8))

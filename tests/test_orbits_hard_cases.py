@@ -247,7 +247,8 @@ CRITICAL = {"period-doubling": dict(s=0.3), "torus": dict(b=0.3)}
 
 
 @pytest.mark.parametrize("name", TANGENT)
-@pytest.mark.parametrize("kind", wide_but(CRITICAL, "period-doubling"))
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", CRITICAL)
 def test_tangential_crossing(kind, name):
     """Found, but not trusted: its place is not a function of the design."""
     point = point_of(kind, **CRITICAL[kind], **TANGENT[name])
@@ -264,6 +265,7 @@ def test_crossing_with_the_cube_is_never_trusted(kind):
     assert point.status in ("tangential", "no such point") and not bool(point.trusted)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("turn", [0.0, 0.5])
 @pytest.mark.parametrize("angle", [0.02, 0.002])
 def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):

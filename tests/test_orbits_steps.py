@@ -146,6 +146,7 @@ def test_choice_is_made_inside_jit_and_in_each_lane():
     np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-6, rtol=1e-5)
 
 
+@pytest.mark.wide
 def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to_it():
     inside, exact = DUFFING_DOUBLINGS[1]
     orbit = jc.periodic_orbit(duffing(inside), 1.2, guess=(1.0, 0.0), revolutions=200)

@@ -112,7 +112,8 @@ def linear(zeta, natural):
     return acceleration
 
 
-@pytest.mark.parametrize("omega", [0.4, pytest.param(1.7, marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("omega", [0.4, 1.7])
 def test_multipliers_of_the_linear_oscillator_underdamped(omega):
     """exp((-z +- i sqrt(1 - z^2)) w_0 T): both exponents are -z w_0 T in the mean."""
     zeta, natural = 0.05, 1.3
@@ -139,6 +140,7 @@ def test_multipliers_of_the_linear_oscillator_overdamped(omega):
     assert np.all(result.standard_error > np.abs(result.exponents - exact))
 
 
+@pytest.mark.wide
 def test_steady_state_of_the_linear_oscillator():
     zeta, natural, omega = 0.2, 1.3, 0.9
     result = spectrum(linear(zeta, natural), omega, discard=100)

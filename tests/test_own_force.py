@@ -210,6 +210,7 @@ def test_forces_and_moments_of_a_run_name_it(tmp_path: Path):
     assert not np.any(moments["contact"])
 
 
+@pytest.mark.wide
 def test_a_figure_draws_each_force_of_ones_own_in_a_line_of_its_own():
     model = with_extra(ViscousDrag(1.0, arm=0.0), Shaker(1.0))
     run = jc.simulate(model, SPEED, revolutions=1, samples=16, method=METHOD)
@@ -245,6 +246,7 @@ def test_equilibrium_knows_a_force_of_ones_own():
 # --- what is refused -------------------------------------------------------------------------
 
 
+@pytest.mark.wide
 def test_no_file_holds_a_force_of_ones_own(tmp_path: Path):
     refused = r"Argument `model` must have no forces of your own to be put into a file, but has ViscousDrag\."
     swept = raw_sweep(OWN, SPEED, discard=1, revolutions=2, blocks=1, exponents=0, keep=1, method=METHOD)

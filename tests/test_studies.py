@@ -151,6 +151,7 @@ def test_a_chunk_half_written_is_written_again(
     assert contents(store) == contents(whole)
 
 
+@pytest.mark.wide
 def test_killed_at_random_and_resumed(whole: Path, tmp_path: Path):
     """SIGKILL at random moments, four times; whoever starts again ends with the very files of an unbroken run."""
     store, dice = tmp_path / "study.zarr", random.Random(1)
@@ -263,6 +264,7 @@ def test_what_makes_no_sense_is_refused(tmp_path: Path, change: dict, words: str
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.wide
 def test_orbit_data_when_asked_for(tmp_path: Path):
     options = OPTIONS | {"lanes": 18, "exponents": 2, "strobe": 5, "blocks": 1}
     found = jc.study(OSCILLATOR, {"speed": SPEEDS}, store=tmp_path / "study.zarr", **options)

@@ -20,7 +20,7 @@ def duffing(tau, q, v, speed):
 
 
 HARDENING = jc.ForcedOscillator(duffing, coordinates=1)
-FAST = jc.method("rodas4", steps=32)
+FAST = jc.method("rk4", steps=128)
 
 
 def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
