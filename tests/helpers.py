@@ -77,7 +77,16 @@ def unforced(model: jc.CageModel) -> jc.CageModel:
 
 def wide_but(values: Iterable[Any], *quick: Any) -> list[Any]:
     """`values` as parameters of a test, all but `quick` marked `wide`: further examples of what `quick` shows."""
+    return _marked(values, quick, pytest.mark.wide)
+
+
+def slow_but(values: Iterable[Any], *quick: Any) -> list[Any]:
+    """`values` as parameters of a test, all but `quick` marked `slow`: nobody waits for them unless asked."""
+    return _marked(values, quick, pytest.mark.slow)
+
+
+def _marked(values: Iterable[Any], quick: tuple[Any, ...], mark: pytest.MarkDecorator) -> list[Any]:
     values = list(values)
     assert all(q in values for q in quick), f"{quick} must be of {values}"
-    marked = [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=pytest.mark.wide) for v in values]
+    marked = [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=mark) for v in values]
     return [v if v in quick else m for v, m in zip(values, marked, strict=True)]

@@ -21,7 +21,7 @@ from jaxcage.report import zones_table
 
 
 TINY = ["--first", "12000", "--last", "13000", "--count", "3", "--discard", "20", "--revolutions"]
-TINY += ["20", "--horizon", "0", "--solver", "rk4", "--steps", "256"]
+TINY += ["20", "--horizon", "0", "--no-confirm", "--solver", "rk4", "--steps", "256"]
 PNG = b"\x89PNG\r\n"
 
 
@@ -82,6 +82,10 @@ def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     stored = load_sweep(found["data"])
     assert stored.rpm == pytest.approx([12000, 12500, 13000])
     assert (stored.discard, stored.revolutions) == (20, 20)
+    length = dict(discard=20, revolutions=20, blocks=20, horizon=0, confirm=False)
+    own = jc.sweep(jc.case("1a"), jc.rpm(12000, 13000, 3), method=jc.method("rk4", steps=256), **length)
+    np.testing.assert_allclose(stored.last, own.last, rtol=1e-9)
+    np.testing.assert_array_equal(stored.label, own.label)
     assert json.loads(open_sweep(found["data"]).attrs["configuration"])["cage_mass"] == float(jc.case("1a").cage_mass)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep_1a.png", "sweep_1a.zarr"]
 

@@ -52,6 +52,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
 
 
+@pytest.mark.slow
 @pytest.mark.wide
 def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     said = document(capsys, *DESIGN, "--out", str(tmp_path))

@@ -7,7 +7,7 @@ unit time with the drive's period 2 pi / omega.
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import wide_but
+from helpers import slow_but, wide_but
 
 from jaxcage.integrate import method
 from jaxcage.models import ForcedOscillator, ForcedSystem
@@ -56,7 +56,7 @@ LITERATURE = {
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("name", LITERATURE)
+@pytest.mark.parametrize("name", slow_but(LITERATURE, "Ueda x'' + .05 x' + x^3 = 7.5 sin t", COEXISTING))
 def test_largest_exponent_of_chaotic_oscillators(name):
     law, omega = LITERATURE[name]
     known = EXPONENTS[name]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers import wide_but
+from helpers import slow_but, wide_but
 
 from jaxcage.validation import DUFFING_DOUBLINGS, EXPONENTS
 from jaxcage.validation._finite_volumes import equations, film_pressure, full_bearing
@@ -67,7 +67,10 @@ OSCILLATORS = {
 }
 
 
-@pytest.mark.parametrize("name", wide_but(OSCILLATORS, "Duffing x'' + .3 x' - x + x^3 = .5 cos 1.2t"))
+@pytest.mark.wide
+@pytest.mark.parametrize(
+    "name", slow_but(OSCILLATORS, "Duffing x'' + .3 x' - x + x^3 = .5 cos 1.2t", "Ueda x'' + .05 x' + x^3 = 7.5 sin t")
+)
 def test_ensembles_find_the_exponents_of_the_table(name: str):
     """A smaller one than the table's."""
     number = EXPONENTS[name]
