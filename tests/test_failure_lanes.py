@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import wide_but
 
 from jaxcage.analysis import Plan
 from jaxcage.integrate import OUTCOMES, method
@@ -23,7 +24,7 @@ HEALTHY = (0.4 * C, 0.3 * C, 0.0, 0.0)
 OTHER = (0.0, -0.5 * C, 0.0, 0.0)
 THIRD = (0.1 * C, -0.2 * C, 0.0, 0.1)
 METHOD = method("rk4", steps=256)
-SETTINGS = dict(discard=12, revolutions=16, blocks=4, keep=8, method=METHOD)
+SETTINGS = dict(discard=12, revolutions=16, blocks=4, keep=8, confirm=False, horizon=0, method=METHOD)
 SPEEDS = RPM * np.array([9000.0, 15000.0])
 FIELDS = "strobe", "last", "block_growth", "peak", "outcome"
 
@@ -51,15 +52,17 @@ BAD_STARTS = {
 }
 
 
+@pytest.mark.parametrize("confirm", wide_but([False, True], False))
 @pytest.mark.parametrize("place", [0, 1, 2])
 @pytest.mark.parametrize("bad", BAD_STARTS)
-def test_bad_start_fails_alone(bad, place):
+def test_bad_start_fails_alone(bad, place, confirm):
     start, outcome = BAD_STARTS[bad]
     states = [HEALTHY, OTHER, THIRD]
-    healthy = sweep(MODEL, SPEEDS, starts=states, **SETTINGS)
+    settings = SETTINGS | (dict(confirm=True, horizon=3000) if confirm else {})
+    healthy = sweep(MODEL, SPEEDS, starts=states, **settings)
     assert not np.any(healthy.failed)
     states[place] = start
-    mixed = sweep(MODEL, SPEEDS, starts=states, **SETTINGS)
+    mixed = sweep(MODEL, SPEEDS, starts=states, **settings)
     others = np.s_[:, [i for i in range(3) if i != place]]
     assert_same_bytes(mixed, healthy, others)
     np.testing.assert_array_equal(mixed.label[others], healthy.label[others])

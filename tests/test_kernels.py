@@ -537,6 +537,7 @@ def test_a_lane_takes_the_rung_that_it_needs(attractor):
     assert np.quantile(apart[rung - 1, i, j], 0.1) > 1e-3 / 32  # it does not take more than it needs
 
 
+@pytest.mark.wide
 def test_what_no_rung_can_is_inaccurate(attractor):
     """It is neither a failure nor a label, and lanes beside it are as they would be without it."""
     speeds, states = attractor

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
+from helpers import wide_but
 
 from jaxcage.cli import main
 from jaxcage.validation import FEIGENBAUM, TOPICS, Comparison, page
@@ -49,12 +50,13 @@ def failures(rows: list[Comparison]) -> list[str]:
     return [c.what for c in rows if not c.passed]
 
 
-@pytest.mark.parametrize("slenderness", [1.0, 0.5, 0.25])
+@pytest.mark.parametrize("slenderness", wide_but([1.0, 0.5, 0.25], 0.25))
 def test_full_bearing(slenderness: float):
     rows = full_bearing_comparisons([b for b in FULL_BEARINGS if b[0] == slenderness])
     assert len(rows) == 8 and failures(rows) == []
 
 
+@pytest.mark.wide
 def test_lund_thomsen():
     """Every number of their table, with two axial grooves and Reynolds cavitation, within 6 %."""
     rows = lund_thomsen_comparisons()
