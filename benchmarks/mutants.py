@@ -24,7 +24,7 @@ FORCES = "test_support_and_forcing test_contact_analytic test_film_analytic"
 SEARCH = "test_loss_zones test_missed test_branches"
 NEWTON = "test_orbits_literature test_orbits_hard_cases"
 TESTS = {
-    "analysis/_labels": "test_labels",
+    "analysis/_labels": "test_labels test_guards",
     "analysis/_zones": "test_labels test_loss_zones",
     "forces/_axial": "test_reynolds",
     "forces/_contact": FORCES,

@@ -217,7 +217,7 @@ def test_labels_that_rest_on_too_few_revolutions(label: str, exponent: float, er
     period, lost = np.array([int(label == "periodic-1")]), np.array([int(label == "failed")])
     assert label_lanes(lost, period, np.array([exponent]), np.array([error]))[0] == label
     lane = np.array([label]), np.array([exponent]), np.array([error])
-    assert too_few_revolutions(*lane, 300)[0] == short
+    assert too_few_revolutions(*lane, 300)[0] == too_few_revolutions(*lane, 20)[0] == short
     judged_by_exponent = label in ("quasi-periodic", "undecided", "chaotic")
     assert too_few_revolutions(*lane, 19)[0] == judged_by_exponent
 
