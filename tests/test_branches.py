@@ -123,6 +123,7 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     assert np.max(away[1:-1]) < 1e-3  # the first and the last are beyond the range
 
 
+@pytest.mark.wide
 def test_branch_in_the_force_passes_folds_of_its_own():
     """At the speed of a fold over speed, the fold over force is at the force used there."""
     speed = DUFFING_FOLDS["up"].value
@@ -137,6 +138,7 @@ def test_branch_in_the_force_passes_folds_of_its_own():
     np.testing.assert_allclose(np.prod(branch.multipliers, axis=1), np.exp(-0.2 * np.pi / speed), rtol=1e-6)
 
 
+@pytest.mark.wide
 def test_parameter_as_a_function(over_speed):
     orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
     named = jc.branch(hardening(), orbit, "g", lower=0.2, upper=0.4, method=METHOD)
@@ -229,7 +231,7 @@ class Bend(eqx.Module):
         return (self.p + self.a * x - x**3,)
 
 
-@pytest.mark.parametrize("start", [-1.3, -1.2, -1.1, -1.0, -0.9])
+@pytest.mark.parametrize("start", wide_but([-1.3, -1.2, -1.1, -1.0, -0.9], -1.3))
 def test_two_folds_within_a_step(start):
     """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
     a = 0.001

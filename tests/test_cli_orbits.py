@@ -397,6 +397,7 @@ def map_of_lines(monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits):
     monkeypatch.setattr("jaxcage.report._map.curve", lines_through)
 
 
+@pytest.mark.wide
 def test_map_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, map_of_lines: None):
     small = ["--first", "3000", "--last", "9000", "--rows", "2", "--columns", "3", "--revolutions", "10"]
     small += ["--discard", "10", "--steps", "64", "--starts", "2", "--lower", "0.4 mm", "--upper", "5e-4"]
@@ -515,6 +516,7 @@ CLEAR = (13190.0103, (0.39853465, -0.18250099, 0.73636913, 0.32681643))
 TOUCHES = (18945.34, (0.49968944, -0.43603818, 0.58386151, 0.51114893))
 
 
+@pytest.mark.wide
 def test_edges_whose_orbit_touches_the_land_are_named():
     model, method = jc.case("3a"), jc.method("rodas4", steps=512)
     edges = {}

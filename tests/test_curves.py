@@ -253,6 +253,7 @@ def test_torus_curve_goes_on_as_neutral_saddles_beyond_a_strong_resonance():
     np.testing.assert_allclose(saddles, -np.exp(np.stack([root, -root], axis=1)), rtol=1e-3)
 
 
+@pytest.mark.wide
 def test_bad_arguments(fold):
     limits = dict(lower=0.2, upper=0.4, x_lower=1.0, x_upper=3.0, method=METHOD)
     pitchfork = eqx.tree_at(lambda p: p.value, fold, fold.value)

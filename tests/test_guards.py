@@ -241,6 +241,7 @@ def test_a_short_sweep_says_so_and_a_long_one_does_not():
     assert "3 labels rest on too few revolutions" in str(single)
 
 
+@pytest.mark.wide
 def test_short_studies_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     counts = ["--starts", "1", "--discard", "2", "--revolutions", "10", "--solver", "rk4", "--steps", "64"]
     counts += ["--out", str(tmp_path)]

@@ -10,6 +10,7 @@ from tests.test_identification import TRUTH, DoubleWell
 
 
 VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
+OPTIMISERS = optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)
 
 
 def double_well():
@@ -26,7 +27,7 @@ def bowl(damping=0.4, cubic=1.5):
     return jc.design.Smooth(height)
 
 
-@pytest.mark.parametrize("optimiser", [None, optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)])
+@pytest.mark.parametrize("optimiser", [None, *(pytest.param(o, marks=pytest.mark.wide) for o in OPTIMISERS)])
 def test_any_optimiser_finds_a_known_optimum(optimiser):
     found = jc.optimise(double_well(), VARY, bowl(), starts=4, steps=150, optimiser=optimiser).best
     assert found.objective == pytest.approx(1.0, abs=2e-2)

@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import wide_but
 
 import jaxcage as jc
 
@@ -171,7 +170,8 @@ def found():
     return points
 
 
-@pytest.mark.parametrize("kind", wide_but(POINTS, "fold"))
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", POINTS)
 def test_gradient_of_a_point(kind, found):
     theta, (_, guess) = POINTS[kind][1], found[kind]
     gradient = EDGE_GRADIENT(jnp.asarray(theta), kind, guess)
@@ -183,6 +183,7 @@ def test_gradient_of_a_point(kind, found):
     assert gradient[NAMES.index(free)] == 0.0
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", POINTS)
 def test_scaling_identities_of_a_point(kind, found):
     theta, (point, guess) = POINTS[kind][1], found[kind]

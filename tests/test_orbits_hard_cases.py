@@ -5,7 +5,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import wide_but
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
@@ -258,7 +257,8 @@ def test_tangential_crossing(kind, name):
     np.testing.assert_allclose(point.transversality, TANGENT[name]["slope"] * 2 * np.pi / 1.1, rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("kind", wide_but(CRITICAL, "period-doubling"))
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", CRITICAL)
 def test_crossing_with_the_cube_is_never_trusted(kind):
     """Newton's method gains but a third a step."""
     point = point_of(kind, slope=0.0, bend=1.0, **CRITICAL[kind])

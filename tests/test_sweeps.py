@@ -102,6 +102,7 @@ def test_labels_are_confirmed_by_finer_steps(followed):
     assert np.all(sure.error[where] < rough.error[where])
 
 
+@pytest.mark.wide
 def test_number_of_exponents_does_not_change_the_first():
     a, b = (
         raw_sweep(

@@ -564,6 +564,7 @@ def chaotic_starts():
     return [tuple(map(float, y)) for y in s.last[0][s.label[0] == "chaotic"][:80]]
 
 
+@pytest.mark.wide
 def test_crisis_of_uedas_oscillator(chaotic_starts):
     """The chaotic attractor ends at a force of 13.388: J. M. T. Thompson and H. B. Stewart, Nonlinear Dynamics and
     Chaos (Wiley).
