@@ -1,4 +1,3 @@
-import fnmatch
 import gc
 import os
 import pathlib
@@ -34,21 +33,3 @@ def forget_compiled_programs():
     yield
     if not MAPS.exists() or MAPS.read_bytes().count(b"\n") > MOST_MAPS:
         jax.clear_caches()
-
-
-WIDE = [line for line in (pathlib.Path(__file__).parent / "wide.txt").read_text().splitlines() if "::" in line]
-MOST_OF_THE_SUITE = 2000
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests that `wide.txt` names; each of its lines must name one."""
-    names = {item: item.nodeid.rpartition("tests/")[2] for item in items}
-    for item, name in names.items():
-        if any(fnmatch.fnmatchcase(name, pattern) for pattern in WIDE):
-            item.add_marker(pytest.mark.wide)
-    files = {name.partition("::")[0] for name in names.values()}
-    collected = [pattern for pattern in WIDE if pattern.partition("::")[0] in files]
-    idle = [pattern for pattern in collected if not fnmatch.filter(names.values(), pattern)]
-    if len(items) > MOST_OF_THE_SUITE and idle:
-        raise pytest.UsageError(f"tests/wide.txt names no test by: {', '.join(idle)}")

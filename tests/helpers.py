@@ -2,13 +2,17 @@
 
 import dataclasses
 import functools
+from collections.abc import Iterable
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import pint
+import pytest
 
 import jaxcage as jc
-from jaxcage._parameters import get, parameter_info, parameter_paths
+from jaxcage import parameter_info
+from jaxcage._parameters import get, parameter_paths
 
 
 UNITS = pint.UnitRegistry()
@@ -69,3 +73,20 @@ def unforced(model: jc.CageModel) -> jc.CageModel:
     names = parameter_paths(model)
     chosen = [n if n in names else n.split(".")[-1] for n in zero]
     return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})
+
+
+def wide_but(values: Iterable[Any], *quick: Any) -> list[Any]:
+    """`values` as parameters of a test, all but `quick` marked `wide`: further examples of what `quick` shows."""
+    return _marked(values, quick, pytest.mark.wide)
+
+
+def slow_but(values: Iterable[Any], *quick: Any) -> list[Any]:
+    """`values` as parameters of a test, all but `quick` marked `slow`: nobody waits for them unless asked."""
+    return _marked(values, quick, pytest.mark.slow)
+
+
+def _marked(values: Iterable[Any], quick: tuple[Any, ...], mark: pytest.MarkDecorator) -> list[Any]:
+    values = list(values)
+    assert all(q in values for q in quick), f"{quick} must be of {values}"
+    marked = [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=mark) for v in values]
+    return [v if v in quick else m for v, m in zip(values, marked, strict=True)]

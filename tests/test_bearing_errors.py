@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import pytest
 
 import jaxcage.bearing as jb
-from jaxcage._parameters import replace
+from jaxcage import replace
 
 
 @pytest.mark.parametrize("load", [0.0, -3.0, float("nan")])

@@ -8,7 +8,7 @@ import pint
 import pytest
 
 import jaxcage.bearing as jb
-from jaxcage._parameters import parameter_info, parameters, replace
+from jaxcage import parameter_info, parameters, replace
 
 
 def distribution(clearance=40e-6, load=4450.0, centrifugal=0.0, angle=-np.pi / 2):
@@ -86,7 +86,7 @@ def scaled(factors):
     return outputs(replace(bearing, **values), 4450.0 * factors[0], 1256.6 * factors[1])
 
 
-@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("mode", [jax.jacfwd, pytest.param(jax.jacrev, marks=pytest.mark.wide)])
 def test_gradients_against_central_differences(mode):
     ones, step = jnp.ones(6), 1e-4
     gradient = jax.jit(mode(scaled))(ones)
@@ -96,6 +96,7 @@ def test_gradients_against_central_differences(mode):
     np.testing.assert_allclose(gradient, difference, rtol=3e-5, atol=0)
 
 
+@pytest.mark.wide
 def test_second_derivative_against_difference_of_gradients():
     def shift(load):
         return jb.load_distribution(jb.nu2310(), load, 100.0).shaft_shift * 1e6

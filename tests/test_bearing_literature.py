@@ -6,7 +6,7 @@ import pytest
 from scipy.special import beta
 
 import jaxcage.bearing as jb
-from jaxcage._parameters import replace
+from jaxcage import replace
 from jaxcage.validation._statics import loads_by_scipy
 
 

@@ -11,13 +11,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import wide_but
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 import jaxcage as jc
 from jaxcage.orbits._normal_form import around, coefficient, critical_vectors, criticality
-from jaxcage.validation._literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
+from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
 METHOD = jc.method("rodas4", steps=256)
@@ -122,6 +123,7 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     assert np.max(away[1:-1]) < 1e-3  # the first and the last are beyond the range
 
 
+@pytest.mark.wide
 def test_branch_in_the_force_passes_folds_of_its_own():
     """At the speed of a fold over speed, the fold over force is at the force used there."""
     speed = DUFFING_FOLDS["up"].value
@@ -136,6 +138,7 @@ def test_branch_in_the_force_passes_folds_of_its_own():
     np.testing.assert_allclose(np.prod(branch.multipliers, axis=1), np.exp(-0.2 * np.pi / speed), rtol=1e-6)
 
 
+@pytest.mark.wide
 def test_parameter_as_a_function(over_speed):
     orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
     named = jc.branch(hardening(), orbit, "g", lower=0.2, upper=0.4, method=METHOD)
@@ -228,7 +231,7 @@ class Bend(eqx.Module):
         return (self.p + self.a * x - x**3,)
 
 
-@pytest.mark.parametrize("start", [-1.3, -1.2, -1.1, -1.0, -0.9])
+@pytest.mark.parametrize("start", wide_but([-1.3, -1.2, -1.1, -1.0, -0.9], -1.3))
 def test_two_folds_within_a_step(start):
     """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
     a = 0.001
@@ -377,6 +380,7 @@ def assert_same_sets(found, exact, rtol):
     assert np.max(np.min(away, axis=1)) < rtol
 
 
+@pytest.mark.wide
 def test_torus_of_a_planted_orbit():
     """The pair exp((p - 0.03 +- 0.4i) T) crosses at p = 0.03; the real pair of the other block stays inside."""
     settings = dict(a=(-0.03, -0.3), c=(1.0, 0.2), s=(0.0, 0.1), b=(0.4, 0.0))
@@ -401,7 +405,7 @@ QUIET = {
 }
 
 
-@pytest.mark.parametrize("name", QUIET)
+@pytest.mark.parametrize("name", wide_but(QUIET, "neutral saddle"))
 def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     branch = planted_branch(**QUIET[name])
     exact = planted_multipliers(branch, **QUIET[name])
@@ -430,7 +434,10 @@ def test_crossings_within_one_step_are_in_order(first):
     assert [p.edge for p in branch.special] == [True, False]
 
 
-@pytest.mark.parametrize("kind, block", [("period-doubling", dict(s=(0.1, 0.0002))), ("torus", dict(b=(0.4, 0.3)))])
+@pytest.mark.parametrize(
+    "kind, block",
+    [("period-doubling", dict(s=(0.1, 0.0002))), pytest.param("torus", dict(b=(0.4, 0.3)), marks=pytest.mark.wide)],
+)
 def test_two_crossings_of_one_kind_within_a_step(kind, block):
     """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""
     places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)
@@ -490,6 +497,7 @@ class VanDerPol(eqx.Module):
         return (u, self.mu * (1 - x * x) * u - x)
 
 
+@pytest.mark.wide
 def test_branch_of_a_self_excited_system_over_its_damping():
     """Periods of van der Pol's limit cycle at mu = 0.1 and 1, and its multiplier, by DOP853."""
     system = jc.ForcedSystem(VanDerPol(**numbers(mu=0.3)), dimension=2)

@@ -21,7 +21,7 @@ from jaxcage.report import zones_table
 
 
 TINY = ["--first", "12000", "--last", "13000", "--count", "3", "--discard", "20", "--revolutions"]
-TINY += ["20", "--horizon", "0", "--solver", "rodas4", "--steps", "64"]
+TINY += ["20", "--horizon", "0", "--no-confirm", "--solver", "rk4", "--steps", "256"]
 PNG = b"\x89PNG\r\n"
 
 
@@ -53,6 +53,7 @@ ZONE_KEYS = {
 }
 
 
+@pytest.mark.wide
 def test_zones(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "zones", "1a", *TINY, "--out", str(tmp_path))
     assert found["case"] == "1a"
@@ -81,6 +82,10 @@ def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     stored = load_sweep(found["data"])
     assert stored.rpm == pytest.approx([12000, 12500, 13000])
     assert (stored.discard, stored.revolutions) == (20, 20)
+    length = dict(discard=20, revolutions=20, blocks=20, horizon=0, confirm=False)
+    own = jc.sweep(jc.case("1a"), jc.rpm(12000, 13000, 3), method=jc.method("rk4", steps=256), **length)
+    np.testing.assert_allclose(stored.last, own.last, rtol=1e-9)
+    np.testing.assert_array_equal(stored.label, own.label)
     assert json.loads(open_sweep(found["data"]).attrs["configuration"])["cage_mass"] == float(jc.case("1a").cage_mass)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep_1a.png", "sweep_1a.zarr"]
 
@@ -99,7 +104,7 @@ def test_sweep_prints_the_zone_table_beside_the_published_edges(capsys: pytest.C
 
 
 def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    arguments = ["--speed", "15000", "--discard", "20", "--revolutions", "20", "--steps", "256"]
+    arguments = ["--speed", "15000", "--discard", "20", "--revolutions", "20", "--solver", "rk4", "--steps", "256"]
     found = document(capsys, "poincare", "1a", *arguments, "--out", str(tmp_path))
     assert [start["start"] for start in found["starts"]] == [1, 2, 3]
     columns = read_columns(found["data"])
@@ -236,17 +241,23 @@ def test_help_of_every_command(capsys: pytest.CaptureFixture[str]):
     assert "CASE" not in text and "--quick" in text and "--json" in text
 
 
+@pytest.mark.wide
 def test_as_a_module_from_a_shell(tmp_path: Path):
     command = [sys.executable, "-m", "jaxcage", "statics", "1a", "--json", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert json.loads(done.stdout)["case"] == "1a"
-    wrong = subprocess.run([*command[:4], "4z"], capture_output=True, text=True, check=False)
+
+
+def test_status_of_a_mistake_in_a_shell():
+    command = [sys.executable, "-m", "jaxcage", "statics", "4z"]
+    wrong = subprocess.run(command, capture_output=True, text=True, check=False)
     assert wrong.returncode == 2
     assert wrong.stdout == ""
     assert wrong.stderr.count("\n") == 1
 
 
+@pytest.mark.wide
 def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     tiny = [
         "--first",
@@ -263,7 +274,7 @@ def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], 
         "0",
     ]
     found = document(
-        capsys, "sweep", "1a", *tiny, "--solver", "rodas4", "--steps", "64", "--waterfall", "3", "--out", str(tmp_path)
+        capsys, "sweep", "1a", *tiny, "--solver", "rk4", "--steps", "256", "--waterfall", "3", "--out", str(tmp_path)
     )
     assert is_png(found["waterfall"]) and is_png(found["figure"])
     assert all(z["kind"] == "synchronous-loss" for z in found["synchronous"])
@@ -271,6 +282,7 @@ def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], 
     assert ("zoom" in found) == bool(closed)
 
 
+@pytest.mark.wide
 def test_programs_kept_on_disk_are_used_again_without_a_word(tmp_path: Path):
     """XLA's loader calls its own tuning flags errors on some processors: nobody should see that."""
     options = ["--speed", "8500", "--discard", "10", "--revolutions", "10", "--out", str(tmp_path)]

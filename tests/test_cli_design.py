@@ -4,13 +4,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import report_example
 
-from jaxcage.cli import main
+import jaxcage as jc
+from jaxcage.cli import _design, main
 
 
 RANGE = ["--first", "8000rpm", "--last", "14000rpm", "--speeds", "6", "--quick"]
 DESIGN = ["design", "1b", *RANGE, "--starts", "2", "--scouts", "2", "--steps", "1", "--cloud", "4"]
+AFTER = "before", "after"
 SENSITIVITY = ["sensitivity", "1a", *RANGE, "--samples", "2"]
 
 
@@ -20,6 +24,36 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, A
     return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
+def bowl(model: jc.CageModel) -> Any:
+    """Smallest, with the value 1, at a gap of 0.5 mm and 20 um of eccentricity."""
+    return 1.0 + (1e4 * model.guidance_gap - 5.0) ** 2 + (1e5 * model.eccentricity - 2.0) ** 2
+
+
+def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The search is one in a bowl; the fresh sweeps, by hand, are chaotic from 9050 to 12050 rpm and from 20050 on."""
+    swept: list[jc.CageModel] = []
+
+    def search(model: Any, vary: Any, width: Any, **given: Any) -> Any:
+        return jc.optimise(model, vary, jc.design.Smooth(bowl), **given | dict(steps=200, scouts=0))
+
+    monkeypatch.setattr(_design, "optimise", search)
+    monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: (swept.append(model), report_example.swept())[1])
+    said = document(capsys, *DESIGN, "--out", str(tmp_path))
+    assert said["optimum"] == pytest.approx({"guidance_gap": 0.5e-3, "eccentricity": 20e-6}, rel=0.02)
+    assert said["objective"] == pytest.approx(1.0, abs=0.01) and said["at_bound"] == []
+    assert [float(m.guidance_gap) for m in swept] == [0.6e-3, said["optimum"]["guidance_gap"]]
+    assert said["cost"] == pytest.approx({n: float(jc.design.cost().function(m)) for n, m in zip(AFTER, swept)})
+    zones = [(z["onset_rpm"], z["exit_rpm"]) for z in said["chaotic_zones"]["after"]]
+    assert zones == [(9050, 12050), (20050, None)]
+    assert said["chaotic_rpm"]["before"] == pytest.approx(np.mean(report_example.swept().restless) * 25000)
+    assert Path(said["figure"]).stat().st_size > 10_000 and not any(tmp_path.glob(".design*"))
+    assert main([*DESIGN, "--out", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
+
+
+@pytest.mark.slow
+@pytest.mark.wide
 def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     said = document(capsys, *DESIGN, "--out", str(tmp_path))
     assert said["vary"] == {
@@ -35,6 +69,7 @@ def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixtur
     assert Path(said["figure"]).parent == tmp_path and Path(said["figure"]).stat().st_size > 10_000
 
 
+@pytest.mark.wide
 def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     scatter = ["--scatter", "guidance_gap=10%", "--scatter", "eccentricity=rayleigh", "--worst", "0.5"]
     small = ["--starts", "1", "--steps", "1", "--out", str(tmp_path)]
@@ -44,12 +79,30 @@ def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], 
     assert "128 designs swept" in text  # two steps x four of a cloud x sixteen made cages
 
 
+@pytest.mark.wide
 def test_sensitivity_shares_the_variance(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     said = document(capsys, *SENSITIVITY, "--out", str(tmp_path))
     assert said["sobol"]["designs"] == 2 * 4
     for order in ("first", "total"):
         assert set(said["sobol"][order]) == {"guidance_gap", "eccentricity"}
         assert all(low <= high for low, high in said["sobol"][f"{order}_interval"].values())
+    assert said["edges"] == [] and said["figure"] is None
+
+
+def test_sensitivity_of_a_known_objective(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Shares of a bowl's variance: as printed they are those of the library's own call."""
+    shares = lambda model, vary, width, **given: jc.design.global_sensitivity(
+        model, vary, jc.design.Smooth(bowl), **given
+    )
+    monkeypatch.setattr(_design, "global_sensitivity", shares)
+    said = document(capsys, *SENSITIVITY[:-1], "64", "--seed", "3", "--out", str(tmp_path))
+    vary = {name: tuple(bounds) for name, bounds in said["vary"].items()}
+    own = shares(jc.case("1a"), vary, None, samples=64, seed=3)
+    assert said["sobol"]["designs"] == own.evaluations == 64 * 4
+    assert said["sobol"]["first"] == pytest.approx(own.first) and said["sobol"]["total"] == pytest.approx(own.total)
+    assert sum(own.first.values()) == pytest.approx(1.0, abs=0.2)  # nothing is in both
     assert said["edges"] == [] and said["figure"] is None
 
 

@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import report_example
 
 import jaxcage as jc
 from jaxcage.analysis import Sweep
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.cli import _orbits, main
+from jaxcage.cli import _orbits, _sweep, main
 from jaxcage.cli._show import plain
-from jaxcage.io import read_columns
+from jaxcage.io import load_sweep, read_columns
 from jaxcage.orbits import (
     Branch,
     CodimensionTwo,
     Curve,
+    Explained,
     Point,
     Sensitivity,
     Stretch,
@@ -263,6 +265,7 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, A
     return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
+@pytest.mark.wide
 def test_bifurcations_of_a_narrow_range(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     narrow = ["--first", "12000", "--last", "13000", "--count", "9", "--discard", "1500"]
     got = document(capsys, "bifurcations", "1a", *narrow, "--out", str(tmp_path))
@@ -276,6 +279,50 @@ def test_bifurcations_of_a_narrow_range(capsys: pytest.CaptureFixture[str], tmp_
     size = np.hypot(columns["multiplier 1 (real part)"], columns["multiplier 1 (imaginary part)"])
     assert np.array_equal(columns["stable"] == 1, size < 1)
     assert np.ptp(columns["speed [rpm]"]) > 700
+
+
+def test_bifurcations_command(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits
+):
+    """What a search found, to figures, columns and print."""
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *a, **k: (asked.append(k | {"span": a[1:]}), found)[1])
+    monkeypatch.setattr("jaxcage.report.contact_notes", lambda *_: ["One touches the land"])
+    arguments = ["--first", "3000", "--last", "9000", "--count", "9", "--discard", "1500", "--out", str(tmp_path)]
+    got = document(capsys, "bifurcations", "1a", *arguments)
+    assert (asked[0]["count"], asked[0]["discard"]) == (9, 1500)
+    assert asked[0]["span"] == pytest.approx((3000 * PER_RPM, 9000 * PER_RPM))
+    assert [p["speed_rpm"] for p in got["points"]] == pytest.approx([7000, 9000, 12000, 20000])
+    assert is_png(got["figure"]) and is_png(got["multipliers"])
+    columns = read_columns(got["data"])
+    size = np.hypot(columns["multiplier 1 (real part)"], columns["multiplier 1 (imaginary part)"])
+    assert np.array_equal(columns["stable"] == 1, size < 1)
+    assert columns["speed [rpm]"].size == sum(b.value.size for b in found.branches)
+    assert main(["bifurcations", "1a", *arguments]) == 0
+    out = capsys.readouterr().out
+    assert "One touches the land" in out and "Further bifurcations, on unstable parts: 1 (listed by --json)" in out
+    assert "Settled orbits that are on no branch: 2" in out
+
+
+def test_zones_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A sweep and a search made by hand: the zones of both, with what the orbits say about the edges."""
+    sweep = report_example.swept()
+    orbits = report_example.orbits(sweep)
+    asked: list[Any] = []
+    monkeypatch.setattr(_sweep, "sweep", lambda model, speeds, **k: (asked.append((speeds, k)), sweep)[1])
+    monkeypatch.setattr(_sweep, "synchronous_orbits", lambda *a, **k: (asked.append((a[1:], k)), orbits)[1])
+    monkeypatch.setattr(_sweep, "explain", lambda found, *_: Explained(found, {}))
+    monkeypatch.setattr("jaxcage.report.contact_notes", lambda *_: [])
+    small = ["--count", "251", "--discard", "40", "--revolutions", "50", "--quick", "--out", str(tmp_path)]
+    got = document(capsys, "zones", "1a", *small)
+    (speeds, how), (span, searched) = asked
+    assert speeds == pytest.approx(jc.rpm(2500, 27500, 251)) and span == pytest.approx(sweep.speed[[0, -1]])
+    assert (how["discard"], how["revolutions"], searched["settled"] is sweep) == (40, 50, True)
+    assert [(z["onset_rpm"], z["exit_rpm"]) for z in got["zones"]] == [(9050, 12050), (20050, None)]
+    lost = got["synchronous_loss"]
+    assert [z["onset_mechanism"] for z in lost] == ["fold", "torus"]
+    assert [z["onset_rpm"] for z in lost] == pytest.approx([7000, 20000]) and lost[0]["onset_gradient"] is None
+    assert load_sweep(got["data"]).rpm == pytest.approx(sweep.rpm)
 
 
 def test_gradient_command(
@@ -341,6 +388,7 @@ def map_of_lines(monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits):
     monkeypatch.setattr("jaxcage.report._map.curve", lines_through)
 
 
+@pytest.mark.wide
 def test_map_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, map_of_lines: None):
     small = ["--first", "3000", "--last", "9000", "--rows", "2", "--columns", "3", "--revolutions", "10"]
     small += ["--discard", "10", "--steps", "64", "--starts", "2", "--lower", "0.4 mm", "--upper", "5e-4"]
@@ -459,6 +507,7 @@ CLEAR = (13190.0103, (0.39853465, -0.18250099, 0.73636913, 0.32681643))
 TOUCHES = (18945.34, (0.49968944, -0.43603818, 0.58386151, 0.51114893))
 
 
+@pytest.mark.wide
 def test_edges_whose_orbit_touches_the_land_are_named():
     model, method = jc.case("3a"), jc.method("rodas4", steps=512)
     edges = {}

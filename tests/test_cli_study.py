@@ -191,6 +191,7 @@ def test_a_line_a_minute_where_there_is_no_terminal(
     assert capsys.readouterr().err.splitlines() == ["study x: 170 of 200 lanes, 2 a second, 0.2 min left"]
 
 
+@pytest.mark.wide
 def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """The figure is there from the coarse picture on, curves come on top; the data hold what was computed."""
     line = np.full(5, jc.rpm(7000))

@@ -43,6 +43,7 @@ def chaotic_share(model, grid):
     return np.mean(raw_sweep(model, grid, discard=150, revolutions=100).chaotic_share > 0)
 
 
+@pytest.mark.wide
 def test_identified_constants_let_the_gap_act():
     """Between 13000 and 20000 rpm 1b is chaotic and 1a is not, as published; with the preliminary set neither is."""
     grid = jc.rpm(13000, 18000, 11)
@@ -51,12 +52,14 @@ def test_identified_constants_let_the_gap_act():
     assert chaotic_share(jc.case("1b", "preliminary"), grid) < 0.2
 
 
+@pytest.mark.wide
 def test_identified_constants_let_the_unbalance_act():
     """Without unbalance chaos fills the upper end of the steady zone of 1a."""
     grid, model = jc.rpm(20700, 23700, 11), jc.case("1a")
     assert chaotic_share(jc.replace(model, eccentricity=0.0), grid) > chaotic_share(model, grid) + 0.3
 
 
+@pytest.mark.wide
 def test_the_search_for_constants_runs(tmp_path: pathlib.Path):
     """The smallest size of the experiment: it gets better, and its best values are within the bounds."""
     script = pathlib.Path(__file__).parent.parent / "experiments" / "identify_nu2310.py"

@@ -14,9 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcage._parameters import replace
-from jaxcage.analysis._equilibrium import (
-    LARGEST_WHIRLING,
+from jaxcage import replace
+from jaxcage.analysis import (
     attitude_angle,
     dimensional,
     eccentricity_ratio,
@@ -24,14 +23,15 @@ from jaxcage.analysis._equilibrium import (
     film_coefficients,
     film_whirl_speed,
     load_number,
+    orbit_measures,
     stability_chart,
     whirl_threshold,
 )
-from jaxcage.analysis._measures import orbit_measures
+from jaxcage.analysis._equilibrium import LARGEST_WHIRLING
 from jaxcage.forces import ElasticRib, RibFilm, film_scale
 from jaxcage.integrate import simulate
 from jaxcage.models import case
-from jaxcage.validation._literature import SHORT_BEARING
+from jaxcage.validation import SHORT_BEARING
 
 
 # eps, N, angle [deg], Kxx, Kxy, Kyx, Kyy, Cxx, Cxy = Cyx, Cyy, omega sqrt(c/g), whirl ratio
@@ -227,6 +227,7 @@ def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     assert float(equilibrium(model, 1.01 * speed).growth_rate) > 0.03
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("film", ["fixed_half", "positive_pressure"])
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
@@ -304,6 +305,7 @@ def test_light_support_adds_its_stiffness_to_the_eigenvalues():
     np.testing.assert_allclose(np.sort(np.abs(at.eigenvalues.imag))[::2], expected, rtol=1e-6)
 
 
+@pytest.mark.wide
 def test_gradient_of_the_growth_rate_is_that_of_differences():
     model, speed = cage_in_film(cage_mass=0.1), 450.0
     rate = lambda v: equilibrium(replace(model, guidance_gap=v), speed).growth_rate
@@ -312,6 +314,7 @@ def test_gradient_of_the_growth_rate_is_that_of_differences():
     assert float(jax.grad(rate)(gap)) == pytest.approx(float(difference), rel=1e-6)
 
 
+@pytest.mark.wide
 def test_elastic_rib_sinks_under_both_weights_and_the_cage_with_it():
     model = case("1a", "preliminary")
     rib = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e7, 50.0)))

@@ -11,6 +11,7 @@ FOLDER = pathlib.Path(__file__).parent.parent / "experiments"
 SCRIPTS = sorted(p for p in FOLDER.glob("*.py") if p.name not in ("_size.py", "identify_nu2310.py"))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.stem)
 def test_experiment(script: pathlib.Path, tmp_path: pathlib.Path):
     done = subprocess.run(

@@ -9,12 +9,12 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import wide_but
 
 from jaxcage.analysis import Plan
 from jaxcage.integrate import OUTCOMES, method
 from jaxcage.models import case
-from jaxcage.sweeps import sweep
-from jaxcage.sweeps._engine import run_lanes
+from jaxcage.sweeps import run_lanes, sweep
 
 
 MODEL = case("1a", "preliminary")
@@ -23,8 +23,8 @@ C = 0.45e-3
 HEALTHY = (0.4 * C, 0.3 * C, 0.0, 0.0)
 OTHER = (0.0, -0.5 * C, 0.0, 0.0)
 THIRD = (0.1 * C, -0.2 * C, 0.0, 0.1)
-METHOD = method("rodas3", steps=160)
-SETTINGS = dict(discard=12, revolutions=16, blocks=4, keep=8, method=METHOD)
+METHOD = method("rk4", steps=256)
+SETTINGS = dict(discard=12, revolutions=16, blocks=4, keep=8, confirm=False, horizon=0, method=METHOD)
 SPEEDS = RPM * np.array([9000.0, 15000.0])
 FIELDS = "strobe", "last", "block_growth", "peak", "outcome"
 
@@ -52,15 +52,17 @@ BAD_STARTS = {
 }
 
 
+@pytest.mark.parametrize("confirm", wide_but([False, True], False))
 @pytest.mark.parametrize("place", [0, 1, 2])
 @pytest.mark.parametrize("bad", BAD_STARTS)
-def test_bad_start_fails_alone(bad, place):
+def test_bad_start_fails_alone(bad, place, confirm):
     start, outcome = BAD_STARTS[bad]
     states = [HEALTHY, OTHER, THIRD]
-    healthy = sweep(MODEL, SPEEDS, starts=states, **SETTINGS)
+    settings = SETTINGS | (dict(confirm=True, horizon=3000) if confirm else {})
+    healthy = sweep(MODEL, SPEEDS, starts=states, **settings)
     assert not np.any(healthy.failed)
     states[place] = start
-    mixed = sweep(MODEL, SPEEDS, starts=states, **SETTINGS)
+    mixed = sweep(MODEL, SPEEDS, starts=states, **settings)
     others = np.s_[:, [i for i in range(3) if i != place]]
     assert_same_bytes(mixed, healthy, others)
     np.testing.assert_array_equal(mixed.label[others], healthy.label[others])
@@ -102,6 +104,7 @@ def test_absurd_speed_in_a_sweep():
     assert np.isnan(mixed.chaotic_share[2]) and not np.any(np.isnan(mixed.chaotic_share[:2]))
 
 
+@pytest.mark.wide
 def test_lanes_without_damping_leave_the_model():
     """No damping, a coupling that pumps and a weak contact: whirl grows until it is outside."""
     where = lambda m: (
@@ -121,7 +124,7 @@ def test_lanes_without_damping_leave_the_model():
     assert np.all(np.isnan(result.chaotic_share))
 
 
-@pytest.mark.parametrize("exponents", [0, 4])
+@pytest.mark.parametrize("exponents", [0, pytest.param(4, marks=pytest.mark.wide)])
 def test_failed_lanes_whatever_is_observed(exponents):
     settings = SETTINGS | dict(exponents=exponents)
     bad = (2 * C, 0.0, 0.0, 0.0)
@@ -133,6 +136,7 @@ def test_failed_lanes_whatever_is_observed(exponents):
     assert np.all(np.isfinite(mixed.exponents[0, 0]))
 
 
+@pytest.mark.wide
 def test_bad_start_fails_alone_with_adaptive_steps():
     settings = dict(discard=1, revolutions=2, blocks=2, keep=2)
     settings |= dict(method=method("rodas3", tolerance=1e-5))

@@ -314,6 +314,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return SimpleNamespace(said=json.loads(done.stdout), before=before, after=contents(out))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", [n for n in INTERRUPTED if n != "standard output"])
 def test_ctrl_c_says_one_sentence(driven: Any, name: str):
     status, text = driven.said[name]
@@ -329,10 +330,12 @@ def test_ctrl_c_says_one_sentence(driven: Any, name: str):
         assert line == "Interrupted: files of earlier runs are as they were, and the same command starts over."
 
 
+@pytest.mark.wide
 def test_ctrl_c_leaves_earlier_results_alone(driven: Any):
     assert driven.after == driven.before
 
 
+@pytest.mark.wide
 def test_a_full_standard_output_is_one_sentence(driven: Any):
     """Python itself does not add to it as it ends."""
     status, text = driven.said["standard output"]

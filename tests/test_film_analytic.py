@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from jaxcage._parameters import replace
+from jaxcage import replace
 from jaxcage.forces import (
     RibFilm,
     film_drive,

@@ -20,7 +20,7 @@ import hostile
 
 import jaxcage as jc
 from jaxcage.cli import _sweep, main
-from jaxcage.design._objective import DesignSpace
+from jaxcage.design import DesignSpace
 from jaxcage.design._optimise import _Kept
 from jaxcage.io import (
     ConfigError,
@@ -46,12 +46,14 @@ fuzzed = settings(
 )
 
 
+@pytest.mark.wide
 @fuzzed
 @given(hostile.files())
 def test_files(tmp_path: Path, data: bytes):
     hostile.check_file(data, tmp_path / "design.toml")
 
 
+@pytest.mark.wide
 def test_command_lines(tmp_path: Path):
     with hostile.playground(tmp_path), hostile.without_computing() as understood:
 

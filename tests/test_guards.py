@@ -20,8 +20,7 @@ import jaxcage as jc
 from jaxcage import _checks
 from jaxcage.analysis import label_lanes, too_few_revolutions
 from jaxcage.cli import main
-from jaxcage.integrate import OUTCOMES
-from jaxcage.integrate._results import outcome_code
+from jaxcage.integrate import OUTCOMES, outcome_code
 
 
 def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
@@ -147,7 +146,15 @@ def _thrown() -> tuple[np.ndarray, Any]:
     return speed, tuple(jnp.asarray(row) for row in rows)
 
 
-@pytest.mark.parametrize("solver, steps", [("rk4", 16), ("rk4", 128), ("newmark", 64), ("rodas3", 32)])
+@pytest.mark.parametrize(
+    "solver, steps",
+    [
+        ("rk4", 16),
+        ("rk4", 128),
+        pytest.param("newmark", 64, marks=pytest.mark.wide),
+        pytest.param("rodas3", 32, marks=pytest.mark.wide),
+    ],
+)
 def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageModel, solver: str, steps: int):
     """With steps too large by far for the contact: a lane is refused, or tells how far out the farthest of its steps
     was, which is compared with here for four of them at a time.
@@ -210,7 +217,7 @@ def test_labels_that_rest_on_too_few_revolutions(label: str, exponent: float, er
     period, lost = np.array([int(label == "periodic-1")]), np.array([int(label == "failed")])
     assert label_lanes(lost, period, np.array([exponent]), np.array([error]))[0] == label
     lane = np.array([label]), np.array([exponent]), np.array([error])
-    assert too_few_revolutions(*lane, 300)[0] == short
+    assert too_few_revolutions(*lane, 300)[0] == too_few_revolutions(*lane, 20)[0] == short
     judged_by_exponent = label in ("quasi-periodic", "undecided", "chaotic")
     assert too_few_revolutions(*lane, 19)[0] == judged_by_exponent
 
@@ -234,6 +241,7 @@ def test_a_short_sweep_says_so_and_a_long_one_does_not():
     assert "3 labels rest on too few revolutions" in str(single)
 
 
+@pytest.mark.wide
 def test_short_studies_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     counts = ["--starts", "1", "--discard", "2", "--revolutions", "10", "--solver", "rk4", "--steps", "64"]
     counts += ["--out", str(tmp_path)]
@@ -241,6 +249,7 @@ def test_short_studies_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert "Warning: 2 labels rest on too few revolutions: choose more --revolutions." in capsys.readouterr().err
 
 
+@pytest.mark.wide
 def test_adaptive_steps_tell_how_far_the_cage_went():
     """Not only where it ended: it bounces off the rib within the revolution."""
     run = lambda method: raw_sweep(

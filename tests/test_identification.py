@@ -14,8 +14,9 @@ from helpers import raw_sweep
 import jaxcage as jc
 from jaxcage._parameters import parameter
 from jaxcage.analysis import Edge, Zone
+from jaxcage.design import matched
 from jaxcage.design._fit import NORMAL_95, determined
-from jaxcage.design._measured import inside_zones, matched
+from jaxcage.design._measured import inside_zones
 
 
 METHOD = jc.method("rk4", steps=64)
@@ -110,6 +111,7 @@ def test_what_the_symmetries_hide_is_called_unknown(located):
     assert all(fit.interval[n][0] == pytest.approx(u.lower) for n, u in zip(names, BOUNDS, strict=True))
 
 
+@pytest.mark.wide
 def test_intervals_cover_the_truth(located):
     """Twenty draws of 1 % noise: each identified combination's 95 % interval holds the truth 17 times or more."""
     rng = np.random.default_rng(0)
@@ -125,6 +127,7 @@ def test_intervals_cover_the_truth(located):
     assert np.all(covered >= 17), covered
 
 
+@pytest.mark.wide
 def test_an_edge_that_vanishes_stops_the_step_and_not_the_search(located):
     """A target beyond the point where the period doubling is there at all: the fit ends and says what is lost."""
     far = [
@@ -137,6 +140,7 @@ def test_an_edge_that_vanishes_stops_the_step_and_not_the_search(located):
     assert fit.chi_square > 100  # no damping makes these edges: the misfit says so
 
 
+@pytest.mark.wide
 def test_slopes_are_those_of_differences(located):
     cases_, points = [c for c, *_ in located], [p for _, _, p, _ in located]
     place = np.array([u.place(TRUTH[u.name]) for u in BOUNDS])
@@ -166,6 +170,7 @@ def test_a_prior_fixes_what_the_edges_cannot(located):
     assert finite(held) == finite(free) + 1
 
 
+@pytest.mark.wide
 def test_the_screen_finds_planted_zones():
     """Chaos of the double well where the planted constants have it: the best of 64 designs beats the median by far."""
     systems = {k: v for k, v in list(cases().items())[::3]}

@@ -76,6 +76,7 @@ def orbits():
     return settled.last[:, 0], np.asarray(found)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("solver", ["LSODA", "Radau"])
 @pytest.mark.parametrize("index", range(len(PERIODIC_RPM)))
 def test_strobe_states_of_periodic_motion(index, solver):
@@ -92,6 +93,7 @@ def test_strobe_states_of_periodic_motion(index, solver):
         np.testing.assert_allclose(image / unit, exact[index] / unit, rtol=0, atol=1e-6)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("index", range(len(PERIODIC_RPM)))
 def test_default_steps_reach_the_same_periodic_motion(index):
     """The library's own 128 steps a revolution, against SciPy: 1e-4 of the clearance."""
@@ -131,6 +133,7 @@ def chaos():
     return list(zip(ours, theirs, strict=True))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("index", range(len(CHAOTIC_RPM)))
 def test_largest_exponent_of_chaotic_motion(index):
     (ours, our_error), (theirs, their_error) = chaos()[index]
@@ -139,6 +142,7 @@ def test_largest_exponent_of_chaotic_motion(index):
     assert ours > 0.2  # no test of zero against zero
 
 
+@pytest.mark.wide
 def test_numpy_tangent_dynamics_against_the_multipliers_of_an_orbit():
     """The reference itself: on a periodic orbit its exponent is the logarithm of the multiplier."""
     _, exact = orbits()

@@ -10,7 +10,7 @@ import pytest
 from helpers import raw_sweep
 
 import jaxcage as jc
-from jaxcage.validation._literature import LORENZ, LORENZ_DIMENSION, ROESSLER, Number
+from jaxcage.validation import LORENZ, LORENZ_DIMENSION, ROESSLER, Number
 
 
 def lorenz(rho):
@@ -55,6 +55,7 @@ def test_lorenz():
     assert dimension == pytest.approx(LORENZ_DIMENSION.value, abs=LORENZ_DIMENSION.tolerance)  # Kaplan and Yorke's
 
 
+@pytest.mark.wide
 def test_roessler():
     found = spectrum(roessler, 1.0, (0.0, -5.0, 0.0), 512, 300, discard=20)
     agrees(found, ROESSLER)

@@ -8,7 +8,7 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.orbits import Point, Stretch, SynchronousOrbits
-from jaxcage.validation._literature import DUFFING_FOLDS
+from jaxcage.validation import DUFFING_FOLDS
 
 
 METHOD = jc.method("rodas4", steps=256)

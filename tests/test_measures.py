@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 import jaxcage.integrate as ji
-from jaxcage._parameters import replace
-from jaxcage.analysis._equilibrium import equilibrium
-from jaxcage.analysis._measures import (
-    cage_forces,
-    film_drag_power,
-    orbit_measures,
-    relative_state,
-    winding,
-)
+from jaxcage import replace
+from jaxcage.analysis import cage_forces, equilibrium, film_drag_power, orbit_measures
+from jaxcage.analysis._measures import relative_state, winding
 from jaxcage.forces import ElasticRib, PocketImpact, RollerPassImpact
 from jaxcage.models import case
 
@@ -148,6 +142,7 @@ def test_forces_of_a_simulation_are_its_acceleration():
     np.testing.assert_allclose(total, MASS * acceleration, atol=2e-3 * size)
 
 
+@pytest.mark.wide
 def test_energy_balance_of_a_synchronous_orbit():
     """On a closed orbit the impacts and the unbalance put in what film and support take out."""
     model, speed = case("1a", "preliminary"), 16000 * np.pi / 30
@@ -162,6 +157,7 @@ def test_energy_balance_of_a_synchronous_orbit():
     assert m.whirl_ratio == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.wide
 def test_forces_vanish_in_sum_at_the_equilibrium():
     model = replace(case("1a", "preliminary"), amplitude=0.0, eccentricity=0.0)
     q = np.asarray(equilibrium(model, SPEED).coordinates)

@@ -68,6 +68,7 @@ def test_a_test_function_that_nearly_vanishes_is_looked_at(lowest, looked_at):
     assert dips(-f, np.array([0.140, 0.096])) == dips(f, np.array([0.140, 0.096]))
 
 
+@pytest.mark.wide
 def test_search_meets_what_only_the_opposite_start_leads_to():
     """Two wells, and starts in one of them: the orbits of both are found, and the counts are those of the starts."""
 

@@ -137,6 +137,7 @@ def test_statistical_slopes_are_within_their_errors():
     assert np.all(np.abs(truth.slope) > 3 * truth.slope_error)
 
 
+@pytest.mark.wide
 def test_statistical_slopes_satisfy_homogeneity():
     """Units of mass, length and time: sum a_i p_i dW/dp_i is 0, 0 and -W, within the error, whatever the reference."""
     system = double_well()
@@ -153,6 +154,7 @@ def test_statistical_slopes_satisfy_homogeneity():
         assert abs(a @ elasticity - expected) < 3 * np.hypot(np.linalg.norm(a * error), got.error), unit
 
 
+@pytest.mark.wide
 def test_why_chaos_is_not_differentiated_through():
     """The derivative of a chaotic trajectory's mean square explodes; the slope of the ensemble stays."""
     system, speed = double_well(), 1.1
@@ -172,6 +174,7 @@ def test_why_chaos_is_not_differentiated_through():
     assert np.all(np.abs(got.slope) < 50) and np.all(got.slope_error < np.abs(got.slope).max())
 
 
+@pytest.mark.wide
 def test_a_share_is_a_mean_over_the_hours():
     spectrum = [(9.0, 10.0, 3.0), (11.0, 12.0, 1.0)]
     share = jc.design.chaotic_share(spectrum, count=6, **CHAOS)
@@ -182,6 +185,7 @@ def test_a_share_is_a_mean_over_the_hours():
     )
 
 
+@pytest.mark.wide
 def test_a_failed_lane_counts_as_chaotic():
     """Starts beyond what the model holds for fail; a design of which nothing is known is not called calm."""
     model = jc.case("1a")

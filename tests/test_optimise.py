@@ -10,6 +10,7 @@ from tests.test_identification import TRUTH, DoubleWell
 
 
 VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
+OPTIMISERS = optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)
 
 
 def double_well():
@@ -26,7 +27,7 @@ def bowl(damping=0.4, cubic=1.5):
     return jc.design.Smooth(height)
 
 
-@pytest.mark.parametrize("optimiser", [None, optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)])
+@pytest.mark.parametrize("optimiser", [None, *(pytest.param(o, marks=pytest.mark.wide) for o in OPTIMISERS)])
 def test_any_optimiser_finds_a_known_optimum(optimiser):
     found = jc.optimise(double_well(), VARY, bowl(), starts=4, steps=150, optimiser=optimiser).best
     assert found.objective == pytest.approx(1.0, abs=2e-2)
@@ -158,6 +159,7 @@ def test_tolerance_budget_is_the_root_of_squares():
         jc.design.tolerance_budget(edge, {"heat": 0.1})
 
 
+@pytest.mark.wide
 def test_pareto_front_of_two_parabolas():
     """(x - 0.3)^2 and (x - 0.8)^2 trade off along sqrt(f) + sqrt(g) = 0.5."""
     f, g = (jc.design.Smooth(lambda s, c=c: (jc.parameters(s)["damping"] - c) ** 2) for c in (0.3, 0.8))

@@ -91,6 +91,7 @@ def test_scaling_identities_of_an_orbit(name):
     np.testing.assert_allclose(number, zero, atol=1e-9)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", ORBITS)
 def test_hessian_of_state_and_multipliers(name):
     theta, guess = ORBITS[name]
@@ -105,6 +106,7 @@ def test_hessian_of_state_and_multipliers(name):
 HESSIAN = jax.jit(jax.jacfwd(jax.jacrev(orbit_numbers)))
 
 
+@pytest.mark.wide
 def test_batches_equal_loops():
     theta, guess = DOUBLE_WELL
     thetas = jnp.asarray(theta + 0.01 * np.outer(np.arange(-2.0, 3.0), [0, 1, 1, 1, -1, -1, 1]))
@@ -168,6 +170,7 @@ def found():
     return points
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", POINTS)
 def test_gradient_of_a_point(kind, found):
     theta, (_, guess) = POINTS[kind][1], found[kind]
@@ -180,6 +183,7 @@ def test_gradient_of_a_point(kind, found):
     assert gradient[NAMES.index(free)] == 0.0
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", POINTS)
 def test_scaling_identities_of_a_point(kind, found):
     theta, (point, guess) = POINTS[kind][1], found[kind]
@@ -196,6 +200,7 @@ def test_scaling_identities_of_a_point(kind, found):
     assert abs(total + force) < 1e-9
 
 
+@pytest.mark.wide
 def test_hessian_of_a_period_doubling(found):
     """Against differences of gradients; with the force as b^(-1/2), d2g/db2 = 3 g/(4 b^2)."""
     theta, (point, guess) = DOUBLE_WELL[0], found["period-doubling"]
@@ -207,6 +212,7 @@ def test_hessian_of_a_period_doubling(found):
     assert abs(hessian[b, b] - 0.75 * point.value) < 1e-9
 
 
+@pytest.mark.wide
 def test_state_and_speed_at_a_point_are_differentiable(found):
     theta, (_, guess) = HARDENING[0], found["fold"]
 
@@ -219,6 +225,7 @@ def test_state_and_speed_at_a_point_are_differentiable(found):
     np.testing.assert_allclose(slope[2], slope[3], rtol=0, atol=1e-14)
 
 
+@pytest.mark.wide
 def test_directional_derivative_and_batch_of_points(found):
     """A tangent through the design and the speed at once, in a batch."""
     theta, (_, guess) = DOUBLE_WELL[0], found["period-doubling"]

@@ -82,6 +82,7 @@ class Pendulum(eqx.Module):
         return (-natural / 2 * u + natural**2 * (self.g * jnp.cos(tau) - jnp.sin(x)),)
 
 
+@pytest.mark.wide
 def test_period_doubling_from_beyond_a_superstable_orbit():
     """Newton's method finds nothing from an orbit with the multiplier .18: the branch leads there (SciPy's DOP853 and
     bisection put it at 1.08208437)."""
@@ -188,6 +189,7 @@ def point_of(kind, a=0.93, speed=1.1, **settings):
     return jc.bifurcation(system, kind, ((0.99, 0.01), a), "a", speed=speed, method=METHOD)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("turn", [0.0, 0.5])
 def test_neutral_saddle_is_no_torus_bifurcation(turn):
     """Real multipliers mu and 1/mu (at a = 1.15): their product is 1, too."""
@@ -210,6 +212,7 @@ ELSEWHERE = {
 }
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow) if "branch" in name else name for name in ELSEWHERE]
 )
@@ -220,11 +223,13 @@ def test_another_kind_than_asked(name):
     assert np.isnan(point.value) and not bool(point.trusted)
 
 
+@pytest.mark.wide
 def test_multiplier_one_that_is_no_fold():
     """A pitchfork is crossed by its orbit: as a fold its place is ill-determined, and must not be trusted."""
     assert not bool(point_of("fold", s=0.3, turn=0.0).trusted)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("square", [0.0, 0.4], ids=["pitchfork", "transcritical"])
 @pytest.mark.parametrize("slope", [1.0, 0.5])
 def test_branch_point_and_its_rate(square, slope):
@@ -241,6 +246,7 @@ CRITICAL = {"period-doubling": dict(s=0.3), "torus": dict(b=0.3)}
 
 
 @pytest.mark.parametrize("name", TANGENT)
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", CRITICAL)
 def test_tangential_crossing(kind, name):
     """Found, but not trusted: its place is not a function of the design."""
@@ -251,6 +257,7 @@ def test_tangential_crossing(kind, name):
     np.testing.assert_allclose(point.transversality, TANGENT[name]["slope"] * 2 * np.pi / 1.1, rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", CRITICAL)
 def test_crossing_with_the_cube_is_never_trusted(kind):
     """Newton's method gains but a third a step."""
@@ -258,6 +265,7 @@ def test_crossing_with_the_cube_is_never_trusted(kind):
     assert point.status in ("tangential", "no such point") and not bool(point.trusted)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("turn", [0.0, 0.5])
 @pytest.mark.parametrize("angle", [0.02, 0.002])
 def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
@@ -306,7 +314,9 @@ def test_bad_arguments():
 CONTACT = {"pressed": (10.0, 20000.0, 0.998), "grazed": (3.0, 20000.0, 0.971)}
 
 
-@pytest.mark.parametrize("name", [pytest.param("pressed", marks=pytest.mark.slow), "grazed"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("pressed", marks=pytest.mark.slow), pytest.param("grazed", marks=pytest.mark.wide)]
+)
 def test_cage_in_contact_with_its_land(name):
     model, speed, orbit, expected_peak = cage_in_contact(name)
     assert bool(orbit.stable) and orbit.residual < 1e-10
@@ -326,6 +336,7 @@ def test_cage_in_contact_with_its_land(name):
     np.testing.assert_allclose(orbit.monodromy / size, jnp.stack(columns, -1) / size, rtol=0, atol=1e-7)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", CONTACT)
 def test_multipliers_of_a_cage_in_contact_are_trusted(name):
     """One multiplier is below 1e-17 of the largest: the determinant is lost to rounding, the others are not."""

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 import jaxcage as jc
-from jaxcage.validation._literature import (
+from jaxcage.validation import (
     DUFFING_DOUBLINGS,
     DUFFING_FOLDS,
     DUFFING_SLOPES,
@@ -144,6 +144,7 @@ class Entrained(eqx.Module):
         return (0.3 * (1 - x * x) * u - x + self.g * jnp.cos(tau),)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("force", [0.8, 1.2], ids=["unstable side", "stable side"])
 def test_torus_bifurcation_of_the_driven_van_der_pol(force):
     """Where a drive of 1.3 rad/s lets go of the oscillator (DOP853)."""
@@ -194,6 +195,7 @@ CHARACTERISTIC = {
 }
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", CHARACTERISTIC)
 def test_characteristic_values_of_mathieu(name):
     """DLMF chapter 28: both multipliers are 1 or -1 with a Jordan block, and cross at an infinite rate."""
@@ -288,6 +290,7 @@ def test_multipliers_of_a_planted_limit_cycle(r, a, b):
     assert bool(orbit.stable) == (a < 0)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("b", [0.37, 1.9])
 def test_torus_bifurcation_of_a_planted_limit_cycle(b):
     """The pair leaves the unit circle at a = 0 with angle b T and rate T: exact. The drive is not resonant."""
@@ -328,6 +331,7 @@ def planted(a, s=0.0, b=0.0, turn=0.5):
 
 
 @pytest.mark.parametrize("speed", [0.8, 2.5])
+@pytest.mark.wide
 @pytest.mark.parametrize("at, inside", [(-0.2, -0.26), (0.2, 0.15)])
 def test_period_doubling_of_a_planted_driven_orbit(speed, at, inside):
     """Multipliers -exp((a + s) T) and -exp((a - s) T): exact, with rate T and the orbit known."""
@@ -365,6 +369,7 @@ class Lure(eqx.Module):
         return (u, f, -self.a * f - u - x + x * x)
 
 
+@pytest.mark.wide
 def test_period_doubling_of_the_lure_system():
     """x''' + a x'' + x' + x = x^2, by DOP853, and by MatCont and BifurcationKit off their meshes."""
     system = jc.ForcedSystem(Lure(**numbers(a=0.65)), dimension=3)

@@ -16,7 +16,7 @@ import jaxcage as jc
 from jaxcage.integrate import FixedSteps, strobe_map
 from jaxcage.io import load_model, write_template
 from jaxcage.orbits import Point, SynchronousOrbits, edge_speed, sensitivity
-from jaxcage.validation._literature import DUFFING_DOUBLINGS
+from jaxcage.validation import DUFFING_DOUBLINGS
 
 
 RPM = np.pi / 30
@@ -66,6 +66,7 @@ def image(model, orbit, steps):
     return np.array(strobe(tuple(orbit.state)).y) / np.array([float(c) for c in model.scale(orbit.speed)])
 
 
+@pytest.mark.wide
 def test_error_of_an_orbit_bounds_what_four_times_the_steps_change():
     stiff = jc.replace(jc.case("1a"), stiffness_x=1e7, stiffness_y=1e7)
     steps = []
@@ -80,6 +81,7 @@ def test_error_of_an_orbit_bounds_what_four_times_the_steps_change():
     assert steps[0] <= 512 and min(steps[1:]) >= 1024  # where the land is touched
 
 
+@pytest.mark.wide
 def test_orbit_of_a_light_cage_that_few_steps_lose(tmp_path: Path):
     """Eighteen rollers 7x7 in a bearing 50 by 80: equal steps that are too few throw the cage out."""
     path = write_template(str(tmp_path / "spindle.toml"))
@@ -110,6 +112,7 @@ def test_orbit_of_a_light_cage_that_few_steps_lose(tmp_path: Path):
     assert np.max(np.abs(theirs - orbit.state) / np.array(model.scale(9000 * RPM))) < 1e-6
 
 
+@pytest.mark.wide
 def test_steps_that_are_asked_for_are_kept():
     orbit = jc.periodic_orbit(stop(), 0.6, method=jc.method("rk4", steps=300))
     assert orbit.steps == 300 and orbit.error > 0
@@ -128,6 +131,7 @@ def test_an_orbit_is_found_again_by_its_own_method():
     np.testing.assert_allclose(again.state, orbit.state, rtol=1e-9)
 
 
+@pytest.mark.wide
 def test_choice_is_made_inside_jit_and_in_each_lane():
     free, touching = 2.5, 1.1
     plain = [jc.periodic_orbit(stop(), w) for w in (free, touching)]
@@ -142,6 +146,7 @@ def test_choice_is_made_inside_jit_and_in_each_lane():
     np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-6, rtol=1e-5)
 
 
+@pytest.mark.wide
 def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to_it():
     inside, exact = DUFFING_DOUBLINGS[1]
     orbit = jc.periodic_orbit(duffing(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
@@ -179,6 +184,7 @@ def test_branch_takes_more_steps_where_the_stop_is_touched():
         assert abs(finer.value - p.value) < p.error + 1e-8
 
 
+@pytest.mark.wide
 def test_bifurcation_of_a_branch_that_does_not_settle_is_no_edge():
     """By 32 steps against 16."""
     coarse = jc.method("rk4", steps=32)
@@ -206,6 +212,7 @@ def test_edges_with_contact_by_two_solvers_and_by_shooting(edge):
     assert abs(rodas4 - theirs) < 1e-3
 
 
+@pytest.mark.wide
 def test_error_of_an_edge_holds_the_value_at_four_times_the_steps():
     for model, point in TOUCHING.values():
         edge = sensitivity(model, point)

@@ -7,11 +7,12 @@ unit time with the drive's period 2 pi / omega.
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import slow_but, wide_but
 
 from jaxcage.integrate import method
 from jaxcage.models import ForcedOscillator, ForcedSystem
 from jaxcage.sweeps import sweep
-from jaxcage.validation._literature import EXPONENTS
+from jaxcage.validation import EXPONENTS
 
 
 COEXISTING = "Duffing x'' + .15 x' - x + x^3 = .3 cos t"
@@ -54,7 +55,8 @@ LITERATURE = {
 }
 
 
-@pytest.mark.parametrize("name", LITERATURE)
+@pytest.mark.wide
+@pytest.mark.parametrize("name", slow_but(LITERATURE, "Ueda x'' + .05 x' + x^3 = 7.5 sin t", COEXISTING))
 def test_largest_exponent_of_chaotic_oscillators(name):
     law, omega = LITERATURE[name]
     known = EXPONENTS[name]
@@ -90,7 +92,7 @@ DAMPED = {
 }
 
 
-@pytest.mark.parametrize("name", DAMPED)
+@pytest.mark.parametrize("name", wide_but(DAMPED, "duffing"))
 def test_sum_of_exponents_is_minus_damping_times_period(name):
     law, omega, damping, steps = DAMPED[name]
     result = spectrum(law, omega, steps)
@@ -110,6 +112,7 @@ def linear(zeta, natural):
     return acceleration
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("omega", [0.4, 1.7])
 def test_multipliers_of_the_linear_oscillator_underdamped(omega):
     """exp((-z +- i sqrt(1 - z^2)) w_0 T): both exponents are -z w_0 T in the mean."""
@@ -122,6 +125,7 @@ def test_multipliers_of_the_linear_oscillator_underdamped(omega):
     assert np.all(result.label == "periodic-1")
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("omega", [0.9, 3.0])
 def test_multipliers_of_the_linear_oscillator_overdamped(omega):
     """Real multipliers exp((-z +- sqrt(z^2 - 1)) w_0 T), one exponent each."""
@@ -136,6 +140,7 @@ def test_multipliers_of_the_linear_oscillator_overdamped(omega):
     assert np.all(result.standard_error > np.abs(result.exponents - exact))
 
 
+@pytest.mark.wide
 def test_steady_state_of_the_linear_oscillator():
     zeta, natural, omega = 0.2, 1.3, 0.9
     result = spectrum(linear(zeta, natural), omega, discard=100)
@@ -145,6 +150,7 @@ def test_steady_state_of_the_linear_oscillator():
     np.testing.assert_allclose(result.last, at, atol=1e-9)
 
 
+@pytest.mark.wide
 def test_first_order_form_gives_the_same_strobe_states():
     """A `ForcedSystem` of the same Duffing oscillator, on its way to periodic motion."""
     law = duffing(0.25, 0.1)

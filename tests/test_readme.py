@@ -34,6 +34,7 @@ def test_python_blocks_of_the_readme():
     assert float(space["slope"].acceleration.cubic / space["force"]) == pytest.approx(-0.5, abs=1e-9)
 
 
+@pytest.mark.wide
 def test_python_blocks_of_the_guide():
     space, _ = run_blocks(GUIDE)
     per_time = space["got"].exponents[0, :, 0].mean() / (2 * np.pi)

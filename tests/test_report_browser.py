@@ -113,7 +113,7 @@ class Addresses(html.parser.HTMLParser):
         return reader.found
 
 
-@pytest.mark.parametrize("scheme, options", [("light", ()), ("dark", (DARK,))])
+@pytest.mark.parametrize("scheme, options", [("light", ()), pytest.param("dark", (DARK,), marks=pytest.mark.wide)])
 def test_figures_are_not_blank_in_either_scheme(
     report: Path, measured: list[str], scheme: str, options: tuple[str, ...]
 ):

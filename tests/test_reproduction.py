@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers import wide_but
 
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone
@@ -62,6 +63,7 @@ def runs():
     return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False)
 
 
+@pytest.mark.wide
 def test_runs_cover_the_published_range(runs):
     assert list(runs.sweeps) == list(PUBLISHED_CASES)
     for found in runs.sweeps.values():
@@ -73,6 +75,7 @@ def test_runs_cover_the_published_range(runs):
         assert not np.array_equal(section.strobe, runs.sections["1b" if name == "1a" else "1a"].strobe)
 
 
+@pytest.mark.wide
 def test_every_conclusion_has_evidence_and_a_verdict(runs):
     found = conclusions(runs)
     assert len(found) == 7
@@ -84,6 +87,7 @@ def test_every_conclusion_has_evidence_and_a_verdict(runs):
     assert found[1].numbers["force_ratio"] == pytest.approx(2 ** (20 / 19), rel=0.02)  # Hertz impact on a stiff bar
 
 
+@pytest.mark.wide
 def test_a_verdict_can_be_no(runs):
     """Six cases with the same zones: the gap does nothing, and conclusion 1 cannot hold."""
     same = dataclasses.replace(runs, zones=dict.fromkeys(runs.zones, runs.zones["1a"]))
@@ -92,6 +96,7 @@ def test_a_verdict_can_be_no(runs):
     assert oil.numbers["change"] == pytest.approx(dict.fromkeys(oil.numbers["change"], 0.0), nan_ok=True)
 
 
+@pytest.mark.wide
 def test_figures_of_the_paper(runs):
     names = [name for name, figure in paper_figures(runs) if figure.axes]
     assert names == ["fig5", "fig7a", "fig8a", "fig7b", "fig8b", "fig7c", "fig8c", "fig9"]
@@ -135,7 +140,11 @@ def test_a_cubic_term_that_falls_with_the_gap_is_that_of_the_narrow_gap():
     assert float(at(wide) / at(narrow)) == pytest.approx((0.45 / 0.60) ** 2, rel=1e-12)
 
 
-@pytest.mark.parametrize("reading", READINGS, ids=lambda r: f"{r.case}-{r.question}-{r.answer}")
+@pytest.mark.parametrize(
+    "reading",
+    wide_but(READINGS, *(r for r in READINGS if r.question == "rib")),
+    ids=lambda r: f"{r.case}-{r.question}-{r.answer}",
+)
 def test_every_reading_can_be_taken(reading):
     model = reading.model(jc.case(reading.case))
     assert model.dimension == (8 if reading.answer == "elastic" else 4)

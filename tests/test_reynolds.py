@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import raw_sweep
+from helpers import raw_sweep, wide_but
 
 import jaxcage as jc
 from jaxcage.forces import (
@@ -69,7 +69,7 @@ def sommerfeld(eps: float, half: bool) -> np.ndarray:
     return np.array([-12 * eps**2 / ((2 + eps**2) * (1 - eps**2)), tangential / 2])
 
 
-@pytest.mark.parametrize("cavitation", ["full", "guembel"])
+@pytest.mark.parametrize("cavitation", wide_but(["full", "guembel"], "full"))
 @pytest.mark.parametrize("eps", [0.3, 0.7])
 def test_long_limit_in_closed_form(cavitation: str, eps: float):
     """The ends take off a share of the order of 1/lambda."""
@@ -99,6 +99,7 @@ def test_short_limit(cavitation: str, short: str):
     np.testing.assert_allclose(found, expected, rtol=0, atol=3e-5 * np.linalg.norm(expected))
 
 
+@pytest.mark.wide
 def test_short_film_is_off_by_the_square_of_the_slenderness():
     excess = jax.jit(lambda lam: short_film_excess(0.6, lam, stations=1024, profiles=1))
     found = [float(excess(lam)) for lam in (0.01, 0.02, 0.04)]
@@ -136,6 +137,7 @@ def strip_balance(profiles: int) -> float:
     return float(out / (source + flux[first - 1] - flux[last]))
 
 
+@pytest.mark.wide
 def test_mass_is_conserved():
     """Galerkin's equations do not say so of a piece of film by themselves: with more functions it must come out."""
     errors = [abs(strip_balance(k) - 1) for k in (1, 2)]
@@ -147,6 +149,7 @@ ROUNDING = 1e-10
 PRESSURE = jax.jit(film_pressure_field, static_argnames=("cavitation", "stations", "profiles"))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("slenderness", [0.05, 0.5])
 def test_film_breaks_off_without_a_slope(slenderness: float):
     """Swift and Stieber's condition, unlike Guembel's: the pressure in the last wet cell falls with its square."""
@@ -196,6 +199,7 @@ def test_film_is_what_it_is_by_relaxation(slenderness: float):
     np.testing.assert_allclose(found, by_hand, rtol=0, atol=4e-3 * np.linalg.norm(by_hand))
 
 
+@pytest.mark.wide
 def test_convergence_is_of_second_order_around_and_faster_across():
     r, v = jnp.asarray([0.7, 0.0]), jnp.asarray([0.1, -0.05])
     around = [FORCE(r, v, 0.5, cavitation="full", stations=n, profiles=1) for n in (32, 64, 128, 256)]
@@ -208,6 +212,7 @@ def test_convergence_is_of_second_order_around_and_faster_across():
     assert errors[0] < 0.03 and errors[1] < 0.1 * errors[0] and errors[2] < 0.2 * errors[1]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("slenderness, bound", [(0.0158, 1e-3), (0.0467, 3e-3), (0.2, 4e-3)])
 def test_grid_of_the_force_law_is_fine_enough(slenderness: float, bound: float):
     """Its 64 stations with one function against 512 with three, in random states up to the onset of contact."""
@@ -233,7 +238,9 @@ def test_mirror_and_turn_of_the_state_turn_the_force():
     np.testing.assert_allclose(FORCE(turn @ r, turn @ v, 0.1, profiles=1, stations=64), turn @ f, rtol=1e-10)
 
 
-@pytest.mark.parametrize("profiles, stations", [pytest.param(1, 64, marks=pytest.mark.slow), (2, 12)])
+@pytest.mark.parametrize(
+    "profiles, stations", [pytest.param(1, 64, marks=pytest.mark.slow), pytest.param(2, 12, marks=pytest.mark.wide)]
+)
 def test_derivatives_through_the_solve_match_differences(profiles: int, stations: int):
     """By position, velocity and slenderness: forward mode, and reverse mode on the grid of the force law."""
 
@@ -287,6 +294,7 @@ def test_cage_uses_the_film_of_each_land():
     assert abs(ratios[0]) < 1e-5 and 0.0015 < ratios[1] < 0.005
 
 
+@pytest.mark.wide
 def test_slopes_of_the_cage_are_its_derivatives():
     law = finite().at_speed(jnp.asarray(1500.0)).acceleration
     q, v = (tuple(map(jnp.asarray, part)) for part in (POINT[:2], POINT[2:]))
@@ -319,6 +327,7 @@ def test_film_of_the_cage_has_the_dimension_of_a_force(base: str, power: int):
     np.testing.assert_allclose(np.array(there), np.array(here) * factor**power, rtol=1e-9)
 
 
+@pytest.mark.wide
 def test_simulation_and_sweep_of_narrow_lands_are_those_of_the_short_film(tmp_path):
     """Through TOML: with lands of 0.5 mm both films give the same motion; a sweep goes where the simulation goes."""
     text = 'base = "1a"\n[film]\nland_width = "0.5 mm"\nmodel = "{}"\n'

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from helpers import slow_but, wide_but
 
+from jaxcage.validation import DUFFING_DOUBLINGS, EXPONENTS
 from jaxcage.validation._finite_volumes import equations, film_pressure, full_bearing
-from jaxcage.validation._literature import DUFFING_DOUBLINGS, EXPONENTS
 from jaxcage.validation._shooting import UEDA, doubling, duffing, largest_exponent, pendulum
 from jaxcage.validation._statics import load_integral
 
@@ -49,7 +50,7 @@ def test_load_integral_against_a_sum(zone: float):
 BRACKETS = {1: (0.262, 0.27), 2: (0.285, 0.288), 4: (0.2908, 0.2912), 8: (0.29196, 0.29205)}
 
 
-@pytest.mark.parametrize("periods", BRACKETS)
+@pytest.mark.parametrize("periods", wide_but(BRACKETS, 1))
 def test_shooting_finds_the_doublings_of_the_table(periods: int):
     _, number = DUFFING_DOUBLINGS[periods]
     found = doubling(lambda g: duffing(0.3, g, 1.2), periods, BRACKETS[periods], (1.0, 0.0))
@@ -66,7 +67,10 @@ OSCILLATORS = {
 }
 
 
-@pytest.mark.parametrize("name", OSCILLATORS)
+@pytest.mark.wide
+@pytest.mark.parametrize(
+    "name", slow_but(OSCILLATORS, "Duffing x'' + .3 x' - x + x^3 = .5 cos 1.2t", "Ueda x'' + .05 x' + x^3 = 7.5 sin t")
+)
 def test_ensembles_find_the_exponents_of_the_table(name: str):
     """A smaller one than the table's."""
     number = EXPONENTS[name]

@@ -5,13 +5,7 @@ import numpy as np
 import pytest
 
 import jaxcage.integrate as ji
-from jaxcage.analysis._spectra import (
-    OrderSpectrum,
-    dominant_orders,
-    order_spectrum,
-    waterfall,
-    whirl_spectrum,
-)
+from jaxcage.analysis import OrderSpectrum, dominant_orders, order_spectrum, waterfall, whirl_spectrum
 from jaxcage.models import ForcedOscillator
 
 

@@ -151,6 +151,7 @@ def test_a_chunk_half_written_is_written_again(
     assert contents(store) == contents(whole)
 
 
+@pytest.mark.wide
 def test_killed_at_random_and_resumed(whole: Path, tmp_path: Path):
     """SIGKILL at random moments, four times; whoever starts again ends with the very files of an unbroken run."""
     store, dice = tmp_path / "study.zarr", random.Random(1)
@@ -178,6 +179,7 @@ def test_killed_at_random_and_resumed(whole: Path, tmp_path: Path):
     assert contents(store) == contents(whole)
 
 
+@pytest.mark.wide
 def test_dask_survives_a_worker_and_finds_the_same(whole: Path, tmp_path: Path):
     """Two worker processes; one is killed as soon as the first chunk is done."""
     pytest.importorskip("distributed", reason="dask.distributed is not installed")
@@ -262,6 +264,7 @@ def test_what_makes_no_sense_is_refused(tmp_path: Path, change: dict, words: str
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.wide
 def test_orbit_data_when_asked_for(tmp_path: Path):
     options = OPTIONS | {"lanes": 18, "exponents": 2, "strobe": 5, "blocks": 1}
     found = jc.study(OSCILLATOR, {"speed": SPEEDS}, store=tmp_path / "study.zarr", **options)

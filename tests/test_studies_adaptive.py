@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.studies import LABELS, PENDING, found_share, kinds, refine
-from jaxcage.studies._adaptive import UNKNOWN, AdaptiveGrid, changes, first_stride
+from jaxcage.studies import LABELS, PENDING, AdaptiveGrid, found_share, kinds, refine
+from jaxcage.studies._adaptive import UNKNOWN, changes, first_stride
 
 
 SIDE = 300
@@ -126,6 +126,7 @@ class Ueda(eqx.Module):
         return (-0.05 * u - x**3 + self.force * jnp.cos(tau),)
 
 
+@pytest.mark.wide
 def test_map_of_a_system_agrees_with_a_sweep():
     """Labels of every computed point are those of sweeps; what a point counts as follows from all of its starts."""
     make = lambda force: jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)

@@ -215,7 +215,7 @@ def solve_14(impact, roller, v0, times):
 
 # Where the contact closes within a step, p^(10/9) costs a fixed-step method order: the errors below
 # belong to the default 511 x 4 steps, and to 16 times as many.
-@pytest.mark.parametrize("samples, tolerance", [(512, 3e-4), (4089, 1e-5)])
+@pytest.mark.parametrize("samples, tolerance", [(512, 3e-4), pytest.param(4089, 1e-5, marks=pytest.mark.wide)])
 def test_impact_against_scipy(samples, tolerance):
     h = history(samples=samples, substeps=4 if samples == 512 else 8)
     q, y = solve_14(IMPACT, ROLLER, SPEED, np.asarray(h.time))
@@ -433,6 +433,7 @@ def test_the_pulse_differentiated_meets_the_bar_twice():
     assert np.count_nonzero(np.diff((q > 0).astype(int)) == 1) >= 2
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_derivatives_of_the_pulse_spectrum_by_all_that_shapes_it(mode):
     at, h = jnp.log(jnp.array(list(PULSE.values()))), 2e-4
@@ -453,6 +454,7 @@ def test_second_derivatives_of_the_pulse_spectrum():
     np.testing.assert_allclose(jax.jit(jax.jacrev(slope))(at) @ along, found, rtol=1e-9)
 
 
+@pytest.mark.wide
 def test_rollers_without_play_do_not_hit():
     still = jax.jit(lambda play: jnp.stack(pulse_spectrum(RollerPassImpact(IMPACT), 900.0, Z, ROLLER, play)))
     assert np.all(still(0.0) == 0)

@@ -9,7 +9,7 @@ from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.models import FirstOrderField
-from jaxcage.validation._literature import DUFFING_FOLDS
+from jaxcage.validation import DUFFING_FOLDS
 
 
 def duffing(tau, q, v, speed):
@@ -20,7 +20,7 @@ def duffing(tau, q, v, speed):
 
 
 HARDENING = jc.ForcedOscillator(duffing, coordinates=1)
-FAST = jc.method("rodas4", steps=32)
+FAST = jc.method("rk4", steps=128)
 
 
 def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
@@ -102,6 +102,7 @@ def test_labels_are_confirmed_by_finer_steps(followed):
     assert np.all(sure.error[where] < rough.error[where])
 
 
+@pytest.mark.wide
 def test_number_of_exponents_does_not_change_the_first():
     a, b = (
         raw_sweep(

@@ -564,6 +564,7 @@ def chaotic_starts():
     return [tuple(map(float, y)) for y in s.last[0][s.label[0] == "chaotic"][:80]]
 
 
+@pytest.mark.wide
 def test_crisis_of_uedas_oscillator(chaotic_starts):
     """The chaotic attractor ends at a force of 13.388: J. M. T. Thompson and H. B. Stewart, Nonlinear Dynamics and
     Chaos (Wiley).
@@ -589,6 +590,7 @@ def test_crisis_of_uedas_oscillator(chaotic_starts):
     assert -fit[0] == pytest.approx(expected, abs=0.2)
 
 
+@pytest.mark.wide
 def test_crisis_with_four_times_the_steps(chaotic_starts):
     coarse, fine = (lives((13.42,), chaotic_starts, steps, 1000)[0] for steps in (512, 2048))
     steps = compare(coarse, fine)

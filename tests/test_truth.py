@@ -32,6 +32,7 @@ def assert_closes(model, sweep, i, j):
     np.testing.assert_allclose(back / field.scale, sweep.last[i, j] / field.scale, rtol=0, atol=DEFAULT_ERROR)
 
 
+@pytest.mark.wide
 def test_an_orbit_that_fixed_steps_called_chaotic_is_periodic():
     found = jc.sweep(MODEL, jc.rpm(18200, 18400, 3), horizon=0)
     # The synchronous orbit is stable up to its fold at 18686 rpm; which start leads to it is decided by last digits.
@@ -43,6 +44,7 @@ def test_an_orbit_that_fixed_steps_called_chaotic_is_periodic():
         assert_closes(MODEL, found, 1, j)
 
 
+@pytest.mark.wide
 def test_a_stiff_land_is_periodic():
     model = replaced(stiffness=5e9)
     found = jc.sweep(model, jc.rpm(18000), horizon=0)
@@ -50,6 +52,7 @@ def test_a_stiff_land_is_periodic():
     assert_closes(model, found, 0, 0)
 
 
+@pytest.mark.wide
 def test_a_stiff_land_that_is_touched_early_is_periodic_or_not_known():
     model = replaced(stiffness=1e10, onset=0.6)
     found = jc.sweep(model, jc.rpm(6000), horizon=0)
@@ -60,6 +63,7 @@ def test_a_stiff_land_that_is_touched_early_is_periodic_or_not_known():
         assert_closes(model, found, 0, j)
 
 
+@pytest.mark.wide
 def test_an_exponent_on_a_soft_support_is_that_of_the_motion():
     model = jc.replace(MODEL, **truth_exponents.SOFT)
     found = jc.sweep(model, jc.rpm(600), discard=100, revolutions=100, horizon=0)
@@ -69,6 +73,7 @@ def test_an_exponent_on_a_soft_support_is_that_of_the_motion():
     assert beside.apart <= beside.stated < 0.1
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("wide", [False, True])
 def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
     finished = 0
@@ -84,6 +89,7 @@ def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
     assert finished >= 18
 
 
+@pytest.mark.wide
 def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
     designs = [MODEL, replaced(stiffness=1e16, onset=0.3), replaced(eccentricity=2e-5)]
     speeds = jc.rpm(9000, 15000, 2)
@@ -96,6 +102,7 @@ def test_a_hopeless_design_leaves_its_neighbours_as_they_are():
             assert np.array_equal(getattr(here, name), getattr(there, name)), name
 
 
+@pytest.mark.wide
 def test_the_section_of_lanes_finds_nothing_wrong():
     assert truth.main(["--quick", "--lanes", "--kinds", "cases"]) == []
 
@@ -115,6 +122,7 @@ def spindle() -> jc.CageModel:
     return model_from(given)
 
 
+@pytest.mark.wide
 def test_forces_of_a_bearing_of_ones_own_are_those_of_the_reference():
     model = spindle()
     settled = jc.simulate(model, jc.rpm(9000), revolutions=1, discard=60)

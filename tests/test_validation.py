@@ -5,9 +5,10 @@ import math
 from pathlib import Path
 
 import pytest
+from helpers import wide_but
 
 from jaxcage.cli import main
-from jaxcage.validation import TOPICS, Comparison, page
+from jaxcage.validation import FEIGENBAUM, TOPICS, Comparison, page
 from jaxcage.validation._bifurcations import pendulum_comparisons
 from jaxcage.validation._film import (
     FULL_BEARINGS,
@@ -16,7 +17,6 @@ from jaxcage.validation._film import (
     lund_thomsen_comparisons,
     nicholas_comparisons,
 )
-from jaxcage.validation._literature import FEIGENBAUM
 
 
 def made(theirs=1.0, ours=1.004, tolerance=0.005):
@@ -38,7 +38,7 @@ def test_page():
     assert text.index("## Film") < text.index("## Cage")
 
 
-@pytest.mark.parametrize("topic", ["statics", "contact"])
+@pytest.mark.parametrize("topic", wide_but(["statics", "contact"], "contact"))
 def test_quick_topics_pass(topic: str):
     found = TOPICS[topic]()
     assert len(found) >= 8
@@ -50,12 +50,13 @@ def failures(rows: list[Comparison]) -> list[str]:
     return [c.what for c in rows if not c.passed]
 
 
-@pytest.mark.parametrize("slenderness", [1.0, 0.5, 0.25])
+@pytest.mark.parametrize("slenderness", wide_but([1.0, 0.5, 0.25], 0.25))
 def test_full_bearing(slenderness: float):
     rows = full_bearing_comparisons([b for b in FULL_BEARINGS if b[0] == slenderness])
     assert len(rows) == 8 and failures(rows) == []
 
 
+@pytest.mark.wide
 def test_lund_thomsen():
     """Every number of their table, with two axial grooves and Reynolds cavitation, within 6 %."""
     rows = lund_thomsen_comparisons()
@@ -68,6 +69,7 @@ def test_two_grooves_whirl_near_half_speed():
     assert all(0.45 < float(grooved_whirl(eps).whirl_ratio) < 0.52 for eps in (0.03, 0.04))
 
 
+@pytest.mark.wide
 def test_cascade_of_the_driven_pendulum():
     rows = pendulum_comparisons((1, 2, 4, 8))
     assert len(rows) == 4 and failures(rows) == []

@@ -23,6 +23,21 @@ from ._comparison import Comparison as Comparison
 from ._contact import contact_comparisons
 from ._exponents import exponent_comparisons
 from ._film import film_comparisons
+from ._literature import (
+    DUFFING_DOUBLINGS as DUFFING_DOUBLINGS,
+    DUFFING_FOLDS as DUFFING_FOLDS,
+    DUFFING_SLOPES as DUFFING_SLOPES,
+    EXPONENTS as EXPONENTS,
+    FEIGENBAUM as FEIGENBAUM,
+    LORENZ as LORENZ,
+    LORENZ_DIMENSION as LORENZ_DIMENSION,
+    LURE as LURE,
+    ROESSLER as ROESSLER,
+    SHORT_BEARING as SHORT_BEARING,
+    VAN_DER_POL as VAN_DER_POL,
+    VAN_DER_POL_LET_GO as VAN_DER_POL_LET_GO,
+    Number as Number,
+)
 from ._page import page as page
 from ._statics import statics_comparisons
 
