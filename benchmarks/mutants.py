@@ -59,7 +59,7 @@ TESTS = {
     "orbits/_newton": NEWTON,
     "orbits/_normal_form": "test_branches",
     "orbits/_orbit": NEWTON,
-    "orbits/_point": NEWTON,
+    "orbits/_bifurcation": NEWTON,
     "orbits/_problem": NEWTON,
     "orbits/_search": SEARCH,
     "orbits/_sensitivity": "test_edges_of_the_cage",
