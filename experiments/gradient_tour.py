@@ -22,7 +22,6 @@ from jaxcage.plotting import elasticity_bars, new_figure
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 model = jc.case("1a")
 
 # %% [markdown]

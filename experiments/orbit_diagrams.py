@@ -17,7 +17,6 @@ from jaxcage.plotting import exponent_strip, mark_published, new_figure, orbit_d
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 
 # %%
 speeds = jc.rpm(4000, 27500, small(236, 12))

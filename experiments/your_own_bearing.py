@@ -19,7 +19,6 @@ from jaxcage.plotting import new_figure, orbit_diagram
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 
 # %%
 TEXT = """

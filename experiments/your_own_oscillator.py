@@ -23,7 +23,6 @@ from jaxcage.plotting import new_figure
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 
 
 # %%
