@@ -2,6 +2,10 @@
 # jupyter:
 #   jupytext:
 #     formats: py:percent,ipynb
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
 # ---
 # %% [markdown]
 # # Sensitivity and tolerances
