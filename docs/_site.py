@@ -6,12 +6,15 @@ of the site; links to those files become links to the pages; equations become Ma
 
 import ast
 import base64
+import functools
+import importlib
 import json
 import pathlib
 import re
 from collections.abc import Iterator
 from typing import Any
 
+import griffe
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -49,11 +52,26 @@ def homes() -> dict[str, str]:
     return {n: next((layer for layer, names in of_layer.items() if n in names), "") for n in public_names()}
 
 
+@functools.cache
+def _tree() -> Any:
+    return griffe.load("jaxcage", search_paths=[str(ROOT)])
+
+
+def entry(layer: str, name: str) -> str:
+    """The entry of a name; griffe does not see constants that are assigned two at a time, so their values stand there."""
+    try:
+        _tree()[layer][name].docstring
+    except griffe.AliasResolutionError:
+        value = getattr(importlib.import_module(f"jaxcage.{layer}"), name)
+        return f"## `{name}` {{#jaxcage.{layer}.{name}}}\n\n`{value!r}`"
+    return f"::: jaxcage.{layer}.{name}"
+
+
 def reference(layer: str) -> str:
     """The page of a layer: what it is responsible for, then each of its names."""
     docstring = ast.get_docstring(ast.parse((PACKAGE / layer / "__init__.py").read_text(encoding="utf-8")))
     summary = (docstring or "").split("\n\n")[0]
-    return "\n\n".join([f"# {layer}", summary, *(f"::: jaxcage.{layer}.{name}" for name in public_names(layer))])
+    return "\n\n".join([f"# {layer}", summary, *(entry(layer, name) for name in public_names(layer))])
 
 
 def top_reference() -> str:
@@ -97,8 +115,9 @@ def parameters() -> str:
     """Every parameter of the cage model."""
     import jaxcage as jc
 
+    jc.enable_x64()
     info = jc.parameter_info(jc.case("1a"))
-    rows = (f"| `{name}` | {of.unit} | {of.about} |" for name, of in info.items())
+    rows = (f"| `{name}` | {of.unit} | {of.text} |" for name, of in info.items())
     return "\n".join(["| parameter | unit | meaning |", "|---|---|---|", *rows])
 
 
@@ -129,6 +148,8 @@ def _moved(link: re.Match[str]) -> str:
     path = pathlib.PurePosixPath(link["path"])
     if str(path) in PLACES:
         return f"]({PLACES[str(path)]}"
+    if path.parts[0] == "docs":
+        return f"]({path.relative_to('docs')}"
     if path.parts[0] == "experiments":
         return f"](figures/{path.name}" if path.suffix == ".png" else f"](gallery/{path.stem}.md"
     return link[0]
@@ -139,7 +160,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     for name, make in {"outputs": outputs, "parameters": parameters}.items():
         if f"<!-- {name} -->" in markdown:
             markdown = markdown.replace(f"<!-- {name} -->", make())
-    markdown = re.sub(r"<!-- shown: (\S+) (\S+) -->", lambda m: block(m[1], m[2]), markdown)
+    markdown = re.sub(r"^.*<!-- shown: (\S+) (\S+) -->$", lambda m: block(m[1], m[2]), markdown, flags=re.M)
     markdown = re.sub(r"\]\((?=(?:experiments|docs)/)", "](../", markdown)
     return re.sub(r"\]\(\.\./(?P<path>[^)#]+)", _moved, markdown)
 
