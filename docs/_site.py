@@ -171,7 +171,14 @@ def _formulas(html: str) -> Iterator[str]:
             yield part
         else:
             latex = part.strip().replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">")
-            yield convert(latex[2:-2].strip(), display="block" if latex.startswith(r"\[") else "inline")
+            made = convert(latex[2:-2].strip(), display="block" if latex.startswith(r"\[") else "inline")
+            made = re.sub(r'<mi mathvariant="bold">(\w)</mi>', lambda m: f"<mi>{_bold(m[1])}</mi>", made)
+            yield made.replace("<mover>", '<mover accent="true">')
+
+
+def _bold(letter: str) -> str:
+    """The letter of Unicode's bold alphabet: browsers do not know `mathvariant="bold"`."""
+    return chr(ord(letter) + (0x1D400 - ord("A") if letter.isupper() else 0x1D41A - ord("a")))
 
 
 def on_page_content(html: str, **_: Any) -> str:

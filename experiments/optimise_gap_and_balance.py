@@ -29,7 +29,7 @@ model = jc.case("1b")
 vary = {"guidance_gap": (0.30e-3, 0.60e-3), "eccentricity": (5e-6, 60e-6)}
 COST = 1000.0  # rpm of chaotic speeds that one unit of manufacturing cost is worth
 width = jc.design.chaotic_width(
-    4000, 27500, small(36, 6), cloud=small(8, 4), spread=0.1, discard=small(120, 10), revolutions=small(80, 10)
+    4000, 27500, small(32, 6), cloud=small(8, 4), spread=0.1, discard=small(120, 10), revolutions=small(80, 10)
 )
 objective = width + COST * jc.design.cost()
 
@@ -48,9 +48,9 @@ print(f"{designs} designs swept for {len(found.optima)} searches, {scouts} of th
 def check(design):
     c, rng = float(design.clearance), np.random.default_rng(7)
     starts = [tuple(float(v) for v in rng.uniform(-0.6, 0.6, 4) * c * np.array([1, 1, 120, 120])) for _ in range(3)]
-    length = dict(discard=small(200, 10), revolutions=small(100, 10), blocks=10)
+    length = dict(discard=small(300, 10), revolutions=small(100, 10), blocks=10, horizon=0, confirm=False)
     return jc.sweep(
-        design, jc.rpm(4000, 27500, small(95, 6)), starts=starts, method=jc.method("rk4", steps=768), **length
+        design, jc.rpm(4000, 27500, small(79, 6)), starts=starts, method=jc.method("rk4", steps=768), **length
     )
 
 
