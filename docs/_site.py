@@ -58,7 +58,7 @@ def _tree() -> Any:
 
 
 def entry(layer: str, name: str) -> str:
-    """The entry of a name; griffe does not see constants that are assigned two at a time, so their values stand there."""
+    """The entry of a name; of constants assigned two at a time, which griffe does not see, the value."""
     try:
         _tree()[layer][name].docstring
     except griffe.AliasResolutionError:

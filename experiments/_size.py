@@ -41,7 +41,7 @@ class Picture:
 
 
 def save(figure: Figure, name: str) -> Picture:
-    """Save a figure as PNG, and in the file where its axes are: left, bottom, width and height as parts of the whole."""
+    """Save a figure as PNG, in it where its axes are: left, bottom, width and height as parts of the whole."""
     FOLDER.mkdir(exist_ok=True)
     path = FOLDER / f"{name}.png"
     figure.draw_without_rendering()

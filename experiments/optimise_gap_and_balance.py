@@ -10,9 +10,9 @@
 # %% [markdown]
 # # Optimising gap and balance
 # The paper's case 1b is chaotic from 7000 rpm to beyond 18000. Which guidance gap and which balance make it calm, and
-# what do they cost? A small gap is dear, and so is good balance. A gradient search from the design itself and from three
-# good ones among 32 random places, all in one batch; searches without gradients on the same objective; and the design
-# for cages that are never made exactly as drawn.
+# what do they cost? A small gap is dear, and so is good balance. A gradient search from the design itself and from
+# three good ones among 32 random places, all in one batch; searches without gradients on the same objective; and the
+# design for cages that are never made exactly as drawn.
 
 # %%
 import json
