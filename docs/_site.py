@@ -76,14 +76,18 @@ def reference(layer: str) -> str:
 
 def top_reference() -> str:
     """The page of `jaxcage` itself: a table of its names, and in full those that no layer has."""
+    said = lambda layer, name: _tree()[layer][name].docstring.value.split("\n\n")[0].replace("\n", " ")
+    link = lambda layer, name: f'<a id="jaxcage.{name}"></a>[`{name}`][jaxcage.{layer}.{name}]'
     rows = [
-        f'| <a id="jaxcage.{name}"></a>[`jaxcage.{name}`][jaxcage.{layer}.{name}] | [`{layer}`]({layer}.md) |'
+        f"| {link(layer, name)} | [`{layer}`]({layer}.md) | {said(layer, name)} |"
         for name, layer in sorted(homes().items(), key=lambda item: item[0].lower())
         if layer
     ]
     own = [f"::: jaxcage.{name}" for name, layer in homes().items() if not layer]
     text = "The names that `import jaxcage as jc` offers. Those in the table are explained in the layer they come from."
-    return "\n\n".join(["# jaxcage", text, "\n".join(["| name | layer |", "|---|---|", *rows]), *own])
+    return "\n\n".join(
+        ["# jaxcage", text, "\n".join(["| name | layer | what it is or does |", "|---|---|---|", *rows]), *own]
+    )
 
 
 def gallery(notebook: pathlib.Path) -> tuple[str, dict[str, bytes]]:
