@@ -27,8 +27,8 @@ now = {name: float(value) for name, value in jc.parameters(model).items()}
 # %%
 varied = ("guidance_gap", "eccentricity", "cage_mass", "stiffness_x", "damping", "amplitude", "land_width")
 vary = {name: (0.8 * now[name], 1.2 * now[name]) for name in varied}
-width = jc.design.chaotic_width(4000, 27500, small(32, 4), discard=small(120, 5), revolutions=small(80, 5))
-shares = jc.design.global_sensitivity(model, vary, width, samples=small(32, 2))
+width = jc.design.chaotic_width(4000, 27500, small(20, 4), discard=small(100, 5), revolutions=small(40, 5))
+shares = jc.design.global_sensitivity(model, vary, width, samples=small(24, 2))
 print(shares)
 
 # %% [markdown]
@@ -45,7 +45,7 @@ print(budget)
 # %%
 rng = np.random.default_rng(0)
 solved = []
-for _ in range(small(20, 2)):
+for _ in range(small(12, 2)):
     changed = {name: now[name] * (1 + 0.05 * rng.uniform(-1, 1)) for name in varied}
     guess = exact.value_rpm * (1 + sum(exact.elasticity[n] * (v / now[n] - 1) for n, v in changed.items())) * np.pi / 30
     found = jc.sensitivity(jc.replace(model, **changed), jc.orbits.Located(edge.kind, guess, exact.state))
