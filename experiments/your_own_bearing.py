@@ -49,8 +49,8 @@ load = jc.bearing.load_distribution(model.bearing, model.load)
 print(
     f"largest roller load {float(load.max_load):.0f} N, the shaft goes down by {1e6 * float(load.shaft_shift):.1f} um"
 )
-sweep = jc.sweep(model, jc.rpm(6000, 22000, small(161, 12)), discard=small(200, 20), revolutions=small(200, 20))
+sweep = jc.sweep(model, jc.rpm(6000, 22000, small(161, 40)), discard=small(200, 20), revolutions=small(200, 20))
 print(jc.zones(sweep))
-figure = new_figure(10.0, 3.5)
+figure = new_figure(small(10, 5), 3.5)
 orbit_diagram(sweep, 1, figure.subplots())
 save(figure, "your_own_bearing")
