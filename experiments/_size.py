@@ -1,17 +1,25 @@
-"""What every experiment shares: its size, its folder, and figures that are saved and shown."""
+"""What every experiment shares: its size, its folder, kept programs, and figures that are saved and shown."""
 
+import json
+import os
 import sys
 import time
 from pathlib import Path
 
+import jaxcage as jc  # before matplotlib and jax: it keeps XLA from talking of kept programs
+
+
+# isort: split
 from matplotlib.figure import Figure
 
 
-SMOKE = "--smoke" in sys.argv
-"""Whether to run in the smallest size, as the tests do."""
+SMOKE = "--smoke" in sys.argv or "JAXCAGE_SMOKE" in os.environ
+"""Whether to run in the smallest size, as the tests do; a notebook is told by the environment."""
 FOLDER = Path("out") if SMOKE else Path(__file__).parent
 """Where figures go."""
 BEGAN = time.perf_counter()
+
+jc.keep_compiled_programs()
 
 
 def small(full: int, smoke: int) -> int:
@@ -19,9 +27,25 @@ def small(full: int, smoke: int) -> int:
     return smoke if SMOKE else full
 
 
-def save(figure: Figure, name: str) -> Figure:
-    """Save a figure as PNG and give it back, so that a notebook shows it."""
+class Picture:
+    """A saved figure, which a notebook shows."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __repr__(self) -> str:
+        return self.path.name
+
+    def _repr_png_(self) -> bytes:
+        return self.path.read_bytes()
+
+
+def save(figure: Figure, name: str) -> Picture:
+    """Save a figure as PNG, in it where its axes are: left, bottom, width and height as parts of the whole."""
     FOLDER.mkdir(exist_ok=True)
-    figure.savefig(FOLDER / f"{name}.png", dpi=110)
-    print(f"{name}.png after {time.perf_counter() - BEGAN:.0f} s")
-    return figure
+    path = FOLDER / f"{name}.png"
+    figure.draw_without_rendering()
+    axes = [[round(part, 4) for part in ax.get_position().bounds] for ax in figure.axes]
+    figure.savefig(path, dpi=110, metadata={"Axes": json.dumps(axes)})
+    print(f"{path.name} after {time.perf_counter() - BEGAN:.0f} s")
+    return Picture(path)

@@ -2,6 +2,10 @@
 # jupyter:
 #   jupytext:
 #     formats: py:percent,ipynb
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
 # ---
 # %% [markdown]
 # # A tour of gradients
@@ -22,7 +26,6 @@ from jaxcage.plotting import elasticity_bars, new_figure
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 model = jc.case("1a")
 
 # %% [markdown]

@@ -2,6 +2,10 @@
 # jupyter:
 #   jupytext:
 #     formats: py:percent,ipynb
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
 # ---
 # %% [markdown]
 # # Sensitivity and tolerances
@@ -17,15 +21,14 @@ from jaxcage.plotting import new_figure
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 model = jc.case("2a")
 now = {name: float(value) for name, value in jc.parameters(model).items()}
 
 # %%
 varied = ("guidance_gap", "eccentricity", "cage_mass", "stiffness_x", "damping", "amplitude", "land_width")
 vary = {name: (0.8 * now[name], 1.2 * now[name]) for name in varied}
-width = jc.design.chaotic_width(4000, 27500, small(32, 4), discard=small(120, 5), revolutions=small(80, 5))
-shares = jc.design.global_sensitivity(model, vary, width, samples=small(64, 2))
+width = jc.design.chaotic_width(4000, 27500, small(20, 4), discard=small(100, 5), revolutions=small(40, 5))
+shares = jc.design.global_sensitivity(model, vary, width, samples=small(16, 2))
 print(shares)
 
 # %% [markdown]
@@ -42,7 +45,7 @@ print(budget)
 # %%
 rng = np.random.default_rng(0)
 solved = []
-for _ in range(small(60, 2)):
+for _ in range(small(12, 2)):
     changed = {name: now[name] * (1 + 0.05 * rng.uniform(-1, 1)) for name in varied}
     guess = exact.value_rpm * (1 + sum(exact.elasticity[n] * (v / now[n] - 1) for n, v in changed.items())) * np.pi / 30
     found = jc.sensitivity(jc.replace(model, **changed), jc.orbits.Point(edge.kind, guess, exact.state))

@@ -2,6 +2,10 @@
 # jupyter:
 #   jupytext:
 #     formats: py:percent,ipynb
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
 # ---
 # %% [markdown]
 # # Bring your own bearing
@@ -19,7 +23,6 @@ from jaxcage.plotting import new_figure, orbit_diagram
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 
 # %%
 TEXT = """
@@ -46,8 +49,8 @@ load = jc.bearing.load_distribution(model.bearing, model.load)
 print(
     f"largest roller load {float(load.max_load):.0f} N, the shaft goes down by {1e6 * float(load.shaft_shift):.1f} um"
 )
-sweep = jc.sweep(model, jc.rpm(4000, 27500, small(236, 12)), discard=small(300, 20), revolutions=small(200, 20))
+sweep = jc.sweep(model, jc.rpm(6000, 22000, small(161, 40)), discard=small(200, 20), revolutions=small(200, 20))
 print(jc.zones(sweep))
-figure = new_figure(10.0, 3.5)
+figure = new_figure(small(10, 5), 3.5)
 orbit_diagram(sweep, 1, figure.subplots())
 save(figure, "your_own_bearing")

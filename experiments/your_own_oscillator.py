@@ -2,6 +2,10 @@
 # jupyter:
 #   jupytext:
 #     formats: py:percent,ipynb
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
 # ---
 # %% [markdown]
 # # Bring your own oscillator
@@ -23,7 +27,6 @@ from jaxcage.plotting import new_figure
 
 
 jc.enable_x64()
-jc.keep_compiled_programs()
 
 
 # %%
@@ -43,7 +46,7 @@ method = jc.method("rodas4", steps=64)
 # Strobe points and the largest exponent over the force: a cascade into chaos.
 
 # %%
-forces = np.linspace(0.20, 0.50, small(400, 12))
+forces = np.linspace(0.20, 0.50, small(400, 48))
 one = dict(starts=[(0.4, 0.3)], discard=small(300, 50), revolutions=small(200, 40), blocks=10, method=method)
 swept = jc.sweep_designs([make(f) for f in forces], np.array([1.2]), **one)
 exponent = np.array([s.exponents[0, 0, 0] for s in swept])

@@ -24,7 +24,7 @@ from benchmarks.remake._runs import ROOT, Run, fingerprint, folder_of
 from benchmarks.remake._shown import SHOWN, Shown
 
 
-PAGES = ("README.md", "docs/guide.md", "docs/reproduction.md", "docs/transcript.md")
+PAGES = ("README.md", *sorted(p.relative_to(ROOT).as_posix() for p in ROOT.glob("docs/*.md")))
 FAKE = "python fake.py"
 STAMP = stamps.Stamp("abc1234", "tree", "2026-11-24", "3 starts", "0123456789ab")
 

@@ -159,8 +159,8 @@ def said(notebook: str) -> str:
 SEARCHES = {
     "gradient, from the best scout": "gradient, from the best of the scouts",
     "gradient, from the design": "gradient, from the given design",
-    "differential evolution": "differential evolution (scipy, 400 designs)",
-    "CMA-ES": "CMA-ES from the given design (400 designs)",
+    "differential evolution": "differential evolution (scipy, 60 designs)",
+    "CMA-ES": "CMA-ES from the given design (60 designs)",
 }
 
 

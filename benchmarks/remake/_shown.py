@@ -57,7 +57,10 @@ def _notebook(name: str, *figures: str) -> Shown:
     return Shown(name.replace("_", "-"), page, [command], ex.page(f"{name}.ipynb"), whole=True, files=files)
 
 
-README, GUIDE, REPRODUCTION = "README.md", "docs/guide.md", "docs/reproduction.md"
+README, EDGES, DESIGNS, STUDIES, REPRODUCTION = (
+    "README.md",
+    *(f"docs/{name}.md" for name in ("edges", "design", "studies", "reproduction")),
+)
 CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
 SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
 SPEED = "python -m benchmarks"
@@ -74,13 +77,13 @@ SHOWN = (
     _whole("speed-page", "benchmarks/speed.md", SPEED, "speed.md"),
     Shown("speed", README, [SPEED], ex.speed),
     Shown("speed-text", README, [SPEED]),
-    Shown("guide-zones-1a", GUIDE, [ZONES], ex.tables("Synchronous-loss", "Elasticities", *CHAOS)),
-    _figure("bifurcations-1a-figure", GUIDE, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
-    Shown("design-1b", GUIDE, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
-    _figure("design-1b-figure", GUIDE, DESIGN, "design_1b.png"),
+    Shown("guide-zones-1a", EDGES, [ZONES], ex.tables("Synchronous-loss", "Elasticities", *CHAOS)),
+    _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
+    Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
+    _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
     OPTIMISE,
-    Shown("searches", GUIDE, OPTIMISE.commands, ex.searches),
-    Shown("studies-text", GUIDE, ["python -m benchmarks.study"]),
+    Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
+    Shown("studies-text", STUDIES, ["python -m benchmarks.study"]),
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.both_kinds),
     Shown("case-fits", REPRODUCTION, [FIT.format(c) for c in CASES], ex.case_fits),
