@@ -5,6 +5,8 @@ that depends on the forcing g, which differs from case to case. Its five constan
 multiplied by a number, and x in another unit. Edges can therefore fix three combinations of them, not five constants.
 """
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -61,7 +63,8 @@ def located():
             point = jc.orbits.Point(kind, speed, np.array(state), 1)
             exact = jc.sensitivity(cases()[f"g={g}"], point, method=METHOD)
             assert exact.trusted
-            found.append((f"g={g}", f"zone 1 {name}", point._replace(speed=exact.value_rpm * np.pi / 30), exact))
+            there = dataclasses.replace(point, speed=exact.value_rpm * np.pi / 30)
+            found.append((f"g={g}", f"zone 1 {name}", there, exact))
     return found
 
 
