@@ -91,7 +91,7 @@ def judged(given: Planted, branch: jc.Branch, fine: jc.Branch) -> Row:
             lost.append(said(point))
             continue
         left.remove(best)
-        worst = max(worst, float(abs(best.value - point.value)) / stated)
+        worst = max(worst, float(abs(best.value - point.value) / stated))
         if point.criticality and best.criticality != point.criticality:
             wrong.append(f"{said(best)} is not {best.criticality or 'without criticality'} but {point.criticality}")
     spurious = [said(p) for p in left] if given.whole else [said(p) for p in left if p.status != "converged"]
