@@ -138,7 +138,7 @@ def test_failed_lanes_whatever_is_observed(exponents):
 
 @pytest.mark.wide
 def test_bad_start_fails_alone_with_adaptive_steps():
-    settings = dict(discard=1, revolutions=2, blocks=2, keep=2)
+    settings = dict(discard=1, revolutions=2, blocks=2, keep=2, confirm=False, horizon=0)
     settings |= dict(method=method("rodas3", tolerance=1e-5))
     bad = (float("nan"), 0.0, 0.0, 0.0)
 
