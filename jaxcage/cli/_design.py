@@ -28,7 +28,7 @@ from ..plotting import design_figure, elasticity_bars
 from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job
-from ._options import SETTLED, DesignOptions, SensitivityOptions, VaryOptions
+from ._options import DesignOptions, SensitivityOptions, VaryOptions
 from ._show import Report
 from ._vary import read_bounds, read_scatter
 
@@ -40,7 +40,7 @@ CHECKED_SPEEDS = 118
 
 def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
     first, last = rpm(options.first), rpm(options.last)
-    return loss_zones(synchronous_orbits(model, first, last, discard=SETTLED, progress=say))
+    return loss_zones(synchronous_orbits(model, first, last, progress=say))
 
 
 def design(job: Job[DesignOptions]) -> Report:

@@ -16,8 +16,6 @@ SIDE = range(2, 10_001)
 """Points along one side of a map."""
 _SIDES = f"ACROSSxUPWARDS, each from {SIDE[0]} to {SIDE[-1]}, e.g. 300x300"
 _PART = "I/N with I from 1 to N, e.g. 1/4"
-SETTLED = 1000
-"""Revolutions after which a lightly damped cage has found its orbit."""
 
 Speed = Annotated[float, number("be a speed above 0 rpm", lambda x: x > 0, "rpm")]
 """[rpm]."""
@@ -140,7 +138,7 @@ class SearchOptions(_Range, IntegrationOptions):
 
     count: FromTwo = 101
     """Speeds that are simulated, from three starts each."""
-    discard: FromZero = SETTLED
+    discard: FromZero = 250
     """Revolutions left out at the beginning."""
 
 

@@ -6,6 +6,7 @@ known. Stable stretches of the branches, bounded by bifurcations, are what the s
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -32,6 +33,8 @@ PATIENCE = 150
 ON_BRANCH = 0.03
 """An orbit lies on a branch if it is within this distance of it, in units of the system's scale."""
 Progress = Callable[[str, int, int], None]
+Scale = Callable[[float], np.ndarray]
+"""Of the state, at a speed [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -169,7 +172,7 @@ def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_P
     return found
 
 
-def _merged(pieces: Sequence[_Piece], scale: Callable[[float], np.ndarray]) -> list[_Piece]:
+def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
     """Pieces of the same orbits, met on two branches that were followed from different starts, made one."""
     whole: list[_Piece] = []
     for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
@@ -177,7 +180,7 @@ def _merged(pieces: Sequence[_Piece], scale: Callable[[float], np.ndarray]) -> l
             a, b = other.stretch, piece.stretch
             shared = min(a.upper_rpm, b.upper_rpm)
             rpm = (b.lower_rpm + shared) / 2
-            if b.lower_rpm <= shared and other.holds(rpm, piece.state_at(rpm), scale(rpm)):
+            if b.lower_rpm <= shared and other.holds(rpm, piece.state_at(rpm), scale(rpm * np.pi / 30)):
                 beyond = piece.rpm > other.rpm[-1]
                 top = b if b.upper_rpm > a.upper_rpm else a
                 joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
@@ -225,6 +228,7 @@ def synchronous_orbits(
     that were met but not followed; those that were not met cannot be counted.
     """
     say = progress or (lambda what, done, of: None)
+    scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 
     def simulate(speeds: np.ndarray, sign: float) -> Sweep:
         return sweep(
@@ -247,8 +251,8 @@ def synchronous_orbits(
     if met:
         middle = met[len(met) // 2]
         follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])), 1)
-    orbits = _stable_orbits(follower, settled)
-    waiting = sorted(orbits + _stable_orbits(follower, opposite), key=lambda o: o.speed)
+    orbits = _stable_orbits(follower, settled, scale)
+    waiting = sorted(orbits + _stable_orbits(follower, opposite, scale), key=lambda o: o.speed)
     branches: list[Branch] = []
     for turn in range(ROUNDS):
         if not waiting:
@@ -257,16 +261,15 @@ def synchronous_orbits(
         branches += [
             b for b in follow_both_ways(follower, _spread(waiting, ROUND), 1, steps, PATIENCE) if b is not None
         ]
-        waiting = [w for w in waiting if not any(_covers(follower, b, w) for b in branches)]
+        waiting = [w for w in waiting if not any(_covers(b, w, scale(w.speed)) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi
-    scale = lambda rpm: _scale(follower, rpm * np.pi / 30)
     pieces = _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale)
-    families = _families(follower, branches)
+    families = _families(branches, scale)
     stretches = []
     for piece in pieces:
         there = [o for o in orbits if o.settled]
-        met = [o.start for o in there if piece.holds(o.speed * 30 / np.pi, o.state, _scale(follower, o.speed))]
+        met = [o.start for o in there if piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
         family = families[piece.stretch.branch]
         stretches.append(dataclasses.replace(piece.stretch, family=family, met=len(met), met_first=met.count(0)))
     return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
@@ -288,7 +291,7 @@ def _met(settled: Sweep) -> list[list[int]]:
     return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
 
 
-def _stable_orbits(follower: Follower, settled: Sweep) -> list[_Settled]:
+def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Settled]:
     """Stable orbits to which Newton's method leads from the ends of simulations, by speed."""
     lanes = _met(settled)
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
@@ -299,7 +302,7 @@ def _stable_orbits(follower: Follower, settled: Sweep) -> list[_Settled]:
     good = points.converged.copy()
     good[good] = is_stable(eigenvalues(follower.monodromy(take(points, good))), follower.problem.free_speed)
     states = points.u[:, :-1] * np.asarray(frame.scale)
-    apart = [np.max(np.abs(y - x) / _scale(follower, at)) for x, (y, at) in zip(states, met, strict=True)]
+    apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
 
 
@@ -309,24 +312,19 @@ def _spread(orbits: Sequence[_Settled], most: int) -> list[Start]:
     return [(orbits[i].state, orbits[i].speed) for i in picked]
 
 
-def _covers(follower: Follower, branch: Branch, orbit: _Settled) -> bool:
+def _covers(branch: Branch, orbit: _Settled, scale: np.ndarray) -> bool:
     """Whether an orbit lies on a branch."""
-    scale = _scale(follower, orbit.speed)
     apart = (np.max(np.abs(s - orbit.state) / scale) for _, s, _ in crossings(branch, orbit.speed))
     return any(a < ON_BRANCH for a in apart)
 
 
-def _families(follower: Follower, branches: Sequence[Branch]) -> list[int]:
+def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
     """A number for each branch, the same for parts of one: a part that was stopped on another ends there."""
     family = list(range(len(branches)))
     for i, b in enumerate(branches):
         for end, why in zip((0, -1), b.ended, strict=True):
             last = _Settled(b.state[end], float(b.speed[end]), 0)
             for j, other in enumerate(branches):
-                if why == "stopped" and i != j and _covers(follower, other, last):
+                if why == "stopped" and i != j and _covers(other, last, scale(last.speed)):
                     family = [family[j] if f == family[i] else f for f in family]
     return family
-
-
-def _scale(follower: Follower, speed: float) -> np.ndarray:
-    return np.array([float(c) for c in follower.given.system.scale(speed)])
