@@ -420,11 +420,12 @@ def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
 
 @pytest.mark.parametrize("first", ["period-doubling", "branch-point"])
 def test_crossings_within_one_step_are_in_order(first):
-    """One at p = 0.02 and one at 0.0201, both between the same two points: only the first is next to stable orbits."""
+    """One at p = 0.02 and one at 0.0201, with one orbit put between them: only the first is next to stable orbits."""
     places = [0.02, 0.0201] if first == "period-doubling" else [0.0201, 0.02]
     a = (-places[1] - 0.2, -places[0] - 0.2)
     branch = planted_branch(a=a, c=(1.0, 1.0), s=(0.2, 0.2))
-    assert branch.special[0].index == branch.special[1].index
+    assert branch.special[0].index + 1 == branch.special[1].index
+    assert np.sum((branch.value > 0.02) & (branch.value < 0.0201)) == 1
     np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0201], rtol=0, atol=1e-8)
     assert branch.special[0].kind == first and sorted(kinds(branch)) == ["branch-point", "period-doubling"]
     # Along the critical direction e' = -e^3 and the map is -e / sqrt(1 + 2 T e^2), to third order -e + T e^3.
@@ -432,6 +433,13 @@ def test_crossings_within_one_step_are_in_order(first):
     np.testing.assert_allclose(doubling.coefficient, 2 * np.pi / 1.1, rtol=1e-6)
     assert doubling.criticality == "supercritical" and doubling.coefficient_error < 1e-6
     assert [p.edge for p in branch.special] == [True, False]
+
+
+def test_stable_orbits_within_one_step_are_found():
+    """The doubling at p = 0.02 is passed on the way in, the other bifurcation at 0.0201 on the way out."""
+    branch = planted_branch(a=(-0.0201 - 0.2, 0.02 - 0.2), c=(1.0, -1.0), s=(0.2, 0.2))
+    assert kinds(branch) == ["period-doubling", "branch-point"] and all(p.edge for p in branch.special)
+    assert np.array_equal(branch.stable, (branch.value > 0.02) & (branch.value < 0.0201)) and np.any(branch.stable)
 
 
 @pytest.mark.parametrize(

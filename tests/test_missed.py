@@ -68,6 +68,12 @@ def test_a_test_function_that_nearly_vanishes_is_looked_at(lowest, looked_at):
     assert dips(-f, np.array([0.140, 0.096])) == dips(f, np.array([0.140, 0.096]))
 
 
+def test_a_test_function_that_vanishes_twice_in_the_first_step_is_looked_at():
+    """Case 2a at 4546, 4980, 5224 and 5360 rpm: the period doubles at 4633 and comes back at 4831."""
+    f = np.array([[0.1185, 0.1414, 0.5309, 0.8128]])
+    assert (0, 1) in dips(f, np.array([0.378, 0.210, 0.117]))
+
+
 @pytest.mark.wide
 def test_search_meets_what_only_the_opposite_start_leads_to():
     """Two wells, and starts in one of them: the orbits of both are found, and the counts are those of the starts."""

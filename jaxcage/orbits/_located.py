@@ -1,5 +1,6 @@
 """Bifurcations along a branch: seen between neighbouring orbits, located, and changes of stability accounted for."""
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -29,8 +30,8 @@ by rounding, or by what Newton's method left."""
 HALVINGS, APART = 20, 1e-7
 """A step is halved so often, and not below this length in the unknowns' units."""
 NEARLY = 0.1
-"""A parabola through three points may be wrong about an extremum by this part of what the function changes over the
-steps beside it, and about its place by this part of a step."""
+"""A parabola through three points may be wrong about an extremum by this part of what the function changes over one of
+the steps beside it, and about its place by this part of a step."""
 
 
 class Seen(NamedTuple):
@@ -52,7 +53,8 @@ def account(
     Where the count of unstable multipliers changes from one orbit to another by what was seen between them does not
     explain, as when two real multipliers pass -1 within a step, the step is halved. Where it changes by what was
     located there does not explain, its orbits are solved for again and it is looked at once more. What is left is in
-    the list, of the kind `unexplained`: there the branch cannot be trusted to be one.
+    the list, of the kind `unexplained`: there the branch cannot be trusted to be one. Between any two bifurcations
+    there is an orbit, that tells whether those between them are stable.
     """
     rows = [_halved(follower, frame, row, lane) for row, lane in zip(rows, lanes, strict=True)]
     seen = _located(follower, frame, rows, lanes)
@@ -66,6 +68,8 @@ def account(
         again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
         for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
             rows[i], seen[i] = row, mine
+    for i, lane in enumerate(lanes):
+        rows[i], seen[i] = _parted(follower, frame, rows[i], lane, seen[i])
     found = []
     for i, (row, mine) in enumerate(zip(rows, seen, strict=True)):
         for a, b in left(i):
@@ -73,9 +77,35 @@ def account(
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
             middle = take(row, np.array(k))._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Seen(k, UNEXPLAINED, middle, far))
-        along = lambda s, row=row: float(np.dot(s.point.u - row.u[s.after], row.u[s.after + 1] - row.u[s.after]))
-        found.append((row, sorted(mine, key=lambda s: (s.after, along(s)))))
+        found.append((row, _in_order(row, mine)))
     return found
+
+
+def _in_order(row: Corrected, seen: Sequence[Seen]) -> list[Seen]:
+    """Bifurcations as they come along a branch."""
+    along = lambda s: float(np.dot(s.point.u - row.u[s.after], row.u[s.after + 1] - row.u[s.after]))
+    return sorted(seen, key=lambda s: (s.after, along(s)))
+
+
+def _parted(
+    follower: Follower, frame: Frame, row: Corrected, lane: int, seen: Sequence[Seen]
+) -> tuple[Corrected, list[Seen]]:
+    """The orbits with one more between bifurcations that are in the same step, and the bifurcations after theirs."""
+    seen = _in_order(row, seen)
+    chord = np.array([b.point.u - a.point.u for a, b in itertools.pairwise(seen)])
+    length = np.linalg.norm(chord, axis=1) if seen[1:] else np.zeros(0)
+    within = np.array([a.after == b.after for a, b in itertools.pairwise(seen)], dtype=bool)
+    after = np.array([s.after for s in seen], dtype=int)
+    pairs = np.flatnonzero(within & (length > APART))
+    if not pairs.size:
+        return row, seen
+    middle = np.stack([seen[k].point.u for k in pairs]) + chord[pairs] / 2
+    steps = np.array([max(seen[k].point.steps, seen[k + 1].point.steps) for k in pairs])
+    got = correct(follower.curves(frame, [lane] * pairs.size), middle, chord[pairs] / length[pairs, None], steps)
+    good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length[pairs] / 2)
+    pairs, got = pairs[good], measured_as(take(got, good), take(row, after[pairs[good]]))
+    row = jax.tree.map(lambda x, y: np.insert(x, after[pairs] + 1, y, axis=0), row, got)
+    return row, [s._replace(after=s.after + int(np.sum(pairs < k))) for k, s in enumerate(seen)]
 
 
 def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
@@ -119,7 +149,7 @@ def dips(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " s
     with np.errstate(divide="ignore", invalid="ignore"):
         place, extreme = -slope / (2 * bend), f[:, 1:-1] - slope**2 / (4 * bend)
     change = np.abs(np.diff(f))
-    nearly = NEARLY * np.minimum(change[:, :-1], change[:, 1:])
+    nearly = NEARLY * np.maximum(change[:, :-1], change[:, 1:])
     found = set()
     before, after = (-back < place) & (place < NEARLY * ahead), (-NEARLY * back < place) & (place < ahead)
     for first, inside in enumerate([before, after]):
