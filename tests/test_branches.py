@@ -522,6 +522,53 @@ def test_branch_of_a_self_excited_system_over_its_damping():
     np.testing.assert_allclose(at(np.log(other))([0.1, 1.0]), [np.log(0.5330692592), -7.05893281], atol=5e-5)
 
 
+class Circling(eqx.Module):
+    """A limit cycle |z| = 1 of period 2 pi, and two directions across it that turn with it, once or half as fast:
+    along these e' = (p - 0.02) e + s e^3 - t f and f' = (p - 0.02 - d) f + s f^3 + t e."""
+
+    p: jax.Array
+    d: jax.Array
+    s: jax.Array
+    t: jax.Array
+
+    def __call__(self, tau, y, speed):
+        x, z, u, v = y
+        angle = jnp.arctan2(z, x) / 2
+        half, side = jnp.cos(angle), jnp.sin(angle)
+        e, f = half * u + side * v, -side * u + half * v
+        square = e * e + f * f
+        de = (self.p - 0.02) * e + self.s * square * e - self.t * f
+        df = (self.p - 0.02 - self.d) * f + self.s * square * f + self.t * e
+        size = 1 - x * x - z * z
+        cycle = size * x - z, size * z + x
+        return *cycle, half * de - side * df - v / 2, side * de + half * df + u / 2
+
+
+CIRCLING = {
+    "supercritical period-doubling": dict(d=0.2, s=-1.0, t=0.0),
+    "subcritical period-doubling": dict(d=0.2, s=1.0, t=0.0),
+    "supercritical torus": dict(d=0.0, s=-1.0, t=0.3),
+    "subcritical torus": dict(d=0.0, s=1.0, t=0.3),
+}
+
+
+@pytest.mark.parametrize("name", wide_but(CIRCLING, "supercritical torus"))
+def test_criticality_on_a_self_excited_orbit(name):
+    """Of e' = sign e^3 over T = 2 pi, of which half a turn of the frame makes -e - sign T e^3; and with
+    q = (1, -i) / sqrt(2) of w' = 2 sign |w|^2 w."""
+    (how, kind), values = name.split(), CIRCLING[name]
+    system = jc.ForcedSystem(Circling(**numbers(p=0.0, **values)), dimension=4)
+    how_to = dict(period="free", method=METHOD)
+    branch = jc.branch(system, ((1.0, 0.0, 0.0, 0.0), 0.0), "p", lower=-0.1, upper=0.1, speed=1.0, **how_to)
+    exact = 2 * np.pi * values["s"] * (-1.0 if kind == "period-doubling" else 2.0)
+    (found,) = branch.special
+    alone = jc.bifurcation(system, kind, (found.state, 0.018), "p", speed=0.99, **how_to)
+    for point in (found, alone):
+        assert point.kind == kind and abs(point.value - 0.02) < 1e-9 and point.criticality == how
+        np.testing.assert_allclose(point.coefficient, exact, rtol=1e-6)
+        assert point.coefficient_error < 1e-5
+
+
 @pytest.mark.parametrize(
     "settings, sentence",
     [

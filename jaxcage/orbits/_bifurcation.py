@@ -19,7 +19,7 @@ from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point
-from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, across_orbit, frozen, is_traced, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 from ._walk import walk
@@ -159,9 +159,9 @@ def bifurcation(
 
         return that_serves(by, method, MOST_OF_A_POINT)
 
-    def around(value: float, part: float) -> Follower:
+    def around(value: float, part: float, speed: Scalar = given.speed) -> Follower:
         away = part * (abs(value) or 1.0)
-        return make_follower(system, given.speed, parameter, value - away, value + away, period, method)
+        return make_follower(system, speed, parameter, value - away, value + away, period, method)
 
     found = find(start, first, at, spin)
     if is_traced((found, given, start)):
@@ -178,8 +178,8 @@ def bifurcation(
             again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
             found = again if bool(again.converged) else found
         found = found if bool(found.converged) else dataclasses.replace(found, looked=looked)
-    classed = bool(found.converged) and not free and kind in KINDS_WITH_ONE
-    return _classed(found, around(float(found.value), 0.1)) if classed else found
+    classed = bool(found.converged) and kind in KINDS_WITH_ONE
+    return _classed(found, around(float(found.value), 0.1, found.speed)) if classed else found
 
 
 def _classed(point: Point, follower: Follower) -> Point:
@@ -191,7 +191,8 @@ def _classed(point: Point, follower: Follower) -> Point:
     if not orbit.converged[0]:
         follower = stable_steps(follower, place, int(point.periods))
         orbit = again(follower)
-    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size)[0]
+    across = across_orbit(follower.problem, frame)
+    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size, across=across)[0]
     return dataclasses.replace(point, coefficient=jnp.asarray(found[0]), coefficient_error=jnp.asarray(found[1]))
 
 

@@ -32,7 +32,7 @@ from ._located import Seen, account
 from ._normal_form import coefficients
 from ._orbit import guess_state
 from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point
-from ._problem import Frame, Given
+from ._problem import Frame, Given, across_orbit
 from ._steps import SETTLED
 
 
@@ -233,13 +233,14 @@ def describe(
     if every:
         lane = [i for i, (_, seen) in zip(lanes, rows, strict=True) for _ in seen]
         places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(found.point for found in every))
-        kinds = ["" if follower.problem.free_speed else found.kind for found in every]
+        kinds = [found.kind for found in every]
         own = follower.parameter == SPEED  # each in the scale at its own speed
         scale_at = lambda i, value: follower.of(i).system.scale(value * follower.unit)
         scales = [scale_at(i, u[-1]) if own else frame.scale for i, u in zip(lane, places.u, strict=True)]
         finer = np.asarray(frame.scale) / np.array([[float(c) for c in row] for row in scales])
         n = follower.problem.dimension
-        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer))
+        across = across_orbit(follower.problem, frame)
+        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer, across=across))
     return [
         _branch(follower, frame, points, [(s, next(cubic).tolist()) for s in seen], ended)
         for (points, seen), (_, ended) in zip(rows, traces, strict=True)

@@ -23,7 +23,7 @@ from ._lens import SPEED, value as value_of
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import Point
-from ._problem import Given, OrbitProblem, ReturnMap, make_frame
+from ._problem import Given, OrbitProblem, ReturnMap, across_orbit, make_frame
 from ._singularity import Kind, null_vectors
 from ._steps import ENOUGH, Counts, by_steps, counted
 
@@ -204,8 +204,9 @@ class _Tracer(eqx.Module):
     def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
         """Coefficients of the normal form and their errors."""
         known = [self.kind != "torus" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
-        kinds = [self.kind if k and not self.problem.free_speed else "" for k in known]
-        return coefficients(self.through(points), points, kinds, self.problem.dimension, FEW)
+        kinds = [self.kind if k else "" for k in known]
+        across = across_orbit(self.problem, self.frame)
+        return coefficients(self.through(points), points, kinds, self.problem.dimension, FEW, across=across)
 
     def special(self, points: Corrected, cubic: Float[np.ndarray, "points 2"]) -> list[CodimensionTwo]:
         """Codimension-2 points between the points of one direction, located."""

@@ -6,7 +6,9 @@ With the return map P at its fixed point, A its derivative, B and C its second a
 - of a torus bifurcation  d = Re(w / mu) / 2  with  w = p C(q, q, q*) + 2 p B(q, (1 - A)^-1 B(q, q*))
   + p B(q*, (mu^2 - A)^-1 B(q, q)), supercritical where it is negative.
 All of it follows from A on both sides of the fixed point, along the real and the imaginary part of q: central
-differences, extrapolated to the fourth order, with the step at which neighbouring steps agree best.
+differences, extrapolated to the fourth order, with the step at which neighbouring steps agree best. The return map of a
+self-excited orbit is that of Poincare, on the plane of its phase condition, the time of the return being another one
+from each place.
 """
 
 from collections.abc import Sequence
@@ -23,6 +25,8 @@ STEPS = tuple(0.01 / 2**j for j in range(8))
 """Lengths of the differences, in units of the system's scale."""
 FEW = STEPS[1:5]
 """As few of them as tell an error."""
+RETURNS = 4
+"""Newton steps for the time of return to the plane, which begin at most 0.01 away."""
 
 
 class Critical(NamedTuple):
@@ -114,6 +118,40 @@ def criticality(kind: str, value: Any, error: Any) -> str:
     return "supercritical" if (value > 0) == (kind == "period-doubling") else "subcritical"
 
 
+class _Plane(NamedTuple):
+    """The plane of a return map: all of the state of a driven system, across the orbit of a self-excited one."""
+
+    basis: Float[np.ndarray, "n k"]
+    across: Float[np.ndarray, " n"] | None
+
+    @classmethod
+    def of(cls, n: int, across: Float[np.ndarray, " n"] | None) -> "_Plane":
+        if across is None:
+            return cls(np.eye(n), None)
+        return cls(np.linalg.svd(across[None])[2][1:].T, across)
+
+    def derivative(self, points: Corrected) -> Float[np.ndarray, "points k k"]:
+        """Of the return map, NaN where a point is none: what ends beside the plane is led to it along the flow."""
+        n = len(self.basis)
+        moved = points.jacobian[:, :n, :n] + np.eye(n)
+        if self.across is not None:
+            flow = points.jacobian[:, :n, n]  # the speed's column: the flow at the end, but for its length
+            moved = moved - flow[:, :, None] * ((self.across @ moved) / (flow @ self.across)[:, None])[:, None]
+        there = points.converged[:, None, None]
+        return np.where(there, self.basis.T @ moved @ self.basis, np.nan)
+
+    def returned(self, curves: Curves, at: np.ndarray, normal: np.ndarray, count: np.ndarray) -> Corrected:
+        """One step of Newton's method from `at`, whose derivatives are those at the place itself, after the speeds with
+        which they return to the plane."""
+        n = len(self.basis)
+        for _ in range(0 if self.across is None else RETURNS):
+            found = correct(curves, at, normal, count, ONCE)
+            closing = np.einsum("pij,pj->pi", found.jacobian[:, :n], at - found.u)
+            at = at.copy()
+            at[:, n] -= (closing @ self.across) / (found.jacobian[:, :n, n] @ self.across)
+        return correct(curves, at, normal, count, ONCE)
+
+
 def coefficients(
     curves: Curves,
     points: Corrected,
@@ -121,31 +159,32 @@ def coefficients(
     n: int,
     steps: tuple[float, ...] = STEPS,
     finer: Float[np.ndarray, "#points n"] | None = None,
+    across: Float[np.ndarray, " n"] | None = None,
 ) -> Float[np.ndarray, "points 2"]:
     """The coefficients at points of curves and their errors, NaN for kinds that have none.
 
     **Arguments:** curves, one per point, whose first equations and unknowns are those of an orbit; points; kinds;
     dimension of the state; lengths of the differences; the curves' scale over that in whose units the coefficients
-    are wanted, by default their own.
+    are wanted, by default their own; for self-excited orbits the direction across the plane on which they begin.
     """
-    monodromy = lambda found: found.jacobian[:, :n, :n] + np.eye(n)
+    plane = _Plane.of(n, across)
     known = np.all(np.isfinite(points.jacobian), axis=(1, 2))
     mine = [i for i, kind in enumerate(kinds) if kind in KINDS_WITH_ONE and known[i]]
     found = np.full((len(kinds), 2), np.nan)
     if mine:
-        critical = [critical_vectors(kinds[i], m) for i, m in zip(mine, monodromy(take(points, mine)), strict=True)]
+        derivatives = plane.derivative(take(points, mine))
+        critical = [critical_vectors(kinds[i], m) for i, m in zip(mine, derivatives, strict=True)]
         ways = [around(c, steps) for c in critical]
         lane, counts = np.repeat(mine, [len(w) for w in ways]), np.cumsum([len(w) for w in ways])
         at = points.u[lane]
-        at[:, :n] += np.concatenate(ways)
+        at[:, :n] += np.concatenate(ways) @ plane.basis.T
         each = []
         for count in (points.steps[lane], (points.steps[lane] + 1) // 2):
-            # One step of Newton's method, whose derivative is that at the place itself.
-            moved = correct(curves.take(lane), at, points.tangent[lane], count, ONCE)
-            parts = np.split(np.where(moved.converged[:, None, None], monodromy(moved), np.nan), counts[:-1])
+            moved = plane.returned(curves.take(lane), at, points.tangent[lane], count)
+            parts = np.split(plane.derivative(moved), counts[:-1])
             each.append([coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
         found[mine] = [with_half(fine, coarse) for fine, coarse in zip(*each, strict=True)]
         if finer is not None:
-            longer = np.stack([c.right for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
+            longer = np.stack([plane.basis @ c.right for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
             found[mine] /= np.sum(np.abs(longer) ** 2, axis=1, keepdims=True)
     return found

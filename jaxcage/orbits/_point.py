@@ -59,8 +59,7 @@ class Point(eqx.Module):
     p dP/d parameter of the map along the critical direction, with p q = 1. On a branch it is not computed."""
     coefficient: Scalar = float("nan")
     """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
-    (see `_normal_form`), which tells the `criticality`; NaN for others, for self-excited orbits and under `jit`,
-    `vmap` and `grad`."""
+    (see `_normal_form`), which tells the `criticality`; NaN for others, and under `jit`, `vmap` and `grad`."""
     coefficient_error: Scalar = float("nan")
     outcome: Int[Array, ""] | int = GIVEN
     """Code: place in `OUTCOMES`."""

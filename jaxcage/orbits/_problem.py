@@ -15,6 +15,7 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
@@ -169,3 +170,8 @@ def make_frame(
     else:
         direction = jnp.zeros_like(z)
     return frozen(Frame(scale, at, units, z, direction, jnp.asarray(periods, dtype=int)))
+
+
+def across_orbit(problem: OrbitProblem, frame: Frame) -> Float[np.ndarray, " dim"] | None:
+    """Direction across the plane on which a self-excited orbit begins; None for a driven one, whose phase is given."""
+    return np.asarray(frame.phase_direction) if problem.free_speed else None
