@@ -11,7 +11,7 @@ import numpy as np
 
 
 LIBRARY = pathlib.Path("/usr/lib/auto-07p/lib")
-KINDS = {5: "fold", 6: "branch-point", 7: "period-doubling", 8: "torus"}
+KINDS = {5: "fold", 6: "branch-point", 7: "period-doubling", 8: "Neimark-Sacker"}
 """What AUTO calls special points of orbits, by number."""
 CONSTANTS = """dat='start'
 NDIM={dimension}, IPS=2, IRS=0, ILP=1, ICP=[1, 11]

@@ -218,7 +218,7 @@ def kicked_point(kind: str, guess: Any, delay: float, times: int, criticality: s
 
     def off(u: np.ndarray) -> np.ndarray:
         y, m = kicked_map(u[:4], u[4], delay, times)
-        if kind != "torus":
+        if kind != "Neimark-Sacker":
             return np.append(y - u[:4], np.linalg.det(m + (np.eye(4) if kind == "period-doubling" else -np.eye(4))))
         i, j = np.triu_indices(4, 1)
         products = np.linalg.det(m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)] - np.eye(6))
@@ -295,8 +295,8 @@ def planted() -> list[Planted]:
         ),
         turning(
             "two tori 4e-4 apart",
-            Point("torus", double[0], criticality=up),
-            Point("torus", double[1]),
+            Point("Neimark-Sacker", double[0], criticality=up),
+            Point("Neimark-Sacker", double[1]),
             a=(-double[0], -double[1]),
             c=(1.0, 1.0),
             s=(0.0, 0.0),
@@ -306,7 +306,7 @@ def planted() -> list[Planted]:
         turning(
             "flip and torus at once",
             Point("period-doubling", 0.05, criticality=down),
-            Point("torus", 0.05, criticality=up),
+            Point("Neimark-Sacker", 0.05, criticality=up),
             a=(-0.05, -0.15),
             c=(1.0, 1.0),
             s=(0.0, 0.1),
@@ -323,7 +323,7 @@ def planted() -> list[Planted]:
         ),
         turning(
             "torus, subcritical",
-            Point("torus", quick, criticality=down),
+            Point("Neimark-Sacker", quick, criticality=down),
             a=(-quick, -0.3),
             c=(1.0, 0.0),
             s=(0.0, 0.1),
@@ -353,7 +353,7 @@ def planted() -> list[Planted]:
             ("fold", (0.03, 0.0), 1.8055, ""),
             ("period-doubling", (-0.044, 0.0), 1.8234, up),
         ),
-        kicked("delayed logistic map", 1.0, (0.47, 0.47), 1.9, (1.5, 2.3), 1, ("torus", (0.5, 0.5), 2.0, up)),
+        kicked("delayed logistic map", 1.0, (0.47, 0.47), 1.9, (1.5, 2.3), 1, ("Neimark-Sacker", (0.5, 0.5), 2.0, up)),
         Planted(
             "limit cycle",
             jc.ForcedSystem(Cycle(**numbers(p=-0.1)), dimension=4),
@@ -361,7 +361,7 @@ def planted() -> list[Planted]:
             -0.1,
             -0.2,
             0.2,
-            (Point("torus", 0.0),),
+            (Point("Neimark-Sacker", 0.0),),
             speed=1.3,
             period="free",
         ),

@@ -125,7 +125,7 @@ def published() -> list[Planted]:
     first = known("period-doubling", DUFFING_DOUBLINGS[1][1], "supercritical")
     folds = tuple(known("fold", DUFFING_FOLDS[way]) for way in ("up", "down"))
     double_well, ueda = Duffing(**numbers(d=0.3, k=1.0, p=0.25)), Duffing(**numbers(d=0.05, k=0.0, p=1.0))
-    taylor, let_go = known("period-doubling", TAYLOR), known("torus", VAN_DER_POL_LET_GO)
+    taylor, let_go = known("period-doubling", TAYLOR), known("Neimark-Sacker", VAN_DER_POL_LET_GO)
     return [
         swept("hardening Duffing", (0.9, 0.0), 0.8, (0.5, 2.5), folds, d=0.1, k=-1.0, p=0.3),
         swept("hardening Duffing, strong", (1.5, 0.0), 1.1, (0.25, 1.2), d=0.1, k=-1.0, p=3.0),

@@ -95,7 +95,7 @@ def edges(subject: Subject, orbit: jc.Orbit) -> list[Any]:
     """Bifurcations near an orbit of period one, those with stability on one side first, the least certain of them."""
     speed = float(orbit.speed)
     found = jc.branch(subject.model, orbit, lower=speed / SPAN, upper=speed * SPAN)
-    shootable = [p for p in found.special if p.kind in ("fold", "period-doubling", "torus")]
+    shootable = [p for p in found.special if p.kind in ("fold", "period-doubling", "Neimark-Sacker")]
     return sorted(shootable, key=lambda p: (not p.edge, -p.error))
 
 

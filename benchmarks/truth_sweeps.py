@@ -23,7 +23,8 @@ def fine() -> ControlledSteps:
 
 @functools.cache
 def pair(subject: Subject, quick: bool) -> tuple[jc.Sweep, jc.Sweep]:
-    """A model over its grid of speeds by the default method, and by the finer steps."""
+    """A model over its grid of speeds as by default, its labels confirmed, and by the finer steps."""
     grid = subject.grid(FEW if quick else GRID)
-    run = lambda method: jc.sweep(subject.model, grid, confirm=True, horizon=0, method=method)
-    return run(None), run(fine())
+    return jc.sweep(subject.model, grid, horizon=0), jc.sweep(
+        subject.model, grid, horizon=0, confirm=False, method=fine()
+    )

@@ -29,7 +29,7 @@ def settled(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> Point:
     """A bifurcation of a 4-dimensional system."""
-    others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
+    others = [complex(critical).conjugate(), 0.5] if kind == "Neimark-Sacker" else [0.5, 0.4]
     mu = np.array([critical, *others, 0.1], dtype=complex)
     state = np.array([1e-5, 2e-5, 0.1, 0.2])
     known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
@@ -65,7 +65,7 @@ def orbits(sweep: jc.Sweep) -> SynchronousOrbits:
     special = (
         point("fold", 7000.0, 1.0, 17),
         point("period-doubling", 12000.0, -1.0, 37),
-        point("torus", 20000.0, np.exp(2.0j), 69),
+        point("Neimark-Sacker", 20000.0, np.exp(2.0j), 69),
     )
     stable = (rpm < 7000) | ((rpm > 12000) & (rpm < 20000))
     state = np.column_stack([np.full(101, 1e-5), 1e-4 * np.sin(rpm / 5e3), np.full(101, 0.1), np.full(101, 0.2)])

@@ -82,7 +82,7 @@ def test_diagrams_of_auto_are_read():
 
 def test_a_missing_point_is_not_within_any_error():
     autos = [orbits.Row("AUTO", special=(("fold", at),)) for at in (1.002, 1.001, 1.0)]
-    row = lambda kind, error: orbits.Row("ours", special=((kind, 1.003), ("torus", 1.0)), errors=(error, 0.0))
+    row = lambda kind, error: orbits.Row("ours", special=((kind, 1.003), ("Neimark-Sacker", 1.0)), errors=(error, 0.0))
     assert orbits.within(row("fold", 0.004), autos) == pytest.approx(0.003 / 0.006)
     assert orbits.within(row("fold", 0.0), autos) == pytest.approx(1.5)
     assert orbits.within(row("period-doubling", 1.0), autos) == np.inf

@@ -386,7 +386,7 @@ def test_torus_of_a_planted_orbit():
     settings = dict(a=(-0.03, -0.3), c=(1.0, 0.2), s=(0.0, 0.1), b=(0.4, 0.0))
     branch = planted_branch(**settings)
     (point,) = branch.special
-    assert point.kind == "torus" and point.edge
+    assert point.kind == "Neimark-Sacker" and point.edge
     assert abs(point.value - 0.03) < 1e-9
     assert abs(point.critical - np.exp(0.4j * 2 * np.pi / 1.1)) < 1e-8
     np.testing.assert_array_equal(point.direction, 0.0)
@@ -444,13 +444,16 @@ def test_stable_orbits_within_one_step_are_found():
 
 @pytest.mark.parametrize(
     "kind, block",
-    [("period-doubling", dict(s=(0.1, 0.0002))), pytest.param("torus", dict(b=(0.4, 0.3)), marks=pytest.mark.wide)],
+    [
+        ("period-doubling", dict(s=(0.1, 0.0002))),
+        pytest.param("Neimark-Sacker", dict(b=(0.4, 0.3)), marks=pytest.mark.wide),
+    ],
 )
 def test_two_crossings_of_one_kind_within_a_step(kind, block):
     """Both test functions have the same sign on either side of the pair: only the count of multipliers tells."""
-    places = (0.0199, 0.0203) if kind == "torus" else (0.0198, 0.0202)
-    a = (-places[0], -places[1]) if kind == "torus" else (-0.3, -0.02)
-    block |= dict(a=a, c=(1.0, 1.0) if kind == "torus" else (0.2, 1.0))
+    places = (0.0199, 0.0203) if kind == "Neimark-Sacker" else (0.0198, 0.0202)
+    a = (-places[0], -places[1]) if kind == "Neimark-Sacker" else (-0.3, -0.02)
+    block |= dict(a=a, c=(1.0, 1.0) if kind == "Neimark-Sacker" else (0.2, 1.0))
     branch = planted_branch(how=dict(steps=jc.orbits.Steps(first=0.1, longest=0.4), method=METHOD), **block)
     assert kinds(branch) == [kind, kind]
     np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
@@ -459,7 +462,7 @@ def test_two_crossings_of_one_kind_within_a_step(kind, block):
     again = planted_branch(how=finer, **block)
     assert kinds(again) == kinds(branch) and again.value.size > 1.5 * branch.value.size
     np.testing.assert_allclose([p.value for p in again.special], places, rtol=0, atol=1e-8)
-    if kind == "torus":  # in the second block |z|' = -|z|^3; along q = (1, -i) / sqrt(2), w' = -2 |w|^2 w
+    if kind == "Neimark-Sacker":  # in the second block |z|' = -|z|^3; along q = (1, -i) / sqrt(2), w' = -2 |w|^2 w
         np.testing.assert_allclose(branch.special[1].coefficient, -4 * np.pi / 1.1, rtol=1e-6)
         assert branch.special[1].criticality == "supercritical"
     assert np.array_equal(branch.stable, branch.value < places[0])
@@ -488,7 +491,7 @@ def test_normal_forms_of_maps():
     p = p / (p @ q)
     matrix = np.array(henon(np.zeros(2)))
     exact = p @ second(q, np.linalg.solve(np.eye(2) - matrix, second(q, q))) / 2
-    for kind, slope, value in (("period-doubling", henon, exact), ("torus", logistic, -1.0)):
+    for kind, slope, value in (("period-doubling", henon, exact), ("Neimark-Sacker", logistic, -1.0)):
         critical = critical_vectors(kind, slope(np.zeros(2)))
         found = coefficient(critical, jax.vmap(slope)(around(critical)))
         np.testing.assert_allclose(found.value, value, rtol=1e-10)
@@ -547,12 +550,12 @@ class Circling(eqx.Module):
 CIRCLING = {
     "supercritical period-doubling": dict(d=0.2, s=-1.0, t=0.0),
     "subcritical period-doubling": dict(d=0.2, s=1.0, t=0.0),
-    "supercritical torus": dict(d=0.0, s=-1.0, t=0.3),
-    "subcritical torus": dict(d=0.0, s=1.0, t=0.3),
+    "supercritical Neimark-Sacker": dict(d=0.0, s=-1.0, t=0.3),
+    "subcritical Neimark-Sacker": dict(d=0.0, s=1.0, t=0.3),
 }
 
 
-@pytest.mark.parametrize("name", wide_but(CIRCLING, "supercritical torus"))
+@pytest.mark.parametrize("name", wide_but(CIRCLING, "supercritical Neimark-Sacker"))
 def test_criticality_on_a_self_excited_orbit(name):
     """Of e' = sign e^3 over T = 2 pi, of which half a turn of the frame makes -e - sign T e^3; and with
     q = (1, -i) / sqrt(2) of w' = 2 sign |w|^2 w."""

@@ -201,14 +201,14 @@ def test_every_published_case_is_known(capsys: pytest.CaptureFixture[str], tmp_p
 def test_zone_table_puts_published_zones_beside_those_found():
     found = (
         Zone("chaotic", Edge(8000.0, 100.0, "chaotic"), Edge(9000.0, 100.0, "chaotic"), 1.0),
-        Zone("chaotic", Edge(9500.0, 100.0, "chaotic", "torus"), Edge(13e3, 90.0, "chaotic"), 0.5),
+        Zone("chaotic", Edge(9500.0, 100.0, "chaotic", "Neimark-Sacker"), Edge(13e3, 90.0, "chaotic"), 0.5),
     )
     zones = Zones(found, (), 100.0, 500.0)
     swept = (2500.0, 27500.0)
     table = zones_table("1a", zones, PUBLISHED_CASES["1a"], swept)
     assert [row[-1] for row in table.rows] == ["-", "9100 to 12000", "25500 and up"]
     assert [row[1] for row in table.rows] == ["8000 ± 100", "9500 ± 100", "not found"]
-    assert table.rows[1][3:6] == ("3500", "torus / unknown", "50%")
+    assert table.rows[1][3:6] == ("3500", "Neimark-Sacker / unknown", "50%")
     empty = zones_table("design", Zones((), (), 100.0, 500.0), None, swept)
     assert [row[0] for row in empty.rows] == ["none"]
 

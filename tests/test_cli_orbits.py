@@ -52,7 +52,7 @@ PERIOD_DOUBLING_RPM = 12355.535
 
 
 def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> Point:
-    others = [complex(critical).conjugate(), 0.5] if kind == "torus" else [0.5, 0.4]
+    others = [complex(critical).conjugate(), 0.5] if kind == "Neimark-Sacker" else [0.5, 0.4]
     multipliers = np.array([critical, *others, 0.1], dtype=complex)
     state = np.array([1e-5, 2e-5, 0.1, 0.2])
     outcome = 5 if kind == "unexplained" else 0  # `unexplained`, `converged`
@@ -75,7 +75,7 @@ def found() -> SynchronousOrbits:
     """One orbit that is lost from 7000 to 12000 rpm and from 20000 rpm on, where another one is stable."""
     rpm = np.linspace(2500.0, 27500.0, 51)
     fold, doubling = point("fold", 7000.0, 1.0, 8), point("period-doubling", 12000.0, -1.0, 19)
-    torus = point("torus", 20000.0, np.exp(2.0j), 35)
+    torus = point("Neimark-Sacker", 20000.0, np.exp(2.0j), 35)
     inner = point("fold", 9000.0, 1.0, 13, edge=False)
     stable = (rpm < 7000) | ((rpm > 12000) & (rpm < 20000))
     first = branch(rpm, stable, fold, inner, doubling, torus)
@@ -114,7 +114,7 @@ def test_document_of_a_search(found: SynchronousOrbits):
     ends = [(s["lower_kind"], s["upper_kind"], s["branch"], s["met"]) for s in document["stretches"]]
     assert ends == [
         ("range", "fold", 0, 4),
-        ("period-doubling", "torus", 0, 30),
+        ("period-doubling", "Neimark-Sacker", 0, 30),
         ("unknown", "range", 1, 3),
     ]
     zone = document["zones"][0]
@@ -158,7 +158,7 @@ def test_search_says_what_is_unexplained_and_what_is_not_confirmed(found: Synchr
 def test_tables_of_a_search(found: SynchronousOrbits):
     loss = loss_zones(found)
     stretches = stretch_table("1a", found)
-    assert stretches.rows[1] == ("12000.00", "period-doubling", "20000.00", "torus", "8000.00", "30", "0")
+    assert stretches.rows[1] == ("12000.00", "period-doubling", "20000.00", "Neimark-Sacker", "8000.00", "30", "0")
     zones = loss_table("1a", found, loss, PUBLISHED_CASES["1a"])
     assert zones.rows[0] == (
         "1",
@@ -169,13 +169,13 @@ def test_tables_of_a_search(found: SynchronousOrbits):
         "5000.00",
         "9100 to 12000",
     )
-    assert zones.rows[1] == ("2", "20000.00 ± 0.0001", "torus", "past range", "-", "open", "25500 and up")
+    assert zones.rows[1] == ("2", "20000.00 ± 0.0001", "Neimark-Sacker", "past range", "-", "open", "25500 and up")
     edges = edge_table("1a", found, loss)
     assert edges.rows[0] == ("7000.000", "0.0001", "fold", "1.0000", "0.00", "0", "zone 1 onset")
     assert edges.rows[2] == (
         "20000.000",
         "0.0001",
-        "torus",
+        "Neimark-Sacker",
         "-0.4161 ± 0.9093i",
         "114.59",
         "0",
@@ -200,7 +200,7 @@ def test_published_zone_that_was_not_searched_has_its_own_row(found: Synchronous
 
 def test_multipliers_read_as_people_write_them():
     assert multiplier_cell(point("period-doubling", 1.0, -1.0, 0)) == "-1.0000"
-    assert multiplier_cell(point("torus", 1.0, 0.6 + 0.8j, 0)) == "0.6000 ± 0.8000i"
+    assert multiplier_cell(point("Neimark-Sacker", 1.0, 0.6 + 0.8j, 0)) == "0.6000 ± 0.8000i"
 
 
 def edge(name: str, rpm: float, status: str = "converged", **elasticity: float) -> Sensitivity:
@@ -320,7 +320,7 @@ def test_zones_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monke
     assert (how["discard"], how["revolutions"], searched["settled"] is sweep) == (40, 50, True)
     assert [(z["onset_rpm"], z["exit_rpm"]) for z in got["zones"]] == [(9050, 12050), (20050, None)]
     lost = got["synchronous_loss"]
-    assert [z["onset_mechanism"] for z in lost] == ["fold", "torus"]
+    assert [z["onset_mechanism"] for z in lost] == ["fold", "Neimark-Sacker"]
     assert [z["onset_rpm"] for z in lost] == pytest.approx([7000, 20000]) and lost[0]["onset_gradient"] is None
     assert load_sweep(got["data"]).rpm == pytest.approx(sweep.rpm)
 
@@ -362,8 +362,8 @@ def test_gradient_without_an_edge_to_be_trusted_fails(
 
 
 def lines_through(system: Any, point: Any, x: str, y: str, **given: Any) -> Curve:
-    """In place of the continuation: straight up, and none through a torus bifurcation."""
-    if point.kind == "torus":
+    """In place of the continuation: straight up, and none through a Neimark-Sacker bifurcation."""
+    if point.kind == "Neimark-Sacker":
         raise ValueError("none there")
     height = np.linspace(given["lower"], given["upper"], 5)
     special = CodimensionTwo("cusp", point.value, height[2], point.multipliers)
@@ -514,7 +514,7 @@ def test_edges_whose_orbit_touches_the_land_are_named():
     for name, (rpm, scaled) in (("zone 1 exit", CLEAR), ("zone 2 onset", TOUCHES)):
         speed = rpm * np.pi / 30
         state = np.array(scaled) * [float(c) for c in model.scale(speed)]
-        edges[name] = Point("torus", speed, state, steps=8192, error=0.3 * np.pi / 30)
+        edges[name] = Point("Neimark-Sacker", speed, state, steps=8192, error=0.3 * np.pi / 30)
     (sentence,) = contact_notes(model, edges, method)
     assert sentence.startswith(
         "Zone 2 onset: its orbit touches the land (eps 0.977, contact from 0.97); by half of its "

@@ -163,7 +163,7 @@ SPEED = 1.2
 
 def torus_curve(b, lower, upper, s=0.0, turn=0.0):
     system = jc.ForcedSystem(Planted(**numbers(a=0.1, b=b, s=s, turn=turn, cube=1.0)), dimension=2)
-    point = jc.bifurcation(system, "torus", ((1.0, 0.0), b**2 / 5 + 0.01), "a", speed=SPEED, method=METHOD)
+    point = jc.bifurcation(system, "Neimark-Sacker", ((1.0, 0.0), b**2 / 5 + 0.01), "a", speed=SPEED, method=METHOD)
     assert abs(point.value - b**2 / 5) < 1e-8
     curve = jc.curve(system, point, "a", "b", lower=lower, upper=upper, x_lower=-1.0, x_upper=1.0, method=METHOD)
     assert curve.ended == ("range", "range")
@@ -199,9 +199,9 @@ def test_torus_curve_turns_subcritical_at_a_chenciner_point():
     """The amplitude changes by -cube |z|^3: exact."""
     system = jc.ForcedSystem(Planted(**numbers(a=0.1, b=0.35, s=0.0, turn=0.0, cube=0.7)), dimension=2)
     place = 0.35**2 / 5
-    point = jc.bifurcation(system, "torus", ((1.0, 0.0), place + 0.01), "a", speed=SPEED, method=METHOD)
+    point = jc.bifurcation(system, "Neimark-Sacker", ((1.0, 0.0), place + 0.01), "a", speed=SPEED, method=METHOD)
     np.testing.assert_allclose(point.coefficient, -0.7 * 4 * np.pi / SPEED, rtol=1e-6)
-    assert str(point).startswith("supercritical torus at ")
+    assert str(point).startswith("supercritical Neimark-Sacker at ")
     curve = jc.curve(system, point, "a", "cube", lower=-0.6, upper=1.0, x_lower=-1.0, x_upper=1.0, method=METHOD)
     (turn,) = curve.special
     assert turn.kind == "Chenciner" and abs(turn.y_value) < 1e-6 and abs(turn.x_value - place) < 1e-8
@@ -258,7 +258,9 @@ def test_bad_arguments(fold):
     limits = dict(lower=0.2, upper=0.4, x_lower=1.0, x_upper=3.0, method=METHOD)
     pitchfork = eqx.tree_at(lambda p: p.value, fold, fold.value)
     object.__setattr__(pitchfork, "kind", "branch-point")
-    with pytest.raises(ValueError, match="`point` must be a period-doubling, torus or fold, but it is a branch-point"):
+    with pytest.raises(
+        ValueError, match="`point` must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point"
+    ):
         jc.curve(duffing(), pitchfork, "speed", "g", **limits)
     for wrong in (dict(lower=0.4, upper=0.2), dict(x_lower=3.0, x_upper=3.0)):
         with pytest.raises(ValueError, match="`x_lower` and `x_upper` must be in ascending order"):

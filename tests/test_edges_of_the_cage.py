@@ -15,7 +15,7 @@ from jaxcage.orbits import Point, edge_speed, sensitivity, width
 
 CASE = jc.case("1a", "preliminary")
 STATES = {
-    "torus": (11023.07, (1.33877e-5, -5.11828e-5, 0.520974, 0.0221109)),
+    "Neimark-Sacker": (11023.07, (1.33877e-5, -5.11828e-5, 0.520974, 0.0221109)),
     "period-doubling": (12266.09, (1.43798e-5, -8.77557e-5, 0.437277, 0.0136768)),
     "fold": (21250.392, (-2.54376e-4, -3.25831e-4, 0.463810, -0.0884847)),
 }
@@ -151,7 +151,7 @@ def test_edges_in_other_units(kind, base, factor, found):
 
 
 def test_width_between_two_edges(found):
-    onset, leaves = found["torus"], found["period-doubling"]
+    onset, leaves = found["Neimark-Sacker"], found["period-doubling"]
     wide = width(onset, leaves)
     assert abs(wide.value_rpm - (leaves.value_rpm - onset.value_rpm)) < 1e-9
     assert wide.trusted and max(abs(r) for r in wide.homogeneity.values()) < 1e-8
@@ -169,7 +169,7 @@ def test_width_between_two_edges(found):
 
 def test_edge_that_is_not_there():
     """A fold is asked for where the pair leaves as a torus: no number is better than a wrong one."""
-    rpm, state = STATES["torus"]
+    rpm, state = STATES["Neimark-Sacker"]
     speed = jc.rpm(rpm)
     wrong = Point("fold", speed, np.array(state))
     assert np.isnan(edge_speed(CASE, wrong))

@@ -13,17 +13,19 @@ from jaxcage.validation import DUFFING_FOLDS
 
 METHOD = jc.method("rodas4", steps=256)
 PER_RPM = np.pi / 30
-CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0}
+CRITICAL = {"period-doubling": -1.0, "Neimark-Sacker": np.exp(2.5j), "fold": 1.0}
 
 
 def special(rpm, kind="fold"):
-    pair = [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5]
+    pair = [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "Neimark-Sacker" else 0.5]
     speed = rpm * PER_RPM
     known = dict(multipliers=np.array(pair, dtype=complex), index=0, edge=True, steps=1024, error=1e-4 * PER_RPM)
     return Point(kind, speed, np.zeros(2), **known, outcome=0)
 
 
-def stretch(lower, upper, family=0, met=10, first=None, open_below=False, open_above=False, kinds=("fold", "torus")):
+def stretch(
+    lower, upper, family=0, met=10, first=None, open_below=False, open_above=False, kinds=("fold", "Neimark-Sacker")
+):
     """A stretch between two speeds [rpm], of a branch with the number of its family."""
     return Stretch(
         None if open_below else special(lower, kinds[0]),
@@ -141,7 +143,7 @@ def test_zones_are_what_is_left_between_the_stretches(name):
     for zone in result.zones:
         assert zone.kind == "synchronous-loss"
         if zone.onset is not None:
-            assert zone.onset.mechanism == "torus" and zone.onset.basis == "located"
+            assert zone.onset.mechanism == "Neimark-Sacker" and zone.onset.basis == "located"
         if zone.exit is not None:
             assert zone.exit.mechanism == "fold" and zone.exit.kind == "synchronous-loss"
         for edge in (zone.onset, zone.exit):
@@ -193,12 +195,12 @@ def explained(zones, *stretches):
 def test_chaotic_edges_at_bifurcations_take_their_mechanism():
     result = explained(chaotic(6090, 14950), BELOW, ABOVE)
     onset, leaves = result.zones.zones[0].onset, result.zones.zones[0].exit
-    assert (onset.mechanism, onset.basis, onset.kind) == ("torus", "located", "chaotic")
+    assert (onset.mechanism, onset.basis, onset.kind) == ("Neimark-Sacker", "located", "chaotic")
     assert (leaves.mechanism, leaves.basis, leaves.kind) == ("fold", "located", "chaotic")
     assert abs(onset.speed_rpm - 6000) < 1e-9 and abs(leaves.speed_rpm - 15000) < 1e-9
     assert onset.uncertainty_rpm < 0.01
     assert result.sources == {"zone 1 onset": BELOW.upper, "zone 1 exit": ABOVE.lower}
-    assert str(onset) == "6000.00 rpm (torus)"
+    assert str(onset) == "6000.00 rpm (Neimark-Sacker)"
     assert result.zones.zones[0].share == 0.8 and result.zones.resolution_rpm == 100.0
 
 

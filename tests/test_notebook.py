@@ -47,7 +47,7 @@ def test_html_has_the_words_and_numbers_of_the_text(name: str):
 def test_loss_zones_say_their_edges():
     text = str(results()["loss"])
     assert "zone 1: 7000.00 rpm (fold) to 12000.00 rpm (period-doubling), 5000.00 rpm wide" in text
-    assert "zone 2: 20000.00 rpm (torus) to above the range, open" in text
+    assert "zone 2: 20000.00 rpm (Neimark-Sacker) to above the range, open" in text
 
 
 def test_words_are_escaped():

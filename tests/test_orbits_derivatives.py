@@ -138,7 +138,7 @@ def test_determinant_of_the_monodromy_matrix(name, periods):
 # Kind, its parameter, theta, and an orbit near it: state and value of the parameter.
 POINTS = {
     "period-doubling": ("g", DOUBLE_WELL[0], DOUBLE_WELL[1], 0.2655),
-    "torus": ("g", VAN_DER_POL[0], VAN_DER_POL[1], 1.2),
+    "Neimark-Sacker": ("g", VAN_DER_POL[0], VAN_DER_POL[1], 1.2),
     "fold": ("speed", HARDENING[0], (0.11, 2.71), 1.775),
 }
 

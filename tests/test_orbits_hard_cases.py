@@ -193,7 +193,7 @@ def point_of(kind, a=0.93, speed=1.1, **settings):
 @pytest.mark.parametrize("turn", [0.0, 0.5])
 def test_neutral_saddle_is_no_torus_bifurcation(turn):
     """Real multipliers mu and 1/mu (at a = 1.15): their product is 1, too."""
-    point = point_of("torus", a=1.12, s=0.3, turn=turn)
+    point = point_of("Neimark-Sacker", a=1.12, s=0.3, turn=turn)
     assert point.status == "other kind"
     assert not bool(point.converged) and not bool(point.trusted)
     assert np.isnan(point.value) and np.isnan(point.angle) and np.all(np.isnan(point.state))
@@ -242,7 +242,7 @@ def test_branch_point_and_its_rate(square, slope):
 
 
 TANGENT = {"hardly crosses": dict(slope=1e-4, bend=1.0), "touches": dict(slope=0.0, touch=-1.0)}
-CRITICAL = {"period-doubling": dict(s=0.3), "torus": dict(b=0.3)}
+CRITICAL = {"period-doubling": dict(s=0.3), "Neimark-Sacker": dict(b=0.3)}
 
 
 @pytest.mark.parametrize("name", TANGENT)
@@ -271,7 +271,7 @@ def test_crossing_with_the_cube_is_never_trusted(kind):
 def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
     """Where the pair is close to 1 or -1, exp(i phi) is a poor unknown; the product of the pair is not."""
     period = 2 * np.pi / 1.1
-    point = point_of("torus", b=angle / period, turn=turn)
+    point = point_of("Neimark-Sacker", b=angle / period, turn=turn)
     assert point.status == "converged"
     assert abs(point.value - 1) < 1e-9
     assert abs(point.angle - abs(2 * np.pi * turn - angle)) < 1e-6
@@ -292,16 +292,16 @@ def test_bad_arguments():
     system = planted()
     start = ((1.0, 0.0), 0.9)
     with pytest.raises(
-        ValueError, match="`kind` must be one of period-doubling, torus, fold, branch-point, but 'hopf'"
+        ValueError, match="`kind` must be one of period-doubling, Neimark-Sacker, fold, branch-point, but 'hopf'"
     ):
         jc.bifurcation(system, "hopf", start, "a", speed=1.1)
     with pytest.raises(ValueError, match="`parameter` must be one of speed, a, .*, but 'x' was given"):
-        jc.bifurcation(system, "torus", start, "x", speed=1.1)
+        jc.bifurcation(system, "Neimark-Sacker", start, "x", speed=1.1)
     with pytest.raises(ValueError, match="`speed` must be given where the parameter is `a`"):
-        jc.bifurcation(system, "torus", start, "a")
+        jc.bifurcation(system, "Neimark-Sacker", start, "a")
     for find in (
         lambda: jc.periodic_orbit(system, 1.1, period="long"),
-        lambda: jc.bifurcation(system, "torus", start, "a", speed=1.1, period="long"),
+        lambda: jc.bifurcation(system, "Neimark-Sacker", start, "a", speed=1.1, period="long"),
     ):
         with pytest.raises(ValueError, match="`period` must be one of driven, free, but 'long'"):
             find()

@@ -151,7 +151,7 @@ def test_torus_bifurcation_of_the_driven_van_der_pol(force):
     system = jc.ForcedOscillator(Entrained(**numbers(g=force)), coordinates=1)
     orbit = jc.periodic_orbit(system, 1.3, guess=(-1.3, -0.4), method=METHOD)
     assert bool(orbit.stable) == (force > 1)
-    point = jc.bifurcation(system, "torus", orbit, "g", method=METHOD)
+    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "g", method=METHOD)
     assert point.status == "converged"
     assert agrees(point.value, VAN_DER_POL_LET_GO)
     np.testing.assert_allclose(jnp.abs(point.multipliers), 1.0, atol=1e-9)
@@ -296,7 +296,7 @@ def test_torus_bifurcation_of_a_planted_limit_cycle(b):
     """The pair leaves the unit circle at a = 0 with angle b T and rate T: exact. The drive is not resonant."""
     system = circle(b=b, a=-0.05)
     orbit = cycle_of(system, 0.3)
-    point = jc.bifurcation(system, "torus", orbit, "a", period="free", method=METHOD)
+    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", period="free", method=METHOD)
     period = 2 * np.pi / 1.3
     assert point.status == "converged"
     assert abs(point.value) < 1e-8
@@ -353,7 +353,7 @@ def test_torus_bifurcation_of_a_planted_driven_orbit(turn):
     """(-1)^(2 turn) exp((a +- i b) T)."""
     system, period = planted(-0.06, b=0.3, turn=turn), 2 * np.pi / 1.1
     orbit = jc.periodic_orbit(system, 1.1, guess=(0.9, 0.1), method=METHOD)
-    point = jc.bifurcation(system, "torus", orbit, "a", method=METHOD)
+    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", method=METHOD)
     assert point.status == "converged"
     assert abs(point.value) < 1e-8
     critical = np.exp(1j * np.pi * 2 * turn + 0.3j * period)

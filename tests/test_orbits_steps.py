@@ -24,7 +24,7 @@ AT_1A = (1.469298462e-04, -1.9758642656e-04, 6.4051751356e-01, 2.655842859e-01)
 AT_3A = (2.2547097488e-04, -2.0012129425e-04, 5.2115206118e-01, 4.6798404478e-01)
 TOUCHING = {
     "1a zone 2 onset": (jc.case("1a"), Point("fold", 18686.338 * RPM, np.array(AT_1A))),
-    "3a zone 2 onset": (jc.case("3a"), Point("torus", 19133.235 * RPM, np.array(AT_3A))),
+    "3a zone 2 onset": (jc.case("3a"), Point("Neimark-Sacker", 19133.235 * RPM, np.array(AT_3A))),
 }
 
 

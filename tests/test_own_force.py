@@ -137,7 +137,7 @@ def test_an_orbit_moves_with_a_drag_as_differences_say():
     np.testing.assert_allclose(slope, differences, atol=1e-6 * float(jnp.max(jnp.abs(slope))))
 
 
-TORUS = Point("torus", float(jc.rpm(11023.07)), np.array([1.33877e-5, -5.11828e-5, 0.520974, 0.0221109]))
+TORUS = Point("Neimark-Sacker", float(jc.rpm(11023.07)), np.array([1.33877e-5, -5.11828e-5, 0.520974, 0.0221109]))
 """An edge of case 1a, as `test_edges_of_the_cage` has it."""
 
 

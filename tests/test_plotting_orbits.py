@@ -26,11 +26,13 @@ from jaxcage.plotting._style import BLUE, GREY, ORANGE
 
 
 PER_RPM = np.pi / 30
-CRITICAL = {"period-doubling": -1.0, "torus": np.exp(2.5j), "fold": 1.0, "branch-point": 1.0}
+CRITICAL = {"period-doubling": -1.0, "Neimark-Sacker": np.exp(2.5j), "fold": 1.0, "branch-point": 1.0}
 
 
 def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> Point:
-    mu = np.array([CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "torus" else 0.5, 0.2, 0.1], dtype=complex)
+    mu = np.array(
+        [CRITICAL[kind], np.conj(CRITICAL[kind]) if kind == "Neimark-Sacker" else 0.5, 0.2, 0.1], dtype=complex
+    )
     state = np.array([0.0, y, 0.0, 0.0])
     known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
     return Point(kind, rpm * PER_RPM, state, **known)
@@ -127,7 +129,7 @@ def test_each_number_of_periods_has_its_colour():
 
 def test_two_bifurcations_between_the_same_points_are_in_order():
     rpm, y = np.array([8000.0, 8100.0, 8200.0]), np.array([0.0, 1e-4, 2e-4])
-    points = [special("torus", 8180.0, 1.8e-4, 1, False), special("period-doubling", 8120.0, 1.2e-4, 1, True)]
+    points = [special("Neimark-Sacker", 8180.0, 1.8e-4, 1, False), special("period-doubling", 8120.0, 1.2e-4, 1, True)]
     x, shown, stable = polyline(branch_of(rpm, y, np.array([True, True, False]), points), 1)
     np.testing.assert_allclose(x, [8000, 8100, 8120, 8180, 8200])
     np.testing.assert_allclose(shown, [0, 0.1, 0.12, 0.18, 0.2])
@@ -199,7 +201,7 @@ def test_multipliers_along_a_branch():
     angle = np.linspace(0.5, 3.0, 11)
     mu = np.stack([0.9 * np.exp(1j * angle), 0.9 * np.exp(-1j * angle), 0.1 + 0j * angle, -0.5 * np.arange(11)], axis=1)
     points = [
-        special("torus", 8300.0, 0.0, 2, True),
+        special("Neimark-Sacker", 8300.0, 0.0, 2, True),
         special("period-doubling", 8700.0, 0.0, 6, True),
         special("period-doubling", 8400.0, 0.0, 3, False),
     ]
@@ -215,15 +217,15 @@ def test_multipliers_along_a_branch():
     np.testing.assert_allclose(shade, np.repeat(rpm, 4)[~far.ravel()])
     assert cloud.get_clim() == pytest.approx((8000, 9000))
     assert [inner.get_ylabel() for inner in ax.child_axes] == ["Cage speed $n$ [rpm]"]
-    pair = data(ax, "torus (T)")
+    pair = data(ax, "Neimark-Sacker (NS)")
     np.testing.assert_allclose(pair, [[np.cos(2.5), np.sin(2.5)], [np.cos(2.5), -np.sin(2.5)]])
     np.testing.assert_allclose(data(ax, "period-doubling (PD)"), [[-1, 0]])
-    assert sorted(text.get_text() for text in ax.texts) == sorted(["◆ T 8300", "■ PD 8700\n□ PD 8400"])
+    assert sorted(text.get_text() for text in ax.texts) == sorted(["◆ NS 8300", "■ PD 8700\n□ PD 8400"])
 
 
 def test_names_of_many_multipliers_do_not_overlap():
     rpm = np.linspace(8000, 9000, 31)
-    kinds = ["torus"] * 6 + ["fold"] * 4 + ["period-doubling"] * 12
+    kinds = ["Neimark-Sacker"] * 6 + ["fold"] * 4 + ["period-doubling"] * 12
     points = [special(kind, 8000 + 40 * i, 0.0, i, i % 2 == 0) for i, kind in enumerate(kinds)]
     ax = multiplier_circle(branch_of(rpm, 1e-7 * rpm, rpm < 8300, points))
     boxes = extents(ax)
@@ -300,15 +302,20 @@ def two_curves() -> list[Curve]:
     gap = np.linspace(4e-4, 6e-4, 21)
     meet = ("1:2 resonance", 10000.0, 5e-4)
     doubling = curve_of("period-doubling", 10000 + (gap - 5e-4) * 5e6, gap, [meet, ("cusp", 9750.0, 4.5e-4)])
-    torus = curve_of("torus", 10000 + np.linspace(0, 900, 10), 5e-4 - np.linspace(0, 0.8e-4, 10), [meet])
+    torus = curve_of("Neimark-Sacker", 10000 + np.linspace(0, 900, 10), 5e-4 - np.linspace(0, 0.8e-4, 10), [meet])
     return [doubling, torus]
 
 
 def test_curves_have_the_colour_of_their_kind_and_the_unit_of_the_parameter():
     ax = stability_map(two_curves(), y_unit="mm", y_factor=1e3)
-    doubling, torus = (next(li for li in ax.get_lines() if li.get_label() == k) for k in ("period-doubling", "torus"))
-    assert (doubling.get_color(), torus.get_color()) == (MARKS["period-doubling"].colour, MARKS["torus"].colour)
-    np.testing.assert_allclose(finite(data(ax, "torus"))[[0, -1]], [[10000, 0.5], [10900, 0.42]])
+    doubling, torus = (
+        next(li for li in ax.get_lines() if li.get_label() == k) for k in ("period-doubling", "Neimark-Sacker")
+    )
+    assert (doubling.get_color(), torus.get_color()) == (
+        MARKS["period-doubling"].colour,
+        MARKS["Neimark-Sacker"].colour,
+    )
+    np.testing.assert_allclose(finite(data(ax, "Neimark-Sacker"))[[0, -1]], [[10000, 0.5], [10900, 0.42]])
     assert ax.get_ylabel() == "Guidance gap [mm]" and ax.get_xlabel() == "Cage speed $n$ [rpm]"
     assert stability_map(two_curves(), y_label="Gap $C_r$", y_unit="m").get_ylabel() == "Gap $C_r$ [m]"
     low, high = ax.get_ylim()
@@ -319,11 +326,11 @@ def test_neutral_saddles_are_dotted_and_named_once():
     doubling, torus = two_curves()
     torus.genuine[6:] = False
     ax = stability_map([doubling, torus, torus])
-    np.testing.assert_allclose(finite(data(ax, "torus"))[:, 0], 10000 + 100 * np.arange(6))
+    np.testing.assert_allclose(finite(data(ax, "Neimark-Sacker"))[:, 0], 10000 + 100 * np.arange(6))
     np.testing.assert_allclose(finite(data(ax, "neutral saddles"))[:, 0], 10000 + 100 * np.arange(5, 10))
     assert next(line for line in ax.get_lines() if line.get_label() == "neutral saddles").get_linestyle() == ":"
     names = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert sorted(names) == ["neutral saddles", "period-doubling", "torus"]
+    assert sorted(names) == ["Neimark-Sacker", "neutral saddles", "period-doubling"]
 
 
 def test_points_of_codimension_two_are_named_once_where_nothing_is_hidden():
@@ -332,7 +339,7 @@ def test_points_of_codimension_two_are_named_once_where_nothing_is_hidden():
     assert [text.get_text() for text in ax.texts] == ["1:2 resonance", "cusp"]
     boxes = extents(ax)
     assert overlaps(boxes) == 0
-    for kind in ("period-doubling", "torus"):
+    for kind in ("period-doubling", "Neimark-Sacker"):
         points = finite(data(ax, kind))
         fine = np.stack(
             [np.interp(np.linspace(0, 1, 999), np.linspace(0, 1, len(points)), c) for c in points.T], axis=1

@@ -30,7 +30,7 @@ class Edge:
     kind: str
     """`chaotic` or `synchronous-loss`."""
     mechanism: str = "unknown"
-    """`period-doubling`, `torus`, `fold`, `crisis` or `unknown`."""
+    """`period-doubling`, `Neimark-Sacker`, `fold`, `crisis` or `unknown`."""
     basis: str = "statistical"
     """`statistical`: seen in a sweep; `located`: a bifurcation, solved for; `cascade`: the limit of a period-doubling
     cascade, extrapolated from its first points."""

@@ -18,7 +18,7 @@
 | `_illinois`    | where a function along a curve vanishes                                            |
 | `_follower`    | what the lanes of one continuation of orbits share                                 |
 | `_located`     | bifurcations between orbits of a branch, every change of stability accounted for   |
-| `_normal_form` | super- or subcritical period doublings and torus bifurcations                      |
+| `_normal_form` | super- or subcritical period doublings and Neimark-Sacker bifurcations                      |
 | `_branch`      | branches of orbits with their bifurcations                                         |
 | `_search`      | the synchronous orbits of a speed range, found without a hint                      |
 | `_loss`        | synchronous-loss zones and their edges                                             |

@@ -92,7 +92,7 @@ def critical_matrix(
     which the flow and the phase condition border M - I.
     """
     a = singular_matrix(kind, monodromy)
-    if not problem.free_speed or kind in ("period-doubling", "torus"):
+    if not problem.free_speed or kind in ("period-doubling", "Neimark-Sacker"):
         return a
     y = tuple(z[i] * frame.scale[i] for i in range(z.size))
     flow = jnp.stack([jnp.asarray(c) for c in strobe.field(jnp.zeros(()), y)]) / frame.scale
@@ -117,7 +117,7 @@ def bifurcation(
 
     **Arguments:**
 
-    - `kind`: `period-doubling`, `torus` (Neimark-Sacker), `fold`, or `branch-point` (pitchfork or transcritical, which
+    - `kind`: `period-doubling`, `Neimark-Sacker`, `fold`, or `branch-point` (pitchfork or transcritical, which
         only systems with a symmetry have).
     - `guess`: a value of the parameter [SI], whose orbit is then found by simulation; an `Orbit` or a `Point`; or a
         pair (state, value of the parameter).
@@ -284,7 +284,7 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     there = (outcome == FOUND) | (outcome == TANGENT)
     keep = lambda x: jnp.where(there, x, jnp.nan)
     value, speed, state = _place(equations, u, given, there)
-    direction = jnp.zeros(problem.dimension) if kind == "torus" else known.right[: problem.dimension]
+    direction = jnp.zeros(problem.dimension) if kind == "Neimark-Sacker" else known.right[: problem.dimension]
     length = jnp.linalg.norm(direction)
     (parameter,) = problem.parameters
     return Point(
@@ -307,7 +307,7 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
 
 def is_critical(kind: Kind, multipliers: Complex[Array, " dim"]) -> Bool[Array, ""]:
     """Whether a multiplier is where a bifurcation of `kind` has it."""
-    if kind == "torus":
+    if kind == "Neimark-Sacker":
         off = jnp.where(jnp.abs(multipliers.imag) > 1e-9, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf)
     else:
         off = jnp.abs(multipliers - CRITICAL[kind])
@@ -332,7 +332,7 @@ def critical_rate(kind: Kind, equations: int, jacobian: Array, known: Singular, 
         return _branching_rate(m, jacobian, known, borders) / jnp.abs(overlap)
     along = g[:m] @ -jnp.linalg.solve(of_orbit, drift) + g[m]
     rate = -along / overlap
-    return rate / 2 if kind == "torus" else -rate
+    return rate / 2 if kind == "Neimark-Sacker" else -rate
 
 
 def _branching_rate(m: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:

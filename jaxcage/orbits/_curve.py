@@ -28,7 +28,7 @@ from ._singularity import Kind, null_vectors
 from ._steps import ENOUGH, Counts, by_steps, counted
 
 
-TURNS = {"period-doubling": "generalised flip", "torus": "Chenciner"}
+TURNS = {"period-doubling": "generalised flip", "Neimark-Sacker": "Chenciner"}
 """Where bifurcations of a kind turn from super- to subcritical."""
 
 
@@ -37,9 +37,10 @@ class CodimensionTwo:
     """A point of a curve at which something else happens too."""
 
     kind: str
-    """`cusp`; `1:1`, `1:2`, `1:3`, `1:4 resonance`; `fold-flip`, `fold-torus`, `flip-torus`, `double torus`;
-    `generalised flip` or `Chenciner`, where period doublings or torus bifurcations turn from super- to subcritical; or
-    `extreme`, where the curve turns back in x: at the value of y two edges meet there, or are born."""
+    """`cusp`; `1:1`, `1:2`, `1:3`, `1:4 resonance`; `fold-flip`, `fold-Neimark-Sacker`, `flip-Neimark-Sacker`,
+    `double Neimark-Sacker`; `generalised flip` or `Chenciner`, where period doublings or Neimark-Sacker bifurcations
+    turn from super- to subcritical; or `extreme`, where the curve turns back in x: at the value of y two edges meet
+    there, or are born."""
     x_value: float
     y_value: float
     multipliers: Complex[np.ndarray, " dim"]
@@ -58,7 +59,7 @@ class Curve:
     state: Float[np.ndarray, "points dim"]
     multipliers: Complex[np.ndarray, "points dim"]
     genuine: Bool[np.ndarray, " points"]
-    """False where a curve of torus bifurcations has gone on, beyond a resonance, as neutral saddles."""
+    """False where a curve of Neimark-Sacker bifurcations has gone on, beyond a resonance, as neutral saddles."""
     special: tuple[CodimensionTwo, ...]
     ended: tuple[str, str]
     name: str = ""
@@ -95,7 +96,8 @@ def curve(
 
     **Arguments:**
 
-    - `point`: a period doubling, torus bifurcation or fold with `x` as its parameter, from a branch or `bifurcation`.
+    - `point`: a period doubling, Neimark-Sacker bifurcation or fold with `x` as its parameter, from a branch or
+        `bifurcation`.
     - `x`, `y`: the two parameters, by name.
     - `lower`, `upper`, `x_lower`, `x_upper`: the range of `y` and of `x` [SI]; the curve ends where it leaves them.
     - `steps`: step lengths, in units of 1/20 of the ranges and of the system's scale.
@@ -105,8 +107,10 @@ def curve(
     **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that cannot be followed.
     """
     require_x64()
-    if point.kind not in ("period-doubling", "torus", "fold"):
-        raise ArgumentError("point", said=f"must be a period-doubling, torus or fold, but it is a {point.kind}.")
+    if point.kind not in ("period-doubling", "Neimark-Sacker", "fold"):
+        raise ArgumentError(
+            "point", said=f"must be a period-doubling, Neimark-Sacker or fold, but it is a {point.kind}."
+        )
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
     tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), is_free(period), method)
@@ -136,7 +140,7 @@ def curve(
         y_value=u[:, -1] * tracer.units[1],
         state=u[:, : system.dimension] * np.asarray(tracer.scale),
         multipliers=multipliers,
-        genuine=np.array([point.kind != "torus" or abs(_pair(mu)[1]) <= 1 for mu in multipliers]),
+        genuine=np.array([point.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) <= 1 for mu in multipliers]),
         special=tuple(special),
         steps=np.concatenate([back.steps, up.points.steps]),
         error=np.concatenate([back.error, up.points.error]) * tracer.units[0],
@@ -203,7 +207,7 @@ class _Tracer(eqx.Module):
 
     def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
         """Coefficients of the normal form and their errors."""
-        known = [self.kind != "torus" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
+        known = [self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
         kinds = [self.kind if k else "" for k in known]
         across = across_orbit(self.problem, self.frame)
         return coefficients(self.through(points), points, kinds, self.problem.dimension, FEW, across=across)
@@ -245,15 +249,24 @@ class _Tracer(eqx.Module):
         product = lambda shift: np.array([np.prod(others + shift).real for others, _ in rows])
         pairs = np.array([np.prod([a * b - 1 for a, b in itertools.combinations(o, 2)]).real for o, _ in rows])
         found = {"extreme": points.tangent[..., -2]}
-        if self.kind == "torus":
+        if self.kind == "Neimark-Sacker":
             cosine = np.array([c for _, c in rows])
             found |= {f"1:{k} resonance": cosine - at for k, at in ((1, 1.0), (2, -1.0), (3, -0.5), (4, 0.0))}
-            return found | {"fold-torus": product(-1), "flip-torus": product(1), "double torus": pairs}
+            return found | {
+                "fold-Neimark-Sacker": product(-1),
+                "flip-Neimark-Sacker": product(1),
+                "double Neimark-Sacker": pairs,
+            }
         if self.kind == "period-doubling":
-            return found | {"1:2 resonance": product(1), "fold-flip": product(-1), "flip-torus": pairs}
+            return found | {"1:2 resonance": product(1), "fold-flip": product(-1), "flip-Neimark-Sacker": pairs}
         n = self.problem.dimension
         bend = np.sum(points.jacobian[..., -1, :n] * points.aux.right[..., :n], axis=-1)
-        return found | {"cusp": bend, "1:1 resonance": product(-1), "fold-flip": product(1), "fold-torus": pairs}
+        return found | {
+            "cusp": bend,
+            "1:1 resonance": product(-1),
+            "fold-flip": product(1),
+            "fold-Neimark-Sacker": pairs,
+        }
 
 
 def _pair(multipliers: np.ndarray) -> tuple[tuple[int, int], float]:
@@ -265,7 +278,7 @@ def _pair(multipliers: np.ndarray) -> tuple[tuple[int, int], float]:
 
 def _others(kind: str, multipliers: np.ndarray) -> tuple[np.ndarray, float]:
     """The multipliers that are not critical, and the cosine of the critical angle."""
-    if kind == "torus":
+    if kind == "Neimark-Sacker":
         taken, cosine = _pair(multipliers)
         return np.delete(multipliers, taken), cosine
     target = -1.0 if kind == "period-doubling" else 1.0
@@ -275,9 +288,9 @@ def _others(kind: str, multipliers: np.ndarray) -> tuple[np.ndarray, float]:
 def _real(what: str, kind: str, multipliers: np.ndarray) -> bool:
     """Whether a change of sign is what it is named for, and not that of a neutral saddle."""
     others, cosine = _others(kind, multipliers)
-    if what in ("fold-torus", "flip-torus", "double torus") and kind != "torus":
+    if what in ("fold-Neimark-Sacker", "flip-Neimark-Sacker", "double Neimark-Sacker") and kind != "Neimark-Sacker":
         return bool(np.any(np.abs(np.imag(others)) > 1e-9))
-    return kind != "torus" or abs(cosine) <= 1 + 1e-6
+    return kind != "Neimark-Sacker" or abs(cosine) <= 1 + 1e-6
 
 
 def _fresh_borders(curves: Any, points: Corrected, lanes: np.ndarray) -> Any:

@@ -114,7 +114,7 @@ def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -
     clear = np.flatnonzero(count_of(follower, row, 1 + CLEAR) == count_of(follower, row, 1 - CLEAR))
     found = []
     for a, b in zip(clear[:-1].tolist(), clear[1:].tolist(), strict=True):
-        crossing = sum(2 if kind == "torus" else 1 for k, kind in seen if a <= k < b)
+        crossing = sum(2 if kind == "Neimark-Sacker" else 1 for k, kind in seen if a <= k < b)
         change = abs(int(count[b] - count[a]))
         if change > crossing or (crossing - change) % 2:
             found.append((a, b))
@@ -125,7 +125,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     """What was seen, without products of two multipliers that pass 1 while no complex pair leaves the circle."""
     mu = eigenvalues(follower.monodromy(row))
     pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
-    return [(k, kind) for k, kind in brackets(follower, row) if kind != "torus" or pairs[k] != pairs[k + 1]]
+    return [(k, kind) for k, kind in brackets(follower, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
 
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:

@@ -1,9 +1,9 @@
-"""Whether a period doubling or torus bifurcation is super- or subcritical: the cubic coefficient of its normal form.
+"""Super- or subcritical period doublings and Neimark-Sacker bifurcations: the cubic coefficient of the normal form.
 
 With the return map P at its fixed point, A its derivative, B and C its second and third, A q = mu q and p A = mu p with
 |q| = 1 and p q = 1, the coefficients are (Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, section 5.4)
 - of a period doubling  c = p C(q, q, q) / 6 + p B(q, (1 - A)^-1 B(q, q)) / 2, supercritical where it is positive;
-- of a torus bifurcation  d = Re(w / mu) / 2  with  w = p C(q, q, q*) + 2 p B(q, (1 - A)^-1 B(q, q*))
+- of a Neimark-Sacker bifurcation  d = Re(w / mu) / 2  with  w = p C(q, q, q*) + 2 p B(q, (1 - A)^-1 B(q, q*))
   + p B(q*, (mu^2 - A)^-1 B(q, q)), supercritical where it is negative.
 All of it follows from A on both sides of the fixed point, along the real and the imaginary part of q: central
 differences, extrapolated to the fourth order, with the step at which neighbouring steps agree best. The return map of a
@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 from ._arclength import ONCE, Corrected, Curves, correct, take
 
 
-KINDS_WITH_ONE = ("period-doubling", "torus")
+KINDS_WITH_ONE = ("period-doubling", "Neimark-Sacker")
 STEPS = tuple(0.01 / 2**j for j in range(8))
 """Lengths of the differences, in units of the system's scale."""
 FEW = STEPS[1:5]

@@ -16,9 +16,9 @@ Numbers = np.ndarray | Array
 UNEXPLAINED = "unexplained"
 OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged", UNEXPLAINED, "given")
 """What is known of a point, in the order of the codes: converged; Newton's method found no point; it found one at which
-the multipliers are not those of the kind asked for (a neutral saddle instead of a torus bifurcation); or one at which
-the multiplier hardly crosses, so that its place is not a function of the design; or one that is elsewhere by half the
-steps; the number of unstable multipliers changes and no bifurcation is found; not solved for yet."""
+the multipliers are not those of the kind asked for (a neutral saddle instead of a Neimark-Sacker bifurcation); or one
+at which the multiplier hardly crosses, so that its place is not a function of the design; or one that is elsewhere by
+half the steps; the number of unstable multipliers changes and no bifurcation is found; not solved for yet."""
 FOUND, NO_SUCH_POINT, OTHER_KIND, TANGENT, NOT_CONVERGED, NOT_EXPLAINED, GIVEN = range(len(OUTCOMES))
 
 CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
@@ -32,8 +32,8 @@ class Point(eqx.Module):
     """
 
     kind: str = eqx.field(static=True)
-    """`period-doubling`, `torus`, `fold` or `branch-point`; on a branch also `unexplained`: the number of unstable
-    multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one."""
+    """`period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also `unexplained`: the number of
+    unstable multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one."""
     speed: Scalar
     """Speed [rad/s]; differentiable."""
     state: Float[Numbers, " dim"]
@@ -51,15 +51,15 @@ class Point(eqx.Module):
     multipliers: Complex[Numbers, " multipliers"] = eqx.field(default_factory=lambda: np.zeros(0, dtype=complex))
     """Floquet multipliers, the largest first."""
     direction: Float[Numbers, " coordinates"] = eqx.field(default_factory=lambda: np.zeros(0))
-    """Critical direction in the state [SI], of length 1 in units of the scale; of a torus bifurcation zero."""
+    """Critical direction in the state [SI], of length 1 in units of the scale; of a Neimark-Sacker bifurcation zero."""
     residual: Scalar = float("nan")
     """Largest component of the equations, in units of the system's scale."""
     transversality: Scalar = float("nan")
     """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
     p dP/d parameter of the map along the critical direction, with p q = 1. On a branch it is not computed."""
     coefficient: Scalar = float("nan")
-    """Cubic coefficient of the normal form of a period doubling or torus bifurcation in units of the system's scale
-    (see `_normal_form`), which tells the `criticality`; NaN for others, and under `jit`, `vmap` and `grad`."""
+    """Cubic coefficient of the normal form of a period doubling or Neimark-Sacker bifurcation in units of the system's
+    scale (see `_normal_form`), which tells the `criticality`; NaN for others, and under `jit`, `vmap` and `grad`."""
     coefficient_error: Scalar = float("nan")
     outcome: Int[Array, ""] | int = GIVEN
     """Code: place in `OUTCOMES`."""
@@ -101,7 +101,7 @@ class Point(eqx.Module):
         target, mu = CRITICAL.get(self.kind), np.asarray(self.multipliers)
         if target is not None:
             return complex(mu[np.argmin(np.abs(mu - target))])
-        mu = mu[np.imag(mu) > 0] if self.kind == "torus" else mu
+        mu = mu[np.imag(mu) > 0] if self.kind == "Neimark-Sacker" else mu
         return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
 
     @property
@@ -129,7 +129,7 @@ class Point(eqx.Module):
         if not bool(self.converged):
             looked = f"; {self.looked}" if self.looked else ""
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
-        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "torus" else ""
+        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "Neimark-Sacker" else ""
         error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
         sort = f"{self.criticality} " if self.criticality else ""
         return (

@@ -209,7 +209,9 @@ def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMetho
     steps."""
     require_x64()
     if point.kind == "branch-point":
-        raise ArgumentError("point", said="must be a period-doubling, torus or fold, but it is a branch-point.")
+        raise ArgumentError(
+            "point", said="must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
+        )
     edge = _located(system, point, method)
     return edge.speed if edge.status == "converged" else float("nan")
 

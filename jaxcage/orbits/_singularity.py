@@ -3,7 +3,7 @@
 With monodromy matrix M an orbit is at a
 - fold, where a multiplier is 1: M - I is singular;
 - period doubling, where a multiplier is -1: M + I is singular;
-- torus (Neimark-Sacker) bifurcation, where a complex pair is on the unit circle: the second compound matrix of M, whose
+- Neimark-Sacker bifurcation, where a complex pair is on the unit circle: the second compound matrix of M, whose
   eigenvalues are the products mu_i mu_j (i < j), has the eigenvalue 1. It also has at a neutral saddle, a real pair
   mu and 1/mu, which is no bifurcation; and it is regular where the pair meets at 1 or -1, unlike M - exp(i phi) I.
 The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 
-Kind = Literal["period-doubling", "torus", "fold", "branch-point"]
-KINDS: tuple[Kind, ...] = ("period-doubling", "torus", "fold", "branch-point")
+Kind = Literal["period-doubling", "Neimark-Sacker", "fold", "branch-point"]
+KINDS: tuple[Kind, ...] = ("period-doubling", "Neimark-Sacker", "fold", "branch-point")
 
 
 def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
@@ -30,7 +30,7 @@ def singular_matrix(kind: Kind, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
     """The matrix that is singular at a bifurcation of `kind` of an orbit with monodromy matrix `m`."""
     if kind == "period-doubling":
         return m + np.eye(m.shape[0])
-    if kind == "torus":
+    if kind == "Neimark-Sacker":
         c = second_compound(m)
         return c - np.eye(c.shape[0])
     return m - np.eye(m.shape[0])
@@ -67,7 +67,7 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
     product = lambda factors: np.asarray(np.prod(factors, axis=-1).real)
     return {
         "period-doubling": product(mu + 1),
-        "torus": product(mu[..., i] * mu[..., j] - 1),
+        "Neimark-Sacker": product(mu[..., i] * mu[..., j] - 1),
         "fold": product(mu - 1),
     }
 
@@ -79,6 +79,6 @@ def matches(kind: str, multipliers: Complex[np.ndarray, " n"]) -> bool:
     A double multiplier is known to the square root of rounding only; the tolerance is wider than that.
     """
     mu = np.asarray(multipliers)
-    if kind != "torus":
+    if kind != "Neimark-Sacker":
         return bool(np.min(np.abs(mu - (-1 if kind == "period-doubling" else 1))) < 1e-3)
     return bool(np.any((np.abs(np.imag(mu)) > 1e-9) & (np.abs(np.abs(mu) - 1) < 1e-4)))

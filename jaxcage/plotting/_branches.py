@@ -42,7 +42,7 @@ class Mark:
 
 MARKS = {
     "period-doubling": Mark("s", VERMILION, "PD"),
-    "torus": Mark("D", GREEN, "T"),
+    "Neimark-Sacker": Mark("D", GREEN, "NS"),
     "fold": Mark("o", BLACK, "F"),
     "branch-point": Mark("^", PURPLE, "BP"),
 }

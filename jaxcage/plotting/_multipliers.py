@@ -62,7 +62,7 @@ def _mark_critical(ax: Axes, points: Sequence[Point]) -> None:
         mark, mu = mark_of(p.kind), p.critical
         label = words(p.kind) if named[p.kind] is p else None
         size, face = (6.0, mark.colour) if p.edge else (4.5, "white")
-        both = (mu, mu.conjugate()) if p.kind == "torus" else (complex(mu.real, 0.0),)
+        both = (mu, mu.conjugate()) if p.kind == "Neimark-Sacker" else (complex(mu.real, 0.0),)
         style: dict[str, Any] = {
             "marker": mark.marker,
             "linestyle": "none",
@@ -70,9 +70,9 @@ def _mark_critical(ax: Axes, points: Sequence[Point]) -> None:
             "markerfacecolor": face,
         }
         ax.plot([m.real for m in both], [m.imag for m in both], **style, markersize=size, zorder=5, label=label)
-    _write_column(ax, [p for p in points if p.critical.real < 0 and p.kind != "torus"], -1)
-    _write_column(ax, [p for p in points if p.critical.real > 0 and p.kind != "torus"], 1)
-    _write_around(ax, [p for p in points if p.kind == "torus"])
+    _write_column(ax, [p for p in points if p.critical.real < 0 and p.kind != "Neimark-Sacker"], -1)
+    _write_column(ax, [p for p in points if p.critical.real > 0 and p.kind != "Neimark-Sacker"], 1)
+    _write_around(ax, [p for p in points if p.kind == "Neimark-Sacker"])
     if named:
         place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 4}
         ax.legend(**place, frameon=False, fontsize=8, handletextpad=0.1, columnspacing=1.0)

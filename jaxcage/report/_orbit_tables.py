@@ -200,7 +200,7 @@ def unsettled_notes(found: SynchronousOrbits) -> list[str]:
 def multiplier_cell(point: Point) -> str:
     """The critical multiplier; of a complex pair both."""
     mu = point.critical
-    return f"{mu.real:.4f} ± {mu.imag:.4f}i" if point.kind == "torus" else f"{mu.real:.4f}"
+    return f"{mu.real:.4f} ± {mu.imag:.4f}i" if point.kind == "Neimark-Sacker" else f"{mu.real:.4f}"
 
 
 def coexisting_notes(loss: LossZones) -> list[str]:

@@ -166,8 +166,8 @@ def _van_der_pol() -> list[Comparison]:
         rows.append(beside(f"{name}: logarithm of the multiplier", log_multiplier, logarithm))
     driven = ForcedSystem(VanDerPol(**_numbers(mu=0.3, g=1.2)), dimension=2)
     held = periodic_orbit(driven, 1.3, guess=(-1.3, -0.4), method=FINE)
-    point = bifurcation(driven, "torus", held, "g", method=FINE)
-    name = "van der Pol, mu 0.3, g cos 1.3t: g where it is let go (torus)"
+    point = bifurcation(driven, "Neimark-Sacker", held, "g", method=FINE)
+    name = "van der Pol, mu 0.3, g cos 1.3t: g where it is let go (Neimark-Sacker)"
     return [*rows, beside(name, VAN_DER_POL_LET_GO, point.value)]
 
 

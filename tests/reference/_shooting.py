@@ -57,7 +57,7 @@ def orbit(make: Make, z: np.ndarray, speed: float, fixed: int | None = None) -> 
 
 
 def bifurcation(make: Make, kind: str, state: np.ndarray, speed: float, reach: float = 1e-5) -> float:
-    """Speed [rad/s] of the fold, period doubling or torus bifurcation near `state` (SI) at `speed`.
+    """Speed [rad/s] of the fold, period doubling or Neimark-Sacker bifurcation near `state` (SI) at `speed`.
 
     By the secant method, from a first step of `reach` of the fixed component over the clearance or of the speed.
     """
@@ -66,7 +66,7 @@ def bifurcation(make: Make, kind: str, state: np.ndarray, speed: float, reach: f
     shift = -1.0 if kind == "fold" else 1.0
 
     def test(m: np.ndarray) -> float:
-        if kind != "torus":
+        if kind != "Neimark-Sacker":
             return float(np.linalg.det(m + shift * np.eye(m.shape[0])))
         return float(np.prod([a * b - 1 for a, b in itertools.combinations(np.linalg.eigvals(m), 2)]).real)
 
