@@ -8,8 +8,12 @@ import platform
 import platformdirs
 
 
+traced: pathlib.Path | None = None
+"""Where lowered programs are kept too; None before `keep_compiled_programs` was called."""
+
+
 def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> pathlib.Path | None:
-    """Have JAX keep what it compiles in a folder and use it again, in this process and later ones.
+    """Keep what is traced and compiled in a folder and use it again, in this process and later ones.
 
     The `jaxcage` command calls this by default; a script or notebook may. It changes JAX's configuration of the whole
     process. Programs are made for the processor they were compiled on: each kind of processor has its own sub-folder.
@@ -27,6 +31,8 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
     place = pathlib.Path(wanted).expanduser() / _processor()
     jax.config.update("jax_compilation_cache_dir", str(place))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+    global traced
+    traced = place / "traced"
     return place
 
 

@@ -151,6 +151,8 @@ class GradientOptions(SearchOptions):
 class MapOptions(SearchOptions):
     """Stability map: the edges followed in two parameters, over colours of the largest exponent."""
 
+    discard: FromZero = 1000
+    """Revolutions left out at the beginning."""
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
     y: str = "guidance_gap"

@@ -35,6 +35,7 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
 from ._program import CONTROL_FLOW, Numbers, Sizes, Step, pieces, program_of, undisturbed
+from ._traced import Kept, name_of
 
 
 LARGEST = {False: 2800, True: 12000}
@@ -59,12 +60,16 @@ _ours = contextvars.ContextVar("ours", default=False)
 """Whether the program that is being made is compiled with `COMPILER_OPTIONS`."""
 
 
-def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
+def compiled(f: Callable[..., Any], name: str | None = None) -> Callable[..., Any]:
     """`equinox.filter_jit` for programs that march: the largest kernels are for these alone.
+
+    A function of a module is known by its name, another one by the `name` that it is given: later processes find such
+    programs traced (`_traced`).
 
     Options are for programs that are called with numbers: within another compiled function it is the function itself,
     and where it is differentiated or mapped from outside it is compiled with XLA's own.
     """
+    kept = Kept(f, name or name_of(f), COMPILER_OPTIONS)
     jitted = eqx.filter_jit(f, compiler_options=COMPILER_OPTIONS)  # pyright: ignore[reportCallIssue]
     traced = eqx.filter_jit(f)
 
@@ -77,7 +82,8 @@ def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
             return traced(*args, **kwargs)
         token = _ours.set(True)
         try:
-            return jitted(*args, **kwargs)
+            there, result = (False, None) if kwargs else kept(args)
+            return result if there else jitted(*args, **kwargs)
         finally:
             _ours.reset(token)
 

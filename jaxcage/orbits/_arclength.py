@@ -109,8 +109,8 @@ def _correct(
 
 
 _axes = eqx.if_array(0)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, 0, None, None)))
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, 0, None, None)))
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, 0, None, None)), "correct shared")
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, 0, None, None)), "correct own")
 
 
 def take(tree: Any, lanes: Any) -> Any:

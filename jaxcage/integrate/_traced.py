@@ -1,0 +1,176 @@
+"""Traced programs kept on disk beside the compiled ones: a later process neither traces nor lowers them again.
+
+JAX keeps what XLA compiles, but only finds it by tracing and lowering the program first: a second or two for a march
+with tangents. What is kept here is the lowered program (`jax.export`), under a name that holds all that it follows
+from: the package's own sources, the versions of what traces it, the function, the shapes of its arrays, and everything
+else in its arguments. Where something in them could be told from another one by no name, as a function made within a
+function, nothing is kept.
+"""
+
+import dataclasses
+import enum
+import functools
+import hashlib
+import importlib.metadata
+import os
+import pathlib
+import pickle
+import tempfile
+import threading
+import types
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from .. import _cache
+
+
+TRACERS = ("jax", "jaxlib", "equinox", "diffrax", "numpy")
+"""Packages whose versions decide what a program is."""
+OURS = ("jaxcage", "jax", "jaxlib", "equinox", "diffrax", "numpy", "optimistix", "lineax", "builtins")
+"""Packages whose functions and classes are known by their names."""
+ARRAYS = (jax.Array, np.ndarray, np.generic)
+
+
+class Unnamed(Exception):
+    """Something that has no name by which another process would know it."""
+
+
+@functools.cache
+def sources() -> str:
+    """All that the package is made of and traced by, as a digest."""
+    digest = hashlib.sha256()
+    root = pathlib.Path(__file__).parents[1]
+    for path in sorted(root.rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
+    digest.update(repr([importlib.metadata.version(name) for name in TRACERS]).encode())
+    return digest.hexdigest()
+
+
+def named(x: Any) -> str:
+    """What an argument is but for the numbers in its arrays.
+
+    **Raises:** `Unnamed`.
+    """
+    if isinstance(x, ARRAYS):
+        return f"array {np.shape(x)} {x.dtype} {getattr(x, 'weak_type', False)}"
+    if x is None or isinstance(x, bool | int | float | complex | str | bytes):
+        return f"{type(x).__name__} {x!r}"
+    if isinstance(x, enum.Enum | np.dtype):
+        return f"{type(x).__qualname__} {x}"
+    if isinstance(x, type | types.FunctionType | types.BuiltinFunctionType):
+        return _known(x)
+    if isinstance(x, dict):
+        return f"{{{', '.join(f'{named(k)}: {named(v)}' for k, v in x.items())}}}"
+    if isinstance(x, tuple | list):
+        return f"{_known(type(x))}({', '.join(map(named, x))})"
+    if isinstance(x, functools.partial):
+        return f"partial({named(x.func)}, {named(x.args)}, {named(x.keywords)})"
+    if dataclasses.is_dataclass(x):
+        fields = [(f.name, getattr(x, f.name)) for f in dataclasses.fields(x) if hasattr(x, f.name)]
+        return f"{_known(type(x))}({', '.join(f'{name}={named(value)}' for name, value in fields)})"
+    raise Unnamed
+
+
+def _known(x: Any) -> str:
+    """The name of a function or class that is found under it."""
+    module, name = getattr(x, "__module__", None) or "", getattr(x, "__qualname__", "<>")
+    if module.partition(".")[0] not in OURS or "<" in name:
+        raise Unnamed
+    return f"{module}.{name}"
+
+
+def name_of(f: Any) -> str | None:
+    """The name of a function of a module of ours; None for another one."""
+    try:
+        return _known(f) if isinstance(f, types.FunctionType) else None
+    except Unnamed:
+        return None
+
+
+class Kept:
+    """A function of pytrees as programs of arrays, one for each form of its arguments.
+
+    **Arguments:** the function; its name, None where it has none; options for XLA.
+    """
+
+    def __init__(self, f: Callable[..., Any], name: str | None, options: dict[str, Any]):
+        self.f, self.name, self.options = f, name, options
+        self.programs: dict[Any, Callable[..., Any] | None] = {}
+        self.lock = threading.Lock()
+
+    def __call__(self, args: tuple[Any, ...]) -> tuple[bool, Any]:
+        """Whether there is such a program, and what it makes of the arguments."""
+        folder = _cache.traced
+        if folder is None or self.name is None or jax.default_backend() != "cpu":
+            return False, None
+        leaves, form = jax.tree.flatten(args)
+        arrays = [x for x in leaves if isinstance(x, ARRAYS)]
+        rest = tuple(None if isinstance(x, ARRAYS) else (type(x), x) for x in leaves)
+        shapes = tuple((np.shape(x), x.dtype, getattr(x, "weak_type", False)) for x in arrays)
+        key = form, rest, shapes
+        with self.lock:
+            if key not in self.programs:
+                self.programs[key] = self._program(folder, args, arrays)
+            program = self.programs[key]
+        return program is not None, program and program(arrays)
+
+    def _program(
+        self, folder: pathlib.Path, args: tuple[Any, ...], arrays: list[Any]
+    ) -> Callable[[list[Any]], Any] | None:
+        try:
+            about = f"{sources()} {self.name} {jax.config.jax_enable_x64} {named(args)}"
+            path = folder / hashlib.sha256(about.encode()).hexdigest()[:32]
+            made = _read(path)
+            if made is None:
+                made = self._lowered(args, arrays)
+                _write(path, made)
+        except (Unnamed, NotImplementedError, TypeError, ValueError):
+            return None  # what is wrong with it, if anything, is said where it is called without being kept
+        program, form = jax.export.deserialize(bytearray(made[0])), made[1]
+        run = jax.jit(program.call, compiler_options=self.options)
+        return lambda arrays: _filled(form, run(*arrays))
+
+    def _lowered(self, args: tuple[Any, ...], arrays: list[Any]) -> tuple[bytes, Any]:
+        """The program, and its result with numbers in the place of arrays."""
+        leaves, form = jax.tree.flatten(args)
+        places = [i for i, x in enumerate(leaves) if isinstance(x, ARRAYS)]
+        result = []
+
+        def flat(*x: Any) -> list[Any]:
+            whole = list(leaves)
+            for i, value in zip(places, x, strict=True):
+                whole[i] = value
+            out, shape = jax.tree.flatten(self.f(*jax.tree.unflatten(form, whole)))
+            if not all(isinstance(y, ARRAYS) for y in out):
+                raise Unnamed
+            result.append(jax.tree.unflatten(shape, range(len(out))))
+            return out
+
+        lowered = jax.export.export(jax.jit(flat))(*arrays)
+        return bytes(lowered.serialize()), result[-1]
+
+
+def _filled(form: Any, arrays: list[Any]) -> Any:
+    return jax.tree.map(lambda i: arrays[i], form)
+
+
+def _read(path: pathlib.Path) -> tuple[bytes, Any] | None:
+    """What was kept there; nothing where it cannot be read."""
+    try:
+        return pickle.loads(path.read_bytes())
+    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):
+        return None
+
+
+def _write(path: pathlib.Path, made: tuple[bytes, Any]) -> None:
+    """Keep it in one step, so that nobody reads half of it; where that cannot be, it is not kept."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            file.write(pickle.dumps(made))
+        os.replace(file.name, path)
+    except OSError:
+        pass
