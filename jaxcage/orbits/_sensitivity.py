@@ -6,6 +6,7 @@ exponents a_i of a unit in every parameter p_i
 These hold for every kind of edge and test a gradient without any reference.
 """
 
+import concurrent.futures
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
+from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import Push, Slopes, by_columns, numbers_of
@@ -285,8 +287,10 @@ def _homogeneity(system: AbstractForcedSystem, elasticity: Mapping[str, float]) 
 def sensitivities(
     system: AbstractForcedSystem, points: Mapping[str, Point], method: AbstractMethod | None = None
 ) -> dict[str, Sensitivity]:
-    """The sensitivity of each named edge."""
-    return {name: sensitivity(system, point, name, method) for name, point in points.items()}
+    """The sensitivity of each named edge, on all cores."""
+    with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
+        found = pool.map(lambda name: sensitivity(system, points[name], name, method), points)
+        return dict(zip(points, found, strict=True))
 
 
 def limit_sensitivity(
