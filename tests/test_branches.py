@@ -555,7 +555,8 @@ CIRCLING = {
 }
 
 
-@pytest.mark.parametrize("name", wide_but(CIRCLING, "supercritical Neimark-Sacker"))
+@pytest.mark.wide
+@pytest.mark.parametrize("name", CIRCLING)
 def test_criticality_on_a_self_excited_orbit(name):
     """Of e' = sign e^3 over T = 2 pi, of which half a turn of the frame makes -e - sign T e^3; and with
     q = (1, -i) / sqrt(2) of w' = 2 sign |w|^2 w."""

@@ -21,8 +21,10 @@ import types
 from collections.abc import Callable
 from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
+from jax import export
 
 from .. import _cache
 
@@ -49,13 +51,14 @@ def sources() -> str:
     return digest.hexdigest()
 
 
-def named(x: Any) -> str:
-    """What an argument is but for the numbers in its arrays.
+def named(x: Any, within: bool = True) -> str:
+    """What an argument is but for the numbers in its arrays; of what is not `within` the tree, with them.
 
     **Raises:** `Unnamed`.
     """
     if isinstance(x, ARRAYS):
-        return f"array {np.shape(x)} {x.dtype} {getattr(x, 'weak_type', False)}"
+        numbers = "" if within else hashlib.sha256(np.asarray(x).tobytes()).hexdigest()
+        return f"array {np.shape(x)} {x.dtype} {getattr(x, 'weak_type', False)} {numbers}"
     if x is None or isinstance(x, bool | int | float | complex | str | bytes):
         return f"{type(x).__name__} {x!r}"
     if isinstance(x, enum.Enum | np.dtype):
@@ -63,14 +66,16 @@ def named(x: Any) -> str:
     if isinstance(x, type | types.FunctionType | types.BuiltinFunctionType):
         return _known(x)
     if isinstance(x, dict):
-        return f"{{{', '.join(f'{named(k)}: {named(v)}' for k, v in x.items())}}}"
+        return f"{{{', '.join(f'{named(k, False)}: {named(v, within)}' for k, v in x.items())}}}"
     if isinstance(x, tuple | list):
-        return f"{_known(type(x))}({', '.join(map(named, x))})"
+        return f"{_known(type(x))}({', '.join(named(v, within) for v in x)})"
     if isinstance(x, functools.partial):
-        return f"partial({named(x.func)}, {named(x.args)}, {named(x.keywords)})"
+        return f"partial({', '.join(named(v, False) for v in (x.func, x.args, x.keywords))})"
     if dataclasses.is_dataclass(x):
-        fields = [(f.name, getattr(x, f.name)) for f in dataclasses.fields(x) if hasattr(x, f.name)]
-        return f"{_known(type(x))}({', '.join(f'{name}={named(value)}' for name, value in fields)})"
+        tree = within and isinstance(x, eqx.Module)
+        fields = [(f, getattr(x, f.name)) for f in dataclasses.fields(x) if hasattr(x, f.name)]
+        row = (f"{f.name}={named(value, tree and not f.metadata.get('static', False))}" for f, value in fields)
+        return f"{_known(type(x))}({', '.join(row)})"
     raise Unnamed
 
 
@@ -121,7 +126,7 @@ class Kept:
         self, folder: pathlib.Path, args: tuple[Any, ...], arrays: list[Any]
     ) -> Callable[[list[Any]], Any] | None:
         try:
-            about = f"{sources()} {self.name} {jax.config.jax_enable_x64} {named(args)}"
+            about = f"{sources()} {self.name} {jax.dtypes.canonicalize_dtype(float)} {named(args)}"
             path = folder / hashlib.sha256(about.encode()).hexdigest()[:32]
             made = _read(path)
             if made is None:
@@ -129,7 +134,7 @@ class Kept:
                 _write(path, made)
         except (Unnamed, NotImplementedError, TypeError, ValueError):
             return None  # what is wrong with it, if anything, is said where it is called without being kept
-        program, form = jax.export.deserialize(bytearray(made[0])), made[1]
+        program, form = export.deserialize(bytearray(made[0])), made[1]
         run = jax.jit(program.call, compiler_options=self.options)
         return lambda arrays: _filled(form, run(*arrays))
 
@@ -149,7 +154,7 @@ class Kept:
             result.append(jax.tree.unflatten(shape, range(len(out))))
             return out
 
-        lowered = jax.export.export(jax.jit(flat))(*arrays)
+        lowered = export.export(jax.jit(flat))(*arrays)
         return bytes(lowered.serialize()), result[-1]
 
 
