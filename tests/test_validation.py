@@ -63,6 +63,7 @@ def test_lund_thomsen():
     assert len(rows) == 12 * 9 and failures(rows) == []
 
 
+@pytest.mark.wide
 def test_two_grooves_whirl_near_half_speed():
     rows = nicholas_comparisons()
     assert len(rows) == 5 and failures(rows) == []
