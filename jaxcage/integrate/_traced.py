@@ -12,9 +12,10 @@ import enum
 import functools
 import hashlib
 import importlib.metadata
+import json
 import os
 import pathlib
-import pickle
+import sys
 import tempfile
 import threading
 import types
@@ -139,7 +140,7 @@ class Kept:
         return lambda arrays: _filled(form, run(*arrays))
 
     def _lowered(self, args: tuple[Any, ...], arrays: list[Any]) -> tuple[bytes, Any]:
-        """The program, and its result with numbers in the place of arrays."""
+        """The program, and the form of its result."""
         leaves, form = jax.tree.flatten(args)
         places = [i for i, x in enumerate(leaves) if isinstance(x, ARRAYS)]
         result = []
@@ -151,31 +152,64 @@ class Kept:
             out, shape = jax.tree.flatten(self.f(*jax.tree.unflatten(form, whole)))
             if not all(isinstance(y, ARRAYS) for y in out):
                 raise Unnamed
-            result.append(jax.tree.unflatten(shape, range(len(out))))
+            result.append(_form(jax.tree.unflatten(shape, range(len(out)))))
             return out
 
         lowered = export.export(jax.jit(flat))(*arrays)
         return bytes(lowered.serialize()), result[-1]
 
 
+def _form(tree: Any) -> Any:
+    """A result with numbers in the place of arrays, as lists and names that JSON can hold.
+
+    **Raises:** `Unnamed` for what is neither a tuple, named or not, nor a list, a dictionary or nothing.
+    """
+    if tree is None or isinstance(tree, int):
+        return tree
+    if isinstance(tree, dict):
+        return {str(k): _form(v) for k, v in tree.items()}
+    if type(tree) not in (tuple, list) and not (isinstance(tree, tuple) and hasattr(tree, "_fields")):
+        raise Unnamed
+    return [_known(type(tree)), *map(_form, tree)]
+
+
 def _filled(form: Any, arrays: list[Any]) -> Any:
-    return jax.tree.map(lambda i: arrays[i], form)
+    """The result of this form. Its classes are named tuples of modules that are there: nothing is imported or run."""
+    if form is None:
+        return None
+    if isinstance(form, int):
+        return arrays[form]
+    if isinstance(form, dict):
+        return {k: _filled(v, arrays) for k, v in form.items()}
+    kind, *parts = form
+    parts = [_filled(x, arrays) for x in parts]
+    if kind in ("builtins.tuple", "builtins.list"):
+        return tuple(parts) if kind == "builtins.tuple" else parts
+    module, _, name = kind.rpartition(".")
+    return getattr(sys.modules[module], name)._make(parts)
 
 
 def _read(path: pathlib.Path) -> tuple[bytes, Any] | None:
     """What was kept there; nothing where it cannot be read."""
     try:
-        return pickle.loads(path.read_bytes())
-    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):
+        digest, whole = path.read_bytes().split(b"\n", 1)
+        form, program = whole.split(b"\n", 1)
+        return (program, json.loads(form)) if digest == _digest(whole) else None
+    except (OSError, ValueError):
         return None
+
+
+def _digest(whole: bytes) -> bytes:
+    return hashlib.sha256(whole).hexdigest().encode()
 
 
 def _write(path: pathlib.Path, made: tuple[bytes, Any]) -> None:
     """Keep it in one step, so that nobody reads half of it; where that cannot be, it is not kept."""
+    whole = json.dumps(made[1]).encode() + b"\n" + made[0]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(pickle.dumps(made))
+            file.write(_digest(whole) + b"\n" + whole)
         os.replace(file.name, path)
     except OSError:
         pass

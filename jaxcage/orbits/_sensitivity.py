@@ -288,6 +288,7 @@ def sensitivities(
     system: AbstractForcedSystem, points: Mapping[str, Point], method: AbstractMethod | None = None
 ) -> dict[str, Sensitivity]:
     """The sensitivity of each named edge, on all cores."""
+    require_x64()
     with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
         found = pool.map(lambda name: sensitivity(system, points[name], name, method), points)
         return dict(zip(points, found, strict=True))
