@@ -34,6 +34,11 @@ NEARLY = 0.1
 the steps beside it, and about its place by this part of a step."""
 
 
+LOOKED = 1e-4
+"""Steps below this length, in the unknowns' units, are not halved for what a parabola says: where orbits cross, the
+functions are their rounding there."""
+
+
 class Seen(NamedTuple):
     """A bifurcation between two orbits of a branch."""
 
@@ -135,7 +140,8 @@ def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     if follower.problem.free_speed:
         del tests["fold"]  # zero along the branch
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
-    return dips(np.stack([*tests.values(), row.tangent[:, -1]]), length)
+    found = dips(np.stack([*tests.values(), row.tangent[:, -1]]), length)
+    return [(a, b) for a, b in found if length[a] > LOOKED]
 
 
 def dips(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " steps"]) -> list[tuple[int, int]]:
