@@ -116,7 +116,7 @@ class Kept:
         arrays = [x for x in leaves if isinstance(x, ARRAYS)]
         rest = tuple(None if isinstance(x, ARRAYS) else (type(x), x) for x in leaves)
         shapes = tuple((np.shape(x), x.dtype, getattr(x, "weak_type", False)) for x in arrays)
-        key = form, rest, shapes
+        key = folder, form, rest, shapes
         with self.lock:
             if key not in self.programs:
                 self.programs[key] = self._program(folder, args, arrays)
