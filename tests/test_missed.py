@@ -86,3 +86,11 @@ def test_search_meets_what_only_the_opposite_start_leads_to():
     found = jc.synchronous_orbits(system, 0.5, 0.6, count=3, discard=20, method=jc.method("rk4", steps=128))
     assert {float(np.sign(b.state[0, 0])) for b in found.branches} == {-1.0, 1.0} and found.missed == 0
     assert sorted(s.met for s in found.stretches) == [0, 3]
+
+
+def test_two_doublings_within_a_long_last_step_are_suspected():
+    """(mu + 1) multiplied over case 1a's branch from 4458.6 rpm: -.0022 at 4700.2 rpm, between the first two points."""
+    rpm = np.array([4458.60665793, 4883.58952552, 5125.82841122, 5260.57554011])
+    doubling = np.array([[0.30397864, 0.09297943, 0.42741154, 0.69109067]])
+    assert (0, 1) in dips(doubling, np.diff(rpm))
+    assert not dips(doubling + 1.0, np.diff(rpm))

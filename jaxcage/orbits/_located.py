@@ -32,6 +32,8 @@ HALVINGS, APART = 20, 1e-7
 NEARLY = 0.1
 """A parabola through three points may be wrong about an extremum by this part of what the function changes over one of
 the steps beside it, and about its place by this part of a step."""
+SUNK = 0.75
+"""Where it says that the function falls below this part of its lesser end, it is not believed about the rest."""
 
 
 LOOKED = 1e-4
@@ -160,7 +162,8 @@ def dips(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " s
     before, after = (-back < place) & (place < NEARLY * ahead), (-NEARLY * back < place) & (place < ahead)
     for first, inside in enumerate([before, after]):
         one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
-        twice = inside & (one * other > 0) & (extreme * np.sign(one) < nearly)
+        near = np.maximum(nearly, SUNK * np.minimum(np.abs(one), np.abs(other)))
+        twice = inside & (one * other > 0) & (extreme * np.sign(one) < near)
         found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}
     return sorted(found)
 
