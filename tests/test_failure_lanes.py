@@ -12,7 +12,7 @@ import pytest
 from helpers import wide_but
 
 from jaxcage.analysis import Plan
-from jaxcage.integrate import OUTCOMES, method
+from jaxcage.integrate import OUTCOMES, controlled, method, revolution, strobe_map
 from jaxcage.models import case
 from jaxcage.sweeps import run_lanes, sweep
 
@@ -167,3 +167,11 @@ def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
     ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 0), SPEEDS[:1], outside, onward=on) for on in (False, True)]
     assert [OUTCOMES[int(end.outcome[0])] for end in ends] == ["outside", "successful"]
     assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005
+
+
+def test_a_lane_that_is_not_to_run_costs_nothing_and_stays():
+    strobe = strobe_map(MODEL, SPEEDS[0], controlled())
+    state = tuple(map(jnp.asarray, HEALTHY))
+    stays, runs = (revolution(strobe, state, (), jnp.asarray(level)) for level in (-1, 0))
+    assert stays.y == state and np.isinf(stays.error)
+    assert runs.y != state and runs.error < 3e-3

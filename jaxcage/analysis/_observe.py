@@ -97,13 +97,14 @@ def _advance(strobe: StrobeMap, lane: Lane, tangents: Tangents = ()) -> tuple[La
 
     A lane that fails turns to NaN and keeps the code of its first failure.
     """
-    # A failed lane runs on from rest, unseen: solvers that check their input would otherwise stop the whole batch.
+    # A failed lane is not run any further. What stands for its state is finite, since it may fill up a block of lanes
+    # that run, and solvers that check their input would stop them all.
     runs = lane.outcome == 0
     moved = revolution(
         strobe,
         tuple(jnp.where(runs, c, 0.0) for c in lane.y),
         tuple(multiply(t, strobe.scale) for t in tangents),
-        jnp.where(runs, lane.level, 0),
+        jnp.where(runs, lane.level, -1),
     )
     outcome = jnp.where(runs, moved.outcome, lane.outcome)
     error = jnp.where(runs, jnp.maximum(lane.error, moved.error), lane.error)

@@ -136,7 +136,7 @@ class ZonesOptions(SweepOptions):
 class SearchOptions(_Range, IntegrationOptions):
     """Synchronous orbits over speed: where they are stable, how they lose it, and the zones without one."""
 
-    count: FromTwo = 101
+    count: FromTwo = 251
     """Speeds that are simulated, from three starts each."""
     discard: FromZero = 250
     """Revolutions left out at the beginning."""

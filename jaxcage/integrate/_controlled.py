@@ -153,10 +153,13 @@ def climb(
     harmonics: int = 1,
     parts: Any = 1,
 ) -> Moved:
-    """Lanes, or one without an axis, by the first rung whose error is small enough, beginning two below `level`."""
+    """Lanes, or one without an axis, by the first rung whose error is small enough, beginning two below `level`.
+
+    One whose level is negative stays where it is.
+    """
     lowest = method.lowest(harmonics)
     begin = jnp.maximum(level - method.before, lowest)
-    carry = (begin, start, jnp.zeros(begin.shape, bool), start.error)
+    carry = (begin, start, level < 0, start.error)
     first = 0
     for rungs, size in zip(method.ladder, method.sizes, strict=True):
 

@@ -24,7 +24,7 @@ from ._results import outcome_code
 from ._strobe import StrobeMap
 
 
-BLOCK = 32
+BLOCK = 16
 """Lanes packed together on a CPU: smaller blocks cost more calls, larger ones run more lanes for nothing."""
 BLOCK_ON_GPU = 1 << 14
 

@@ -211,7 +211,7 @@ def synchronous_orbits(
     lower: float,
     upper: float,
     *,
-    count: int = 101,
+    count: int = 251,
     discard: int = 250,
     steps: Steps = Steps(most=1500),
     settled: Sweep | None = None,

@@ -23,7 +23,7 @@ from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
 
 
-CHUNKS = (16, 32, 64, 128, 256, 512)
+CHUNKS = (16, 32, 64, 128, 256, 384, 512)
 """Lanes per call on a CPU: few sizes, as each is compiled (`python -m benchmarks.chunks` times them)."""
 CALL = 32
 """What a call costs beside its lanes, in lanes."""
