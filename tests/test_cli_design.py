@@ -38,11 +38,19 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
 
     monkeypatch.setattr(_design, "optimise", search)
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: (swept.append(model), report_example.swept())[1])
+    monkeypatch.setattr(_design, "_objective", lambda job, width, vary: width)
+    loads = lambda model, found, error: {"wear load": [1e9 * model.eccentricity], "peak land force": [2.0, np.nan]}
+    monkeypatch.setattr(_design, "land_loads", loads)
     said = document(capsys, *DESIGN, "--out", str(tmp_path))
     assert said["optimum"] == pytest.approx({"guidance_gap": 0.5e-3, "eccentricity": 20e-6}, rel=0.02)
     assert said["objective"] == pytest.approx(1.0, abs=0.01) and said["at_bound"] == []
     assert [float(m.guidance_gap) for m in swept] == [0.6e-3, said["optimum"]["guidance_gap"]]
     assert said["cost"] == pytest.approx({n: float(jc.design.cost().function(m)) for n, m in zip(AFTER, swept)})
+    assert said["vary"]["eccentricity"] == pytest.approx([5e-6, 23e-6])  # no worse balanced than it is
+    assert said["wear_load_N_m_per_s"] == pytest.approx({"before": 23e3, "after": 20e3}, rel=0.02)
+    assert said["peak_land_force_N"] == {"before": 2.0, "after": 2.0}
+    grade = 23e-6 * 14000 * np.pi / 30 * 1e3  # [mm/s]
+    assert said["balance_grade_mm_per_s"] == pytest.approx({"before": grade, "after": grade * 20 / 23}, rel=0.02)
     zones = [(z["onset_rpm"], z["exit_rpm"]) for z in said["chaotic_zones"]["after"]]
     assert zones == [(9050, 12050), (20050, None)]
     assert said["chaotic_rpm"]["before"] == pytest.approx(np.mean(report_example.swept().restless) * 25000)
@@ -50,6 +58,9 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert main([*DESIGN, "--out", str(tmp_path)]) == 0
     text = capsys.readouterr().out
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
+    assert "Balance may only get better: eccentricity of at most 23 um" in text
+    worse = document(capsys, *DESIGN, "--worse-balance", "--out", str(tmp_path))
+    assert worse["vary"]["eccentricity"] == pytest.approx([5e-6, 60e-6])
 
 
 @pytest.mark.slow
@@ -58,7 +69,7 @@ def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixtur
     said = document(capsys, *DESIGN, "--out", str(tmp_path))
     assert said["vary"] == {
         "guidance_gap": pytest.approx([0.3e-3, 0.6e-3]),
-        "eccentricity": pytest.approx([5e-6, 60e-6]),
+        "eccentricity": pytest.approx([5e-6, 23e-6]),
     }
     assert all(low <= said["optimum"][n] <= high for n, (low, high) in said["vary"].items())
     assert sum(o["starts"] for o in said["optima"]) == 2
@@ -103,6 +114,7 @@ def test_sensitivity_of_a_known_objective(
     assert said["sobol"]["designs"] == own.evaluations == 64 * 4
     assert said["sobol"]["first"] == pytest.approx(own.first) and said["sobol"]["total"] == pytest.approx(own.total)
     assert sum(own.first.values()) == pytest.approx(1.0, abs=0.2)  # nothing is in both
+    assert said["sobol"]["doubtful"] == list(own.doubtful) and said["sobol"]["samples_wanted"] == own.samples_wanted
     assert said["edges"] == [] and said["figure"] is None
 
 
@@ -119,6 +131,10 @@ def test_sensitivity_of_a_known_objective(
         ("design 1a --vary guidance_gap=0.3kg:0.6kg", "guidance_gap"),
         ("design 1a --scatter eccentricity=weibull", "weibull"),
         ("design 1a --scatter damping=10%", "damping"),
+        (
+            "design 1a --vary eccentricity=30um:60um",
+            "--vary must let the eccentricity become smaller than the 2.3e-05 m",
+        ),
         ("sensitivity 1a --samples 3", "--samples must be a power of 2, but 3 was given"),
         ("sensitivity 1a --tolerance 0", "--tolerance must lie between 0 and 100 percent, but 0 was given"),
         ("sensitivity 1a --first nan", "--first must be a speed above 0 rpm, but nan was given"),

@@ -60,6 +60,18 @@ def test_width_of_a_zone(edges):
     assert here.value == pytest.approx(exact[0] - exact[1], rel=1e-9)
 
 
+def test_an_open_zone_counts_to_the_end_of_the_range_and_has_the_slope_of_its_other_edge(edges):
+    onset = jc.design.FollowedEdges({"zone 1 onset": edges.points["zone 1 onset"]}, METHOD)
+    with pytest.raises(ValueError, match="`range_rpm` must be given for zone 1, which is open: its onset alone"):
+        jc.design.zone_width(onset)
+    with pytest.raises(ValueError, match="`zone` must be one with an edge among zone 1 onset, but is 2"):
+        jc.design.zone_width(onset, 2)
+    got = agrees(jc.design.zone_width(onset, range_rpm=(5.0, 20.0)), SPACE, SPACE.place + 0.01)
+    speeds, slopes = onset.at(SPACE, SPACE.place + 0.01)
+    assert got.value == pytest.approx(20.0 - speeds[0], rel=1e-12)
+    np.testing.assert_allclose(got.slope, -slopes[0], rtol=1e-12)
+
+
 @pytest.mark.parametrize("operating", [(10.0,), (9.9, 11.0)])
 def test_distance_from_the_nearest_edge(edges, operating):
     far = jc.design.EdgeClearance(edges, operating, softness=0.05)
@@ -241,3 +253,51 @@ def test_a_scatter_of_all_and_more_is_refused():
 def test_bad_input_gets_a_sentence(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+def cage_at_speeds(**options):
+    """1b at two speeds, one of them within a chaotic zone, and a design space of its gap and balance."""
+    space = jc.DesignSpace.of(jc.case("1b"), {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 60e-6)})
+    return space, jc.design.chaotic_width(9000.0, 27500.0, 2, starts=2, **options)
+
+
+def test_a_design_is_judged_alike_whatever_it_is_swept_with():
+    """Each design starts from its own states: those of a wide gap lie outside a narrow one."""
+    space, width = cage_at_speeds(discard=3, revolutions=2, method=jc.method("rk4", steps=128))
+    narrow, wide = np.array([[0.0, 0.3]]), np.array([[1.0, 0.3]])
+    alone, beside = width.run(space, narrow), width.run(space, np.concatenate([wide, narrow]))
+    assert np.all(np.isfinite(alone.last))
+    np.testing.assert_allclose(beside.last[1], alone.last[0], rtol=1e-9)
+
+
+@pytest.mark.wide
+def test_loads_of_the_land_are_those_of_a_time_history():
+    space, width = cage_at_speeds(discard=60, revolutions=20)
+    places = np.array([[1.0, 0.33], [0.0, 0.98]])
+    wear, peak = (jc.design.LandMeasure(width, what) for what in ("wear load", "peak land force"))
+    got = wear.at_speeds(space, places), peak.at_speeds(space, places)
+    last = width.run(space, places).last
+    touched = 0
+    for k, place in enumerate(places):
+        model = space.model(place)
+        for i, speed in enumerate(width.speeds):
+            runs = [jc.simulate(model, speed, revolutions=8, samples=1024, start=tuple(y)) for y in last[k, i]]
+            seen = [jc.orbit_measures(model, run) for run in runs]
+            load = np.mean([o.mean_contact_force for o in seen]) * speed * float(model.land_radius)
+            assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
+            assert got[1][k, i] == pytest.approx(np.mean([o.peak_contact_force for o in seen]), rel=0.06, abs=1e-6)
+            touched += load > 1.0
+    assert touched >= 2
+    own = wear.values(space, space.place[None])
+    assert own[0] > 100.0 and wear.relative(space, 1000.0).values(space, space.place[None]) == pytest.approx([1000.0])
+
+
+def test_sobol_indices_say_when_they_are_not_to_be_believed():
+    row = lambda first, total: dict(first=dict(gap=first), total=dict(gap=total))
+    known = dict(first_interval=dict(gap=(0.4, 0.6)), total_interval=dict(gap=(0.5, 0.7)))
+    sure = jc.design.SobolIndices(**row(0.5, 0.6), **known, evaluations=192, samples=64)
+    assert sure.doubtful == () and sure.warning is None and sure.samples_wanted == 64
+    above = dataclasses.replace(sure, **row(0.5, 1.19))
+    assert above.doubtful == ("gap",) and "between 0 and 1" in above.warning
+    wide = dataclasses.replace(sure, first_interval=dict(gap=(-0.1, 1.1)))  # 1.2 wide: 16 times the samples for .3
+    assert wide.doubtful == ("gap",) and wide.samples_wanted == 1024 and "1024 base samples" in str(wide)

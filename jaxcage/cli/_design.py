@@ -11,17 +11,23 @@ from typing import Any
 import numpy as np
 
 from .. import report
+from .._errors import InputError
 from ..analysis import Sweep, zones
 from ..design import (
     AbstractObjective,
+    ChaosMeasure,
+    DesignSpace,
+    LandMeasure,
     Optimised,
     Robust,
     chaotic_width,
     cost,
     global_sensitivity,
+    land_loads,
     optimise,
     tolerance_budget,
 )
+from ..integrate import DEFAULT_ERROR
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
 from ..plotting import design_figure, elasticity_bars
@@ -47,17 +53,19 @@ def design(job: Job[DesignOptions]) -> Report:
     """`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs."""
     options = job.options
     vary = read_bounds(options.vary or VARY, job.model)
+    balance = None if options.worse_balance else _no_worse_balance(job.model, vary)
     scatter = read_scatter(options.scatter, list(vary))
     range_ = options.first, options.last, options.speeds
-    width: AbstractObjective = chaotic_width(*range_, **job.given("cloud spread seed"))
-    if scatter:
-        width = Robust(width, scatter, **job.given("worst seed"))
+    width = chaotic_width(*range_, **job.given("cloud spread seed"))
     kept = _kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
+        objective = _objective(job, width, vary)
+        if scatter:
+            objective = Robust(objective, scatter, **job.given("worst seed"))
         found = optimise(
             job.model,
             vary,
-            width + options.cost * cost() if options.cost else width,
+            objective + options.cost * cost() if options.cost else objective,
             **job.given("starts scouts steps seed"),
             keep=kept,
             report=lambda step, _: say("search", step, options.steps),
@@ -79,7 +87,9 @@ def design(job: Job[DesignOptions]) -> Report:
         **report.chosen(found.best, "objective error at_bound status"),
         "optimum": found.best.values,
         "optima": [report.chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
-        "designs_swept": _swept(found, options, width),
+        "designs_swept": _swept(found, options, objective),
+        **_loads(models, checked),
+        "balance_grade_mm_per_s": {name: _balance_grade(model, options.last) for name, model in models.items()},
         "cost": {name: float(cost().function(model)) for name, model in models.items()},
         "chaotic_rpm": {name: _chaotic_rpm(swept) for name, swept in checked.items()},
         "chaotic_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in chaotic.items()},
@@ -91,7 +101,43 @@ def design(job: Job[DesignOptions]) -> Report:
         report.optima_table(found),
         *report.before_and_after_tables(document),
     ]
-    return Report(document, tables, _notes(document, found))
+    return Report(document, tables, [*_notes(document, found), *([balance] if balance else [])])
+
+
+def _no_worse_balance(model: CageModel, vary: dict[str, tuple[float, float]]) -> str | None:
+    """Lower the upper bound of the eccentricity to what it is now; what there is to say of that."""
+    if "eccentricity" not in vary:
+        return None
+    (lower, upper), own = vary["eccentricity"], float(model.eccentricity)
+    if upper <= own:
+        return None
+    if lower >= own:
+        raise InputError(
+            f"Option --vary must let the eccentricity become smaller than the {own:g} m that it is, but it is "
+            f"{lower:g} to {upper:g} m; with --worse-balance it may become larger."
+        )
+    vary["eccentricity"] = lower, own
+    return f"Balance may only get better: eccentricity of at most {own * 1e6:g} um (--worse-balance lifts that)."
+
+
+def _objective(job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tuple[float, float]]) -> AbstractObjective:
+    """Chaotic speeds, and what the land feels beside what it feels now."""
+    options, space = job.options, DesignSpace.of(job.model, vary)
+    prices = {"wear load": options.wear, "peak land force": options.force}
+    terms = [LandMeasure(width, what).relative(space, price) for what, price in prices.items() if price]
+    return sum(terms, start=width)
+
+
+def _loads(models: Mapping[str, CageModel], checked: Mapping[str, Sweep]) -> dict[str, dict[str, float]]:
+    """Means over the speeds that were checked, by steps at 1/16 of the usual error."""
+    found = {name: land_loads(models[name], swept, DEFAULT_ERROR / 16) for name, swept in checked.items()}
+    keys = {"wear_load_N_m_per_s": "wear load", "peak_land_force_N": "peak land force"}
+    return {key: {name: float(np.nanmean(f[what])) for name, f in found.items()} for key, what in keys.items()}
+
+
+def _balance_grade(model: CageModel, last_rpm: float) -> float:
+    """Eccentricity times the highest cage speed [mm/s], the G of ISO 21940-11."""
+    return float(model.eccentricity) * rpm(last_rpm) * 1e3
 
 
 def _kept_search(job: Job[DesignOptions]) -> Path:
@@ -158,7 +204,8 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
         job.draw(lambda ax: elasticity_bars(list(edges.values()), ax), size, title)
     document = {
         "vary": vary,
-        "sobol": report.chosen(shares, "first total first_interval total_interval") | {"designs": shares.evaluations},
+        "sobol": report.chosen(shares, "first total first_interval total_interval samples_wanted")
+        | {"designs": shares.evaluations, "doubtful": list(shares.doubtful)},
         "tolerance_percent": options.tolerance,
         "edges": [
             {
@@ -170,6 +217,5 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
             for b in budgets
         ],
     }
-    return Report(
-        document, [report.sobol_table(job.name, shares), *(report.budget_table(b, options.tolerance) for b in budgets)]
-    )
+    tables = [report.sobol_table(job.name, shares), *(report.budget_table(b, options.tolerance) for b in budgets)]
+    return Report(document, tables, [shares.warning] if shares.warning else [])

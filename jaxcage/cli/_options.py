@@ -276,6 +276,12 @@ class DesignOptions(VaryOptions):
 
     cost: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What one unit of manufacturing cost is worth, in rpm of chaotic speeds; the paper's case 1a costs 2 units."""
+    wear: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
+    """What the wear load of the guiding land as it is now is worth, in rpm of chaotic speeds."""
+    force: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
+    """What the peak force on the guiding land as it is now is worth, in rpm of chaotic speeds."""
+    worse_balance: bool = False
+    """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
     scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()
     """What manufacture makes of a parameter: evenly within a part of it, guidance_gap=10%, or eccentricity=rayleigh.
     The mean over it is then made small."""

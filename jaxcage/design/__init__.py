@@ -12,6 +12,7 @@
 | `_margin`   | how far the synchronous orbit is from losing its stability                    |
 | `_edges`    | widths of zones and distances from edges, exact                               |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
+| `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
 | `_optimise` | designs made better by gradient                                               |
 | `_scatter`  | Sobol indices, tolerance budgets, Pareto fronts                               |
@@ -25,6 +26,7 @@ from ._edges import (
     zone_width as zone_width,
 )
 from ._fit import Combination as Combination, Fit as Fit, FittedEdge as FittedEdge, fit_edges as fit_edges
+from ._land import LandMeasure as LandMeasure, land_loads as land_loads
 from ._margin import StabilityMargin as StabilityMargin
 from ._measured import MeasuredEdge as MeasuredEdge, matched as matched
 from ._objective import (

@@ -8,8 +8,9 @@ what they are and not by luck.
 """
 
 import dataclasses
-from collections.abc import Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -26,6 +27,13 @@ TOGETHER = 96
 """Designs swept in one batch."""
 RESAMPLED = 400
 """Bootstrap samples behind a standard error."""
+
+
+class Ran(NamedTuple):
+    """Designs after their revolutions."""
+
+    exponent: Float[np.ndarray, "k speeds starts"]
+    last: Float[np.ndarray, "k speeds starts dim"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,6 +55,7 @@ class ChaosMeasure(AbstractObjective):
     """Standard deviation of the cloud, as a part of the distance between the bounds."""
     seed: int = 0
     method: AbstractMethod | None = None
+    _last: list[Any] = dataclasses.field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self):
         if self.cloud < 4 or self.cloud % 2:
@@ -60,16 +69,18 @@ class ChaosMeasure(AbstractObjective):
         """Largest distance between two speeds."""
         return float(np.max(np.diff(self.speeds))) * 30 / np.pi if self.speeds.size > 1 else float("inf")
 
-    def chaos(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
-        """How chaotic each design is at each speed. A lane that failed counts as chaotic: nothing says it is calm."""
-        found = []
+    def run(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> "Ran":
+        """The designs run over the speeds; what was run last is known, for other terms of a sum that ask for it."""
+        key = space.system, space.unknowns, np.asarray(places).tobytes()
+        if self._last and self._last[0][2] == key[2] and self._last[0][0] is key[0] and self._last[0][1] == key[1]:
+            return self._last[0][3]
+        rows = []
         for part in np.array_split(places, -(-len(places) // TOGETHER)):
             models = [space.model(place) for place in part]
-            first = models[0].starts(float(self.speeds[self.speeds.size // 2]))[: self.starts]
-            swept = sweep_designs(
+            rows += sweep_designs(
                 models,
                 self.speeds,
-                starts=[tuple(float(c) for c in y) for y in first],
+                starts=self.starts,
                 discard=self.discard,
                 revolutions=self.revolutions,
                 exponents=1,
@@ -77,20 +88,34 @@ class ChaosMeasure(AbstractObjective):
                 keep=1,
                 method=self.method,
             )
-            level = [expit((s.exponents[..., 0] - CHAOS_THRESHOLD) / self.softness) for s in swept]
-            found += [np.max(np.where(np.isfinite(c), c, 1.0), axis=1) for c in level]
-        return np.array(found)
+        ran = Ran(np.array([s.exponents[..., 0] for s in rows]), np.array([s.last for s in rows]))
+        self._last[:] = [(*key, ran)]
+        return ran
+
+    def chaos(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
+        """How chaotic each design is at each speed. A lane that failed counts as chaotic: nothing says it is calm."""
+        level = expit((self.run(space, places).exponent - CHAOS_THRESHOLD) / self.softness)
+        return np.max(np.where(np.isfinite(level), level, 1.0), axis=2)
 
     def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
         return self.chaos(space, np.asarray(places)) @ self.weights
 
     def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
+        return self.through_cloud(space, places, self.values)
+
+    def through_cloud(
+        self,
+        space: DesignSpace,
+        places: Float[np.ndarray, "k n"],
+        values: Callable[[DesignSpace, Float[np.ndarray, "k n"]], Float[np.ndarray, " k"]],
+    ) -> list[Measured]:
+        """Value and slope of `values` at each place, from the cloud of designs around it."""
         steps = self.spread * self._directions(len(space.unknowns))
         around = np.clip(
             np.asarray(places)[:, None, None] + steps[None, None] * np.array([[1.0], [-1.0]])[:, None], 0, 1
         )
         k, _, pairs, n = around.shape
-        found = self.values(space, around.reshape(-1, n)).reshape(k, 2, pairs)
+        found = values(space, around.reshape(-1, n)).reshape(k, 2, pairs)
         rng = np.random.default_rng(self.seed)
         drawn = np.concatenate([np.arange(pairs)[None], rng.integers(0, pairs, (RESAMPLED, pairs))])
         return [self._plane(around[i], found[i], drawn) for i in range(k)]
@@ -106,6 +131,9 @@ class ChaosMeasure(AbstractObjective):
     def _plane(self, around: np.ndarray, found: np.ndarray, drawn: np.ndarray) -> Measured:
         """Value and slope from pairs of opposite designs, with errors by the bootstrap over pairs."""
         apart, change, middle = around[0] - around[1], found[0] - found[1], found.mean(axis=0)
+        if not np.all(np.isfinite(found)):
+            nothing = np.full(around.shape[-1], np.nan)
+            return Measured(math.nan, math.nan, nothing, nothing, "every start of a design near it failed")
         slopes = np.array([np.linalg.lstsq(apart[rows], change[rows], rcond=1e-6)[0] for rows in drawn])
         pairs, n = apart.shape
         small = np.sqrt(pairs / max(pairs - n, 1))  # the bootstrap of few pairs is too sure of itself

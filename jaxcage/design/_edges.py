@@ -56,6 +56,8 @@ class EdgeSum(AbstractObjective):
 
     edges: FollowedEdges
     weights: Mapping[str, float]
+    constant: float = 0.0
+    """Added to the sum [rpm]."""
 
     def __post_init__(self):
         if missing := [name for name in self.weights if name not in self.edges.names]:
@@ -70,7 +72,7 @@ class EdgeSum(AbstractObjective):
             here = weights != 0
             measured.append(
                 Measured(
-                    float(weights[here] @ speeds[here]),
+                    self.constant + float(weights[here] @ speeds[here]),
                     0.0,
                     weights[here] @ slopes[here],
                     np.zeros(len(space.unknowns)),
@@ -83,9 +85,28 @@ class EdgeSum(AbstractObjective):
         return np.array([m.value for m in self.measure(space, places)])
 
 
-def zone_width(edges: FollowedEdges, zone: int = 1) -> EdgeSum:
-    """Width of a synchronous-loss zone, exit less onset [rpm]."""
-    return EdgeSum(edges, {f"zone {zone} exit": 1.0, f"zone {zone} onset": -1.0})
+def zone_width(edges: FollowedEdges, zone: int = 1, range_rpm: tuple[float, float] | None = None) -> EdgeSum:
+    """Width of a synchronous-loss zone, exit less onset [rpm].
+
+    A zone that is open, its onset or exit beyond the speeds that were looked at, counts to the end of that range, and
+    has the slope of its other edge alone.
+
+    **Arguments:** edges by name; number of the zone; first and last speed that were looked at, for an open zone.
+
+    **Raises:** `ValueError` for a zone of which no edge is known, or an open one without a range.
+    """
+    names = {end: f"zone {zone} {end}" for end in ("onset", "exit")}
+    known = [end for end, name in names.items() if name in edges.names]
+    if not known:
+        raise ArgumentError("zone", said=f"must be one with an edge among {', '.join(edges.names)}, but is {zone}.")
+    if len(known) == 1 and range_rpm is None:
+        raise ArgumentError(
+            "range_rpm", said=f"must be given for zone {zone}, which is open: its {known[0]} alone is known."
+        )
+    first, last = range_rpm or (0.0, 0.0)
+    ends = {"onset": (-1.0, -first), "exit": (1.0, last)}
+    weights = {names[end]: ends[end][0] for end in known}
+    return EdgeSum(edges, weights, sum(ends[end][1] for end in names if end not in known))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

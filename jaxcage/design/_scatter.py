@@ -1,6 +1,7 @@
 """What parameters do to an objective over their whole range, and what a drawing's tolerances do to an edge."""
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,10 @@ from ._objective import AbstractObjective, DesignSpace, Measured
 from ._optimise import Optimised, optimise
 
 
+NARROW = 0.3
+"""Width of an interval [share of the variance] that is narrow enough to tell what matters from what does not."""
+
+
 @dataclasses.dataclass(frozen=True)
 class SobolIndices:
     """Shares of an objective's variance, with 95 % intervals by the bootstrap."""
@@ -25,6 +30,33 @@ class SobolIndices:
     first_interval: dict[str, tuple[float, float]]
     total_interval: dict[str, tuple[float, float]]
     evaluations: int
+    samples: int
+    """Base samples."""
+
+    @property
+    def doubtful(self) -> tuple[str, ...]:
+        """Parameters of which an index lies outside 0 to 1, or has an interval wider than itself and than `NARROW`."""
+        rows = [(self.first, self.first_interval), (self.total, self.total_interval)]
+        bad = lambda value, pair: not 0 <= value <= 1 or pair[1] - pair[0] > max(abs(value), NARROW)
+        return tuple(n for n in self.first if any(bad(value[n], pair[n]) for value, pair in rows))
+
+    @property
+    def samples_wanted(self) -> int:
+        """Base samples, a power of 2, by which all intervals should be no wider than `NARROW`: widths fall with the
+        root of their number."""
+        widest = max(b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values())
+        return max(self.samples, 1 << math.ceil(math.log2(self.samples * (widest / NARROW) ** 2)))
+
+    @property
+    def warning(self) -> str | None:
+        """What to say where indices are not known well enough to be believed."""
+        if not self.doubtful:
+            return None
+        return (
+            f"Too few samples to believe the indices of {', '.join(self.doubtful)}: shares of a variance lie between 0 "
+            f"and 1. With {self.samples_wanted} base samples (now {self.samples}) their intervals would be about "
+            f"{NARROW:g} wide."
+        )
 
     def __str__(self) -> str:
         span = lambda pair: f"[{pair[0]:+.2f}, {pair[1]:+.2f}]"
@@ -34,7 +66,7 @@ class SobolIndices:
             f"total {self.total[n]:+.3f} {span(self.total_interval[n])}"
             for n in self.first
         ]
-        return "\n".join([head, *rows])
+        return "\n".join([head, *rows, *([self.warning] if self.warning else [])])
 
 
 def global_sensitivity(
@@ -77,6 +109,7 @@ def global_sensitivity(
         pairs(spread.first_order.confidence_interval),
         pairs(spread.total_order.confidence_interval),
         samples * (len(space.names) + 2),
+        samples,
     )
 
 

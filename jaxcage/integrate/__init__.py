@@ -18,6 +18,7 @@
 """
 
 from ._controlled import (
+    DEFAULT_ERROR as DEFAULT_ERROR,
     ControlledSteps as ControlledSteps,
     controlled as controlled,
     finer as finer,

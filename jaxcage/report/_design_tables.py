@@ -20,9 +20,16 @@ def parameters_table(name: str, model: CageModel, found: Optimised, document: Ma
         (n, info[n].unit, f"{float(before[n]):.4g}", f"{value:.4g}", " to ".join(f"{b:.4g}" for b in bounds[n]))
         for n, value in found.best.values.items()
     ]
-    for what, unit, form in (("cost", "", ".3f"), ("chaotic_rpm", "rpm", ".0f")):
-        then, now = (format(value, form) for value in document[what].values())
-        rows.append((what.removesuffix("_rpm"), unit, then, now, ""))
+    said = (
+        ("cost", "cost", "", ".3f"),
+        ("chaotic_rpm", "chaotic", "rpm", ".0f"),
+        ("wear_load_N_m_per_s", "wear load of the land", "N m/s", ".4g"),
+        ("peak_land_force_N", "peak land force", "N", ".4g"),
+        ("balance_grade_mm_per_s", "balance grade G", "mm/s", ".3g"),
+    )
+    for key, what, unit, form in said:
+        then, now = (format(value, form) for value in document[key].values())
+        rows.append((what, unit, then, now, ""))
     return Table(f"Design of {name}", ("parameter", "unit", "before", "after", "bounds"), rows)
 
 

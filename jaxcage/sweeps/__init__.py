@@ -5,9 +5,11 @@
 | `_engine`  | lanes in chunks, on all cores                      |
 | `_speed`   | sweeps over speed from several starts              |
 | `_monodromy` | monodromy matrices of many lanes                 |
+| `_averages` | means and peaks of forces and the like over revolutions |
 | `_carried` | run-up and run-down with the state carried along   |
 """
 
+from ._averages import averages as averages
 from ._carried import (
     Hysteresis as Hysteresis,
     run_up_down as run_up_down,

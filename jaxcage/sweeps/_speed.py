@@ -74,7 +74,7 @@ def sweep(
     system: AbstractForcedSystem,
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
-    starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
+    starts: int | Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
     confirm: bool = True,
@@ -91,8 +91,8 @@ def sweep(
 
     - `system`: any `AbstractForcedSystem`.
     - `speeds`: ascending speeds [rad/s]; `jaxcage.rpm` makes them from revolutions per minute.
-    - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; by default the
-        system's own.
+    - `starts`: initial states, each a tuple of numbers, or an array with its own states for each speed; or how many of
+        the system's own; by default all of these.
     - `discard`, `revolutions`: revolutions left out at the beginning, and observed after that.
     - `confirm`: run what is not periodic, its neighbours in speed and a tenth of the rest again with steps at most half
         as long, and what changes with finer ones still (`Sweep.confirmed`).
@@ -125,7 +125,7 @@ def sweep_designs(
     systems: Sequence[AbstractForcedSystem],
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
-    starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
+    starts: int | Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
     revolutions: int = 300,
     confirm: bool = True,
@@ -233,11 +233,16 @@ def assemble(
 def initial_states(
     system: AbstractForcedSystem,
     speed: np.ndarray,
-    starts: Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None,
+    starts: int | Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None,
 ) -> Float[np.ndarray, "speeds starts dim"]:
-    """A state for each speed and start: the system's own, the same ones at every speed, or as given."""
-    if starts is None:
-        return np.asarray(_own_starts(system, jnp.asarray(speed)))
+    """A state for each speed and start: the system's own, some of them, the same ones at every speed, or as given."""
+    if starts is None or isinstance(starts, int):
+        own = np.asarray(_own_starts(system, jnp.asarray(speed)))
+        if starts is not None and not 1 <= starts <= own.shape[1]:
+            raise ArgumentError(
+                "starts", said=f"must be 1 to {own.shape[1]}, as many as the system has, but {starts} was given."
+            )
+        return own[:, :starts]
     wanted = f"states of {system.dimension} numbers"
     if isinstance(starts, np.ndarray):
         if starts.ndim != 3 or starts.shape[::2] != (speed.size, system.dimension):

@@ -1,0 +1,110 @@
+"""What running costs the guiding land: the force with which the cage meets it, and the load that wears it.
+
+Archard's law (J. F. Archard, J. Appl. Phys. 24 (1953) 981): the volume worn off is k N s, with the normal force N, the
+way s slid and a specific wear rate k of the two surfaces and their oil. k is a shop's own number and the same before
+and after; what a design changes is the mean of N times the sliding speed.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._errors import ArgumentError
+from ..analysis import Sweep
+from ..models import CageModel
+from ..sweeps import averages
+from ._chaos import ChaosMeasure
+from ._objective import AbstractObjective, DesignSpace, Measured
+
+
+MEASURES = {"wear load": "N m/s", "peak land force": "N"}
+
+
+def land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array]:
+    """Size of the land's contact force on the cage [N]."""
+    n = len(state) // 2
+    q, v = state[:n], state[n:]
+    if n == 4:  # an elastic rib moves too
+        q, v = (q[0] - q[2], q[1] - q[3]), (v[0] - v[2], v[1] - v[3])
+    fx, fy, _ = model.cage_at(speed).forces(tau, *q, *v)["contact"]
+    return (jnp.sqrt(fx * fx + fy * fy),)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LandMeasure(AbstractObjective):
+    """The mean over speeds, weighted as in `chaos`, of what its designs' land feels; the mean over their starts.
+
+    `wear load` [N m/s]: mean contact force times the speed at which the cage's land slides on the rib's; `peak land
+    force` [N]: its largest value over some revolutions. Slopes come from the same cloud of designs, and the same
+    simulations, as those of `chaos`.
+    """
+
+    chaos: ChaosMeasure
+    what: str = "wear load"
+    revolutions: int = 8
+
+    def __post_init__(self):
+        if self.what not in MEASURES:
+            raise ArgumentError("what", said=f"must be one of {', '.join(MEASURES)}, but '{self.what}' was given.")
+
+    def at_speeds(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
+        """At each speed; NaN where every start of a design failed."""
+        last = self.chaos.run(space, places).last
+        models: list[Any] = [space.model(place) for place in places]
+        return _loads(models, self.chaos.speeds, last, self.revolutions)[self.what]
+
+    def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
+        weights = self.chaos.weights / np.sum(self.chaos.weights)
+        return self.at_speeds(space, np.asarray(places)) @ weights
+
+    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
+        return self.chaos.through_cloud(space, places, self.values)
+
+    def relative(self, space: DesignSpace, price: float) -> AbstractObjective:
+        """`price` times this over what the design itself has; where that is next to nothing, over what its weight would
+        do: as a peak the whole of it, as a mean force a hundredth."""
+        model: Any = space.system
+        weight = float(model.cage_mass * model.gravity)
+        least = weight
+        if self.what == "wear load":
+            least *= 0.01 * float(np.average(self.chaos.speeds, weights=self.chaos.weights) * model.land_radius)
+        own = float(self.values(space, space.place[None])[0])
+        return price / (max(own, least) if np.isfinite(own) else least) * self
+
+
+def land_loads(model: CageModel, found: Sweep, error: float | None = None) -> dict[str, Float[np.ndarray, " speeds"]]:
+    """Wear load [N m/s] and peak land force [N] at each speed of a sweep, the mean of its starts, over revolutions that
+    begin where it ended.
+
+    **Arguments:** model and its sweep; error of a revolution, by default that of `jaxcage.controlled`.
+    """
+    return {name: rows[0] for name, rows in _loads([model], found.speed, found.last[None], error=error).items()}
+
+
+def _loads(
+    models: Sequence[Any],
+    speeds: Float[np.ndarray, " speeds"],
+    last: Float[np.ndarray, "k speeds starts dim"],
+    revolutions: int = 8,
+    error: float | None = None,
+) -> dict[str, Float[np.ndarray, "k speeds"]]:
+    starts = last.shape[2]
+    which = np.repeat(np.arange(len(models)), speeds.size * starts)
+    speed = np.tile(np.repeat(speeds, starts), len(models))
+    states = last.reshape(-1, last.shape[-1])
+    mean, largest = averages(models, speed, states, which, land_force, revolutions, error)
+    radius = np.array([float(m.land_radius) for m in models])[which]
+
+    def mean_of_starts(found: np.ndarray) -> np.ndarray:
+        rows = found.reshape(len(models), speeds.size, starts)
+        known = np.isfinite(rows)
+        return np.sum(np.where(known, rows, 0.0), axis=2) / np.where(known.any(axis=2), known.sum(axis=2), np.nan)
+
+    return {
+        "wear load": mean_of_starts(mean[:, 0] * speed * radius),
+        "peak land force": mean_of_starts(largest[:, 0]),
+    }
