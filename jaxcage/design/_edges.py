@@ -106,7 +106,7 @@ def zone_width(edges: FollowedEdges, zone: int = 1, range_rpm: tuple[float, floa
     first, last = range_rpm or (0.0, 0.0)
     ends = {"onset": (-1.0, -first), "exit": (1.0, last)}
     weights = {names[end]: ends[end][0] for end in known}
-    return EdgeSum(edges, weights, sum(ends[end][1] for end in names if end not in known))
+    return EdgeSum(edges, weights, sum((ends[end][1] for end in names if end not in known), start=0.0))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
