@@ -61,6 +61,44 @@ def choice(*options: str, text: str, **kwargs: Any) -> Any:
     return eqx.field(static=True, metadata={"choice": options, "text": text}, **kwargs)
 
 
+NOT_GIVEN: Any = None
+"""In the place of a reading that nobody chose: `__check_init__` refuses it."""
+
+
+def reading(text: str, **options: str) -> Any:
+    """A choice between two readings of the paper that has no default: `options` says in words what each means.
+
+    A module that holds one calls `require_readings` when it is made.
+    """
+    metadata = {"choice": tuple(options), "text": text, "readings": options}
+    return eqx.field(static=True, default=NOT_GIVEN, metadata=metadata)
+
+
+def must_be_given(options: dict[str, str]) -> str:
+    """What is said of a reading that nobody chose."""
+    return "must be given, " + " or ".join(f'"{name}" ({words})' for name, words in options.items())
+
+
+def require_readings(module: eqx.Module) -> None:
+    """**Raises:** `ValueError`, one sentence, for readings of `module` that were left out or that it does not offer."""
+    fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
+    missing = [f for f in fields if getattr(module, f.name) is NOT_GIVEN]
+    if missing:
+        first, *rest = missing
+        also = "".join(f", and `{f.name}` {must_be_given(f.metadata['readings'])}" for f in rest)
+        raise ArgumentError(first.name, said=f"{must_be_given(first.metadata['readings'])}{also}.")
+    for field in fields:
+        if (given := getattr(module, field.name)) not in field.metadata["choice"]:
+            offered = ", ".join(field.metadata["choice"])
+            raise ArgumentError(field.name, said=f"must be one of {offered}, but {given!r} was given.")
+
+
+def readings_of(module: eqx.Module) -> dict[str, tuple[str, str]]:
+    """Reading by name, with what it means in words."""
+    fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
+    return {f.name: (getattr(module, f.name), f.metadata["readings"][getattr(module, f.name)]) for f in fields}
+
+
 def count(lower: int, upper: int, text: str, **kwargs: Any) -> Any:
     """A static whole number, e.g. of rollers."""
     return eqx.field(static=True, metadata={"count": (lower, upper), "text": text}, **kwargs)

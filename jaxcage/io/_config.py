@@ -25,6 +25,7 @@ from typing import Any
 import equinox as eqx
 
 from .._checks import require_x64
+from .._parameters import must_be_given
 from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
@@ -37,6 +38,10 @@ _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
     ("lubricant", "grade"): lambda given: vg(_grade(given)),
 }
 """Keys by which a table starts from a ready-made module."""
+
+
+_OLD = {"clearance_reading": '"as_printed"', "unbalance": '"physical"'}
+"""What a file without a reading meant while it could be left out."""
 
 
 def load_model(path: str | Path) -> CageModel:
@@ -132,6 +137,10 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
     if missing:
         hint = "" if path else ', unless `base = "1a"` or the like gives the rest'
         raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
+    if readings := [f for f in values(kind) if "readings" in f.metadata and f.name not in arguments]:
+        said = ", and ".join(f"`{_dotted(path, f.name)}` {must_be_given(f.metadata['readings'])}" for f in readings)
+        before = " and ".join(_OLD[f.name] for f in readings)
+        raise ConfigError(f"{said}; before, a file without {'them' if len(readings) > 1 else 'it'} meant {before}.")
     try:
         return kind(**arguments)
     except ValueError as error:

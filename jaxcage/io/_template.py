@@ -33,7 +33,7 @@ def template() -> str:
         "exponent": impact.exponent,
     }
     words = {name: f"{float(value):.4g}" for name, value in numbers.items()}
-    filled = Template(text).substitute(words, unbalance=model.unbalance)
+    filled = Template(text).substitute(words)
     return "\n".join(map(_aligned, filled.splitlines())) + "\n"
 
 

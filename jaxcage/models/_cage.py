@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array
 
 from .._errors import ArgumentError
-from .._parameters import choice, parameter, with_numbers
+from .._parameters import parameter, reading, require_readings, with_numbers
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
 from ..forces import (
@@ -59,16 +59,21 @@ class CageModel(AbstractForcedSystem):
     gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
     load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", default=4450.0)
     printed_unit: Scalar = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
-    clearance_reading: ClearanceReading = choice(
-        "as_printed", "radial", text="radial clearance c = C_r (as printed) or C_r/2", default="as_printed"
+    clearance_reading: ClearanceReading = reading(
+        "radial clearance c of film, contact and land",
+        radial="c = C_r/2, as C_r is defined",
+        as_printed="c = C_r, as the paper uses it",
     )
-    unbalance: UnbalanceReading = choice(
-        "physical", "as_printed", text="eccentricity as given, or as (20) prints it", default="physical"
+    unbalance: UnbalanceReading = reading(
+        "centrifugal force of the mass centre",
+        physical="M e omega^2",
+        as_printed="2 M rho omega^2 with rho = e/C_r in mm, as the paper's eq. (20) reads",
     )
     extra: tuple[AbstractForce, ...] = eqx.field(default=(), converter=with_numbers)
     """Forces of one's own between land and cage, each a `jaxcage.forces.AbstractForce` named after its class."""
 
     def __check_init__(self) -> None:
+        require_readings(self)
         for name, kinds in PARTS.items():
             part = getattr(self, name)
             if isinstance(part, eqx.Module) and type(part) not in kinds:

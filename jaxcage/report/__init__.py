@@ -67,6 +67,11 @@ from ._paper_tables import (
     ranges_table as ranges_table,
     readings_table as readings_table,
 )
+from ._readings import (
+    readings_document as readings_document,
+    readings_words as readings_words,
+    short_readings as short_readings,
+)
 from ._slopes import (
     EXIT as EXIT,
     ONSET as ONSET,

@@ -18,6 +18,7 @@ from ._findings import Findings
 from ._operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict
 from ._orbit_tables import coexisting_notes, edge_table, loss_table
 from ._page_tables import at_speeds_table, checks_table, provenance_table, published_table, slope_tables
+from ._readings import readings_words
 from ._sources import parameter_rows, shown
 from ._statics import statics_table
 from ._table import Table, number
@@ -148,6 +149,7 @@ def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
         for old, new in words.items():
             states = [s.replace(old, new) for s in states]
         said.append(f"{_with_shaft(findings, j.at)}: {', '.join(states)}.")
+    said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
     if np.any(swept.failed):
         said.append(f"{int(np.sum(swept.failed))} of {swept.failed.size} simulations failed: nothing is known of them.")
     return said
