@@ -1,4 +1,4 @@
-"""Two readings of the paper that nobody takes by accident: they are given, or the model is refused; results name them."""
+"""Two readings of the paper that nobody takes by accident: without them a model is refused; results name them."""
 
 import dataclasses
 import json

@@ -84,23 +84,27 @@ def _of_options(error: ArgumentError, options: AnyOptions) -> Exception:
 
 
 def _complete(job: "Job[Any]", report: "Report") -> "Report":
-    """What is said after every command: the case, how long it took, and what was written."""
+    """What every command says: the case, how long it took, what was written, and shaft speeds in its tables."""
+    from ..report import with_shaft
+
     case = {"case": job.name} if job.name else {}
     read, named = _readings(job)
     time = {"seconds": round(job.seconds, 2)} if job.options.timed else {}
     said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
     files = [f"{key.replace('_', ' ').capitalize()}: {path}" for key, path in job.files.items() if path is not None]
     document = {**case, **report.document, **read, **time, **job.files}
-    return dataclasses.replace(report, document=document, notes=[*report.notes, *named, *said, *files])
+    tables = [with_shaft(table, job.ratio) if job.name else table for table in report.tables]
+    return dataclasses.replace(report, document=document, tables=tables, notes=[*report.notes, *named, *said, *files])
 
 
 def _readings(job: "Job[Any]") -> tuple[dict[str, Any], list[str]]:
-    """How the model reads what the paper leaves open, for programs and for people."""
+    """How the model reads what the paper leaves open, and its speeds, for programs and for people."""
     if not job.name:
         return {}, []
     from ..report import readings_document, readings_words
 
-    return {"readings": readings_document(job.model)}, [f"Readings: {readings_words(job.model)}"]
+    document = {"readings": readings_document(job.model), "cage_speed_ratio": job.ratio}
+    return document, [f"Readings: {readings_words(job.model)}"]
 
 
 def _print(report: "Report", as_json: bool) -> None:

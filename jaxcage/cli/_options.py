@@ -86,12 +86,15 @@ class IntegrationOptions(Options):
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Range(Options):
     first: Speed = 2500.0
-    """First cage speed [rpm], or with a unit, e.g. "300 rad/s"."""
+    """First cage speed [rpm], or with a unit or of the shaft, e.g. "300 rad/s", "6000 rpm shaft"."""
     last: Speed = 27500.0
     """Last cage speed [rpm]."""
 
     def check(self) -> None:
-        if self.last <= self.first:
+        mixed = getattr(self.first, "whose", None) != getattr(
+            self.last, "whose", None
+        )  # not before the bearing is read
+        if self.last <= self.first and not mixed:
             between = f"{self.first:g} to {self.last:g} rpm"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
 
@@ -259,7 +262,7 @@ class VaryOptions(_Range):
     """What may be changed and between which values, once for each parameter, e.g. guidance_gap=0.3mm:0.6mm; the
     guidance gap from 0.3 to 0.6 mm and the eccentricity from 5 to 60 um if left out."""
     first: Speed = 4000.0
-    """First cage speed that matters [rpm], or with a unit."""
+    """First cage speed that matters [rpm], or with a unit or of the shaft."""
     last: Speed = 27500.0
     """Last cage speed that matters [rpm]."""
     speeds: Annotated[int, whole(4)] = 48
@@ -320,7 +323,7 @@ class _AtSpeed(Options):
     timed: ClassVar[bool] = False
 
     speed: Speed
-    """Cage speed [rpm], or with a unit, e.g. "900 rad/s"."""
+    """Cage speed [rpm], or with a unit or of the shaft, e.g. "900 rad/s", "20000 rpm shaft"."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -384,7 +387,7 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
     """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is."""
 
     operating: str = ""
-    """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm] or "900 rad/s"."""
+    """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
     count: Annotated[int | None, whole(2)] = None
     """Number of speeds; 251, or 126 with --quick."""
     quick: bool = False

@@ -30,6 +30,7 @@ from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
 from ._schema import KINDS, ConfigError, read_value, submodules, values
+from ._speeds import WHOSE, Whose
 from ._units import printable, shown
 
 
@@ -44,8 +45,27 @@ _OLD = {"clearance_reading": '"as_printed"', "unbalance": '"physical"'}
 """What a file without a reading meant while it could be left out."""
 
 
+@dataclasses.dataclass(frozen=True)
+class BearingFile:
+    """What a TOML file says: a model, and how its speeds are meant."""
+
+    model: CageModel
+    speeds: Whose
+    """Whose speeds bare numbers of the commands are: key `speeds`, the cage's if left out."""
+    table: Mapping[str, Any]
+    """As it was read."""
+
+
 def load_model(path: str | Path) -> CageModel:
     """The model that the TOML file at `path` describes.
+
+    **Raises:** as `read_bearing`.
+    """
+    return read_bearing(path).model
+
+
+def read_bearing(path: str | Path) -> BearingFile:
+    """All that the TOML file at `path` says.
 
     **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the
     key, what was given and what is allowed; `RuntimeError` without double precision.
@@ -59,7 +79,7 @@ def load_model(path: str | Path) -> CageModel:
         reason = printable(str(error).rstrip("."))
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
     try:
-        return model_from(table)
+        return BearingFile(model_from(table), _whose(table), table)
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
 
@@ -68,7 +88,8 @@ def model_from(table: Mapping[str, Any]) -> CageModel:
     """The model that a nested mapping, as read from TOML, describes. **Raises:** `ConfigError`."""
     require_x64()
     rest = dict(table)
-    start = None
+    start, _ = None, _whose(rest)
+    rest.pop("speeds", None)
     if "base" in rest:
         name = rest.pop("base")
         if not isinstance(name, str) or name not in PUBLISHED_CASES:
@@ -78,6 +99,13 @@ def model_from(table: Mapping[str, Any]) -> CageModel:
     assert isinstance(model, CageModel)
     _check_together(model)
     return model
+
+
+def _whose(table: Mapping[str, Any]) -> Whose:
+    given = table.get("speeds", "cage")
+    if given not in WHOSE:
+        raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(given)}.")
+    return given
 
 
 def _build(
@@ -157,7 +185,7 @@ def _dotted(path: tuple[str, ...], name: str = "") -> str:
 
 def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple[str, ...]) -> None:
     extra = [key for (where, key) in _READY_MADE if (where,) == path]
-    allowed = [*([] if path else ["base"]), *extra, *keys, *(f"[{name}]" for name in tables)]
+    allowed = [*([] if path else ["base", "speeds"]), *extra, *keys, *(f"[{name}]" for name in tables)]
     for key in table:
         if key not in keys and key not in tables:
             where = f" in [{_dotted(path)}]" if path else " at the top level"

@@ -3,6 +3,7 @@
 | module           | responsibility                                                          |
 |------------------|-------------------------------------------------------------------------|
 | `_style`         | colours, frames, light, dark and print style, no global state           |
+| `_shaft`         | the shaft's speed beneath the cage's                                    |
 | `_marks`         | zones shaded and published edges marked on a speed axis                 |
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
@@ -47,6 +48,7 @@ from ._orbit_diagram import (
 )
 from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
 from ._section import strobe_section as strobe_section
+from ._shaft import add_shaft_axes as add_shaft_axes
 from ._stability_map import stability_map as stability_map
 from ._statics import load_bars as load_bars
 from ._style import (

@@ -98,6 +98,7 @@ from ._table import (
     number as number,
     shares_table as shares_table,
     shown_unit as shown_unit,
+    with_shaft as with_shaft,
 )
 from ._zone_tables import (
     transient_tables as transient_tables,

@@ -41,7 +41,7 @@ def at_speeds_table(findings: Findings, operating: Sequence[Operating]) -> Table
         "unstable orbits",
         "simulations by start",
     )
-    return Table("Orbits and simulations at the operating speeds", columns, rows)
+    return Table("Orbits and simulations at the operating speeds", columns, rows, ("speed [rpm]",))
 
 
 def slope_tables(findings: Findings) -> list[Table]:

@@ -44,7 +44,7 @@ def elasticities_table(name: str, slopes: Mapping[str, Sensitivity]) -> Table:
         **{n.replace("_", " "): f"{{0[1].elasticity[{n}]:+.4f}}" for n in FIRST},
         "status": "{0[1].status}",
     }
-    return Table.of(f"Elasticities of the exact edges of {name}", columns, slopes.items())
+    return Table.of(f"Elasticities of the exact edges of {name}", columns, slopes.items(), ("speed [rpm]",))
 
 
 def gradient_document(edges: Mapping[str, Sensitivity], wide: Sensitivity | None) -> dict[str, Any]:
@@ -68,7 +68,8 @@ def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Tab
     info, value = parameter_info(model), parameters(model)
     unit = lambda n: "" if info[n].unit == "1" else info[n].unit
     rows = [(n, f"{float(value[n]):.6g}", unit(n), f"{slope[n]:+.6g}", _elasticity_cell(change[n])) for n in order]
-    at = f"{sensitivity.value_rpm:.3f} ± {error_cell(sensitivity.error_rpm)} rpm"
+    shaft = sensitivity.value_rpm / float(model.bearing.cage_speed_ratio)
+    at = f"{sensitivity.value_rpm:.3f} ± {error_cell(sensitivity.error_rpm)} rpm (shaft {shaft:.0f} rpm)"
     title = f"{sensitivity.name.capitalize()} of {name}: {at}, {sensitivity.kind}"
     still = len(slope) - len(moving)
     columns = ("parameter", "value", "unit", "rpm per unit", "elasticity")
