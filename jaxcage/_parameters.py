@@ -9,7 +9,7 @@ import functools
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import equinox as eqx
 import jax
@@ -23,14 +23,32 @@ from ._errors import ArgumentError
 M = TypeVar("M", bound=eqx.Module)
 
 
+Kind = Literal["drawing", "catalogue", "oil", "operating", "unknown", "fixed"]
+SOURCES: dict[Kind, str] = {
+    "drawing": "drawing, or weighed and measured",
+    "catalogue": "catalogue of the bearing",
+    "oil": "data sheet of the oil",
+    "operating": "the machine",
+    "unknown": "nobody knows it unless it is measured",
+    "fixed": "constant of nature, of a law, or numerical",
+}
+"""Kinds of parameters, and where a value comes from."""
+
+
 @dataclasses.dataclass(frozen=True)
 class ParameterInfo:
-    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description."""
+    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, kind."""
 
     unit: str
     lower: float
     upper: float
     text: str
+    kind: Kind = "fixed"
+    """Who knows it."""
+    within: tuple[float, float] | None = None
+    """Range that an `unknown` one lies in, if nothing has been measured."""
+    source: str = ""
+    """Where its value comes from; of an `unknown` one, what to measure."""
 
 
 UNKNOWN = "?"
@@ -45,14 +63,26 @@ def _as_leaf(x: Any) -> Any:
     return jnp.asarray(np.asarray(x, dtype=float)) if isinstance(x, int | float) else x
 
 
-def parameter(unit: str, lower: float, upper: float, text: str, **kwargs: Any) -> Any:
+def parameter(
+    unit: str,
+    lower: float,
+    upper: float,
+    text: str,
+    *,
+    kind: Kind = "fixed",
+    within: tuple[float, float] | None = None,
+    source: str = "",
+    **kwargs: Any,
+) -> Any:
     """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
+
+    `kind` says who knows it, `within` in which range an unknown one lies, `source` what to measure.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    info = ParameterInfo(unit, lower, upper, text)
+    info = ParameterInfo(unit, lower, upper, text, kind, within, source or SOURCES[kind])
     return eqx.field(converter=_as_leaf, metadata={"parameter": info}, **kwargs)
 
 
@@ -243,6 +273,8 @@ def replace(module: M, **values: PyTree) -> M:
         offered = fields[choices[name]].metadata.get("choice") if name in choices else None
         if offered and value not in offered:
             raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
+        if name in leaves and name not in parts:
+            _require_range(name, value, fields[leaves[name]].metadata["parameter"])
     if exchanged := {name: values[name] for name in parts if name in values}:
         module = _with_parts(module, exchanged)
     changed = [name for name in leaves if name in values and name not in parts]
@@ -256,6 +288,23 @@ def replace(module: M, **values: PyTree) -> M:
         if name in values and name not in own:
             module = _with_static(module, path, values[name])
     return module
+
+
+def allowed(info: ParameterInfo) -> str:
+    """What a parameter must be, as every refusal of a number says it."""
+    unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
+    return f"must be a number from {info.lower:g} to {info.upper:g}{unit}"
+
+
+def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
+    """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
+    if isinstance(value, jax.core.Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
+        return
+    numbers = np.asarray(value, dtype=float)
+    wrong = numbers[~((numbers >= info.lower) & (numbers <= info.upper))]
+    if wrong.size:
+        unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
+        raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong.flat[0]:g}{unit}.")
 
 
 def _with_parts(module: M, parts: dict[str, Any]) -> M:

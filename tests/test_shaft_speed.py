@@ -51,6 +51,14 @@ def test_ends_of_a_range_may_belong_to_either(mine: str):
         asked("sweep", "1a", "--first", "9000", "--last", "20000 rpm shaft")
 
 
+def test_a_cage_that_would_burst_is_refused():
+    with pytest.raises(
+        InputError, match="Option --speed must be a cage speed of at most 41.* rpm, .*60000 rpm was given"
+    ):
+        asked("simulate", "1a", "--speed", "60000")
+    assert asked("simulate", "1a", "--speed", "60000 rpm shaft").speed == pytest.approx(60000 * RATIO)
+
+
 @pytest.mark.parametrize("text", ["20000 rpm shaft cage", "20000 rpm spindle", "20000 shafts"])
 def test_whose_speed_is_said_in_one_word(text: str):
     with pytest.raises(InputError, match="Option --speed must be a number in rpm") as refusal:

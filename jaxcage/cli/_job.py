@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import functools
+import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -17,11 +18,12 @@ from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import Whose, cage_rpm, check_writable, read_bearing, replacing, write_columns
-from ..models import CageModel, case
+from ..models import FASTEST, CageModel, case, fastest_speed
 from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
 from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
+from ._readers import flag
 
 
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
@@ -70,6 +72,13 @@ class Job(Generic[Given]):
             return options
         found = dataclasses.replace(options, **{n: cage_rpm(v, self.speeds, self.ratio) for n, v in given.items()})
         found.check()
+        limit = fastest_speed(self.model) * 30 / math.pi
+        for name in given:
+            if (speed := getattr(found, name)) > limit:
+                raise InputError(
+                    f"Option {flag(name)} must be a cage speed of at most {limit:.0f} rpm, which is {FASTEST:g} m/s at its "
+                    f'land, but {speed:g} rpm was given: is that the shaft\'s (write "{speed:g} rpm shaft")?'
+                )
         return found
 
     @property

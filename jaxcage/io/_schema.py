@@ -12,7 +12,7 @@ from typing import Any
 import equinox as eqx
 
 from .._errors import InputError
-from .._parameters import ParameterInfo
+from .._parameters import ParameterInfo, allowed as must_be
 from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
 from ._units import printable, shown, to_si
 
@@ -81,7 +81,7 @@ def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
 
 def _read_number(name: str, value: Any, info: ParameterInfo) -> float:
     unit = "" if info.unit == "1" else f" {info.unit}"
-    allowed = f"`{name}` must be a number from {info.lower:g} to {info.upper:g}{unit}"
+    allowed = f"`{name}` {must_be(info)}"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ConfigError(f"{allowed}, but is {shown(value)}.")
     try:

@@ -28,6 +28,7 @@ from ..forces import (
 )
 from ._cage_at_speed import FORCES, CageAtSpeed, ElasticRibLaw, RigidRibLaw
 from ._field import AbstractField, SecondOrderField
+from ._printed import printed
 from ._system import AbstractForcedSystem
 
 
@@ -52,13 +53,17 @@ class CageModel(AbstractForcedSystem):
     contact: LandContact
     support: Support
     impact: SynchronousImpact | RollerPassImpact
-    cage_mass: Scalar = parameter("kg", 1e-3, 100.0, "cage mass M")
-    guidance_gap: Scalar = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib")
-    eccentricity: Scalar = parameter("m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre")
+    cage_mass: Scalar = parameter("kg", 1e-3, 100.0, "cage mass M", kind="drawing")
+    guidance_gap: Scalar = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib", kind="drawing")
+    eccentricity: Scalar = parameter(
+        "m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre", kind="drawing"
+    )
     rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
-    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
-    load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", default=4450.0)
-    printed_unit: Scalar = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
+    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", kind="fixed", default=9.81)
+    load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", kind="operating", default=4450.0)
+    printed_unit: Scalar = parameter(
+        "m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", kind="fixed", default=1e-3
+    )
     clearance_reading: ClearanceReading = reading(
         "radial clearance c of film, contact and land",
         radial="c = C_r/2, as C_r is defined",
@@ -91,6 +96,9 @@ class CageModel(AbstractForcedSystem):
                     f"{name}.smoothing",
                     said=f"must be at most a tenth of the clearance, {room:g} mm, but is {given:g} mm.",
                 )
+
+    def __str__(self) -> str:
+        return printed(self)
 
     @property
     def dimension(self) -> int:
