@@ -76,8 +76,8 @@ class Job(Generic[Given]):
         for name in given:
             if (speed := getattr(found, name)) > limit:
                 raise InputError(
-                    f"Option {flag(name)} must be a cage speed of at most {limit:.0f} rpm, which is {FASTEST:g} m/s at its "
-                    f'land, but {speed:g} rpm was given: is that the shaft\'s (write "{speed:g} rpm shaft")?'
+                    f"Option {flag(name)} must be a cage speed of at most {limit:.0f} rpm, which is {FASTEST:g} m/s at "
+                    f'its land, but {speed:g} rpm was given: is that the shaft\'s (write "{speed:g} rpm shaft")?'
                 )
         return found
 
