@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
-from ..io import Whose, cage_rpm, check_writable, read_bearing, replacing, write_columns
+from ..io import BearingFile, Unknown, Whose, cage_rpm, check_writable, read_bearing, replacing, write_columns
 from ..models import FASTEST, CageModel, case, fastest_speed
 from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
@@ -44,15 +44,23 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            self.name, self.model, self.published, self.speeds, self.table = _subject(options.case)
+            self.name, self.model, self.published, self.file = _subject(options.case)
             self.options = self._of_the_cage(options)
 
     model: CageModel
     published: PublishedCase | None
-    speeds: Whose = "cage"
-    """Whose speeds bare numbers are, as the file says."""
-    table: Mapping[str, Any] | None = None
+    file: BearingFile | None = None
     """What the TOML file says, None for a published case."""
+
+    @property
+    def speeds(self) -> Whose:
+        """Whose speeds bare numbers are."""
+        return "cage" if self.file is None else self.file.speeds
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What the file knows within ranges only."""
+        return () if self.file is None else self.file.unknowns
 
     @property
     def ratio(self) -> float:
@@ -162,26 +170,23 @@ def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     return path
 
 
-Subject = tuple[str, CageModel, PublishedCase | None, Whose, Mapping[str, Any] | None]
-
-
-def _subject(given: str) -> Subject:
-    """Name and model of a case or TOML file, and what else it says; a broken design rule is said on standard error."""
-    speeds, table = "cage", None
+def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None, BearingFile | None]:
+    """Name and model of a case or TOML file; a broken design rule is said on standard error."""
+    file = None
     if given in PUBLISHED_CASES:
         name, model, published = given, case(given), PUBLISHED_CASES[given]
     elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
         stem = Path(given).stem
         name = "".join(c if c.isprintable() and c != "$" else "_" for c in stem)  # as matplotlib shows it
-        read = read_bearing(given)
-        model, published, speeds, table = read.model, None, read.speeds, read.table
+        file = read_bearing(given)
+        model, published = file.model, None
     else:
         known = ", ".join(PUBLISHED_CASES)
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
     broken = design_rule_violations(model.bearing, model.guidance_gap)
     if broken:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
-    return name, model, published, speeds, table
+    return name, model, published, file
 
 
 def _method(options: IntegrationOptions) -> AbstractMethod | None:

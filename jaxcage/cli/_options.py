@@ -111,8 +111,14 @@ class _Length(Options):
 class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones."""
 
-    count: FromOne = 251
-    """Number of speeds; with one, only the first speed is run."""
+    count: Annotated[int | None, whole(1)] = None
+    """Number of speeds, 251 if left out, 40 where ranges are drawn from; with one, only the first speed is run."""
+    draws: FromTwo = 64
+    """Draws from what the file knows within ranges only, each run once at every speed, 100 revolutions after 100."""
+    seed: FromZero = 0
+    """Seed of the draws."""
+    nominal: bool = False
+    """Take the best guesses of what is known within ranges only, as if they were known."""
     confirm: bool = True
     """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
     horizon: FromZero = 3000
@@ -123,7 +129,7 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Speeds of a waterfall of spectra of the vertical motion; none by default."""
 
     def check(self) -> None:
-        if self.count > 1:
+        if self.count != 1:
             super().check()
 
 
@@ -390,6 +396,10 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
     """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
     count: Annotated[int | None, whole(2)] = None
     """Number of speeds; 251, or 126 with --quick."""
+    draws: Annotated[int, whole(0)] = 64
+    """Draws from what the file knows within ranges only; 0 takes the best guesses alone."""
+    seed: FromZero = 0
+    """Seed of the draws."""
     quick: bool = False
     """Leave out what takes long: gradients, mechanisms of chaotic edges, curves of the map."""
 

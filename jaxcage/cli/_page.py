@@ -35,7 +35,9 @@ def report_on(job: Job[ReportOptions]) -> Report:
             orbit_method=job.asked,
             progress=say,
         )
-    html = report.page(findings, operating, table=job.table, command=_command(options))
+    html = report.page(
+        findings, operating, table=None if job.file is None else job.file.table, command=_command(options)
+    )
     job.text(html, job.path(".html"), "report")
     judged = report.judge(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())

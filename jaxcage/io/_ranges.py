@@ -51,8 +51,8 @@ class Range:
             middle, sigma = (self.lower + self.upper) / 2, (self.upper - self.lower) / (2 * SIGMAS)
             return np.asarray(truncnorm.ppf(place, -SIGMAS, SIGMAS, loc=middle, scale=sigma))
         if self.is_logarithmic:
-            return self.lower * (self.upper / self.lower) ** np.asarray(place)
-        return self.lower + np.asarray(place) * (self.upper - self.lower)
+            return np.asarray(self.lower * (self.upper / self.lower) ** place)
+        return np.asarray(self.lower + place * (self.upper - self.lower))
 
 
 def is_range(text: str) -> bool:

@@ -15,6 +15,7 @@
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
 | `_elasticities`  | elasticities of edges as bars                                           |
 | `_zone_strip`    | zones of both kinds and operating speeds as bars                        |
+| `_chance`        | chance of chaos over speed with its error bars                          |
 | `_design`        | a search for a better design, and what came of it                       |
 | `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
@@ -24,6 +25,7 @@ from ._branches import (
     branch_diagram as branch_diagram,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
 )
+from ._chance import chance_of_chaos as chance_of_chaos
 from ._design import design_figure as design_figure, design_history as design_history
 from ._elasticities import elasticity_bars as elasticity_bars
 from ._history import (

@@ -19,6 +19,16 @@
 | `_page`          | the page                                                                    |
 """
 
+from ._chances import (
+    bands_table as bands_table,
+    chances_document as chances_document,
+    chances_notes as chances_notes,
+    chances_table as chances_table,
+    chances_tables as chances_tables,
+    measures as measures,
+    operating_chances as operating_chances,
+    unknowns_table as unknowns_table,
+)
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (
     before_and_after_tables as before_and_after_tables,
