@@ -9,7 +9,7 @@ import functools
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import equinox as eqx
 import jax
@@ -23,14 +23,32 @@ from ._errors import ArgumentError
 M = TypeVar("M", bound=eqx.Module)
 
 
+Kind = Literal["drawing", "catalogue", "oil", "operating", "unknown", "fixed"]
+SOURCES: dict[Kind, str] = {
+    "drawing": "drawing, or weighed and measured",
+    "catalogue": "catalogue of the bearing",
+    "oil": "data sheet of the oil",
+    "operating": "the machine",
+    "unknown": "nobody knows it unless it is measured",
+    "fixed": "constant of nature, of a law, or numerical",
+}
+"""Kinds of parameters, and where a value comes from."""
+
+
 @dataclasses.dataclass(frozen=True)
 class ParameterInfo:
-    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description."""
+    """What is known of a parameter beside its value: SI unit, closed range of sensible values, description, kind."""
 
     unit: str
     lower: float
     upper: float
     text: str
+    kind: Kind = "fixed"
+    """Who knows it."""
+    within: tuple[float, float] | None = None
+    """Range that an `unknown` one lies in, if nothing has been measured."""
+    source: str = ""
+    """Where its value comes from; of an `unknown` one, what to measure."""
 
 
 UNKNOWN = "?"
@@ -45,20 +63,70 @@ def _as_leaf(x: Any) -> Any:
     return jnp.asarray(np.asarray(x, dtype=float)) if isinstance(x, int | float) else x
 
 
-def parameter(unit: str, lower: float, upper: float, text: str, **kwargs: Any) -> Any:
+def parameter(
+    unit: str,
+    lower: float,
+    upper: float,
+    text: str,
+    *,
+    kind: Kind = "fixed",
+    within: tuple[float, float] | None = None,
+    source: str = "",
+    **kwargs: Any,
+) -> Any:
     """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
+
+    `kind` says who knows it, `within` in which range an unknown one lies, `source` what to measure.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    info = ParameterInfo(unit, lower, upper, text)
+    info = ParameterInfo(unit, lower, upper, text, kind, within, source or SOURCES[kind])
     return eqx.field(converter=_as_leaf, metadata={"parameter": info}, **kwargs)
 
 
 def choice(*options: str, text: str, **kwargs: Any) -> Any:
     """A static field that takes one of `options`."""
     return eqx.field(static=True, metadata={"choice": options, "text": text}, **kwargs)
+
+
+NOT_GIVEN: Any = None
+"""In the place of a reading that nobody chose: `__check_init__` refuses it."""
+
+
+def reading(text: str, **options: str) -> Any:
+    """A choice between two readings of the paper that has no default: `options` says in words what each means.
+
+    A module that holds one calls `require_readings` when it is made.
+    """
+    metadata = {"choice": tuple(options), "text": text, "readings": options}
+    return eqx.field(static=True, default=NOT_GIVEN, metadata=metadata)
+
+
+def must_be_given(options: dict[str, str]) -> str:
+    """What is said of a reading that nobody chose."""
+    return "must be given, " + " or ".join(f'"{name}" ({words})' for name, words in options.items())
+
+
+def require_readings(module: eqx.Module) -> None:
+    """**Raises:** `ValueError`, one sentence, for readings of `module` that were left out or that it does not offer."""
+    fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
+    missing = [f for f in fields if getattr(module, f.name) is NOT_GIVEN]
+    if missing:
+        first, *rest = missing
+        also = "".join(f", and `{f.name}` {must_be_given(f.metadata['readings'])}" for f in rest)
+        raise ArgumentError(first.name, said=f"{must_be_given(first.metadata['readings'])}{also}.")
+    for field in fields:
+        if (given := getattr(module, field.name)) not in field.metadata["choice"]:
+            offered = ", ".join(field.metadata["choice"])
+            raise ArgumentError(field.name, said=f"must be one of {offered}, but {given!r} was given.")
+
+
+def readings_of(module: eqx.Module) -> dict[str, tuple[str, str]]:
+    """Reading by name, with what it means in words."""
+    fields = [f for f in dataclasses.fields(module) if "readings" in f.metadata]
+    return {f.name: (getattr(module, f.name), f.metadata["readings"][getattr(module, f.name)]) for f in fields}
 
 
 def count(lower: int, upper: int, text: str, **kwargs: Any) -> Any:
@@ -205,6 +273,8 @@ def replace(module: M, **values: PyTree) -> M:
         offered = fields[choices[name]].metadata.get("choice") if name in choices else None
         if offered and value not in offered:
             raise ArgumentError(name, said=f"must be one of {', '.join(offered)}, but {value!r} was given.")
+        if name in leaves and name not in parts:
+            _require_range(name, value, fields[leaves[name]].metadata["parameter"])
     if exchanged := {name: values[name] for name in parts if name in values}:
         module = _with_parts(module, exchanged)
     changed = [name for name in leaves if name in values and name not in parts]
@@ -218,6 +288,23 @@ def replace(module: M, **values: PyTree) -> M:
         if name in values and name not in own:
             module = _with_static(module, path, values[name])
     return module
+
+
+def allowed(info: ParameterInfo) -> str:
+    """What a parameter must be, as every refusal of a number says it."""
+    unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
+    return f"must be a number from {info.lower:g} to {info.upper:g}{unit}"
+
+
+def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
+    """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
+    if isinstance(value, jax.core.Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
+        return
+    numbers = np.asarray(value, dtype=float)
+    wrong = numbers[~((numbers >= info.lower) & (numbers <= info.upper))]
+    if wrong.size:
+        unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
+        raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong.flat[0]:g}{unit}.")
 
 
 def _with_parts(module: M, parts: dict[str, Any]) -> M:

@@ -237,7 +237,7 @@ def test_smoothing_is_checked_of_what_was_asked_for_and_not_of_a_half_of_it():
     radial = jc.replace(SMOOTH, clearance_reading="radial", guidance_gap=1e-4)
     read = {"unbalance": "as_printed", "clearance_reading": "as_printed", "film.n_lands": 1}
     assert float(jc.replace(radial, contact=jc.replace(SMOOTH.contact, smoothing=8e-6), **read).clearance) == 1e-4
-    assert jc.replace(SMOOTH, **{"contact.smoothing": 4.5e-5 * (1 - 1e-12)}).dimension == 4
+    assert jc.replace(SMOOTH, **{"guidance_gap": 1e-4, "contact.smoothing": 1e-5 * (1 - 1e-12)}).dimension == 4
 
 
 def test_smoothing_of_many_models_at_once_is_checked():

@@ -19,8 +19,8 @@ class CageGeometry(eqx.Module):
     NU2310 and give 0.22-0.32 kg; the defaults give 0.255 kg at C_r = 0.45 mm.
     """
 
-    inner_diameter: Scalar = parameter("m", 1e-3, 4.0, "inner diameter of the cage", default=75e-3)
-    cage_width: Scalar = parameter("m", 1e-3, 1.0, "axial width of the cage", default=35e-3)
+    inner_diameter: Scalar = parameter("m", 1e-3, 4.0, "inner diameter of the cage", kind="drawing", default=75e-3)
+    cage_width: Scalar = parameter("m", 1e-3, 1.0, "axial width of the cage", kind="drawing", default=35e-3)
     material: Material = eqx.field(default_factory=brass)
 
 

@@ -17,18 +17,18 @@ from ._validate import is_concrete
 class Bearing(eqx.Module):
     """A cylindrical roller bearing with its outer ring at rest and the shaft in its inner ring."""
 
-    bore: Scalar = parameter("m", 1e-3, 2.0, "bore diameter")
-    outside_diameter: Scalar = parameter("m", 1e-3, 4.0, "outside diameter")
-    width: Scalar = parameter("m", 1e-3, 1.0, "width of the rings")
+    bore: Scalar = parameter("m", 1e-3, 2.0, "bore diameter", kind="catalogue")
+    outside_diameter: Scalar = parameter("m", 1e-3, 4.0, "outside diameter", kind="catalogue")
+    width: Scalar = parameter("m", 1e-3, 1.0, "width of the rings", kind="catalogue")
     n_rollers: int = count(3, 200, "number of rollers Z")
-    roller_diameter: Scalar = parameter("m", 1e-4, 0.5, "roller diameter d_w")
-    roller_length: Scalar = parameter("m", 1e-4, 0.5, "roller length l")
-    rib_diameter: Scalar = parameter("m", 1e-3, 4.0, "inner diameter d_g of the outer ring's ribs")
-    inner_raceway_diameter: Scalar = parameter("m", 1e-3, 4.0, "inner raceway diameter d_i")
-    radial_clearance: Scalar = parameter("m", 0.0, 1e-3, "radial clearance G_r, on the diameter")
-    pocket_clearance: Scalar = parameter("m", 0.0, 1e-2, "pocket clearance T, on the diameter")
+    roller_diameter: Scalar = parameter("m", 1e-4, 0.5, "roller diameter d_w", kind="catalogue")
+    roller_length: Scalar = parameter("m", 1e-4, 0.5, "roller length l", kind="catalogue")
+    rib_diameter: Scalar = parameter("m", 1e-3, 4.0, "inner diameter d_g of the outer ring's ribs", kind="drawing")
+    inner_raceway_diameter: Scalar = parameter("m", 1e-3, 4.0, "inner raceway diameter d_i", kind="catalogue")
+    radial_clearance: Scalar = parameter("m", 0.0, 1e-3, "radial clearance G_r, on the diameter", kind="catalogue")
+    pocket_clearance: Scalar = parameter("m", 0.0, 1e-2, "pocket clearance T, on the diameter", kind="drawing")
     palmgren_constant: Scalar = parameter(
-        "Pa", 1e8, 1e13, "Palmgren's line-contact constant C_P", default=PALMGREN_CONSTANT
+        "Pa", 1e8, 1e13, "Palmgren's line-contact constant C_P", kind="fixed", default=PALMGREN_CONSTANT
     )
     roller_material: Material = eqx.field(default_factory=bearing_steel)
 

@@ -53,14 +53,14 @@ def walther_viscosity(
 class Lubricant(eqx.Module):
     """An oil given by its density and two points of its viscosity-temperature line."""
 
-    density: Scalar = parameter("kg/m^3", 500.0, 2000.0, "density of the oil")
-    viscosity_1: Scalar = parameter("m^2/s", 1e-6, 1e-1, "kinematic viscosity at temperature_1")
-    temperature_1: Scalar = parameter("K", 200.0, 600.0, "temperature of the first point")
-    viscosity_2: Scalar = parameter("m^2/s", 1e-6, 1e-1, "kinematic viscosity at temperature_2")
-    temperature_2: Scalar = parameter("K", 200.0, 600.0, "temperature of the second point")
-    temperature: Scalar = parameter("K", 200.0, 600.0, "operating temperature", default=CELSIUS_40)
+    density: Scalar = parameter("kg/m^3", 500.0, 2000.0, "density of the oil", kind="oil")
+    viscosity_1: Scalar = parameter("m^2/s", 1e-6, 1e-1, "kinematic viscosity at temperature_1", kind="oil")
+    temperature_1: Scalar = parameter("K", 200.0, 600.0, "temperature of the first point", kind="oil")
+    viscosity_2: Scalar = parameter("m^2/s", 1e-6, 1e-1, "kinematic viscosity at temperature_2", kind="oil")
+    temperature_2: Scalar = parameter("K", 200.0, 600.0, "temperature of the second point", kind="oil")
+    temperature: Scalar = parameter("K", 200.0, 600.0, "operating temperature", kind="operating", default=CELSIUS_40)
     reference_viscosity: Scalar = parameter(
-        "m^2/s", 1e-7, 1e-5, "1 mm^2/s, the unit in the double logarithm of ASTM D341", default=1e-6
+        "m^2/s", 1e-7, 1e-5, "1 mm^2/s, the unit in the double logarithm of ASTM D341", kind="fixed", default=1e-6
     )
 
     def __check_init__(self) -> None:

@@ -9,9 +9,9 @@ from .._types import Scalar
 class Material(eqx.Module):
     """A linear elastic solid."""
 
-    density: Scalar = parameter("kg/m^3", 100.0, 30e3, "density of the solid")
-    youngs_modulus: Scalar = parameter("Pa", 1e8, 1e12, "Young's modulus")
-    poisson_ratio: Scalar = parameter("1", 0.0, 0.5, "Poisson's ratio")
+    density: Scalar = parameter("kg/m^3", 100.0, 30e3, "density of the solid", kind="catalogue")
+    youngs_modulus: Scalar = parameter("Pa", 1e8, 1e12, "Young's modulus", kind="catalogue")
+    poisson_ratio: Scalar = parameter("1", 0.0, 0.5, "Poisson's ratio", kind="catalogue")
 
 
 def brass() -> Material:

@@ -72,10 +72,10 @@ def impact(job: Job[ImpactOptions]) -> Report:
     with job.computing():
         v0 = approach_speed(law.approach_ratio, rpm(options.speed), model.bearing.pocket_clearance)
         history = impact_history(law, model.bearing.roller_mass, v0, jnp.asarray(1e-3 * options.duration))
-    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, approach at {float(v0):.3g} m/s"
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {job.at_speed}, approach at {float(v0):.3g} m/s"
     job.draw(lambda ax: impact_forces(history, ax), (7.0, 4.0), title, detail=at)
     units = {"time": "s", "contact_force": "N", "bar_force": "N", "roller_position": "m", "bar_position": "m"}
     job.columns({f"{n} [{unit}]": np.asarray(getattr(history, n)) for n, unit in units.items()}, detail=at)
     values = {"approach_speed": float(v0)} | impact_document(history)
-    table = impact_table(f"Impact in {job.name} at {options.speed:g} rpm", values)
-    return Report({"speed_rpm": options.speed, **values}, [table])
+    table = impact_table(f"Impact in {job.name} at {job.at_speed}", values)
+    return Report({"speed_rpm": options.speed, "shaft_speed_rpm": options.speed / job.ratio, **values}, [table])

@@ -1,7 +1,9 @@
 """What a command has to work with: its options, the model and methods they ask for, and a folder to write to."""
 
 import contextlib
+import dataclasses
 import functools
+import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -15,12 +17,13 @@ from matplotlib.figure import Figure
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
-from ..io import check_writable, load_model, replacing, write_columns
-from ..models import CageModel, case
-from ..plotting import Style, new_figure, restyle
+from ..io import BearingFile, Unknown, Whose, cage_rpm, check_writable, read_bearing, replacing, write_columns
+from ..models import FASTEST, CageModel, case, fastest_speed
+from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
 from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
+from ._readers import flag
 
 
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
@@ -41,10 +44,50 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            self.name, self.model, self.published = _subject(options.case)
+            self.name, self.model, self.published, self.file = _subject(options.case)
+            self.options = self._of_the_cage(options)
 
     model: CageModel
     published: PublishedCase | None
+    file: BearingFile | None = None
+    """What the TOML file says, None for a published case."""
+
+    @property
+    def speeds(self) -> Whose:
+        """Whose speeds bare numbers are."""
+        return "cage" if self.file is None else self.file.speeds
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What the file knows within ranges only."""
+        return () if self.file is None else self.file.unknowns
+
+    @property
+    def ratio(self) -> float:
+        """Cage speed over shaft speed."""
+        return float(self.model.bearing.cage_speed_ratio)
+
+    @property
+    def at_speed(self) -> str:
+        """The one speed that a command is about, in words."""
+        cage = self.options.speed  # pyright: ignore[reportAttributeAccessIssue]
+        return f"{cage:g} rpm (shaft {cage / self.ratio:.0f} rpm)"
+
+    def _of_the_cage(self, options: Any) -> Any:
+        """Options with their speeds as cage speeds [rpm]: whatever comes after knows no others."""
+        given = {n: getattr(options, n) for n in ("first", "last", "speed") if getattr(options, n, None) is not None}
+        if not given:
+            return options
+        found = dataclasses.replace(options, **{n: cage_rpm(v, self.speeds, self.ratio) for n, v in given.items()})
+        found.check()
+        limit = fastest_speed(self.model) * 30 / math.pi
+        for name in given:
+            if (speed := getattr(found, name)) > limit:
+                raise InputError(
+                    f"Option {flag(name)} must be a cage speed of at most {limit:.0f} rpm, which is {FASTEST:g} m/s at "
+                    f'its land, but {speed:g} rpm was given: is that the shaft\'s (write "{speed:g} rpm shaft")?'
+                )
+        return found
 
     @property
     def method(self) -> AbstractMethod:
@@ -86,7 +129,9 @@ class Job(Generic[Given]):
         return self.folder / f"{self.command}_{self.name}{ending}"
 
     def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> None:
-        """Write a figure, and list it under `key`."""
+        """Write a figure with shaft speeds under its cage speeds, and list it under `key`."""
+        if self.name:
+            add_shaft_axes(figure, self.ratio)
         self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
 
     def draw(
@@ -125,21 +170,23 @@ def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     return path
 
 
-def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None]:
+def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None, BearingFile | None]:
     """Name and model of a case or TOML file; a broken design rule is said on standard error."""
+    file = None
     if given in PUBLISHED_CASES:
         name, model, published = given, case(given), PUBLISHED_CASES[given]
     elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
         stem = Path(given).stem
         name = "".join(c if c.isprintable() and c != "$" else "_" for c in stem)  # as matplotlib shows it
-        model, published = load_model(given), None
+        file = read_bearing(given)
+        model, published = file.model, None
     else:
         known = ", ".join(PUBLISHED_CASES)
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
     broken = design_rule_violations(model.bearing, model.guidance_gap)
     if broken:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
-    return name, model, published
+    return name, model, published, file
 
 
 def _method(options: IntegrationOptions) -> AbstractMethod | None:

@@ -8,7 +8,7 @@ import io
 import itertools
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
@@ -84,13 +84,35 @@ def _of_options(error: ArgumentError, options: AnyOptions) -> Exception:
 
 
 def _complete(job: "Job[Any]", report: "Report") -> "Report":
-    """What is said after every command: the case, how long it took, and what was written."""
+    """What every command says: the case, how long it took, what was written, and shaft speeds in its tables."""
+    from ..report import with_shaft
+
     case = {"case": job.name} if job.name else {}
+    read, named = _readings(job, report.document)
     time = {"seconds": round(job.seconds, 2)} if job.options.timed else {}
     said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
     files = [f"{key.replace('_', ' ').capitalize()}: {path}" for key, path in job.files.items() if path is not None]
-    document = {**case, **report.document, **time, **job.files}
-    return dataclasses.replace(report, document=document, notes=[*report.notes, *said, *files])
+    document = {**case, **report.document, **read, **time, **job.files}
+    tables = [with_shaft(table, job.ratio) if job.name else table for table in report.tables]
+    return dataclasses.replace(report, document=document, tables=tables, notes=[*report.notes, *named, *said, *files])
+
+
+def _readings(job: "Job[Any]", found: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """How the model reads what the paper leaves open, and its speeds, for programs and for people."""
+    if not job.name:
+        return {}, []
+    from ..report import readings_document, readings_words
+
+    document: dict[str, Any] = {"readings": readings_document(job.model), "cage_speed_ratio": job.ratio}
+    notes = [f"Readings: {readings_words(job.model)}"]
+    if job.file is not None:
+        document["left_as_in_template"] = job.file.left
+    if job.file is not None and job.file.left:
+        notes.append(f"As the template has them, of another bearing: {', '.join(job.file.left)}")
+    if job.unknowns and "chance_of_chaos" not in found:
+        document["best_guesses"] = [u.label for u in job.unknowns]
+        notes.append(f"Best guesses of what is known within ranges only: {', '.join(document['best_guesses'])}")
+    return document, notes
 
 
 def _print(report: "Report", as_json: bool) -> None:

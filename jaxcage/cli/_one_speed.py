@@ -28,11 +28,12 @@ def simulate_at(job: Job[SimulateOptions]) -> Report:
     if trajectory.outcome != "successful":
         raise NoResult(f"The simulation at {options.speed:g} rpm failed ({trajectory.outcome}): try more --steps.")
     forces, measures = cage_forces(model, trajectory), orbit_measures(model, trajectory)
-    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, {options.revolutions} revolutions"
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {job.at_speed}, {options.revolutions} revolutions"
     job.figure(simulation_figure(trajectory, forces, float(model.clearance), title), detail=at)
     job.listed("data", write_trajectory(job.path(f"{at}.csv"), trajectory, forces))
     document = {
         "speed_rpm": options.speed,
+        "shaft_speed_rpm": options.speed / job.ratio,
         "revolutions": options.revolutions,
         **chosen(trajectory, "outcome peak error"),
         "measures": dataclasses.asdict(measures),
@@ -65,7 +66,7 @@ def poincare_at(job: Job[PoincareOptions]) -> Report:
             progress=partial(say, ""),
         )
     require_some(found.outcome, f" at {options.speed:g} rpm")
-    at, title = f"_{options.speed:g}rpm", f"{job.name}, {options.speed:g} rpm, {options.revolutions} revolutions"
+    at, title = f"_{options.speed:g}rpm", f"{job.name}, {job.at_speed}, {options.revolutions} revolutions"
     names = [f"start {i + 1}: {label}" for i, label in enumerate(found.label[0])]
     job.draw(lambda ax: strobe_section(found.strobe[0], ax, names=names), (6.5, 5.4), title, detail=at)
     job.columns(strobe_columns(found), detail=at)
@@ -78,8 +79,8 @@ def poincare_at(job: Job[PoincareOptions]) -> Report:
         ),
     }
     length = f"{options.discard} + {options.revolutions} revolutions"
-    table = Table.of(f"Strobe section of {job.name} at {options.speed:g} rpm, {length}", columns, starts)
-    return Report({"speed_rpm": options.speed, "starts": starts}, [table])
+    table = Table.of(f"Strobe section of {job.name} at {job.at_speed}, {length}", columns, starts)
+    return Report({"speed_rpm": options.speed, "shaft_speed_rpm": options.speed / job.ratio, "starts": starts}, [table])
 
 
 def _starts(found: Sweep) -> list[dict[str, Any]]:

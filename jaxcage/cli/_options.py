@@ -86,12 +86,15 @@ class IntegrationOptions(Options):
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Range(Options):
     first: Speed = 2500.0
-    """First cage speed [rpm], or with a unit, e.g. "300 rad/s"."""
+    """First cage speed [rpm], or with a unit or of the shaft, e.g. "300 rad/s", "6000 rpm shaft"."""
     last: Speed = 27500.0
     """Last cage speed [rpm]."""
 
     def check(self) -> None:
-        if self.last <= self.first:
+        mixed = getattr(self.first, "whose", None) != getattr(
+            self.last, "whose", None
+        )  # not before the bearing is read
+        if self.last <= self.first and not mixed:
             between = f"{self.first:g} to {self.last:g} rpm"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
 
@@ -108,8 +111,14 @@ class _Length(Options):
 class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones."""
 
-    count: FromOne = 251
-    """Number of speeds; with one, only the first speed is run."""
+    count: Annotated[int | None, whole(1)] = None
+    """Number of speeds, 251 if left out, 40 where ranges are drawn from; with one, only the first speed is run."""
+    draws: FromTwo = 64
+    """Draws from what the file knows within ranges only, each run once at every speed, 100 revolutions after 100."""
+    seed: FromZero = 0
+    """Seed of the draws."""
+    nominal: bool = False
+    """Take the best guesses of what is known within ranges only, as if they were known."""
     confirm: bool = True
     """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
     horizon: FromZero = 3000
@@ -120,7 +129,7 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Speeds of a waterfall of spectra of the vertical motion; none by default."""
 
     def check(self) -> None:
-        if self.count > 1:
+        if self.count != 1:
             super().check()
 
 
@@ -259,7 +268,7 @@ class VaryOptions(_Range):
     """What may be changed and between which values, once for each parameter, e.g. guidance_gap=0.3mm:0.6mm; the
     guidance gap from 0.3 to 0.6 mm and the eccentricity from 5 to 60 um if left out."""
     first: Speed = 4000.0
-    """First cage speed that matters [rpm], or with a unit."""
+    """First cage speed that matters [rpm], or with a unit or of the shaft."""
     last: Speed = 27500.0
     """Last cage speed that matters [rpm]."""
     speeds: Annotated[int, whole(4)] = 48
@@ -326,7 +335,7 @@ class _AtSpeed(Options):
     timed: ClassVar[bool] = False
 
     speed: Speed
-    """Cage speed [rpm], or with a unit, e.g. "900 rad/s"."""
+    """Cage speed [rpm], or with a unit or of the shaft, e.g. "900 rad/s", "20000 rpm shaft"."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -390,9 +399,13 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
     """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is."""
 
     operating: str = ""
-    """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm] or "900 rad/s"."""
+    """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
     count: Annotated[int | None, whole(2)] = None
     """Number of speeds; 251, or 126 with --quick."""
+    draws: Annotated[int, whole(0)] = 64
+    """Draws from what the file knows within ranges only; 0 takes the best guesses alone."""
+    seed: FromZero = 0
+    """Seed of the draws."""
     quick: bool = False
     """Leave out what takes long: gradients, mechanisms of chaotic edges, curves of the map."""
 

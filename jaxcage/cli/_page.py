@@ -1,14 +1,11 @@
 """`jaxcage report`: one page about a design."""
 
 import shlex
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .. import report
 from .._errors import InputError
-from ..bearing import PUBLISHED_CASES
 from ..sweeps import rpm
 from ._job import Job, blocks_of
 from ._options import ReportOptions
@@ -22,7 +19,7 @@ SPEEDS, QUICK_SPEEDS = 251, 126
 def report_on(job: Job[ReportOptions]) -> Report:
     """Carry out `jaxcage report`."""
     options = job.options
-    operating = report.read_operating(options.operating)
+    operating = report.read_operating(options.operating, job.ratio, job.speeds)
     if options.operating and not operating:
         raise InputError(f"Option --operating must hold a speed, but '{options.operating}' was given.")
     count = options.count or (QUICK_SPEEDS if options.quick else SPEEDS)
@@ -38,7 +35,9 @@ def report_on(job: Job[ReportOptions]) -> Report:
             orbit_method=job.asked,
             progress=say,
         )
-    html = report.page(findings, operating, table=_table(options.case), command=_command(options))
+    html = report.page(
+        findings, operating, table=None if job.file is None else job.file.table, command=_command(options)
+    )
     job.text(html, job.path(".html"), "report")
     judged = report.judge(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())
@@ -46,11 +45,6 @@ def report_on(job: Job[ReportOptions]) -> Report:
     stages = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in findings.seconds.items())
     notes = [f"Failed simulations: {failed}", f"Stages: {stages}", f"Size: {size / 1e6:.1f} MB"]
     return Report(document, _tables(findings, judged), notes)
-
-
-def _table(case: str) -> Mapping[str, Any] | None:
-    """What the TOML file says, None for a published case."""
-    return None if case in PUBLISHED_CASES else tomllib.loads(Path(case).read_text(encoding="utf-8"))
 
 
 def _command(options: ReportOptions) -> str:
@@ -74,12 +68,13 @@ def _document(findings: report.Findings, judged: list[report.Judged]) -> dict[st
 
 def _tables(findings: report.Findings, judged: list[report.Judged]) -> list[report.Table]:
     swept = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
+    ratio = float(findings.model.bearing.cage_speed_ratio)
     rows = [
-        (str(j.at) if i == 0 else "", kind, v.state, str(v))
+        (*((str(j.at), str(j.at.of_shaft(ratio))) if i == 0 else ("", "")), kind, v.state, str(v))
         for j in judged
         for i, (kind, v) in enumerate(j.verdicts.items())
     ]
-    verdicts = report.Table("Operating speeds", ("cage speed", "kind of zone", "verdict", "where"), rows)
+    verdicts = report.Table("Operating speeds", ("cage speed", "shaft speed", "kind of zone", "verdict", "where"), rows)
     return [
         *([verdicts] if rows else []),
         report.loss_table(findings.name, findings.found, findings.loss, findings.published),

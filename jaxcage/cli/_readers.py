@@ -16,7 +16,7 @@ MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
 LONGEST = 200
 """Bytes in the name of a store: file systems have room for 255, and what is written aside has a longer name."""
-_EXAMPLES = {"rpm": '"900 rad/s"', "N": '"4.45 kN"', "ms": '"600 us"'}
+_EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"', "ms": '"600 us"'}
 
 
 def flag(name: str) -> str:
@@ -42,10 +42,13 @@ def read_quantity(text: str, unit: str) -> float:
     """
     with contextlib.suppress(ValueError):
         return float(text)  # "nan" and "inf" too: who reads it says what it wants instead
-    from ..io import to_si  # pint and xarray are loaded only when a unit is met
+    from ..io import SpeedOf, split_owner, to_si  # pint and xarray are loaded only when a unit is met
 
     try:
-        return to_si(text, unit)
+        if unit != "rpm":
+            return to_si(text, unit)
+        speed, whose = split_owner(text)
+        return to_si(speed, unit) if whose is None else SpeedOf(to_si(speed, unit), whose)
     except ValueError as error:
         example = _EXAMPLES[unit]
         raise ValueError(f"must be a number in {unit}, or one with a unit such as {example}, but {error}.") from None

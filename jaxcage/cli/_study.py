@@ -53,7 +53,7 @@ def study(job: Job[StudyOptions]) -> Report:
 
 
 def _plan(job: Job[StudyOptions]) -> Plan:
-    options, vary = job.options, read_vary(job.options.vary, job.model)
+    options, vary = job.options, read_vary(job.options.vary, job.model, job.speeds)
     sampled = {name: how for name, how in vary.items() if isinstance(how, Spread)}
     grid = {name: how for name, how in vary.items() if not isinstance(how, Spread)}
     starts = options.starts or len(job.model.starts(1.0))

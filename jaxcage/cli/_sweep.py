@@ -14,6 +14,7 @@ from ..io import save_sweep
 from ..orbits import explain, loss_zones, synchronous_orbits
 from ..plotting import sweep_figure, waterfall_map, zoomed_diagram
 from ..sweeps import rpm, sweep
+from ._chances import chances
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import SweepOptions, ZonesOptions
@@ -21,6 +22,7 @@ from ._show import Report
 
 
 ENDS = ("onset", "exit")
+SPEEDS = 251
 
 
 def _swept(job: Job[SweepOptions]) -> Sweep:
@@ -29,7 +31,7 @@ def _swept(job: Job[SweepOptions]) -> Sweep:
     with job.computing("sweep") as say:
         found = sweep(
             job.model,
-            rpm(options.first, options.last, options.count),
+            rpm(options.first, options.last, options.count or SPEEDS),
             **job.given("discard revolutions confirm horizon exponents"),
             blocks=blocks_of(options.revolutions),
             method=job.method,
@@ -42,6 +44,8 @@ def _swept(job: Job[SweepOptions]) -> Sweep:
 
 def sweep_over_speed(job: Job[SweepOptions]) -> Report:
     """`jaxcage sweep`: orbit diagram, exponents and zones of a case over speed."""
+    if job.unknowns and not job.options.nominal:
+        return chances(job)
     found = _swept(job)
     edges = zones(found)
     job.figure(sweep_figure(found, edges, job.published, _title(job, found)))
@@ -96,7 +100,7 @@ def _title(job: Job[SweepOptions], found: Sweep) -> str:
     what = job.name if job.published is None else f"Case {job.name}"
     gap, e = 1e3 * float(job.model.guidance_gap), 1e6 * float(job.model.eccentricity)
     lasting = f", chaos followed to {found.horizon} revolutions" if found.horizon else ""
-    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm{lasting}"
+    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm, {report.short_readings(job.model)}{lasting}"
 
 
 def _zoom(job: Job[SweepOptions], found: Sweep, edges: Zones) -> None:
@@ -121,6 +125,8 @@ def _waterfall(job: Job[SweepOptions], found: Sweep) -> None:
 
 def zones_over_speed(job: Job[ZonesOptions]) -> Report:
     """`jaxcage zones`: where the synchronous orbit is lost, with exact edges and gradients, beside where chaos is."""
+    if job.unknowns and not job.options.nominal:
+        return chances(job)
     swept = _swept(job)
     first, last = float(swept.speed[0]), float(swept.speed[-1])
     with job.computing("synchronous orbits") as say:

@@ -10,7 +10,7 @@ import numpy as np
 from .._errors import ArgumentError, InputError
 from .._parameters import parameter_info
 from ..design import Scatter, rayleigh, uniform
-from ..io import configuration, model_from, to_si
+from ..io import Whose, cage_rpm, configuration, model_from, to_si
 from ..models import CageModel
 from ..studies import OIL, SPEED, Between, Spread, Tolerance, with_values
 from ..sweeps import rpm
@@ -25,12 +25,12 @@ MOST_CORNERS = 256
 Vary = dict[str, np.ndarray | Spread]
 
 
-def read_vary(given: Sequence[str], model: CageModel) -> Vary:
-    """Every `NAME=VALUES`, in SI units.
+def read_vary(given: Sequence[str], model: CageModel, speeds: Whose = "cage") -> Vary:
+    """Every `NAME=VALUES`, in SI units; `speeds` says whose speeds those are that do not say it.
 
     **Raises:** `InputError`.
     """
-    found = _each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, values: _read(name, values, model))
+    found = _each("--vary", given, f"NAME=VALUES with {FORMS}", lambda name, values: _read(name, values, model, speeds))
     if SPEED not in found:
         raise InputError("Option --vary must be given for the speed too, e.g. --vary speed=12000rpm.")
     _check_corners(found, model)
@@ -96,8 +96,8 @@ def _each(option: str, given: Sequence[str], form: str, read: Callable[[str, str
     return found
 
 
-def _read(name: str, text: str, model: CageModel) -> np.ndarray | Spread:
-    number = _number(name, model)
+def _read(name: str, text: str, model: CageModel, speeds: Whose = "cage") -> np.ndarray | Spread:
+    number = _number(name, model, speeds)
     parts = text.split(":")
     if "+-" in text or "±" in text:
         found = Tolerance(*map(number, text.replace("±", "+-").split("+-", 1)))
@@ -115,11 +115,12 @@ def _read(name: str, text: str, model: CageModel) -> np.ndarray | Spread:
     return found
 
 
-def _number(name: str, model: CageModel) -> Callable[[str], float]:
+def _number(name: str, model: CageModel, speeds: Whose) -> Callable[[str], float]:
     """How a number of this parameter is read: with its unit, or bare in SI units, a speed in rpm."""
     known = parameter_info(model)
     if name == SPEED:
-        return lambda text: rpm(read_quantity(text.strip(), "rpm"))
+        ratio = float(model.bearing.cage_speed_ratio)
+        return lambda text: rpm(cage_rpm(read_quantity(text.strip(), "rpm"), speeds, ratio))
     if name not in (OIL, *known):
         raise InputError(f"Option --vary must name one of {', '.join([SPEED, OIL, *known])}, but names '{name}'.")
     return lambda text: to_si(text, "1" if name == OIL else known[name].unit)

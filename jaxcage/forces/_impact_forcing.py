@@ -29,9 +29,27 @@ def synchronous_force(tau: Scalar, amplitude: Scalar) -> tuple[Scalar, Scalar]:
 class SynchronousImpact(eqx.Module):
     """The paper's (15): one horizontal force at cage frequency that grows as a power of speed."""
 
-    amplitude: Scalar = parameter("N", 0.0, 1e5, "amplitude A at the reference speed")
-    exponent: Scalar = parameter("1", 0.0, 4.0, "power n of speed; 20/19 for a Hertz impact on a stiff bar")
-    reference_speed: Scalar = parameter("rad/s", 1.0, 1e5, "speed to which the amplitude belongs", default=1000.0)
+    amplitude: Scalar = parameter(
+        "N",
+        0.0,
+        1e5,
+        "amplitude A at the reference speed",
+        kind="unknown",
+        within=(5.0, 300.0),
+        source="once-a-revolution part of the acceleration of the cage, at one speed",
+    )
+    exponent: Scalar = parameter(
+        "1",
+        0.0,
+        4.0,
+        "power n of speed; 20/19 for a Hertz impact on a stiff bar",
+        kind="unknown",
+        within=(1.0, 2.0),
+        source="once-a-revolution part of the acceleration of the cage, at two speeds",
+    )
+    reference_speed: Scalar = parameter(
+        "rad/s", 1.0, 1e5, "speed to which the amplitude belongs", kind="fixed", default=1000.0
+    )
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "SynchronousForce":
         """The force at cage speed `speed` [rad/s]."""

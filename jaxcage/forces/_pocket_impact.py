@@ -22,12 +22,44 @@ class PocketImpact(eqx.Module):
     """Constants of the roller-bar oscillator; none is printed in the paper."""
 
     contact_stiffness: Scalar = parameter(
-        "N/m^(10/9)", 1e4, 1e13, "roller-bar line-contact stiffness K_cw", default=2e8
+        "N/m^(10/9)",
+        1e4,
+        1e13,
+        "roller-bar line-contact stiffness K_cw",
+        kind="unknown",
+        within=(2e7, 2e9),
+        source="press a roller on a bar: force over approach",
+        default=2e8,
     )
-    bar_stiffness: Scalar = parameter("N/m", 1e3, 1e10, "bending stiffness of a cage bar K_c", default=2.5e6)
-    bar_mass: Scalar = parameter("kg", 1e-5, 1.0, "effective mass of a cage bar M_c", default=4e-3)
+    bar_stiffness: Scalar = parameter(
+        "N/m",
+        1e3,
+        1e10,
+        "bending stiffness of a cage bar K_c",
+        kind="unknown",
+        within=(2.5e5, 2.5e7),
+        source="bend a bar, or a finite-element model of the cage",
+        default=2.5e6,
+    )
+    bar_mass: Scalar = parameter(
+        "kg",
+        1e-5,
+        1.0,
+        "effective mass of a cage bar M_c",
+        kind="unknown",
+        within=(1e-3, 1.6e-2),
+        source="a modal test of a bar, or a finite-element model of the cage",
+        default=4e-3,
+    )
     approach_ratio: Scalar = parameter(
-        "1", 1e-3, 10.0, "kappa in v_0 = kappa omega T, T the pocket clearance", default=0.45
+        "1",
+        1e-3,
+        10.0,
+        "kappa in v_0 = kappa omega T, T the pocket clearance",
+        kind="unknown",
+        within=(0.1, 1.0),
+        source="cage speed over roller speed in the pocket, by high-speed film",
+        default=0.45,
     )
 
 

@@ -23,7 +23,32 @@ class RigidRib(eqx.Module):
 class ElasticRib(eqx.Module):
     """A rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
 
-    mass: Scalar = parameter("kg", 1e-3, 100.0, "rib mass M_O")
-    stiffness: Scalar = parameter("N/m", 1.0, 1e12, "rib stiffness K_O")
-    damping: Scalar = parameter("N s/m", 0.0, 1e8, "rib damping B_O")
-    cubic_stiffness: Scalar = parameter("N/m^3", 0.0, 1e24, "cubic rib stiffness K_O3", default=0.0)
+    mass: Scalar = parameter("kg", 1e-3, 100.0, "rib mass M_O", kind="drawing")
+    stiffness: Scalar = parameter(
+        "N/m",
+        1.0,
+        1e12,
+        "rib stiffness K_O",
+        kind="unknown",
+        within=(5e6, 5e8),
+        source="tap the outer ring in its seat: the frequency it answers with",
+    )
+    damping: Scalar = parameter(
+        "N s/m",
+        0.0,
+        1e8,
+        "rib damping B_O",
+        kind="unknown",
+        within=(50.0, 5e3),
+        source="tap the outer ring in its seat: how fast the answer decays",
+    )
+    cubic_stiffness: Scalar = parameter(
+        "N/m^3",
+        0.0,
+        1e24,
+        "cubic rib stiffness K_O3",
+        kind="unknown",
+        within=(0.0, 1e16),
+        source="push the outer ring in its seat: force over way",
+        default=0.0,
+    )

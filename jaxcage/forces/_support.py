@@ -58,16 +58,72 @@ def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffnes
 class Support(eqx.Module):
     """Stiffness and damping between cage and rib; none of the values is printed in the paper."""
 
-    stiffness_x: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_x")
-    stiffness_y: Scalar = parameter("N/m", 0.0, 1e9, "support stiffness K_y")
-    damping: Scalar = parameter("N s/m", 0.0, 1e5, "support damping B_s")
-    cubic_stiffness: Scalar = parameter("N/m^3", 0.0, 1e18, "cubic stiffness K_3, for cubic = absolute", default=0.0)
-    cubic_ratio: Scalar = parameter(
-        "1", 0.0, 1e4, "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless", default=0.0
+    stiffness_x: Scalar = parameter(
+        "N/m",
+        0.0,
+        1e9,
+        "support stiffness K_x",
+        kind="unknown",
+        within=(1e4, 1e6),
+        source="tap the cage on its rib: the frequency it answers with",
     )
-    cross_stiffness: Scalar = parameter("N/m", -1e8, 1e8, "cross-coupling stiffness K_xy", default=0.0)
+    stiffness_y: Scalar = parameter(
+        "N/m",
+        0.0,
+        1e9,
+        "support stiffness K_y",
+        kind="unknown",
+        within=(1e4, 1e6),
+        source="tap the cage on its rib: the frequency it answers with",
+    )
+    damping: Scalar = parameter(
+        "N s/m",
+        0.0,
+        1e5,
+        "support damping B_s",
+        kind="unknown",
+        within=(0.3, 30.0),
+        source="tap the cage on its rib: how fast the answer decays",
+    )
+    cubic_stiffness: Scalar = parameter(
+        "N/m^3",
+        0.0,
+        1e18,
+        "cubic stiffness K_3, for cubic = absolute",
+        kind="unknown",
+        within=(1e11, 1e14),
+        source="push the cage on its rib: force over way, far out",
+        default=0.0,
+    )
+    cubic_ratio: Scalar = parameter(
+        "1",
+        0.0,
+        1e4,
+        "alpha in K_3 = alpha K_s / c^2, for cubic = dimensionless",
+        kind="unknown",
+        within=(0.1, 100.0),
+        source="push the cage on its rib: force over way, far out",
+        default=0.0,
+    )
+    cross_stiffness: Scalar = parameter(
+        "N/m",
+        -1e8,
+        1e8,
+        "cross-coupling stiffness K_xy",
+        kind="unknown",
+        within=(-5e3, 5e3),
+        source="whirl frequency and its growth, from two probes at the cage",
+        default=0.0,
+    )
     cross_cubic: Scalar = parameter(
-        "N/m^3", -1e18, 1e18, "cubic cross-coupling K'_xy, for cross = as_printed", default=0.0
+        "N/m^3",
+        -1e18,
+        1e18,
+        "cubic cross-coupling K'_xy, for cross = as_printed",
+        kind="unknown",
+        within=(-1e13, 1e13),
+        source="whirl frequency and its growth, from two probes at the cage",
+        default=0.0,
     )
     cross: Cross = choice("circulatory", "as_printed", text="form of the cross-coupling", default="circulatory")
     cubic: Cubic = choice("absolute", "dimensionless", text="how the cubic stiffness is given", default="absolute")

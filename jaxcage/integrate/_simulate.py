@@ -13,7 +13,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
-from ..models import AbstractForcedSystem
+from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._controlled import ControlledSteps, controlled, stated
 from ._method import REVOLUTION, AbstractMethod, FixedSteps
 from ._results import INACCURATE, OUTCOMES, outcome_code
@@ -151,8 +151,10 @@ def simulate(
     **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
     """
     require_x64()
+    require_known("simulate", INSTEAD, system, speed, start)
     value = float(speed)
     _check(value, revolutions, samples, discard)
+    require_speeds(system, value)
     chosen = _method(method, samples)
     speeds = np.full(discard + revolutions, value)
     ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(0.0), _start(system, value, start), samples)
@@ -180,8 +182,10 @@ def ramp(
     **Returns:** `Trajectory` with the speed of each sample.
     """
     require_x64()
+    require_known("ramp", INSTEAD, system, first, last, start)
     low, high = float(first), float(last)
     _check(min(low, high), revolutions, samples)
+    require_speeds(system, max(low, high))
     chosen = _method(method, samples)
     rise = (high - low) / revolutions
     speeds = low + rise * np.arange(revolutions)

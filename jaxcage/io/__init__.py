@@ -6,13 +6,22 @@
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
 | `_config`       | TOML to `CageModel`, with every value checked                             |
 | `_write_config` | `CageModel` to nested mapping or TOML                                     |
+| `_ranges`       | values that are known within a range only                                 |
+| `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
 | `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
 | `_csv`          | time histories, strobe points and branches as CSV                         |
 | `_files`        | whole files or none; is a folder writable                                 |
 """
 
-from ._config import load_model as load_model, model_from as model_from
+from ._config import (
+    BearingFile as BearingFile,
+    Unknown as Unknown,
+    check_together as check_together,
+    load_model as load_model,
+    model_from as model_from,
+    read_bearing as read_bearing,
+)
 from ._csv import (
     branch_columns as branch_columns,
     read_columns as read_columns,
@@ -30,7 +39,9 @@ from ._dataset import (
     to_dataset as to_dataset,
 )
 from ._files import check_writable as check_writable, replacing as replacing
+from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
+from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner
 from ._template import template as template, write_template as write_template
 from ._units import to_si as to_si
 from ._write_config import (

@@ -25,10 +25,14 @@ from typing import Any
 import equinox as eqx
 
 from .._checks import require_x64
+from .._parameters import must_be_given, parameter_paths
 from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
-from ._schema import KINDS, ConfigError, read_value, submodules, values
+from ._ranges import Range
+from ._schema import KINDS, ConfigError, Known, read_value, submodules, values
+from ._speeds import WHOSE, Whose
+from ._template import left_as_written
 from ._units import printable, shown
 
 
@@ -39,8 +43,50 @@ _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
 """Keys by which a table starts from a ready-made module."""
 
 
+Ranges = dict[tuple[str, ...], tuple[Range, tuple[str, ...]]]
+"""Where a range is given -> the range, and the fields of that table that it sets."""
+_SHORTHANDS = {("support", "stiffness"): ("stiffness_x", "stiffness_y")}
+"""Keys that set several parameters to one value."""
+_OLD = {"clearance_reading": '"as_printed"', "unbalance": '"physical"'}
+"""What a file without a reading meant while it could be left out."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknown:
+    """What a file knows a range of, and no value."""
+
+    label: str
+    """As the file calls it."""
+    names: tuple[str, ...]
+    """Parameters that it sets, all to the same value."""
+    range: Range
+
+
+@dataclasses.dataclass(frozen=True)
+class BearingFile:
+    """What a TOML file says: a model, and how its speeds are meant."""
+
+    model: CageModel
+    speeds: Whose
+    """Whose speeds bare numbers of the commands are: key `speeds`, the cage's if left out."""
+    unknowns: tuple[Unknown, ...]
+    """Values of which the file knows a range only."""
+    left: tuple[str, ...]
+    """Values that are still those of the template that `jaxcage init` writes, by dotted name."""
+    table: Mapping[str, Any]
+    """As it was read."""
+
+
 def load_model(path: str | Path) -> CageModel:
     """The model that the TOML file at `path` describes.
+
+    **Raises:** as `read_bearing`.
+    """
+    return read_bearing(path).model
+
+
+def read_bearing(path: str | Path) -> BearingFile:
+    """All that the TOML file at `path` says.
 
     **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the
     key, what was given and what is allowed; `RuntimeError` without double precision.
@@ -54,25 +100,50 @@ def load_model(path: str | Path) -> CageModel:
         reason = printable(str(error).rstrip("."))
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
     try:
-        return model_from(table)
+        unknowns: list[Unknown] = []
+        model = model_from(table, unknowns)
+        return BearingFile(model, _whose(table), tuple(unknowns), left_as_written(table), table)
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
 
 
-def model_from(table: Mapping[str, Any]) -> CageModel:
-    """The model that a nested mapping, as read from TOML, describes. **Raises:** `ConfigError`."""
+def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> CageModel:
+    """The model that a nested mapping, as read from TOML, describes; of a range its best guess.
+
+    **Arguments:** the mapping; a list that takes what is known within ranges only.
+
+    **Raises:** `ConfigError`.
+    """
     require_x64()
     rest = dict(table)
-    start = None
+    start, _ = None, _whose(rest)
+    rest.pop("speeds", None)
     if "base" in rest:
         name = rest.pop("base")
         if not isinstance(name, str) or name not in PUBLISHED_CASES:
             raise ConfigError(f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {shown(name)}.")
         start = case(name)
-    model = _build(CageModel, rest, start, ())
+    ranges: Ranges = {}
+    model = _build(CageModel, rest, start, (), ranges)
     assert isinstance(model, CageModel)
-    _check_together(model)
+    check_together(model)
+    if unknowns is not None:
+        unknowns += _named(model, ranges)
     return model
+
+
+def _named(model: CageModel, ranges: Ranges) -> list[Unknown]:
+    """Ranges by the names that `jaxcage.replace` knows; a key that sets several parameters is one unknown."""
+    short = {path: name for name, path in parameter_paths(model).items()}
+    each = lambda path, names: tuple(short[(*path[:-1], name)] for name in names)
+    return [Unknown(".".join(path), each(path, names), found) for path, (found, names) in ranges.items()]
+
+
+def _whose(table: Mapping[str, Any]) -> Whose:
+    given = table.get("speeds", "cage")
+    if given not in WHOSE:
+        raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(given)}.")
+    return given
 
 
 def _build(
@@ -80,6 +151,7 @@ def _build(
     table: Mapping[str, Any],
     start: eqx.Module | None,
     path: tuple[str, ...],
+    ranges: Ranges,
 ) -> eqx.Module:
     """A module of `kind` from its table; what the table leaves out comes from `start`, or from the
     defaults.
@@ -89,10 +161,18 @@ def _build(
     nested, fields = submodules(kind), list(values(kind))
     _refuse_unknown(table, [f.name for f in fields], list(nested), path)
     arguments = {f.name: read_value(_dotted(path, f.name), table[f.name], f) for f in fields if f.name in table}
+    short = {where[-1]: names for where, names in _SHORTHANDS.items() if where[:-1] == path and where[-1] in table}
+    for key, names in short.items():
+        value = read_value(_dotted(path, key), table[key], next(f for f in fields if f.name == names[0]))
+        free = tuple(name for name in names if name not in arguments)
+        if isinstance(value, Known) and free:
+            ranges[(*path, key)] = value.range, free
+        arguments = dict.fromkeys(names, float(value)) | arguments
+    ranges |= {(*path, n): (value.range, (n,)) for n, value in arguments.items() if isinstance(value, Known)}
     for name, options in nested.items():
         if name in table:
             below = getattr(start, name, None)
-            arguments[name] = _build_chosen(options, table[name], below, (*path, name))
+            arguments[name] = _build_chosen(options, table[name], below, (*path, name), ranges)
     if start is not None:
         arguments = {f.name: getattr(start, f.name) for f in dataclasses.fields(kind)} | arguments
     return _construct(kind, arguments, path)
@@ -103,6 +183,7 @@ def _build_chosen(
     table: Any,
     start: eqx.Module | None,
     path: tuple[str, ...],
+    ranges: Ranges,
 ) -> eqx.Module:
     """A sub-table, which chooses its law with `kind` where there are several."""
     if not isinstance(table, Mapping):
@@ -116,7 +197,7 @@ def _build_chosen(
             given = "missing" if given is None else shown(given)
             raise ConfigError(f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}.")
         kind = KINDS[given]
-    return _build(kind, table, start if isinstance(start, kind) else None, path)
+    return _build(kind, table, start if isinstance(start, kind) else None, path, ranges)
 
 
 def kind_name(module: eqx.Module) -> str:
@@ -132,6 +213,10 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
     if missing:
         hint = "" if path else ', unless `base = "1a"` or the like gives the rest'
         raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
+    if readings := [f for f in values(kind) if "readings" in f.metadata and f.name not in arguments]:
+        said = ", and ".join(f"`{_dotted(path, f.name)}` {must_be_given(f.metadata['readings'])}" for f in readings)
+        before = " and ".join(_OLD[f.name] for f in readings)
+        raise ConfigError(f"{said}; before, a file without {'them' if len(readings) > 1 else 'it'} meant {before}.")
     try:
         return kind(**arguments)
     except ValueError as error:
@@ -148,7 +233,8 @@ def _dotted(path: tuple[str, ...], name: str = "") -> str:
 
 def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple[str, ...]) -> None:
     extra = [key for (where, key) in _READY_MADE if (where,) == path]
-    allowed = [*([] if path else ["base"]), *extra, *keys, *(f"[{name}]" for name in tables)]
+    keys = [*keys, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
+    allowed = [*([] if path else ["base", "speeds"]), *extra, *keys, *(f"[{name}]" for name in tables)]
     for key in table:
         if key not in keys and key not in tables:
             where = f" in [{_dotted(path)}]" if path else " at the top level"
@@ -178,7 +264,7 @@ def _grade(given: Any) -> float:
     return float(given)
 
 
-def _check_together(model: CageModel) -> None:
+def check_together(model: CageModel) -> None:
     """What ranges of single values cannot see."""
     gap, eccentricity = 1e3 * float(model.guidance_gap), 1e3 * float(model.eccentricity)
     if eccentricity >= gap:

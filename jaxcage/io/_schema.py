@@ -12,8 +12,9 @@ from typing import Any
 import equinox as eqx
 
 from .._errors import InputError
-from .._parameters import ParameterInfo
+from .._parameters import ParameterInfo, allowed as must_be
 from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
+from ._ranges import Range, is_range, read_range
 from ._units import printable, shown, to_si
 
 
@@ -79,18 +80,33 @@ def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
     return value
 
 
+class Known(float):
+    """The best guess of a value that is known within a range only."""
+
+    range: Range
+
+    def __new__(cls, found: Range) -> "Known":
+        number = super().__new__(cls, found.best)
+        number.range = found
+        return number
+
+
 def _read_number(name: str, value: Any, info: ParameterInfo) -> float:
     unit = "" if info.unit == "1" else f" {info.unit}"
-    allowed = f"`{name}` must be a number from {info.lower:g} to {info.upper:g}{unit}"
+    allowed = f"`{name}` {must_be(info)}"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ConfigError(f"{allowed}, but is {shown(value)}.")
     try:
-        number = to_si(value, info.unit) if isinstance(value, str) else float(value)
+        if isinstance(value, str) and is_range(value):
+            number = Known(read_range(value, info.unit))
+        else:
+            number = to_si(value, info.unit) if isinstance(value, str) else float(value)
     except ValueError as error:
         raise ConfigError(f"{allowed}, but {error}.") from error
     except OverflowError as error:  # of a whole number
         raise ConfigError(f"{allowed}, but is {shown(value)}.") from error
-    if not math.isfinite(number) or not info.lower <= number <= info.upper:
-        given = f' (given as "{printable(value)}")' if isinstance(value, str) else ""
-        raise ConfigError(f"{allowed}, but is {number:g}{unit}{given}.")
+    for each in (number.range.lower, number.range.upper) if isinstance(number, Known) else (number,):
+        if not math.isfinite(each) or not info.lower <= each <= info.upper:
+            given = f' (given as "{printable(value)}")' if isinstance(value, str) else ""
+            raise ConfigError(f"{allowed}, but is {each:g}{unit}{given}.")
     return number

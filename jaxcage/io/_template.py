@@ -1,14 +1,23 @@
 """A configuration to start from: every value with its unit, its meaning and where it comes from."""
 
 import contextlib
+import functools
+import tomllib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from .._errors import InputError
 from ..forces import SynchronousImpact
 from ..models import case
 
 
+CHOSEN = ("speeds", "clearance_reading", "unbalance", "kind")
+"""What the template holds that is no number of the NU2310."""
+
+
+@functools.cache
 def template() -> str:
     """The commented TOML text that `jaxcage init` writes; `load_model` accepts it as it is.
 
@@ -33,8 +42,22 @@ def template() -> str:
         "exponent": impact.exponent,
     }
     words = {name: f"{float(value):.4g}" for name, value in numbers.items()}
-    filled = Template(text).substitute(words, unbalance=model.unbalance)
+    filled = Template(text).substitute(words)
     return "\n".join(map(_aligned, filled.splitlines())) + "\n"
+
+
+def left_as_written(table: Mapping[str, Any]) -> tuple[str, ...]:
+    """Values of a nested mapping that are those of the template, by dotted name: they are the NU2310's."""
+    return tuple(_alike(table, tomllib.loads(template()), ()))
+
+
+def _alike(given: Mapping[str, Any], written: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    for key, value in given.items():
+        other = written.get(key)
+        if isinstance(value, Mapping) and isinstance(other, Mapping):
+            yield from _alike(value, other, (*path, key))
+        elif value == other and key not in CHOSEN:
+            yield ".".join((*path, key))
 
 
 def _aligned(line: str) -> str:

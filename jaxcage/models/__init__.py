@@ -6,15 +6,25 @@
 | `_field`          | dy/dtau at one speed, its linearisation, elimination of positions                |
 | `_cage`           | the cage in its rib: parameters                                                  |
 | `_cage_at_speed`  | the cage in its rib: forces at one speed                                         |
+| `_door`           | refusal of traced arguments and of speeds that no cage has                       |
 | `_groups`         | dimensionless groups                                                             |
 | `_cases`          | the paper's six cases as models                                                  |
 | `_constants`      | what the paper leaves out, in sets                                               |
+| `_printed`        | a model as people read it                                                        |
+| `_user_law`       | what goes wrong in a law of the user's, in a sentence                            |
 """
 
 from ._cage import CageModel as CageModel
 from ._cage_at_speed import FORCES as FORCES, CageAtSpeed as CageAtSpeed
 from ._cases import case as case
 from ._constants import CONSTANTS as CONSTANTS, Constants as Constants
+from ._door import (
+    FASTEST as FASTEST,
+    INSTEAD as INSTEAD,
+    fastest_speed as fastest_speed,
+    require_known as require_known,
+    require_speeds as require_speeds,
+)
 from ._field import (
     AbstractField as AbstractField,
     AbstractLinearisation as AbstractLinearisation,

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array
 
 from .._errors import ArgumentError
-from .._parameters import choice, parameter, with_numbers
+from .._parameters import parameter, reading, require_readings, with_numbers
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
 from ..forces import (
@@ -28,6 +28,7 @@ from ..forces import (
 )
 from ._cage_at_speed import FORCES, CageAtSpeed, ElasticRibLaw, RigidRibLaw
 from ._field import AbstractField, SecondOrderField
+from ._printed import printed
 from ._system import AbstractForcedSystem
 
 
@@ -52,23 +53,32 @@ class CageModel(AbstractForcedSystem):
     contact: LandContact
     support: Support
     impact: SynchronousImpact | RollerPassImpact
-    cage_mass: Scalar = parameter("kg", 1e-3, 100.0, "cage mass M")
-    guidance_gap: Scalar = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib")
-    eccentricity: Scalar = parameter("m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre")
-    rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
-    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", default=9.81)
-    load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", default=4450.0)
-    printed_unit: Scalar = parameter("m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", default=1e-3)
-    clearance_reading: ClearanceReading = choice(
-        "as_printed", "radial", text="radial clearance c = C_r (as printed) or C_r/2", default="as_printed"
+    cage_mass: Scalar = parameter("kg", 1e-3, 100.0, "cage mass M", kind="drawing")
+    guidance_gap: Scalar = parameter("m", 1e-5, 5e-3, "guidance gap C_r between cage and rib", kind="drawing")
+    eccentricity: Scalar = parameter(
+        "m", 0.0, 1e-3, "distance e of the cage's mass centre from its centre", kind="drawing"
     )
-    unbalance: UnbalanceReading = choice(
-        "physical", "as_printed", text="eccentricity as given, or as (20) prints it", default="physical"
+    rib: RigidRib | ElasticRib = eqx.field(default_factory=RigidRib)
+    gravity: Scalar = parameter("m/s^2", 0.0, 100.0, "acceleration of gravity", kind="fixed", default=9.81)
+    load: Scalar = parameter("N", 0.0, 1e7, "shaft load F", kind="operating", default=4450.0)
+    printed_unit: Scalar = parameter(
+        "m", 1e-6, 1.0, "unit in which unbalance = as_printed reads rho", kind="fixed", default=1e-3
+    )
+    clearance_reading: ClearanceReading = reading(
+        "radial clearance c of film, contact and land",
+        radial="c = C_r/2, as C_r is defined",
+        as_printed="c = C_r, as the paper uses it",
+    )
+    unbalance: UnbalanceReading = reading(
+        "centrifugal force of the mass centre",
+        physical="M e omega^2",
+        as_printed="2 M rho omega^2 with rho = e/C_r in mm, as the paper's eq. (20) reads",
     )
     extra: tuple[AbstractForce, ...] = eqx.field(default=(), converter=with_numbers)
     """Forces of one's own between land and cage, each a `jaxcage.forces.AbstractForce` named after its class."""
 
     def __check_init__(self) -> None:
+        require_readings(self)
         for name, kinds in PARTS.items():
             part = getattr(self, name)
             if isinstance(part, eqx.Module) and type(part) not in kinds:
@@ -86,6 +96,9 @@ class CageModel(AbstractForcedSystem):
                     f"{name}.smoothing",
                     said=f"must be at most a tenth of the clearance, {room:g} mm, but is {given:g} mm.",
                 )
+
+    def __str__(self) -> str:
+        return printed(self)
 
     @property
     def dimension(self) -> int:

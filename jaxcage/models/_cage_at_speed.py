@@ -20,6 +20,7 @@ from ..forces import (
     rib_force,
     weight,
 )
+from ._user_law import told
 
 
 if TYPE_CHECKING:
@@ -96,7 +97,8 @@ class CageAtSpeed(eqx.Module):
 
 def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
     """**Raises:** `ValueError` for a law of one's own that returns something else than three numbers."""
-    force = law.force(motion)
+    with told(f"Force `{name}`"):
+        force = law.force(motion)
     if not isinstance(force, tuple) or [jnp.shape(part) for part in force] != [(), (), ()]:
         raise ValueError(f"Force `{name}` must return (F_x, F_y, moment), three numbers, but returned {force}.")
     return force

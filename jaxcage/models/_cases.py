@@ -36,5 +36,6 @@ def case(name: str, constants: str = "identified") -> CageModel:
         guidance_gap=gap,
         eccentricity=published.eccentricity_um * 1e-6,
         gravity=found.gravity,
+        clearance_reading="as_printed",
         unbalance=found.unbalance,
     )

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 
 from .._types import Scalar, State
 from ._field import AbstractField, FirstOrderField, SecondOrderField
+from ._user_law import components
 
 
 ESCAPE = 2.0
@@ -109,7 +110,7 @@ class ForcedSystem(AbstractForcedSystem):
         return self._harmonics
 
     def at_speed(self, speed: Scalar) -> AbstractField:
-        return FirstOrderField(_Bound(self.rates, speed), speed)
+        return FirstOrderField(_Bound(self.rates, speed, "The law `rates(tau, y, speed)`"), speed)
 
     def scale(self, speed: Scalar) -> State:
         del speed
@@ -166,7 +167,7 @@ class ForcedOscillator(AbstractForcedSystem):
         return self._harmonics
 
     def at_speed(self, speed: Scalar) -> AbstractField:
-        return SecondOrderField(_Bound(self.acceleration, speed), speed)
+        return SecondOrderField(_Bound(self.acceleration, speed, "The law `acceleration(tau, q, v, speed)`"), speed)
 
     def scale(self, speed: Scalar) -> State:
         del speed
@@ -187,6 +188,8 @@ class _Bound(eqx.Module):
 
     law: Callable[..., State]
     speed: Scalar
+    what: str = eqx.field(static=True)
+    """What a refusal calls it."""
 
     def __call__(self, *state: Any) -> State:
-        return self.law(*state, self.speed)
+        return components(self.what, self.law, *state, self.speed, number=len(state[-1]))

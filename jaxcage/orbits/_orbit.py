@@ -13,7 +13,7 @@ from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, FixedSteps, compiled, strobe_map
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
 from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
@@ -254,6 +254,7 @@ def periodic_orbit(
     the equation P(z) = z.
     """
     require_x64()
+    require_speeds(system, speed)
     free = is_free(period)
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)

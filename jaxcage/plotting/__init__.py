@@ -3,6 +3,7 @@
 | module           | responsibility                                                          |
 |------------------|-------------------------------------------------------------------------|
 | `_style`         | colours, frames, light, dark and print style, no global state           |
+| `_shaft`         | the shaft's speed beneath the cage's                                    |
 | `_marks`         | zones shaded and published edges marked on a speed axis                 |
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
@@ -14,6 +15,7 @@
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
 | `_elasticities`  | elasticities of edges as bars                                           |
 | `_zone_strip`    | zones of both kinds and operating speeds as bars                        |
+| `_chance`        | chance of chaos over speed with its error bars                          |
 | `_design`        | a search for a better design, and what came of it                       |
 | `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
@@ -23,6 +25,7 @@ from ._branches import (
     branch_diagram as branch_diagram,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
 )
+from ._chance import chance_of_chaos as chance_of_chaos
 from ._design import design_figure as design_figure, design_history as design_history
 from ._elasticities import elasticity_bars as elasticity_bars
 from ._history import (
@@ -47,6 +50,7 @@ from ._orbit_diagram import (
 )
 from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
 from ._section import strobe_section as strobe_section
+from ._shaft import add_shaft_axes as add_shaft_axes
 from ._stability_map import stability_map as stability_map
 from ._statics import load_bars as load_bars
 from ._style import (

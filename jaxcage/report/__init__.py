@@ -19,6 +19,16 @@
 | `_page`          | the page                                                                    |
 """
 
+from ._chances import (
+    bands_table as bands_table,
+    chances_document as chances_document,
+    chances_notes as chances_notes,
+    chances_table as chances_table,
+    chances_tables as chances_tables,
+    measures as measures,
+    operating_chances as operating_chances,
+    unknowns_table as unknowns_table,
+)
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (
     before_and_after_tables as before_and_after_tables,
@@ -67,6 +77,11 @@ from ._paper_tables import (
     ranges_table as ranges_table,
     readings_table as readings_table,
 )
+from ._readings import (
+    readings_document as readings_document,
+    readings_words as readings_words,
+    short_readings as short_readings,
+)
 from ._slopes import (
     EXIT as EXIT,
     ONSET as ONSET,
@@ -93,6 +108,7 @@ from ._table import (
     number as number,
     shares_table as shares_table,
     shown_unit as shown_unit,
+    with_shaft as with_shaft,
 )
 from ._zone_tables import (
     transient_tables as transient_tables,

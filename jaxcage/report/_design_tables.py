@@ -56,7 +56,7 @@ def before_and_after_tables(document: Mapping[str, Any]) -> list[Table]:
         ]
         if found:
             title = f"{kind.replace('_', '-').capitalize()} zones before and after [rpm]"
-            tables.append(Table(title, ("design", "zone", "onset", "exit", "width"), rows))
+            tables.append(Table(title, ("design", "zone", "onset", "exit", "width"), rows, ("onset", "exit", "width")))
     return tables
 
 

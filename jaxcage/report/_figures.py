@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import functools
 import io
 from collections.abc import Callable, Iterator, Sequence
 
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from ..orbits import Sensitivity
 from ..plotting import (
     Style,
+    add_shaft_axes,
     elasticity_bars,
     load_bars,
     mark_operating,
@@ -57,6 +59,7 @@ def pictures(findings: Findings, operating: list[Operating]) -> dict[str, Pictur
 
 def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
     swept, found, name = findings.sweep, findings.found, findings.name
+    picture = functools.partial(_picture, float(findings.model.bearing.cage_speed_ratio))
     spans = [(at.low_rpm, at.high_rpm) for at in operating]
     limits = float(swept.rpm[0]), float(swept.rpm[-1])
     strip = _alone(
@@ -64,7 +67,7 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
         1.9 if spans else 1.5,
         lambda ax: zone_strip(findings.loss.zones, findings.zones.zones, limits, spans, findings.published, ax),
     )
-    yield _picture(
+    yield picture(
         "strip",
         strip,
         f"Bars over the cage speed: zones of {name} without a stable synchronous orbit, chaotic zones"
@@ -74,7 +77,7 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
     diagram = sweep_figure(swept, findings.zones, findings.published)
     for ax in diagram.axes:
         mark_operating(ax, spans)
-    yield _picture(
+    yield picture(
         "orbits",
         diagram,
         f"Orbit diagram of {name}: strobe points of the vertical displacement over cage speed, with the largest "
@@ -83,7 +86,7 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
         "Chaotic zones are shaded.",
     )
     if found.branches:
-        yield _picture(
+        yield picture(
             "branches",
             _alone(9.5, 5.4, lambda ax: orbit_diagram_with_branches(swept, found.branches, 1, ax)),
             f"Synchronous orbits of {name} over speed, stable parts thick, unstable ones thin, bifurcations marked.",
@@ -91,7 +94,7 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
         )
         principal = findings.loss.principal
         branch = found.branches[0 if principal is None else principal.branch]
-        yield _picture(
+        yield picture(
             "multipliers",
             _alone(7.0, 5.8, lambda ax: multiplier_circle(branch, ax)),
             "Floquet multipliers of the synchronous orbit in the complex plane with the unit circle.",
@@ -99,12 +102,12 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
             "inside the unit circle; how one leaves it tells what follows.",
         )
     if findings.map is not None:
-        yield _picture("map", _map(findings, spans), *_map_words(findings))
+        yield picture("map", _map(findings, spans), *_map_words(findings))
     trusted = [
         with_full_names(findings, s) for n, s in findings.slopes.items() if s.trusted and n in findings.loss.edges
     ]
     if trusted:
-        yield _picture(
+        yield picture(
             "elasticities",
             _alone(9.5, 2.2 + 0.95 * len(trusted), lambda ax: _bars(trusted, ax)),
             "Bars: elasticities of the synchronous-loss edges with respect to the parameters that move them most.",
@@ -113,7 +116,7 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
         )
     if findings.statics is not None:
         shared = findings.statics
-        yield _picture(
+        yield picture(
             "statics",
             _alone(7.0, 3.2, lambda ax: load_bars(shared, ax)),
             "Load of every roller over its angle from the load.",
@@ -175,7 +178,8 @@ def _map_words(findings: Findings) -> tuple[str, str]:
     )
 
 
-def _picture(key: str, figure: Figure, alt: str, caption: str) -> Picture:
+def _picture(cage_speed_ratio: float, key: str, figure: Figure, alt: str, caption: str) -> Picture:
+    add_shaft_axes(figure, cage_speed_ratio)
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (96 * float(x) for x in figure.get_size_inches())

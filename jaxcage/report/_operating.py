@@ -9,7 +9,7 @@ import numpy as np
 
 from .._errors import ArgumentError
 from ..analysis import Edge, Sweep, Zone, Zones
-from ..io import to_si
+from ..io import Whose, split_owner, to_si
 
 
 CLOSE = 0.05
@@ -28,6 +28,10 @@ class Operating:
         if self.low_rpm == self.high_rpm:
             return f"{self.low_rpm:.0f} rpm"
         return f"{self.low_rpm:.0f} to {self.high_rpm:.0f} rpm"
+
+    def of_shaft(self, cage_speed_ratio: float) -> "Operating":
+        """The shaft's speeds."""
+        return Operating(self.low_rpm / cage_speed_ratio, self.high_rpm / cage_speed_ratio)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,16 +56,25 @@ class Verdict:
         return f"{self.where}; nearest edge: {self.edge}, {self.distance_rpm:.0f} rpm ({self.percent:.1f} %) away"
 
 
-def read_operating(text: str) -> list[Operating]:
-    """Speeds and ranges such as `8500, 12000-15000` or `900 rad/s, 1200 to 1500 rad/s`, in rpm if nothing else is said.
+def read_operating(text: str, cage_speed_ratio: float = 1.0, unsaid: Whose = "cage") -> list[Operating]:
+    """Speeds and ranges such as `8500, 12000-15000`, `900 rad/s, 1200 to 1500 rad/s` or `20000-24000 rpm shaft`.
+
+    **Arguments:** the text, in rpm if nothing else is said; cage speed over shaft speed; whose speeds they are where
+    the text does not say it.
+
+    **Returns:** speeds of the cage.
 
     **Raises:** `ValueError`, one sentence.
     """
-    return [_read_one(part) for part in text.split(",") if part.strip()]
+    return [_read_one(part, cage_speed_ratio, unsaid) for part in text.split(",") if part.strip()]
 
 
-def _read_one(part: str) -> Operating:
-    match = _RANGE.fullmatch(part)
+def _read_one(given: str, ratio: float, unsaid: Whose) -> Operating:
+    try:
+        part, whose = split_owner(given)
+    except ValueError as error:
+        raise ArgumentError("operating", said=f"must be speeds of either, but {error}.") from None
+    match = _RANGE.fullmatch(" ".join(part.split()))
     if match is None:
         raise ArgumentError(
             "operating", said=f'must be speeds and ranges like "8500, 12000-15000 rpm", but "{part.strip()}" was given.'
@@ -80,7 +93,8 @@ def _read_one(part: str) -> Operating:
         raise ArgumentError(
             "operating", said=f'must be speeds above 0 and ranges that grow, but "{part.strip()}" was given.'
         )
-    return Operating(first, last)
+    factor = ratio if (whose or unsaid) == "shaft" else 1.0
+    return Operating(factor * first, factor * last)
 
 
 def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:

@@ -11,7 +11,7 @@ from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
 from ._table import Table, number
-from ._zone_tables import Span, published_zones, zone_document
+from ._zone_tables import SPEEDS, Span, published_zones, zone_document
 
 
 AT_LIMIT_RPM = 1e-6
@@ -115,7 +115,9 @@ def stretch_table(name: str, found: SynchronousOrbits) -> Table:
         speeds = [number(rpm, 2) for rpm in (s.lower_rpm, s.upper_rpm, s.width_rpm)]
         rows.append((speeds[0], lower, speeds[1], upper, speeds[2], str(s.met), str(s.branch)))
     columns = ("from", "by", "to", "by", "width", "settled", "branch")
-    return Table(f"Stable synchronous orbits of {name} [rpm]", columns, rows or [("none", *6 * ("-",))])
+    return Table(
+        f"Stable synchronous orbits of {name} [rpm]", columns, rows or [("none", *6 * ("-",))], ("from", "to", "width")
+    )
 
 
 def loss_table(name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None) -> Table:
@@ -131,7 +133,7 @@ def loss_table(name: str, found: SynchronousOrbits, loss: LossZones, published: 
         rows.append(("-", "not found" if met else "not searched", *4 * ("-",), _span_cell(span)))
     title = f"Synchronous-loss zones of {name} [rpm], closed below {number(loss.close_below_rpm)} rpm"
     columns = ("zone", "onset", "by", "exit", "by", "width", "published chaos")
-    return Table(title, columns, rows or [("none", *6 * ("-",))])
+    return Table(title, columns, rows or [("none", *6 * ("-",))], SPEEDS)
 
 
 def _zone_cells(zone: Zone) -> list[str]:
@@ -176,7 +178,9 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
         for p in found.edges
     ]
     columns = ("speed [rpm]", "±", "kind", "multiplier", "angle [°]", "branch", "edge of")
-    return Table(f"Ends of the stable synchronous orbits of {name}", columns, rows or [("none", *6 * ("-",))])
+    return Table(
+        f"Ends of the stable synchronous orbits of {name}", columns, rows or [("none", *6 * ("-",))], ("speed [rpm]",)
+    )
 
 
 def error_cell(error_rpm: Scalar) -> str:

@@ -18,9 +18,10 @@ from ._findings import Findings
 from ._operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict
 from ._orbit_tables import coexisting_notes, edge_table, loss_table
 from ._page_tables import at_speeds_table, checks_table, provenance_table, published_table, slope_tables
+from ._readings import readings_words
 from ._sources import parameter_rows, shown
 from ._statics import statics_table
-from ._table import Table, number
+from ._table import Table, number, with_shaft
 from ._zone_tables import transient_tables, zones_table
 
 
@@ -76,23 +77,26 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
     span = float(swept.rpm[0]), float(swept.rpm[-1])
     what = f"Case {name}" if findings.published is not None else name
     drawn = pictures(findings, [j.at for j in judged])
+    ratio = float(model.bearing.cage_speed_ratio)
+    both = lambda table: with_shaft(table, ratio)
     slopes, statics, at_rest = slope_tables(findings), findings.statics, f"At rest under {float(model.load):g} N"
     context: dict[str, Any] = {
         "title": f"{what}: where the cage moves chaotically",
-        "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage"
+        "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage "
+        f"({span[0] / ratio:.0f} to {span[1] / ratio:.0f} rpm of the shaft)"
         + (", quick report: no gradients, a coarser sweep" if findings.quick else ""),
         "summary": _summary(findings, judged),
         "key_figures": _key_figures(findings),
         "pictures": drawn,
         "operating": [_operating_rows(findings, j) for j in judged],
         "close_percent": f"{100 * CLOSE:g}",
-        "at_speeds": at_speeds_table(findings, [j.at for j in judged]) if judged else None,
+        "at_speeds": both(at_speeds_table(findings, [j.at for j in judged])) if judged else None,
         "resolution": number(swept.resolution_rpm),
-        "loss_table": loss_table(name, found, findings.loss, findings.published),
-        "zones_table": zones_table(name, findings.zones, findings.published, span),
-        "transient_tables": transient_tables(name, findings.zones),
+        "loss_table": both(loss_table(name, found, findings.loss, findings.published)),
+        "zones_table": both(zones_table(name, findings.zones, findings.published, span)),
+        "transient_tables": [both(t) for t in transient_tables(name, findings.zones)],
         "zone_notes": coexisting_notes(findings.loss),
-        "edge_table": _named_edges(findings),
+        "edge_table": both(_named_edges(findings)),
         "further_edges": len(found.edges) - len({id(p) for p in findings.loss.edges.values()}),
         "map_notes": [
             f"Not followed: {n} ({why})." for n, why in (findings.map.refused if findings.map else {}).items()
@@ -148,6 +152,7 @@ def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
         for old, new in words.items():
             states = [s.replace(old, new) for s in states]
         said.append(f"{_with_shaft(findings, j.at)}: {', '.join(states)}.")
+    said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
     if np.any(swept.failed):
         said.append(f"{int(np.sum(swept.failed))} of {swept.failed.size} simulations failed: nothing is known of them.")
     return said
@@ -159,7 +164,7 @@ def _named_edges(findings: Findings) -> Table:
     columns = (whole.columns[-1], *whole.columns[:-2])
     rows = [(row[-1], *row[:-2]) for row in whole.rows if row[-1] != "-"]
     nothing = ("none", *(len(columns) - 1) * ("-",))
-    return Table("Bifurcations of the synchronous orbit that bound a zone", columns, rows or [nothing])
+    return Table("Bifurcations of the synchronous orbit that bound a zone", columns, rows or [nothing], whole.speeds)
 
 
 def _counted(n: int, what: str) -> str:
@@ -200,8 +205,7 @@ def _key_figures(findings: Findings) -> list[tuple[str, str]]:
 
 def _with_shaft(findings: Findings, at: Operating) -> str:
     ratio = float(findings.model.bearing.cage_speed_ratio)
-    shaft = Operating(at.low_rpm / ratio, at.high_rpm / ratio)
-    return f"{at} (shaft {shaft})"
+    return f"{at} (shaft {at.of_shaft(ratio)})"
 
 
 def _operating_rows(findings: Findings, judged: Judged) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from ..orbits import Sensitivity
 from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
+from ._readings import readings_words
 from ._slopes import FIRST
 from ._sources import shown
 from ._table import Table, number
@@ -40,7 +41,7 @@ def at_speeds_table(findings: Findings, operating: Sequence[Operating]) -> Table
         "unstable orbits",
         "simulations by start",
     )
-    return Table("Orbits and simulations at the operating speeds", columns, rows)
+    return Table("Orbits and simulations at the operating speeds", columns, rows, ("speed [rpm]",))
 
 
 def slope_tables(findings: Findings) -> list[Table]:
@@ -133,6 +134,7 @@ def provenance_table(findings: Findings) -> Table:
     rows = [
         ("versions", ", ".join([*versions, f"Python {platform.python_version()}"])),
         ("machine", f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"),
+        ("readings", readings_words(findings.model)),
         ("sweep", f"{speeds} speeds from {swept.rpm[0]:.0f} to {swept.rpm[-1]:.0f} rpm, {starts} starts"),
         ("revolutions", f"{swept.discard} left out, {swept.revolutions} observed, chaos followed to {swept.horizon}"),
         ("resolution", f"{swept.resolution_rpm:.0f} rpm; windows below {findings.zones.close_below_rpm:g} rpm closed"),

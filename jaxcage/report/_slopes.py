@@ -13,6 +13,18 @@ from ._table import Table, chosen, number
 
 FIRST = ("guidance_gap", "eccentricity")
 """Rows that are always on top."""
+FIXED_RHO = "gap at fixed rho"
+
+
+def at_fixed_rho(elasticity: Mapping[str, float]) -> float:
+    """Elasticity by the gap if the eccentricity grows with it, so that rho = e/C_r stays.
+
+    With the printed unbalance, 2 M rho omega^2, that leaves the excitation alone: what remains of the gap's effect is
+    that of clearance, film and land. With the physical one it does not.
+    """
+    return elasticity["guidance_gap"] + elasticity["eccentricity"]
+
+
 ONSET, EXIT = "zone 1 onset", "zone 1 exit"
 EXPECTED = (ONSET, EXIT, "zone 2 onset")
 
@@ -31,7 +43,9 @@ def edge_slopes(
 def slopes_document(slopes: Mapping[str, Sensitivity], edge: str) -> dict[str, Any] | None:
     """The gradient of an edge [rpm per SI unit] for programs, None where it was left out."""
     names = "trusted status error_rpm steps transversality derivative elasticity"
-    return chosen(slopes[edge], names) if edge in slopes else None
+    if edge not in slopes:
+        return None
+    return chosen(slopes[edge], names) | {"elasticity_gap_at_fixed_rho": at_fixed_rho(slopes[edge].elasticity)}
 
 
 def elasticities_table(name: str, slopes: Mapping[str, Sensitivity]) -> Table:
@@ -42,9 +56,10 @@ def elasticities_table(name: str, slopes: Mapping[str, Sensitivity]) -> Table:
         "speed [rpm]": lambda item: number(item[1].value_rpm, 2),
         "±": lambda item: error_cell(item[1].error_rpm),
         **{n.replace("_", " "): f"{{0[1].elasticity[{n}]:+.4f}}" for n in FIRST},
+        FIXED_RHO: lambda item: f"{at_fixed_rho(item[1].elasticity):+.4f}",
         "status": "{0[1].status}",
     }
-    return Table.of(f"Elasticities of the exact edges of {name}", columns, slopes.items())
+    return Table.of(f"Elasticities of the exact edges of {name}", columns, slopes.items(), ("speed [rpm]",))
 
 
 def gradient_document(edges: Mapping[str, Sensitivity], wide: Sensitivity | None) -> dict[str, Any]:
@@ -52,7 +67,12 @@ def gradient_document(edges: Mapping[str, Sensitivity], wide: Sensitivity | None
     names = "name kind error_rpm steps trusted status transversality derivative elasticity"
     trusted = [edge.homogeneity for edge in edges.values() if edge.trusted]
     return {
-        "edges": [{"speed_rpm": edge.value_rpm} | chosen(edge, names) for edge in edges.values()],
+        "edges": [
+            {"speed_rpm": edge.value_rpm}
+            | chosen(edge, names)
+            | {"elasticity_gap_at_fixed_rho": at_fixed_rho(edge.elasticity)}
+            for edge in edges.values()
+        ],
         "width": wide and chosen(wide, "name kind value_rpm error_rpm derivative elasticity"),
         "homogeneity": {
             base: max((abs(h[base]) for h in trusted), default=None) for base in ("mass", "length", "time")
@@ -68,8 +88,11 @@ def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Tab
     info, value = parameter_info(model), parameters(model)
     unit = lambda n: "" if info[n].unit == "1" else info[n].unit
     rows = [(n, f"{float(value[n]):.6g}", unit(n), f"{slope[n]:+.6g}", _elasticity_cell(change[n])) for n in order]
-    at = f"{sensitivity.value_rpm:.3f} ± {error_cell(sensitivity.error_rpm)} rpm"
+    shaft = sensitivity.value_rpm / float(model.bearing.cage_speed_ratio)
+    at = f"{sensitivity.value_rpm:.3f} ± {error_cell(sensitivity.error_rpm)} rpm (shaft {shaft:.0f} rpm)"
     title = f"{sensitivity.name.capitalize()} of {name}: {at}, {sensitivity.kind}"
+    if set(FIRST) <= set(change):
+        rows.insert(len(FIRST), (FIXED_RHO, "", "", "", _elasticity_cell(at_fixed_rho(change))))
     still = len(slope) - len(moving)
     columns = ("parameter", "value", "unit", "rpm per unit", "elasticity")
     return Table(title + (f"; {still} other parameters do not move it" if still else ""), columns, rows)

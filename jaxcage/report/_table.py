@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -13,12 +14,43 @@ class Table:
     title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
+    speeds: Sequence[str] = ()
+    """Columns that hold cage speeds or differences of them [rpm]: people are shown the shaft's beside them."""
 
     @classmethod
-    def of(cls, title: str, columns: Mapping[str, str | Callable[[Any], str]], found: Iterable[Any]) -> "Table":
+    def of(
+        cls,
+        title: str,
+        columns: Mapping[str, str | Callable[[Any], str]],
+        found: Iterable[Any],
+        speeds: Sequence[str] = (),
+    ) -> "Table":
         """A row for each thing `found`; a column says how its texts are made of it, by a format or a function."""
         cell = lambda how, one: how.format(one) if isinstance(how, str) else how(one)
-        return cls(title, tuple(columns), [tuple(cell(how, one) for how in columns.values()) for one in found])
+        return cls(title, tuple(columns), [tuple(cell(how, one) for how in columns.values()) for one in found], speeds)
+
+
+_NUMBER = re.compile(r"\d+(?:\.(\d+))?(?:e[+-]?\d+)?")
+
+
+def with_shaft(table: Table, cage_speed_ratio: float) -> Table:
+    """The table with a column of the shaft's speed after each of the cage's."""
+
+    def times(match: re.Match[str]) -> str:
+        value = float(match[0]) / cage_speed_ratio
+        return f"{value:.1g}" if "e" in match[0] else f"{value:.{len(match[1] or '')}f}"
+
+    def each(cells: Sequence[str], new: Callable[[str], str]) -> tuple[str, ...]:
+        pairs = zip(table.columns, cells, strict=True)
+        return tuple(c for head, cell in pairs for c in ((cell, new(cell)) if head in table.speeds else (cell,)))
+
+    if not table.speeds:
+        return table
+    heads = each(
+        table.columns, lambda head: head.replace(" [rpm]", "") + ", shaft" + (" [rpm]" if "[rpm]" in head else "")
+    )
+    rows = [each(row, lambda cell: _NUMBER.sub(times, cell)) for row in table.rows]
+    return Table(table.title, heads, rows)
 
 
 def chosen(found: Any, names: str) -> dict[str, Any]:

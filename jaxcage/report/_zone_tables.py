@@ -8,6 +8,8 @@ from ._table import Table, number
 
 
 LIFE = "mean life [revolutions]"
+SPEEDS = ("onset", "exit", "width")
+"""Columns that hold speeds."""
 Span = tuple[float, float | None]
 
 
@@ -77,7 +79,7 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     lasting = f", chaos that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm{lasting}"
     columns = ("zone", "onset", "exit", "width", "mechanism", "share")
-    return Table(title, (*columns, *[LIFE][:followed], "published"), rows)
+    return Table(title, (*columns, *[LIFE][:followed], "published"), rows, SPEEDS)
 
 
 def transient_tables(name: str, zones: Zones) -> list[Table]:
@@ -86,7 +88,7 @@ def transient_tables(name: str, zones: Zones) -> list[Table]:
         return []
     rows = [(_edge_cell(z.onset), _edge_cell(z.exit), f"{z.share:.0%}", _life_cell(z)) for z in zones.transient]
     title = f"Transient chaos of {name} [rpm], mean life below {zones.horizon} revolutions"
-    return [Table(title, ("from", "to", "share", LIFE), rows)]
+    return [Table(title, ("from", "to", "share", LIFE), rows, ("from", "to"))]
 
 
 def _zone_cells(zone: Zone) -> tuple[str, ...]:

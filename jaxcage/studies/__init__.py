@@ -9,10 +9,23 @@
 | `_run`      | runs what a store lacks, in this process                                      |
 | `_dask`     | or on dask.distributed                                                        |
 | `_adaptive` | a grid of labels refined where the label changes                              |
+| `_ensemble` | chances of chaos of a cage that is known within ranges only                   |
 | `_label_map` | that grid over two parameters of a system                                    |
 """
 
 from ._adaptive import AdaptiveGrid as AdaptiveGrid, found_share as found_share, refine as refine
+from ._ensemble import (
+    ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
+    REVOLUTIONS as REVOLUTIONS,
+    Band as Band,
+    Clue as Clue,
+    Ensemble as Ensemble,
+    binomial_interval as binomial_interval,
+    draw as draw,
+    ensemble as ensemble,
+    sobol as sobol,
+    verdict_of as verdict_of,
+)
 from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map
 from ._plan import Plan as Plan
 from ._run import run_study as run_study, study as study

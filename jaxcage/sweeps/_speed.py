@@ -18,7 +18,7 @@ from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Confirmation, Observation, Plan, Sweep
 from ..integrate import AbstractMethod, controlled, finer
-from ..models import AbstractForcedSystem
+from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._confirm import Judged, confirm as confirm_lanes, doubtful
 from ._engine import Progress, run_lanes
 from ._lasting import follow
@@ -143,7 +143,10 @@ def sweep_designs(
     **Returns:** a `Sweep` for each system, the same as one by one to rounding (which chaos makes large).
     """
     require_x64()
+    require_known("sweep", INSTEAD, systems, speeds)
     speed = checked_speeds(speeds)
+    for system in systems[:1]:
+        require_speeds(system, speed, "speeds")
     chosen = controlled() if method is None else method
     if not systems:
         raise ArgumentError("systems", said="must hold at least one system, but it is empty.")

@@ -1,0 +1,64 @@
+"""What every computation asks of its arguments before it begins: known numbers, and speeds that a cage can have."""
+
+import math
+from typing import Any
+
+import jax
+import numpy as np
+
+from .._errors import ArgumentError
+from ._cage import CageModel
+from ._system import AbstractForcedSystem
+
+
+FASTEST = 200.0
+"""Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 340 MPa of hoop stress in
+brass, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
+
+
+def fastest_speed(model: CageModel) -> float:
+    """The speed [rad/s] at which the land of the slowest of the cages in `model` runs at `FASTEST`."""
+    return FASTEST / float(np.max(np.asarray(model.land_radius)))
+
+
+def require_speeds(system: AbstractForcedSystem, speeds: Any, name: str = "speed") -> None:
+    """Stop at speeds that no cage has, which are those of somebody who gave revolutions per minute.
+
+    **Raises:** `ValueError`.
+    """
+    if not isinstance(system, CageModel) or _is_traced((speeds, system.land_radius)):
+        return
+    highest, limit = float(np.max(np.asarray(speeds, dtype=float), initial=0.0)), fastest_speed(system)
+    if highest > limit:
+        raise ArgumentError(
+            name,
+            said=(
+                f"must be in rad/s, at most {limit:.0f} ({FASTEST:g} m/s at the land of this cage), but {highest:g} "
+                f"was given, which is {highest * 30 / math.pi:.0f} rpm: `jaxcage.rpm({highest:g})` makes rad/s of rpm."
+            ),
+        )
+
+
+def require_known(function: str, instead: str, *arguments: Any) -> None:
+    """Stop where `jax.vmap`, `jax.grad` or `jax.jit` goes over a function that steers by what it finds.
+
+    **Raises:** `ValueError` that says what to call `instead`.
+    """
+    if _is_traced(arguments):
+        raise ArgumentError(
+            *("system", "speeds" if function == "sweep" else "speed"),
+            said=(
+                f"of `{function}` must be known numbers, but are traced by `jax.vmap`, `jax.grad` or `jax.jit`, which "
+                f"cannot go over it: {instead}."
+            ),
+        )
+
+
+def _is_traced(arguments: Any) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(arguments))
+
+
+INSTEAD = (
+    "many designs are swept in one call by `jaxcage.sweep_designs(systems, speeds)`, and derivatives are those of "
+    "orbits and edges, by `jaxcage.periodic_orbit` and `jaxcage.sensitivity`"
+)

@@ -1,0 +1,135 @@
+"""Chances of chaos as documents, tables and sentences."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..io import Unknown
+from ..studies import Band, Ensemble, verdict_of
+from ._operating import Operating
+from ._table import Table, number
+
+
+MOST = 3
+"""Things that one is told to measure."""
+
+
+def chances_document(found: Ensemble) -> dict[str, Any]:
+    """An ensemble for programs."""
+    low, high = found.interval
+    chaotic, of = found.counts
+    return {
+        "draws": int(found.place.shape[0]),
+        "speeds_rpm": found.rpm,
+        "chance_of_chaos": found.chance,
+        "chance_lower": low,
+        "chance_upper": high,
+        "chaotic_draws": chaotic,
+        "finished_draws": of,
+        "verdict": found.verdict,
+        "bands": [{"edge": b.name, "share": b.share, "rpm_5_50_95": b.rpm} for b in found.bands],
+        "unknowns": {u.label: [u.range.lower, u.range.upper] for u in found.unknowns},
+        "measure": [{"what": c.label, "share": c.share, "how": c.source} for c in found.clues()],
+    }
+
+
+def chances_table(name: str, found: Ensemble) -> Table:
+    """Stretches of speeds with one verdict, and the chances within them."""
+    low, high = found.interval
+    verdict, rows, first = found.verdict, [], 0
+    for i in range(1, len(verdict) + 1):
+        if i == len(verdict) or verdict[i] != verdict[first]:
+            part = slice(first, i)
+            p = found.chance[part]
+            said = "not decided by what is known" if verdict[first] == "not decided" else verdict[first]
+            chance = "-" if verdict[first] == "unknown" else _span(p)
+            bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
+            rows.append((number(float(found.rpm[first])), number(float(found.rpm[i - 1])), said, chance, bar))
+            first = i
+    title = f"Chance of chaos of {name}, {found.place.shape[0]} draws from {len(found.unknowns)} ranges [rpm]"
+    return Table(title, ("from", "to", "verdict", "chance", "95 % bars"), rows, ("from", "to"))
+
+
+def _span(p: np.ndarray) -> str:
+    low, high = 100 * float(np.min(p)), 100 * float(np.max(p))
+    return f"{low:.0f} %" if round(low) == round(high) else f"{low:.0f} to {high:.0f} %"
+
+
+def bands_table(name: str, bands: Sequence[Band]) -> Table:
+    """Where each edge may be."""
+    rows = [(b.name, *(number(rpm) for rpm in b.rpm), f"{b.share:.0%}") for b in bands]
+    columns = ("edge", "5 %", "middle", "95 %", "draws that have it")
+    return Table(
+        f"Bands of the chaotic edges of {name} [rpm]",
+        columns,
+        rows or [("none", *4 * ("-",))],
+        ("5 %", "middle", "95 %"),
+    )
+
+
+def unknowns_table(unknowns: Sequence[Unknown], shares: Mapping[str, float], sources: Mapping[str, str]) -> Table:
+    """What is unknown, how much of the verdict hangs on it, and what to measure; the most telling first."""
+    order = sorted(unknowns, key=lambda u: -shares.get(u.label, 0.0))
+    rows = [
+        (u.label, f"{u.range.lower:.4g} to {u.range.upper:.4g}", _share(shares.get(u.label)), sources[u.label])
+        for u in order
+    ]
+    return Table("What is not known [SI units]", ("value", "range", "of the verdict", "measure"), rows)
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"
+
+
+def chances_tables(name: str, found: Ensemble) -> list[Table]:
+    """All that is said of an ensemble."""
+    sources = {u.label: s for u, s in zip(found.unknowns, found.sources, strict=True)}
+    shares = {c.label: c.share for c in found.clues()}
+    return [
+        chances_table(name, found),
+        bands_table(name, found.bands),
+        unknowns_table(found.unknowns, shares, sources),
+    ]
+
+
+def chances_notes(found: Ensemble) -> list[str]:
+    """What to do about it."""
+    notes = [
+        f"One start for each draw, {found.discard} revolutions left out, {found.revolutions} observed: chaos that dies "
+        "out later counts too."
+    ]
+    clues = found.clues()
+    open_ = found.rpm[found.undecided]
+    if open_.size:
+        notes.insert(0, f"Not decided by what is known at {open_.size} of {found.rpm.size} speeds. {measures(clues)}")
+    else:
+        notes.insert(0, "What is known decides at every speed.")
+    return notes
+
+
+def measures(clues: Sequence[Any]) -> str:
+    """What to measure, the most telling first."""
+    telling = [c for c in clues if c.share > 0][:MOST]
+    if not telling:
+        return "No single value decides: measure all, or draw more (--draws)."
+    each = "; ".join(f"{c.label} ({c.source}), {c.share:.0%} of the verdict" for c in telling)
+    return f"Measure {each}."
+
+
+def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: float) -> Table:
+    """Verdicts at operating speeds; of a range, the chance that some speed in it is chaotic."""
+    rows = []
+    for at in operating:
+        which = found.between(at.low_rpm, at.high_rpm)
+        done = ~np.any(found.failed[:, which], axis=1) | np.any(found.chaotic[:, which], axis=1)
+        chance = float(np.mean(np.any(found.chaotic[done][:, which], axis=1))) if np.any(done) else float("nan")
+        verdict = verdict_of(chance)
+        said = "not decided by what is known" if verdict == "not decided" else verdict
+        measure = measures(found.clues(which)) if verdict == "not decided" else "-"
+        rows.append((str(at), str(at.of_shaft(ratio)), f"{100 * chance:.0f} %", said, measure))
+    return Table(
+        "Operating speeds, by what is known",
+        ("cage speed", "shaft speed", "chance of chaos", "verdict", "measure"),
+        rows,
+    )

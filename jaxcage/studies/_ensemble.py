@@ -1,0 +1,237 @@
+"""Chaos of a cage of which some values are known within ranges only: chances instead of zones.
+
+Each draw is a design with values from the ranges; it runs once at every speed, from the conventional start. At a speed
+the draws are independent, so that their chaotic share has the error bar of a binomial count; speeds are not.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from .._errors import ArgumentError
+from .._parameters import parameter_info, replace
+from ..analysis import Sweep, zones
+from ..integrate import AbstractMethod, controlled
+from ..io import Unknown, check_together
+from ..models import CageModel
+from ..sweeps import sweep_designs
+
+
+DRAWS, ENSEMBLE_SPEEDS = 64, 40
+REVOLUTIONS = 100
+"""Left out, and observed: what one lane shows is an example of a chance, and need not be known to three digits."""
+ERROR = 1e-2
+LADDER = (*(("rk4", 64 << i) for i in range(6)), *(("rodas4", 512 << i) for i in range(3)))
+"""Steps of the draws: some are far stiffer than any cage, and a lane that wants more steps counts as failed."""
+RARE = 0.05
+"""Chance below which a speed is called calm, and above one less which it is called chaotic."""
+CONFIDENCE = 0.95
+BINS = 4
+"""Parts of a range whose chances are compared, to tell what an unknown has to say."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Band:
+    """Where an edge may be."""
+
+    name: str
+    share: float
+    """Of the draws that have this edge."""
+    rpm: tuple[float, float, float]
+    """5 %, 50 % and 95 % of the draws that have it lie below."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Clue:
+    """What one unknown says about the verdict."""
+
+    label: str
+    share: float
+    """Of the variance of the chaotic share, due to it alone, as far as the draws can tell."""
+    source: str
+    """What to measure."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ensemble:
+    """What the draws do."""
+
+    unknowns: tuple[Unknown, ...]
+    sources: tuple[str, ...]
+    """What to measure of each."""
+    place: Float[np.ndarray, "draws unknowns"]
+    """Place of each draw in each range, 0 to 1."""
+    speed: Float[np.ndarray, " speeds"]
+    """[rad/s]."""
+    chaotic: Bool[np.ndarray, "draws speeds"]
+    """While observed."""
+    failed: Bool[np.ndarray, "draws speeds"]
+    bands: tuple[Band, ...]
+    discard: int
+    revolutions: int
+
+    @property
+    def rpm(self) -> Float[np.ndarray, " speeds"]:
+        """Cage speeds in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    @property
+    def counts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Chaotic draws, and draws that finished, at each speed."""
+        return np.sum(self.chaotic & ~self.failed, axis=0), np.sum(~self.failed, axis=0)
+
+    @property
+    def chance(self) -> Float[np.ndarray, " speeds"]:
+        """Share of the draws that are chaotic at each speed; NaN where none finished."""
+        chaotic, of = self.counts
+        return np.where(of > 0, chaotic / np.maximum(of, 1), np.nan)
+
+    @property
+    def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
+        """Between which bounds the chance lies with 95 % confidence, by Clopper and Pearson."""
+        return binomial_interval(*self.counts)
+
+    @property
+    def verdict(self) -> list[str]:
+        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided` or `unknown` at each speed."""
+        return [verdict_of(p) for p in self.chance]
+
+    @property
+    def undecided(self) -> Bool[np.ndarray, " speeds"]:
+        """Speeds at which what is known does not decide."""
+        return np.array([v == "not decided" for v in self.verdict], dtype=bool)
+
+    def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
+        """What each unknown has to say about the chaotic share of the speeds `which` (all undecided ones if left out),
+        the most telling first; empty where there is nothing to decide."""
+        chosen = self.undecided if which is None else which
+        y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
+        if np.ptp(y) == 0:
+            return []
+        shares = [_explained(self.place[:, i], y) for i in range(len(self.unknowns))]
+        found = [Clue(u.label, s, of) for u, s, of in zip(self.unknowns, shares, self.sources, strict=True)]
+        return sorted(found, key=lambda clue: -clue.share)
+
+    def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
+        """Speeds in a range, or the one that is nearest to it."""
+        inside = (self.rpm >= low_rpm) & (self.rpm <= high_rpm)
+        return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
+
+
+def verdict_of(chance: float) -> str:
+    """What a chance of chaos means."""
+    if not np.isfinite(chance):
+        return "unknown"
+    return "calm" if chance <= RARE else "chaotic" if chance >= 1 - RARE else "not decided"
+
+
+def binomial_interval(hits: Any, of: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Clopper and Pearson's bounds of a share of which `hits` of `of` were seen."""
+    from scipy.stats import beta  # takes half a second to load
+
+    k, n, tail = np.asarray(hits, dtype=float), np.asarray(of, dtype=float), (1 - CONFIDENCE) / 2
+    low = np.where(k > 0, beta.ppf(tail, np.maximum(k, 1e-9), n - k + 1), 0.0)
+    high = np.where(k < n, beta.ppf(1 - tail, k + 1, np.maximum(n - k, 1e-9)), 1.0)
+    return low, high
+
+
+def _explained(place: np.ndarray, y: np.ndarray) -> float:
+    """Share of the variance of y between quarters of `place`, less what chance alone would put there."""
+    parts = np.array_split(y[np.argsort(place)], BINS)
+    between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
+    within = sum(((part - part.mean()) ** 2).sum() for part in parts)
+    noise = (BINS - 1) * within / max(y.size - BINS, 1)
+    return float(max(between - noise, 0.0) / (between + within))
+
+
+def draw(model: CageModel, unknowns: Sequence[Unknown], place: Float[np.ndarray, "draws unknowns"]) -> list[CageModel]:
+    """Designs with the values at `place` in the ranges.
+
+    **Raises:** `ValueError` for values that do not go together.
+    """
+    models = []
+    for row in place:
+        values = {name: float(u.range.at(p)) for u, p in zip(unknowns, row, strict=True) for name in u.names}
+        models.append(replace(model, **values))
+        check_together(models[-1])
+    return models
+
+
+def ensemble(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    speeds: Float[np.ndarray, " speeds"],
+    *,
+    draws: int = DRAWS,
+    seed: int = 0,
+    discard: int = REVOLUTIONS,
+    revolutions: int = REVOLUTIONS,
+    blocks: int = 20,
+    method: AbstractMethod | None = None,
+    progress: Any = None,
+) -> Ensemble:
+    """Run `draws` designs, spread evenly over the ranges, over speed.
+
+    **Arguments:** design; what is unknown of it; ascending speeds [rad/s]; number and seed of the draws (scrambled
+    Sobol points); revolutions left out and observed in `blocks` blocks; method and progress as in `sweep`.
+
+    **Returns:** `Ensemble`.
+
+    **Raises:** `ValueError` if nothing is unknown, or values from the ranges do not go together.
+    """
+    if not unknowns:
+        raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
+    place = sobol(len(unknowns), draws, seed)
+    start = tuple(float(c) for c in model.starts(float(speeds[0]))[0])
+    found = sweep_designs(
+        draw(model, unknowns, place),
+        speeds,
+        starts=[start],
+        discard=discard,
+        revolutions=revolutions,
+        confirm=False,
+        horizon=0,
+        blocks=blocks,
+        keep=32,
+        method=controlled(ERROR, LADDER) if method is None else method,
+        progress=progress,
+    )
+    info = parameter_info(model)
+    return Ensemble(
+        tuple(unknowns),
+        tuple(info[u.names[0]].source for u in unknowns),
+        place,
+        np.asarray(speeds, dtype=float),
+        np.array([s.restless for s in found]),
+        np.array([s.failed[:, 0] for s in found]),
+        tuple(_bands(found)),
+        discard,
+        revolutions,
+    )
+
+
+def sobol(unknowns: int, draws: int, seed: int) -> Float[np.ndarray, "draws unknowns"]:
+    """Scrambled Sobol points."""
+    from scipy.stats import qmc
+
+    log2 = int(np.ceil(np.log2(draws)))
+    return qmc.Sobol(unknowns, rng=seed).random_base2(log2)[:draws]
+
+
+def _bands(found: Sequence[Sweep]) -> list[Band]:
+    """Where the ends of the first two zones of each draw are."""
+    places: dict[str, list[float]] = {}
+    for swept in found:
+        for i, zone in enumerate(zones(swept).zones[:2], start=1):
+            for name, edge in ((f"zone {i} onset", zone.onset), (f"zone {i} exit", zone.exit)):
+                if edge is not None:
+                    places.setdefault(name, []).append(edge.speed_rpm)
+    order = ("zone 1 onset", "zone 1 exit", "zone 2 onset", "zone 2 exit")
+    return [
+        Band(name, len(places[name]) / len(found), tuple(map(float, np.quantile(places[name], (0.05, 0.5, 0.95)))))  # pyright: ignore[reportArgumentType]
+        for name in order
+        if name in places
+    ]
