@@ -29,7 +29,13 @@ from ._dataset import (
     stored_configuration as stored_configuration,
     to_dataset as to_dataset,
 )
-from ._files import check_writable as check_writable, replacing as replacing
+from ._files import (
+    check_writable as check_writable,
+    put_bytes as put_bytes,
+    read_bytes as read_bytes,
+    replacing as replacing,
+    sync as sync,
+)
 from ._schema import ConfigError as ConfigError
 from ._template import template as template, write_template as write_template
 from ._units import to_si as to_si

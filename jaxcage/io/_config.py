@@ -28,6 +28,7 @@ from .._checks import require_x64
 from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
+from ._files import read_bytes
 from ._schema import KINDS, ConfigError, read_value, submodules, values
 from ._units import printable, shown
 
@@ -46,8 +47,7 @@ def load_model(path: str | Path) -> CageModel:
     key, what was given and what is allowed; `RuntimeError` without double precision.
     """
     try:
-        with open(path, "rb") as file:
-            table = tomllib.load(file)
+        table = tomllib.loads(read_bytes(path).decode())
     except OSError as error:
         raise ConfigError(f"File '{path}' must be a readable TOML file, but: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits; nested too deep
