@@ -246,6 +246,9 @@ class StudyOptions(_Length, IntegrationOptions):
     workers: Annotated[int | None, whole(1)] = None
     """Processes of the cluster on this machine; one a core if left out."""
 
+    verify: Annotated[bool, tyro.conf.arg(name="check")] = False
+    """Compute nothing: compare every byte of the store with what was written. Needs only the case, and --store."""
+
     def check(self) -> None:
         if self.executor == "local" and (self.scheduler is not None or self.workers is not None):
             raise InputError("Options --scheduler and --workers go with --executor dask.")

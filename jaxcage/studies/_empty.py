@@ -15,7 +15,7 @@ from .._parameters import parameter_info
 from ..integrate import OUTCOMES
 from ..io import put_bytes, sync
 from ..models import CageModel
-from ._manifest import ABOUT, FOLDER, FORMAT, describing, write_entry
+from ._manifest import ABOUT, FOLDER, FORMAT, describing, is_as_marked, make_way, mark, write_entry
 from ._plan import SAMPLE
 from ._study import LABELS, OIL, PENDING, SPEED, Study
 from ._zarr import compressors
@@ -43,9 +43,8 @@ def mend(path: Path, study: Study) -> None:
         _write(new, study)
         for name in [*describing(new), ABOUT]:
             there, wanted = path / name, (new / name).read_bytes()
-            if there.is_dir() and not there.is_symlink():
-                shutil.rmtree(there)
-            if not there.is_file() or there.stat().st_size != len(wanted) or there.read_bytes() != wanted:
+            if not is_as_marked(there, mark(wanted)):
+                make_way(path, there)
                 put_bytes(there, wanted)
 
 

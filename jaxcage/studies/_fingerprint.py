@@ -17,7 +17,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from ._references import MISSING, OUTSIDE, Unknown, owner, references, release
 
@@ -110,9 +112,9 @@ class _Walk:
     def _array(self, x: Any, name: str) -> str:
         if isinstance(x, np.ma.MaskedArray):
             return _digest("masked", [self._array(np.asarray(x.data), name), self._array(np.ma.getmaskarray(x), name)])
-        if isinstance(x, jax.core.Tracer):
+        if isinstance(x, Tracer):
             raise Unknown(f"{name} is a number that is being traced")
-        if jax.dtypes.issubdtype(x.dtype, jax.dtypes.prng_key):
+        if jnp.issubdtype(x.dtype, jax.dtypes.prng_key):
             x = jax.random.key_data(x)
         values = np.asarray(x)
         if values.dtype.hasobject:

@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,15 @@ def read_entry(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError):
         return None
     return entry if right else None
+
+
+def make_way(root: Path, path: Path) -> None:
+    """Remove what is in the way of a file of a store: a folder in its place, or something else in place of a folder."""
+    for above in reversed(path.relative_to(root).parents):
+        if os.path.lexists(root / above) and not (root / above).is_dir():
+            (root / above).unlink()
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
 
 
 def write_entry(path: Path, entry: Mapping[str, Any]) -> None:

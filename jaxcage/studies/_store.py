@@ -21,7 +21,7 @@ from .._errors import ArgumentError
 from ..io import read_bytes
 from ._check import DamagedStore, OldStore, about_store
 from ._empty import create, mend
-from ._manifest import damage, damaged_metadata, entry_of, read_entry, write_entry
+from ._manifest import damage, damaged_metadata, entry_of, make_way, read_entry, write_entry
 from ._study import LABELS, Results, Study
 
 
@@ -76,6 +76,7 @@ class Store:
             for name in sorted(results, key=lambda name: name == "outcome"):
                 self._arrays[name][region] = results[name]
             entry = {"chunk": chunk, "fingerprint": self.about["fingerprint"], "files": files}
+            make_way(self.path, entry_of(self.path, chunk))
             write_entry(entry_of(self.path, chunk), entry)
         self._finished.add(chunk)
 

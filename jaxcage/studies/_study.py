@@ -224,6 +224,5 @@ def _described(system: AbstractForcedSystem) -> Any:
 
 def _numbers(module: eqx.Module) -> dict[str, Any]:
     leaves, _ = jax.tree_util.tree_flatten_with_path(module)
-    return {
-        jax.tree_util.keystr(path).lstrip("."): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)
-    }
+    named = lambda path: jax.tree_util.keystr(path).lstrip(".")
+    return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}

@@ -11,7 +11,7 @@ from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.storage import LocalStore, WrapperStore
 
 from ..io import put_bytes
-from ._manifest import Files, chunk_of, damage, keys_of, mark
+from ._manifest import Files, chunk_of, damage, keys_of, make_way, mark
 
 
 def compressors() -> tuple[Any, ...]:
@@ -65,10 +65,12 @@ class Marking(WrapperStore[LocalStore]):
 
     async def set(self, key: str, value: Buffer) -> None:
         data = value.to_bytes()
+        make_way(self.path, self.path / key)
         put_bytes(self.path / key, data)
         self.marked[key] = mark(data)
 
     async def delete(self, key: str) -> None:
+        make_way(self.path, self.path / key)
         (self.path / key).unlink(missing_ok=True)
 
     @contextlib.contextmanager
