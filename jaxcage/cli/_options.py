@@ -349,6 +349,7 @@ class StaticsOptions(Options):
     """Load of every roller, loaded zone, static displacement of the cage, kinematics."""
 
     timed: ClassVar[bool] = False
+    called: ClassVar[Mapping[str, str]] = {"centrifugal_force": "shaft_speed"}
 
     load: Annotated[float | None, number("be above 0 N", lambda x: x > 0, "N", "own")] = None
     """Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out."""
