@@ -57,6 +57,24 @@ def test_two_points_of_an_oil_must_differ():
         jb.Lubricant(870.0, 56e-6, 313.15, 7e-6, 313.15)
 
 
+@pytest.mark.parametrize("first, second", [((2e-5, 313.15), (5e-5, 373.15)), ((5e-5, 373.15), (2e-5, 313.15))])
+def test_an_oil_does_not_thicken_when_hot(first, second):
+    with pytest.raises(ValueError, match="must not rise with the temperature, but .* m.2/s at 3.*15 K were given"):
+        jb.Lubricant(870.0, *first, *second)
+    (nu, _), (_, t) = first, second
+    assert float(jb.Lubricant(870.0, *first, nu, t).kinematic_viscosity) == pytest.approx(nu, rel=1e-12)
+
+
+@pytest.mark.parametrize("load, force, said", [
+    (1e300, 0.0, "`load` must be at most 1e.07 N, but 1e.300"),
+    (4450.0, 1e300, "`centrifugal_force` must be at most 1e.07 N, but 1e.300"),
+    (1.0, 1e7, "`load` and `centrifugal_force` must be of sizes that can be added, but 1 and 1e.07 N were given"),
+])  # fmt: skip
+def test_loads_beyond_all_sense(load, force, said):
+    with pytest.raises(ValueError, match=said):
+        jb.load_distribution(jb.nu2310(), load, force)
+
+
 @pytest.mark.parametrize(
     "change, message",
     [

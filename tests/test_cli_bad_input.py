@@ -70,6 +70,11 @@ COMMANDS = (
         ("statics 1a --load -4450", "--load must be above 0 N, but -4450 was given"),
         ("statics 1a --load nan", "--load must be above 0 N, but nan was given"),
         ("statics 1a --shaft-speed -1", "--shaft-speed must be at least 0 rpm, but -1"),
+        ("statics 1a --load 1e300", "--load must be at most 1e+07 N, but 1e+300 was given"),
+        ("statics 1a --shaft-speed 1e9", "--shaft-speed must be at most 1e+06 rpm, but 1e+09 was given"),
+        ("statics 1a --shaft-speed 1e6 --load 1e-6", "--load and --shaft-speed must be of sizes that can be added"),
+        ("simulate 1a --speed 1e308", "--speed must be at most 1e+06 rpm, but 1e+308 was given"),
+        ("sweep 1a --first 1e307 --last 1.7e308 --count 2", "must be at most 1e+06 rpm, but 1e+307 was given"),
         ("statics 1a --load heavy", 'is "heavy", which is not a number with a unit'),
         ("sweep", "CASE"),
         ("spin 1a", "Unrecognized options: spin"),
@@ -129,6 +134,20 @@ def test_unwritable_output_is_refused_before_the_computation(
     sentence = refused(capsys, *command.split(), "--out", str(occupied / below))
     assert "must be a folder that can be written to" in sentence
     assert occupied.read_text() == "a file, not a folder"
+
+
+def test_a_name_cannot_turn_the_direction_of_writing(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Neither on the terminal nor in the command on a page."""
+    from jaxcage.cli import _page
+    from jaxcage.cli._options import ReportOptions
+
+    path = tmp_path / "a\u202egpj.toml"
+    path.write_text("base = '1a'")
+    assert "\u202e" not in _page._command(ReportOptions(str(path)))
+    assert main(["statics", str(path), "--out", str(tmp_path / "\u202eout")]) == 0
+    out, err = capsys.readouterr()
+    assert "\u202e" not in out + err and r"\u202eout" in out
+    assert "\u202e" not in refused(capsys, "statics", str(path) + "x")
 
 
 def test_interruption(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):

@@ -70,6 +70,17 @@ class Lubricant(eqx.Module):
                 "temperature_2", said=f"must differ from `temperature_1`, but both are {float(first):g} K."
             )
 
+        points = self.viscosity_1, self.viscosity_2
+        if is_concrete(first, second, *points):
+            hotter = np.asarray(second) > np.asarray(first)
+            thicker = np.asarray(points[1]) > np.asarray(points[0])
+            if np.any((hotter == thicker) & (np.asarray(points[1]) != np.asarray(points[0]))):
+                row = zip(points, (first, second), strict=True)
+                given = " and ".join(f"{np.ravel(x)[0]:g} m^2/s at {np.ravel(t)[0]:g} K" for x, t in row)
+                raise ArgumentError(
+                    "viscosity_1", "viscosity_2", said=f"must not rise with the temperature, but {given} were given."
+                )
+
     @property
     def kinematic_viscosity(self) -> Array:
         """Kinematic viscosity at the operating temperature [m^2/s]."""

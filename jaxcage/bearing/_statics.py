@@ -12,11 +12,13 @@ from .._errors import ArgumentError
 from .._types import Scalar
 from ._geometry import Bearing
 from ._line_contact import line_contact_approach, raceway_loads_of_all
-from ._validate import require_not_negative, require_positive
+from ._validate import require_at_most, require_not_negative, require_positive
 
 
 Guidance = Literal["outer_rib", "inner_rib", "roller"]
 
+LARGEST = 1e7
+"""Of loads [N]."""
 DEFAULT_SHAFT_LOAD = 4450.0
 """Shaft load F [N]; the paper does not print it."""
 
@@ -184,9 +186,12 @@ def load_distribution(
     traced, an error as the computation runs.
     """
     require_x64()
-    return _distribution(
-        bearing,
-        require_positive("load", load),
-        require_not_negative("centrifugal_force", centrifugal_force),
-        jnp.asarray(roller_angle, dtype=float),
-    )
+    force = require_at_most("load", require_positive("load", load), LARGEST, "N")
+    outward = require_not_negative("centrifugal_force", centrifugal_force)
+    outward = require_at_most("centrifugal_force", outward, LARGEST, "N")
+    try:
+        return _distribution(bearing, force, outward, jnp.asarray(roller_angle, dtype=float))
+    except eqx.EquinoxRuntimeError as error:
+        given = f"but {float(force):g} and {float(outward):g} N were given."
+        said = f"must be of sizes that can be added, {given}"
+        raise ArgumentError("load", "centrifugal_force", said=said) from error

@@ -8,6 +8,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array
 
+from .._errors import ArgumentError
 from .._types import Scalar
 
 
@@ -29,6 +30,14 @@ def _require(array: Array, holds: Any, message: str) -> Array:
         given = "" if isinstance(array, Tracer) else f", but {float(array):g} was given"
         raise ValueError(f"{message}{given}.")
     return array
+
+
+def require_at_most(name: str, array: Array, largest: float, unit: str) -> Array:
+    """`array`, checked not to be beyond all sense. **Raises:** as `require_positive`, an `ArgumentError` if known."""
+    holds = _known(array) <= largest
+    if not isinstance(holds, Tracer) and not isinstance(array, Tracer) and not np.all(holds):
+        raise ArgumentError(name, said=f"must be at most {largest:g} {unit}, but {np.max(array):g} was given.")
+    return _require(array, holds, f"Argument `{name}` must be at most {largest:g} {unit}")
 
 
 def require_positive(name: str, value: Scalar) -> Array:

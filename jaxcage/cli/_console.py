@@ -10,11 +10,15 @@ from types import FrameType
 from typing import TypeAlias
 
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 FILES_ARE_WHOLE = "files of earlier runs are as they were, and the same command starts over"
 SECONDS_BETWEEN_LINES = 60.0
 _SHOW_CURSOR_AND_CLEAR_LINE = "\x1b[?25h\r\x1b[2K"
+ENDS = (signal.SIGINT, signal.SIGTERM)
+"""Signals by which a command is told to end."""
+_number: int = signal.SIGINT
+"""The one that it was told by."""
 _advice: str | None = None
 """What is said to whoever interrupts the computation; None outside of one."""
 
@@ -24,8 +28,12 @@ Say: TypeAlias = Callable[[str, int, int], None]
 
 def say(text: str) -> None:
     """One line on standard error; names and texts of others cannot move the cursor."""
-    line = " ".join(text.split())
-    print("".join(c if c.isprintable() else repr(c)[1:-1] for c in line), file=sys.stderr)
+    print(visible(" ".join(text.split())), file=sys.stderr)
+
+
+def visible(text: str) -> str:
+    """A text in which nothing moves the cursor or turns the direction of writing: such characters are spelt out."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def warn_of_short(labels: int) -> None:
@@ -35,23 +43,33 @@ def warn_of_short(labels: int) -> None:
 
 
 def leave_at_once_when_interrupted() -> None:
-    """Ctrl-C during a computation ends the process then and there.
+    """Ctrl-C, or being told to end, during a computation ends the process then and there.
 
     The threads of a sweep cannot be stopped, and Python would wait for them. Outside a computation,
-    when files are written, an interruption is raised as ever, so that things are tidied up.
+    when files are written, an interruption is raised as ever, so that things are tidied up; a second one ends that too.
     """
-    signal.signal(signal.SIGINT, _on_interruption)
+    for each in ENDS:
+        signal.signal(each, _on_interruption)
+
+
+def interrupted_status() -> int:
+    """Exit status after an interruption: 128 and the number of the signal."""
+    return 128 + _number
 
 
 def _on_interruption(number: int, frame: FrameType | None) -> None:
-    del number, frame
+    del frame
+    global _number
+    _number = number
+    for each in ENDS:
+        signal.signal(each, signal.SIG_DFL)
     if _advice is None:
         raise KeyboardInterrupt
     if sys.stderr.isatty():
         sys.stderr.write(_SHOW_CURSOR_AND_CLEAR_LINE)
     say(f"Interrupted: {_advice}.")
     sys.stderr.flush()
-    os._exit(INTERRUPTED)
+    os._exit(interrupted_status())
 
 
 @contextlib.contextmanager

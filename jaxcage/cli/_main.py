@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError, InputError, NoResult
-from ._console import BAD_INPUT, FAILED, FILES_ARE_WHOLE, INTERRUPTED, OK, leave_at_once_when_interrupted, say
+from ._console import (
+    BAD_INPUT,
+    FAILED,
+    FILES_ARE_WHOLE,
+    OK,
+    interrupted_status,
+    leave_at_once_when_interrupted,
+    say,
+    visible,
+)
 from ._options import COMMANDS, AnyOptions, Command, CommonOptions
 from ._readers import flag
 
@@ -31,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments`, by default those of the process.
 
     **Returns:** exit status: 0, 1 for a computation without a result, 2 for bad input, 130 when
-    interrupted.
+    interrupted, 143 when told to end.
     """
     if arguments is None:  # the process is ours, not a notebook's
         leave_at_once_when_interrupted()
@@ -52,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return FAILED
     except KeyboardInterrupt:
         say(f"Interrupted: {FILES_ARE_WHOLE}.")
-        return INTERRUPTED
+        return interrupted_status()
 
 
 def _carry_out(options: AnyOptions) -> None:
@@ -91,7 +100,9 @@ def _complete(job: "Job[Any]", report: "Report") -> "Report":
     read, named = _readings(job, report.document)
     time = {"seconds": round(job.seconds, 2)} if job.options.timed else {}
     said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
-    files = [f"{key.replace('_', ' ').capitalize()}: {path}" for key, path in job.files.items() if path is not None]
+    files = [
+        f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in job.files.items() if path is not None
+    ]
     document = {**case, **report.document, **read, **time, **job.files}
     tables = [with_shaft(table, job.ratio) if job.name else table for table in report.tables]
     return dataclasses.replace(report, document=document, tables=tables, notes=[*report.notes, *named, *said, *files])

@@ -255,6 +255,9 @@ class StudyOptions(_Length, IntegrationOptions):
     workers: Annotated[int | None, whole(1)] = None
     """Processes of the cluster on this machine; one a core if left out."""
 
+    verify: Annotated[bool, tyro.conf.arg(name="check")] = False
+    """Compute nothing: compare every byte of the store with what was written. Needs only the case, and --store."""
+
     def check(self) -> None:
         if self.executor == "local" and (self.scheduler is not None or self.workers is not None):
             raise InputError("Options --scheduler and --workers go with --executor dask.")
@@ -361,6 +364,7 @@ class StaticsOptions(Options):
     """Load of every roller, loaded zone, static displacement of the cage, kinematics."""
 
     timed: ClassVar[bool] = False
+    called: ClassVar[Mapping[str, str]] = {"centrifugal_force": "shaft_speed"}
 
     load: Annotated[float | None, number("be above 0 N", lambda x: x > 0, "N", "own")] = None
     """Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out."""

@@ -7,6 +7,7 @@ from typing import Any
 from .. import report
 from .._errors import InputError
 from ..sweeps import rpm
+from ._console import visible
 from ._job import Job, blocks_of
 from ._options import ReportOptions
 from ._show import Report
@@ -51,7 +52,7 @@ def _command(options: ReportOptions) -> str:
     """The command line as a shell takes it, without folders."""
     parts = ["jaxcage", "report", Path(options.case).name]
     parts += ["--operating", options.operating] if options.operating else []
-    return shlex.join([*parts, *(["--quick"] if options.quick else [])])
+    return visible(shlex.join([*parts, *(["--quick"] if options.quick else [])]))
 
 
 def _document(findings: report.Findings, judged: list[report.Judged]) -> dict[str, Any]:

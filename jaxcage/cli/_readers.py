@@ -14,6 +14,8 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
+LARGEST = {"rpm": 1e6, "N": 1e7}
+"""Of quantities: beyond, nothing that is computed means anything."""
 LONGEST = 200
 """Bytes in the name of a store: file systems have room for 255, and what is written aside has a longer name."""
 _EXAMPLES = {"rpm": '"900 rad/s" or "20000 rpm shaft"', "N": '"4.45 kN"', "ms": '"600 us"'}
@@ -63,6 +65,8 @@ def number(
         value = read_quantity(text, unit) if unit else _plain(text)
         if must and not (math.isfinite(value) and holds(value)):
             raise ValueError(f"must {must}, but {value:g} was given.")
+        if value > LARGEST.get(unit, math.inf):
+            raise ValueError(f"must be at most {LARGEST[unit]:g} {unit}, but {value:g} was given.")
         return value
 
     return _option({"": "FLOAT", "rpm": "RPM"}.get(unit, unit), read, nothing)

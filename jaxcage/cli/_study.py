@@ -10,9 +10,10 @@ import numpy as np
 from .._errors import InputError
 from ..integrate import OUTCOMES
 from ..report import require_some, shares_table
-from ..studies import LABELS, Plan, Spread, Study, open_study, run_study, too_short
+from ..studies import LABELS, DamagedStore, Plan, Spread, Study, check_study, open_study, run_study, too_short
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of
+from ._limits import demand_of_study
 from ._options import StudyOptions
 from ._show import Report
 from ._vary import read_vary
@@ -26,9 +27,12 @@ ADVICE = "what is stored stays, and the same command goes on from there"
 def study(job: Job[StudyOptions]) -> Report:
     """Carry out `jaxcage study`."""
     options = job.options
+    if options.verify:
+        return _verify(job)
     length = job.given("discard revolutions exponents strobe")
     work = Study(job.model, _plan(job), job.method, blocks=blocks_of(options.revolutions), **length)
-    path = job.folder / (options.store or f"study_{job.name}.zarr")
+    job.require(demand_of_study(work))
+    path = job.folder / _name(job)
     before, began = _lanes_stored(path), time.perf_counter()
     with job.computing(unit="lanes", advice=ADVICE) as bar:
         try:
@@ -47,9 +51,27 @@ def study(job: Job[StudyOptions]) -> Report:
     notes = [
         f"Failed lanes: {', '.join(f'{n} {what}' for what, n in document['failed'].items()) or 'none'}",
         f"Computed: {document['stored'] - before} lanes" + (f", {rate:.0f} a second" if rate else ""),
-        f"Open it: xarray.open_zarr({str(path)!r})",
+        f"Open it: jaxcage.open_study({str(path)!r})",
     ]
     return Report(document, [table], notes)
+
+
+def _name(job: Job[StudyOptions]) -> str:
+    return job.options.store or f"study_{job.name}.zarr"
+
+
+def _verify(job: Job[StudyOptions]) -> Report:
+    """Compare a store with what was written."""
+    path = Path(job.options.out) / _name(job)
+    try:
+        state = check_study(path)
+    except FileNotFoundError as error:
+        raise InputError(str(error)) from error
+    damaged = {str(chunk): what for chunk, what in state.damaged.items()}
+    counts = {"chunks": state.chunks, "finished": state.finished, "damaged": damaged, "metadata": state.metadata}
+    again = "the same command without --check computes it again and leaves the rest"
+    failure = "" if state.whole else f"The store '{path}' is damaged: {again}."
+    return Report({"store": str(path), **counts}, notes=str(state).splitlines(), failure=failure)
 
 
 def _plan(job: Job[StudyOptions]) -> Plan:
@@ -69,7 +91,7 @@ def _lanes_stored(path: Path) -> int:
     try:
         with open_study(path) as dataset:
             return int(np.sum(dataset["outcome"].values >= 0))
-    except (FileNotFoundError, KeyError):
+    except (FileNotFoundError, KeyError, DamagedStore):
         return 0  # nothing yet, or nothing of ours: that is said later
 
 

@@ -38,7 +38,13 @@ from ._dataset import (
     stored_configuration as stored_configuration,
     to_dataset as to_dataset,
 )
-from ._files import check_writable as check_writable, replacing as replacing
+from ._files import (
+    check_writable as check_writable,
+    put_bytes as put_bytes,
+    read_bytes as read_bytes,
+    replacing as replacing,
+    sync as sync,
+)
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
 from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner

@@ -29,6 +29,7 @@ from .._parameters import must_be_given, parameter_paths
 from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import CageModel, case
+from ._files import read_bytes
 from ._ranges import Range
 from ._schema import KINDS, ConfigError, Known, read_value, submodules, values
 from ._speeds import WHOSE, Whose
@@ -92,8 +93,7 @@ def read_bearing(path: str | Path) -> BearingFile:
     key, what was given and what is allowed; `RuntimeError` without double precision.
     """
     try:
-        with open(path, "rb") as file:
-            table = tomllib.load(file)
+        table = tomllib.loads(read_bytes(path).decode())
     except OSError as error:
         raise ConfigError(f"File '{path}' must be a readable TOML file, but: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits; nested too deep

@@ -10,7 +10,11 @@ from .._glossary import component_names, quantity
 from ..analysis import Sweep
 from ..integrate import Trajectory
 from ..orbits import Branch
-from ._files import replacing
+from ._files import read_bytes, replacing
+
+
+LARGEST_TABLE = 4_000_000_000
+"""Bytes of a table that is read."""
 
 
 def write_columns(path: str | Path, columns: Mapping[str, Shaped[np.ndarray, " rows"]]) -> Path:
@@ -26,9 +30,9 @@ def read_columns(path: str | Path) -> dict[str, Float[np.ndarray, " rows"]]:
 
     **Raises:** `ValueError` for what is no table of numbers with a head over each column.
     """
-    with open(path, encoding="utf-8") as file:
-        names = file.readline().strip().split(",")
-    table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    head, *rows = read_bytes(path, LARGEST_TABLE).decode().splitlines()
+    names = head.strip().split(",")
+    table = np.loadtxt(rows, delimiter=",", ndmin=2)
     return dict(zip(names, table.T, strict=True))
 
 

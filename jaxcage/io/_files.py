@@ -3,11 +3,73 @@
 import contextlib
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from .._errors import InputError
+
+
+LARGEST = 10_000_000
+"""Bytes of a file that describes something: a hundred times what anybody writes by hand."""
+
+
+def read_bytes(path: str | Path, largest: int = LARGEST) -> bytes:
+    """What a file holds, unless it is something else than a file, as a pipe or a device, which may never end.
+
+    **Raises:** `OSError` with the reason in its `strerror`.
+    """
+    with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+        about = os.fstat(file.fileno())
+        if stat.S_ISDIR(about.st_mode):
+            raise IsADirectoryError(None, "Is a directory")
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(None, "it is no regular file, but a pipe, a device or the like")
+        if about.st_size > largest:
+            raise OSError(None, f"it has {about.st_size} bytes, more than the {largest} that are read")
+        return file.read(largest)
+
+
+def put_bytes(path: Path, data: bytes) -> None:
+    """Write a file in one step that a loss of power does not undo: the bytes reach the disk before the name does.
+
+    What is written aside is named `*.partial`; if somebody tidies it away meanwhile, it is written again.
+    """
+    for attempt in range(3):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, aside = tempfile.mkstemp(prefix=".", suffix=".partial", dir=path.parent)
+        try:
+            with open(handle, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(aside, 0o666 & ~_umask())
+            os.replace(aside, path)
+            break
+        except FileNotFoundError:
+            if attempt == 2:
+                raise
+        except BaseException:
+            Path(aside).unlink(missing_ok=True)
+            raise
+    sync_folder(path.parent)
+
+
+def sync_folder(path: Path) -> None:
+    """Have the names in a folder reach the disk, where the system can do that."""
+    with contextlib.suppress(OSError):
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
 
 
 @contextlib.contextmanager
@@ -28,6 +90,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         workplace = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".partial", dir=target.parent))
         try:
             yield workplace / target.name
+            sync(workplace / target.name)
             _move_in(workplace / target.name, target, workplace / "earlier")
         finally:
             if target.exists() or not (workplace / "earlier").exists():
@@ -37,6 +100,16 @@ def replacing(path: str | Path) -> Iterator[Path]:
             f"'{target}' could not be written ({reason(error)}), and what was there before stays as it was: "
             "make room or choose another folder, and run this again."
         ) from error
+
+
+def sync(path: Path) -> None:
+    """Have a file, or all files of a folder, reach the disk before they get their place."""
+    files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path] if path.exists() else []
+    for each in files:
+        with open(each, "rb") as file:
+            os.fsync(file.fileno())
+    for folder in {p.parent for p in files}:
+        sync_folder(folder)
 
 
 def reason(error: OSError) -> str:

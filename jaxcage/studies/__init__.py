@@ -5,7 +5,13 @@
 | `_vary`     | how a parameter is sampled                                                    |
 | `_plan`     | what is varied, lanes and chunks                                              |
 | `_study`    | what is computed of a lane, the same bits anywhere                            |
+| `_references` | what code refers to                                                         |
+| `_fingerprint` | digests of all that the numbers follow from                                |
 | `_store`    | the zarr folder, whole at any time                                            |
+| `_empty`    | what describes it                                                             |
+| `_manifest` | digests of what is finished                                                   |
+| `_zarr`     | reading and writing with them                                                 |
+| `_check`    | whether a store is what was written                                           |
 | `_run`      | runs what a store lacks, in this process                                      |
 | `_dask`     | or on dask.distributed                                                        |
 | `_adaptive` | a grid of labels refined where the label changes                              |
@@ -14,6 +20,11 @@
 """
 
 from ._adaptive import AdaptiveGrid as AdaptiveGrid, found_share as found_share, refine as refine
+from ._check import (
+    DamagedStore as DamagedStore,
+    OldStore as OldStore,
+    StoreState as StoreState,
+    check_study as check_study,
 from ._ensemble import (
     ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
     REVOLUTIONS as REVOLUTIONS,

@@ -108,17 +108,18 @@ class Plan:
         return tuple(reversed(extents))
 
     @property
-    def _blocks(self) -> tuple[int, ...]:
+    def blocks(self) -> tuple[int, ...]:
+        """Number of chunks along each axis."""
         return tuple(-(-length // extent) for length, extent in zip(self.shape, self.block, strict=True))
 
     @property
     def chunks(self) -> int:
         """Number of chunks."""
-        return math.prod(self._blocks)
+        return math.prod(self.blocks)
 
     def region(self, chunk: int) -> tuple[slice, ...]:
         """Where a chunk lies in the grid."""
-        place = np.unravel_index(chunk, self._blocks)
+        place = np.unravel_index(chunk, self.blocks)
         corners = zip(place, self.block, self.shape, strict=True)
         return tuple(slice(int(i) * extent, min((int(i) + 1) * extent, length)) for i, extent, length in corners)
 

@@ -113,12 +113,13 @@ def run_study(
     else:
         compute = lambda chunks: _chunks_here(about, chunks)
     store = Store(path, about)
-    mine, pending = set(range(about.plan.chunks)[i - 1 :: n]), store.pending()
+    part = range(about.plan.chunks)[i - 1 :: n]
+    mine, pending = set(part), store.pending(part)
     size = {chunk: about.plan.lanes_of(chunk).size for chunk in mine}
     done, total = sum(size[c] for c in mine - set(pending)), sum(size.values())
     report = progress or (lambda done, total: None)
     report(done, total)
-    for chunk, results in compute([c for c in pending if c in mine]):
+    for chunk, results in compute(pending):
         store.write(chunk, results)
         done += size[chunk]
         report(done, total)

@@ -1,29 +1,28 @@
 """The results of a study on disk: a zarr folder that plain xarray opens, whole at any time, filled chunk by chunk.
 
-A chunk of lanes is one file of each variable, written aside and put in place in one step, `outcome` last: a chunk is
-done if its outcomes are no longer pending. What was written before a kill without its outcomes is written again, with
-the same bits. Nothing in the folder depends on when, where or in which order it was written.
+A chunk of lanes is one file of each variable, written aside and put in place in one step, and then an entry in the
+manifest with the digests of all of them: a chunk is finished if each of its files is what its entry says. What is
+missing, torn or wrong is pending, and computed again with the same bits. So two processes may write to one store
+without a lock: both write the same files. Nothing in the folder depends on when, where or in which order it was
+written.
 """
 
 import contextlib
 import json
 import os
 import shutil
-import tempfile
-import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._errors import ArgumentError
-from .._glossary import component_names, quantity
-from .._parameters import parameter_info
-from ..integrate import OUTCOMES
-from ..models import CageModel
-from ._plan import SAMPLE
-from ._study import LABELS, OIL, PENDING, SPEED, Results, Study
+from ..io import read_bytes
+from ._check import DamagedStore, OldStore, about_store
+from ._empty import create, mend
+from ._manifest import damage, damaged_metadata, entry_of, make_way, read_entry, write_entry
+from ._study import LABELS, Results, Study
 
 
 if TYPE_CHECKING:
@@ -38,19 +37,34 @@ class Store:
     """The store of a study, made if there is none."""
 
     def __init__(self, path: str | Path, study: Study):
-        """**Raises:** `OtherStudy` for a folder that holds anything else than results of this very study."""
-        self.path, self.study = Path(path), study
-        if not self.path.exists():
-            with _going_on(self.path):
-                _create(self.path, study)
-        _check_same(self.path, study)
-        self._arrays = {name: array for name, array in _group(self.path, "r+").arrays()}
+        """**Raises:** `OtherStudy` for a folder that holds anything else than results of this very study, or for a
+        study of which that cannot be told.
+        """
+        import zarr
 
-    def pending(self) -> list[int]:
-        """Chunks that are not done, read from the store."""
-        outcome = np.asarray(self._arrays["outcome"][...])
-        plan = self.study.plan
-        return [i for i in range(plan.chunks) if np.any(outcome[plan.region(i)] == PENDING)]
+        from ._zarr import Marking
+
+        self.path, self.study = Path(path), study
+        there = os.path.lexists(self.path)
+        if there and study.unknown:
+            said = f"must be a new folder, since nobody can tell whether '{path}' is of this study: {study.unknown}."
+            raise OtherStudy("store", said=said)
+        with _going_on(self.path):
+            if not there:
+                create(self.path, study)
+            self.about = _same(self.path, study)
+        self._files = Marking(self.path, self.about)
+        group = zarr.open_group(self._files, mode="r+", zarr_format=3, use_consolidated=False)
+        self._arrays: dict[str, Any] = {name: group[name] for name in self.about["variables"]}
+        self._finished: set[int] = set()
+
+    def pending(self, among: Iterable[int] | None = None) -> list[int]:
+        """Chunks that are not finished, or are not what they were, by every byte that is stored of them."""
+        chunks = range(self.study.plan.chunks) if among is None else among
+        for chunk in chunks:
+            if chunk not in self._finished and damage(self.path, self.about, chunk) is None:
+                self._finished.add(chunk)
+        return [chunk for chunk in chunks if chunk not in self._finished]
 
     def write(self, chunk: int, results: Results) -> None:
         """Put the results of a chunk in place.
@@ -58,31 +72,43 @@ class Store:
         **Raises:** `OSError`, one sentence with the reason and how to go on.
         """
         region = self.study.plan.region(chunk)
-        with _going_on(self.path):
+        with _going_on(self.path), self._files.chunk(chunk) as files:
             for name in sorted(results, key=lambda name: name == "outcome"):
                 self._arrays[name][region] = results[name]
+            entry = {"chunk": chunk, "fingerprint": self.about["fingerprint"], "files": files}
+            make_way(self.path, entry_of(self.path, chunk))
+            write_entry(entry_of(self.path, chunk), entry)
+        self._finished.add(chunk)
 
     def tidy(self) -> None:
         """Remove what kills left behind; for a store that nobody writes to any more."""
         for left in self.path.rglob("*.partial"):
-            left.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                left.unlink()
         for left in self.path.parent.glob(f".{self.path.name}.*.partial"):
             shutil.rmtree(left, ignore_errors=True)
 
 
 def open_study(path: str | Path) -> "xr.Dataset":
-    """The results of a study so far, read from disk when they are used.
+    """The results of a study so far, read from disk when they are used, each chunk compared with what was written.
 
-    Lanes that have not been run are NaN with the label and outcome -1.
+    Lanes that have not been run are NaN with the label and outcome -1; so are those of chunks that are damaged.
 
-    **Raises:** `FileNotFoundError`.
+    **Raises:** `FileNotFoundError`; `DamagedStore`, a `ValueError`, where what describes the store is damaged.
     """
     import xarray as xr
 
-    if not (Path(path) / "zarr.json").is_file():
-        raise FileNotFoundError(f"There is no study at '{path}'.")
+    from ._zarr import Checked
+
     # Version 3 only, and not what consolidated metadata say: version 2 has a codec that runs what a file says.
-    return xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, chunks=None)
+    options: dict[str, Any] = dict(engine="zarr", zarr_format=3, consolidated=False, chunks=None)
+    try:
+        about = about_store(Path(path))
+    except OldStore:
+        return xr.open_dataset(path, **options)
+    if wrong := damaged_metadata(Path(path), about):
+        raise DamagedStore(path, wrong[0])
+    return xr.open_dataset(Checked(Path(path), about), **options)  # pyright: ignore[reportArgumentType]
 
 
 def label_names(dataset: "xr.Dataset") -> "xr.DataArray":
@@ -104,22 +130,49 @@ def _going_on(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _group(path: Path, mode: Any) -> Any:
-    import zarr
+def _same(path: Path, study: Study) -> Mapping[str, Any]:
+    """What the manifest says of the store of this study, after what describes the store has been mended if need be.
 
-    return zarr.open_group(path, mode=mode, zarr_format=3, use_consolidated=False)
+    **Raises:** `OtherStudy`.
+    """
+    refused = "must be a new folder or the store of this study, but"
+    try:
+        about = about_store(path)
+        theirs = about["fingerprint"]
+    except OldStore as error:
+        raise OtherStudy("store", said=f"{refused} {error}") from error
+    except (FileNotFoundError, DamagedStore) as error:
+        about, theirs = None, _claimed(path, study)
+        if theirs is None:
+            raise OtherStudy("store", said=f"{refused} '{path}' is neither.") from error
+    if theirs != study.fingerprint:
+        described = json.loads(json.dumps(study.describe()))
+        different = _differences(_attributes_of(path).get("study"), described)
+        several = [name for name in different if name not in ("model", "integration")] or different
+        what = ", ".join(several) or "its lanes"
+        other = f"'{path}' holds another study, which differs in {what}: choose another folder."
+        raise OtherStudy("store", said=f"{refused} {other}")
+    if about is None or damaged_metadata(path, about):
+        mend(path, study)
+        about = about_store(path)
+    return about
 
 
-def _check_same(path: Path, study: Study) -> None:
-    if not (path / "zarr.json").is_file():
-        raise OtherStudy("store", said=f"must be a new folder or the store of this study, but '{path}' is neither.")
-    attributes = _group(path, "r").attrs
-    if attributes.get("fingerprint") == study.fingerprint:
-        return
-    theirs, ours = json.loads(str(attributes.get("study", "{}"))), json.loads(json.dumps(study.describe()))
-    different = ", ".join(_differences(theirs, ours)) or "its lanes"
-    other = f"'{path}' holds another study, which differs in {different}: choose another folder."
-    raise OtherStudy("store", said=f"must be a new folder or the store of this study, but {other}")
+def _claimed(path: Path, study: Study) -> str | None:
+    """Whose study a store without a manifest is, by its attributes or any chunk that is left."""
+    found = _attributes_of(path).get("fingerprint")
+    chunks = (path / "manifest" / "chunks").glob("*")
+    entries = (read_entry(each) for each in chunks)
+    return found or next((e["fingerprint"] for e in entries if e and "fingerprint" in e), None)
+
+
+def _attributes_of(path: Path) -> dict[str, Any]:
+    """Attributes of a store, as far as they can be read."""
+    try:
+        attributes = json.loads(read_bytes(path / "zarr.json"))["attributes"]
+        return attributes | {"study": json.loads(attributes.get("study", "{}"))}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return {}
 
 
 def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
@@ -127,114 +180,5 @@ def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
     if not (isinstance(theirs, dict) and isinstance(ours, dict)):
         return [] if theirs == ours else [name]
     keys = [key for key in {**ours, **theirs} if theirs.get(key) != ours.get(key)]
-    dotted = lambda key: key if name in ("", "system", "plan") else f"{name}.{key}"
+    dotted = lambda key: key if name in ("", "system", "plan", "code") else f"{name}.{key}"
     return [found for key in keys for found in _differences(theirs.get(key), ours.get(key), dotted(key))]
-
-
-def _create(path: Path, study: Study) -> None:
-    """Make an empty store beside its place and move it there in one step; whoever comes second leaves it alone."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
-    try:
-        _write_template(aside / path.name, study)
-        os.rename(aside / path.name, path)
-    except OSError:
-        if not path.exists():
-            raise
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
-
-
-def _write_template(path: Path, study: Study) -> None:
-    import xarray as xr
-    import zarr
-
-    plan, shape = study.plan, _shapes(study)
-    dataset = xr.Dataset(coords=_coordinates(study, shape), attrs=_attributes(study))
-    dataset.to_zarr(path, mode="w", consolidated=False)
-    group = _group(path, "r+")
-    for name, (dims, kind) in shape.items():
-        extra = [_extents(study)[d] for d in dims[len(plan.shape) :]]
-        group.create_array(
-            name,
-            shape=(*plan.shape, *extra),
-            chunks=(*plan.block, *extra),
-            dtype=kind,
-            fill_value=np.nan if kind == "float64" else PENDING,
-            dimension_names=dims,
-            attributes=_words(name),
-        )
-    with warnings.catch_warnings():  # zarr warns that the specification does not have this yet; xarray warns without it
-        warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(path)
-
-
-def _extents(study: Study) -> dict[str, int]:
-    """Lengths of the axes within a lane."""
-    return {"exponent": study.exponents, "revolution": study.strobe, "component": study.system.dimension}
-
-
-def _shapes(study: Study) -> dict[str, tuple[tuple[str, ...], str]]:
-    """Dimensions and kind of number of every variable."""
-    lanes = tuple(study.plan.axes)
-    one = {name: (lanes, "float64") for name in ("largest_exponent", "standard_error", "peak", "error")}
-    one |= {name: (lanes, "int8") for name in ("period", "label", "outcome")}
-    if study.exponents > 1:
-        one |= {name: ((*lanes, "exponent"), "float64") for name in ("exponents", "standard_errors")}
-    if study.strobe:
-        one["strobe"] = ((*lanes, "revolution", "component"), "float64")
-    return one
-
-
-def _words(name: str) -> dict[str, Any]:
-    known = quantity({"exponents": "exponent", "standard_errors": "standard_error"}.get(name, name))
-    words: dict[str, Any] = {"long_name": known.text, "units": known.unit}
-    meanings = {"label": LABELS, "outcome": OUTCOMES}.get(name)
-    if meanings is None:
-        return words
-    codes = [PENDING, *range(len(meanings))]
-    return words | {"flag_values": codes, "flag_meanings": " ".join(["pending", *meanings])}
-
-
-def _coordinates(study: Study, shapes: dict[str, tuple[tuple[str, ...], str]]) -> dict[str, Any]:
-    plan = study.plan
-    info = parameter_info(study.system)
-
-    def words(name: str) -> dict[str, str]:
-        if name == OIL:
-            return {"long_name": "ISO VG grade of the oil", "units": "mm^2/s"}
-        known = quantity(name) if name == SPEED or name not in info else None
-        return {
-            "long_name": known.text if known else info[name].text,
-            "units": known.unit if known else info[name].unit,
-        }
-
-    found: dict[str, Any] = {name: (name, np.asarray(x), words(name)) for name, x in plan.grid.items()}
-    found |= {name: (SAMPLE, x, words(name)) for name, x in plan.cloud.items()}
-    if SPEED in plan.names:
-        dims, speed, _ = found[SPEED]
-        known = quantity("speed_rpm")
-        found["speed_rpm"] = (dims, speed * 30 / np.pi, {"long_name": known.text, "units": known.unit})
-    if "strobe" in shapes:
-        last = study.discard + study.revolutions
-        found["revolution"] = np.arange(last - study.strobe + 1, last + 1)
-        names = component_names(study.system.dimension, isinstance(study.system, CageModel))
-        found["component"] = np.array(names, dtype=object)
-    return found
-
-
-def _attributes(study: Study) -> dict[str, Any]:
-    described = study.describe()
-    system, configured = study.system, {}
-    if isinstance(system, CageModel) and not system.extra:  # a configuration cannot hold forces of one's own
-        configured = {"configuration": json.dumps(described["system"])}
-    return {
-        "title": "jaxcage study",
-        "fingerprint": study.fingerprint,
-        "study": json.dumps(described),
-        "discard": study.discard,
-        "revolutions": study.revolutions,
-        "seed": study.plan.seed,
-        **configured,
-        **{name: text for name, text in described.items() if name.startswith("version_")},
-    }

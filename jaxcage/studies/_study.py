@@ -3,9 +3,8 @@
 import dataclasses
 import functools
 import hashlib
-import inspect
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -19,12 +18,13 @@ from .._errors import ArgumentError
 from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
-from ..forces import AbstractForce
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, CageModel
 from ..orbits import pick
 from ..sweeps import Designs, Progress, make_plan, run_lanes, settings_of
+from ._fingerprint import fingerprint, package_digest, platform_traits
 from ._plan import Plan, Values
+from ._references import Unknown
 
 
 SPEED, OIL = "speed", "oil"
@@ -93,7 +93,22 @@ class Study:
             "strobe": self.strobe,
             **settings_of(self.method),
             "version_jaxlib": version("jaxlib"),
+            "package": package_digest(),
+            "platform": platform_traits(),
+            "code": {"unknown": self.unknown} if self.unknown else self._code,
         }
+
+    @functools.cached_property
+    def _code(self) -> dict[str, str]:
+        return fingerprint(model=self.system, integration=self.method)
+
+    @functools.cached_property
+    def unknown(self) -> str:
+        """Why it cannot be told whether another study is this one: a reason, or nothing if it can."""
+        try:
+            return "" if self._code else ""
+        except Unknown as error:
+            return str(error)
 
     @functools.cached_property
     def fingerprint(self) -> str:
@@ -198,29 +213,16 @@ def _start_and_scale(
 
 
 def _described(system: AbstractForcedSystem) -> Any:
-    """The configuration of a cage, with its user's forces; of another system its numbers, and its functions' text."""
+    """The configuration of a cage, with the numbers of its user's forces; of another system its numbers."""
     if isinstance(system, CageModel):
         from ..io import configuration  # the core does not load the tables of `io`
 
-        own = {type(law).__name__: [*_numbers_and_text(law), *_classes(law)] for law in system.extra}
+        own = {type(law).__name__: _numbers(law) for law in system.extra}
         return configuration(replace(system, extra=())) | ({"extra": own} if own else {})
-    return _numbers_and_text(system)
+    return _numbers(system)
 
 
-def _numbers_and_text(module: eqx.Module) -> list[Any]:
-    leaves = jax.tree.leaves(module)
-    numbers = [np.asarray(x).tolist() for x in leaves if eqx.is_array_like(x)]
-    return [str(jax.tree.structure(module)), numbers, [_text(x) for x in leaves if callable(x)]]
-
-
-def _classes(law: AbstractForce) -> list[str]:
-    """The text of its class and of those between this and ours."""
-    kinds = type(law).__mro__
-    return [_text(kind) for kind in kinds[: kinds.index(AbstractForce)]]
-
-
-def _text(f: Callable[..., Any]) -> str:
-    try:
-        return inspect.getsource(f)
-    except (OSError, TypeError):
-        return getattr(f, "__qualname__", type(f).__qualname__)
+def _numbers(module: eqx.Module) -> dict[str, Any]:
+    leaves, _ = jax.tree_util.tree_flatten_with_path(module)
+    named = lambda path: jax.tree_util.keystr(path).lstrip(".")
+    return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}
