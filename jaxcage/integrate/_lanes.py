@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from .._types import Scalar
-from ..models.whole import LEDGER, MEANS, PEAKS, BearingAtSpeed, BearingState, Rates
+from ..models.whole import LEDGER, MEANS, BearingAtSpeed, BearingState
 from ._results import INACCURATE, OUTCOMES
 
 
@@ -22,39 +22,73 @@ By = Literal["angle", "time"]
 ORDER = 4.0
 SAFETY, LEAST, MOST = 0.9, 0.2, 3.0
 """Of the step that the estimate asks for, and how far a step may be from the one before it."""
-SHORTEST = 1e-6
-"""Shortest step, as a share of a revolution: one that is still too inaccurate there is taken, and said."""
-STALLED = 0.05
-"""Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
+FAR = 2.0
+"""Eccentricity ratio beyond which a cage is no longer in its land."""
 NOT_FINITE, OUTSIDE, TOO_MANY = (OUTCOMES.index(name) for name in ("not_finite", "outside", "max_steps_reached"))
 
 
 class Lanes(NamedTuple):
     """Where lanes are, and what has been gathered on the way; the last axis of everything is that of the lanes."""
 
-    state: BearingState
-    integrals: Array
-    peaks: Array
-    rates: Rates
-    """Over time, at `state`."""
+    packed: Float[Array, "numbers lanes"]
+    """State and integrals in one array, so that what a step does to all of them is done at once: see `unpacked`."""
+    rates: Float[Array, "numbers lanes"]
+    """Over time, at `packed`."""
+    peaks: Float[Array, "peaks lanes"]
+    """The largest since they were last set back."""
     step: Float[Array, " lanes"]
-    """To try next, in revolutions' or time's unit."""
+    """To try next, in units of angle or time."""
     error: Float[Array, " lanes"]
     """Sum of the estimated errors of all steps, each the largest of the state, in units of its scale."""
     steps: Int[Array, " lanes"]
     refused: Int[Array, " lanes"]
     outcome: Int[Array, " lanes"]
 
+    @property
+    def state(self) -> BearingState:
+        """The state of each lane."""
+        return unpacked(self.packed)[0]
+
+    @property
+    def integrals(self) -> Array:
+        """What has been integrated beside it, as in `LEDGER` and `MEANS`."""
+        return unpacked(self.packed)[1]
+
+
+INTEGRALS = len(LEDGER) + len(MEANS)
+
+
+def packed(state: BearingState, integrals: Array) -> Array:
+    """One array of a state and its integrals; the rollers come first."""
+    rollers = state.rollers.reshape(-1, *state.rollers.shape[2:])
+    return jnp.concatenate([rollers, state.bodies, state.clock, integrals])
+
+
+def unpacked(numbers: Array) -> tuple[BearingState, Array]:
+    """The same apart."""
+    n = numbers.shape[0] - INTEGRALS
+    rollers = numbers[: n - 11].reshape(5, (n - 11) // 5, *numbers.shape[1:])
+    return BearingState(rollers, numbers[n - 11 : n - 2], numbers[n - 2 : n]), numbers[n:]
+
+
+def _field(at: BearingAtSpeed, numbers: Array) -> tuple[Array, Array]:
+    """Rates over time of packed numbers, and what peaks are taken of."""
+    rates = at(unpacked(numbers)[0])
+    return packed(rates.state, rates.integrals), rates.peaks
+
 
 class Controls(NamedTuple):
     """How to integrate."""
 
-    tolerance: Scalar
+    tolerance: Float[Array, " lanes"]
     """Largest estimated error of a step, in units of the state's scale."""
     longest: Scalar
     """Longest step, in units of the angle or time."""
     shortest: Scalar
+    """Shortest step: one that is still too inaccurate is taken, and the lane is `inaccurate`."""
     most_steps: int
+    slowest: Float[Array, " lanes"]
+    """Speed of the cage below which its angle is no measure of progress [rad/s]; 0 where time is."""
 
 
 def _over(f: Any, *arguments: Any) -> Any:
@@ -65,85 +99,93 @@ def _over(f: Any, *arguments: Any) -> Any:
 def begin(at: BearingAtSpeed, state: BearingState, step: Scalar) -> Lanes:
     """Lanes at their beginning."""
     lanes = state.bodies.shape[-1]
-    rates = _over(lambda at, y: at(y), at, state)
-    zero = lambda n: jnp.zeros((n, lanes))
+    y = packed(state, jnp.zeros((INTEGRALS, lanes)))
+    rates, peaks = _over(_field, at, y)
     count = jnp.zeros((lanes,), jnp.int32)
-    each = jnp.ones((lanes,)) * step
-    return Lanes(state, zero(len(LEDGER) + len(MEANS)), rates.peaks, rates, each, 0 * each, count, count, count)
-
-
-def _slope(rates: Rates, by: By) -> tuple[BearingState, Array]:
-    """Rates of state and integrals over what is integrated over."""
-    if by == "time":
-        return rates.state, rates.integrals
-    pace = 1 / rates.state.clock[0]
-    return jax.tree.map(lambda r: r * pace, (rates.state, rates.integrals))
-
-
-def _add(y: Any, h: Array, k: Any) -> Any:
-    return jax.tree.map(lambda y, k: y + h * k, y, k)
+    return Lanes(y, rates, peaks, jnp.ones((lanes,)) * step, jnp.zeros((lanes,)), count, count, count)
 
 
 def advance(
     at: BearingAtSpeed, scale: BearingState, lanes: Lanes, span: Float[Array, " lanes"], controls: Controls, by: By
 ) -> Lanes:
-    """Every lane over its `span`, in as many steps as it needs."""
-    slope = lambda rates: _over(lambda r: _slope(r, by), rates)
+    """Every lane over its `span`, in as many steps as it needs.
 
-    def step(carry: tuple[Lanes, Array]) -> tuple[Lanes, Array]:
+    **Arguments:** laws and scale of each lane, with lanes last; lanes; how far [rad or s]; controls.
+    """
+    n_state = lanes.packed.shape[0] - INTEGRALS
+    units = 1 / packed(scale, jnp.ones((INTEGRALS, span.size)))[: n_state - 2]
+    pace = lambda rates: rates / jnp.abs(rates[n_state - 2]) if by == "angle" else rates
+    slope = lambda rates: _over(pace, rates)
+    move = lambda y, h, k: _over(lambda y, h, k: y + h * k, y, h, k)
+
+    def attempt(carry: tuple[Lanes, Array]) -> tuple[Lanes, Array]:
         lanes, done = carry
         left = span - done
         h = jnp.where(left <= lanes.step, left, jnp.where(left < 2 * lanes.step, left / 2, lanes.step))
-        y, k1 = (lanes.state, lanes.integrals), slope(lanes.rates)
+        y, k1 = lanes.packed, slope(lanes.rates)
 
         def stage(i: Array, c: tuple) -> tuple:
-            rates, k, _, total = c
+            _, _, k, total = c
             share, weight = jnp.asarray((0.5, 0.5, 1.0, 0.0))[i], jnp.asarray((2.0, 2.0, 1.0, 0.0))[i]
-            last = (i == 3).astype(float)
-            way = jax.tree.map(lambda k, t: share * k + last / 6 * t, k, total)
-            state = _over(lambda y, h, k: _add(y, h, k), y[0], h, way[0])
-            rates = _over(lambda at, y: at(y), at, state)
+            way = jnp.where(i == 3, total / 6, share * k)  # the last stage is the first of the next step
+            moved = move(y, h, way)
+            rates, peaks = _over(_field, at, moved)
             new = slope(rates)
-            return rates, new, k, jax.tree.map(lambda t, n: t + weight * n, total, new)
+            return (moved, rates, peaks), k, new, total + weight * new
 
-        rates, k5, k4, total = jax.lax.fori_loop(0, 4, stage, (lanes.rates, k1, k1, k1))
-        after = _over(lambda y, h, k: _add(y, h / 6, k), y, h, total)
-        error = _over(_largest, h, k4[0], k5[0], scale)
+        found, k4, k5, _ = jax.lax.fori_loop(0, 4, stage, ((y, lanes.rates, lanes.peaks), k1, k1, k1))
+        difference = (k4 - k5)[: n_state - 2]
+        error = _over(lambda h, d, u: jnp.max(jnp.abs(h / 6 * d) * u), h, difference, units)
         error = jax.lax.stop_gradient(error)
-        finite = jnp.isfinite(error)
-        floor = lanes.step <= controls.shortest
-        good = (error <= controls.tolerance) & finite
-        taken = (good | floor) & (left > 0)
-        wish = SAFETY * (controls.tolerance / jnp.maximum(error, 1e-30)) ** (1 / ORDER)
-        factor = jnp.where(finite, jnp.clip(wish, LEAST, MOST), LEAST)
-        # A step that was shortened to end the stretch says nothing against the one that was to be tried.
-        tried = jnp.where(good & (h < lanes.step), jnp.maximum(lanes.step, h * factor), h * factor)
-        tried = jnp.clip(tried, controls.shortest, controls.longest)
-        code = jnp.where(taken & ~good, jnp.where(finite, INACCURATE, NOT_FINITE), 0)
-        code = jnp.where(lanes.steps >= controls.most_steps, TOO_MANY, code)
-        outcome = jnp.where(lanes.outcome == 0, code, lanes.outcome).astype(jnp.int32)
-        keep = lambda new, old: jax.tree.map(lambda n, o: jnp.where(taken, n, o), new, old)
-        active = left > 0
-        new = Lanes(
-            *keep(after, y),
-            peaks=keep(jnp.maximum(lanes.peaks, rates.peaks), lanes.peaks),
-            rates=keep(rates, lanes.rates),
-            step=jax.lax.stop_gradient(jnp.where(active, tried, lanes.step)),
-            error=lanes.error + jnp.where(taken, error, 0.0),
-            steps=lanes.steps + taken.astype(jnp.int32),
-            refused=lanes.refused + (active & ~taken).astype(jnp.int32),
-            outcome=outcome,
-        )
-        fatal = (outcome == NOT_FINITE) | (outcome == TOO_MANY)
-        done = jnp.where(taken, jnp.where(h >= left, span, done + h), done)
-        return new, jnp.where(fatal, span, done)
+        new, done = _judged(lanes, found, h, left, error, done, span, controls)
+        lost = (jnp.abs(new.rates[n_state - 2]) < controls.slowest) | (new.peaks[-1] > FAR)
+        outcome = jnp.where((new.outcome == 0) & lost, OUTSIDE, new.outcome).astype(jnp.int32)
+        return new._replace(outcome=outcome), jnp.where(outcome == OUTSIDE, span, done)
 
     going = lambda carry: jnp.any(span - carry[1] > 0)
-    lanes, _ = jax.lax.while_loop(going, step, (lanes, jnp.zeros_like(span)))
+    lanes, _ = jax.lax.while_loop(going, attempt, (lanes, jnp.zeros_like(span)))
     return lanes
 
 
-def _largest(h: Array, k4: BearingState, k5: BearingState, scale: BearingState) -> Array:
-    """The embedded estimate h/6 (k_4 - k_5), the largest of all parts over its scale; the clock is left out."""
-    of = lambda a, b, s: jnp.max(jnp.abs(h / 6 * (a - b)) / s)
-    return jnp.maximum(of(k4.rollers, k5.rollers, scale.rollers), of(k4.bodies, k5.bodies, scale.bodies))
+def _judged(
+    lanes: Lanes,
+    found: tuple[Array, Array, Array],
+    h: Array,
+    left: Array,
+    error: Array,
+    done: Array,
+    span: Array,
+    controls: Controls,
+) -> tuple[Lanes, Array]:
+    """Take a step or refuse it, and choose the next one."""
+    after, rates, peaks = found
+    finite, active = jnp.isfinite(error), left > 0
+    good = (error <= controls.tolerance) & finite
+    taken = (good | (lanes.step <= controls.shortest)) & active
+    wish = SAFETY * (controls.tolerance / jnp.maximum(error, 1e-30)) ** (1 / ORDER)
+    tried = h * jnp.where(finite, jnp.clip(wish, LEAST, MOST), LEAST)
+    # A step that was shortened to end the stretch says nothing against the one that was to be tried.
+    tried = jnp.where(good & (h < lanes.step), jnp.maximum(lanes.step, tried), tried)
+    tried = jnp.clip(tried, controls.shortest, controls.longest)
+    code = jnp.where(taken & ~good, jnp.where(finite, INACCURATE, NOT_FINITE), 0)
+    code = jnp.where(active & (lanes.steps >= controls.most_steps), TOO_MANY, code)
+    outcome = jnp.where(lanes.outcome == 0, code, lanes.outcome).astype(jnp.int32)
+    fatal = (outcome == NOT_FINITE) | (outcome == TOO_MANY)
+    keep = lambda new, old: jnp.where(taken, new, old)
+    new = Lanes(
+        packed=_over(_kept, taken, after, lanes.packed),
+        rates=_over(_kept, taken, rates, lanes.rates),
+        peaks=_over(_kept, taken, jnp.maximum(lanes.peaks, peaks), lanes.peaks),
+        step=jax.lax.stop_gradient(jnp.where(active, tried, lanes.step)),
+        error=lanes.error + keep(error, jnp.zeros_like(error)),
+        steps=lanes.steps + taken.astype(jnp.int32),
+        refused=lanes.refused + (active & ~taken).astype(jnp.int32),
+        outcome=outcome,
+    )
+    done = jnp.where(taken, jnp.where(h >= left, span, done + h), done)
+    return new, jnp.where(fatal, span, done)
+
+
+def _kept(taken: Array, new: Array, old: Array) -> Array:
+    """The new numbers of a lane if its step was taken."""
+    return jnp.where(taken, new, old)

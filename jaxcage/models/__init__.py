@@ -9,6 +9,7 @@
 | `_groups`         | dimensionless groups                                                             |
 | `_cases`          | the paper's six cases as models                                                  |
 | `_constants`      | what the paper leaves out, in sets                                               |
+| `whole`           | the whole bearing: rollers, pockets, cage, guiding land, inner ring              |
 """
 
 from ._cage import CageModel as CageModel
@@ -30,4 +31,10 @@ from ._system import (
     AbstractForcedSystem as AbstractForcedSystem,
     ForcedOscillator as ForcedOscillator,
     ForcedSystem as ForcedSystem,
+)
+from .whole import (
+    BearingModel as BearingModel,
+    BearingState as BearingState,
+    rolling_start as rolling_start,
+    whole_bearing as whole_bearing,
 )

@@ -17,8 +17,8 @@ def nu2310_bearing() -> BearingModel:
     C_r = 0.45 mm, e = 23 um, oil of 56 mm^2/s. Worked out from the drawing: cage of 0.25 kg, a ring from 75 to 91.65 mm
     with J_G = M (r_1^2 + r_2^2)/2; bars 3 mm thick, 8.3 mm high and 27 mm long (`bar_stiffness`); two lands of 4 mm
     (6.5 mm fit). From handbooks: traction of a mineral oil, .05 at 1 m/s and .036 far beyond (P. K. Gupta 1984);
-    restitution slopes of steel and brass near 0.1 s/m (K. H. Hunt and F. R. E. Crossley 1975); friction of oiled brass on
-    steel .05 in the pocket, .1 on the land. Chosen: inner ring with 2 kg of the shaft, damping of its mounting, land
+    restitution slopes of steel and brass near 0.1 s/m (K. H. Hunt and F. R. E. Crossley 1975); friction of oiled brass
+    on steel .05 in the pocket, .1 on the land. Chosen: inner ring with 2 kg of the shaft, damping of its mounting, land
     stiffness, load 4450 N.
     """
     mass, inner, outer = 0.25, 37.5e-3, 45.825e-3

@@ -1,7 +1,8 @@
 """The guiding land on the cage and on the ring that carries it.
 
 Film and normal contact are the laws of `jaxcage.forces`, in the inertial frame: the film is carried by the sum of both
-surface speeds. Those laws are written for a film that is carried counter-clockwise; the other sense is its mirror image.
+surface speeds. Those laws are written for a film that is carried counter-clockwise; the other sense is its mirror
+image.
 """
 
 from typing import NamedTuple
