@@ -1,4 +1,4 @@
-"""Contacts of the rollers: outer raceway, inner raceway, pocket. Each gives one set of numbers, used for both bodies.
+"""Contacts of a roller: outer raceway, inner raceway, pocket. Each gives one set of numbers, used for both bodies.
 
 A raceway contact acts at the middle of the overlap: the roller's arm is h = D/2 - delta/2, and the race's ends there
 too. Other arms would leave a couple of traction times overlap.
@@ -7,7 +7,6 @@ too. Other arms would leave a couple of traction times overlap.
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
 
 from ..._types import Scalar
 from ...forces import smooth_plus
@@ -16,23 +15,24 @@ from ._raceway import hunt_crossley, line_load
 from ._traction import TractionCurve
 
 
-Many = Float[Array, " rollers"]
+OfRoller = Scalar
+"""Of one roller; over all of them under `jax.vmap`."""
 
 
 class RacewayForces(NamedTuple):
-    """Of one raceway on each roller."""
+    """Of one raceway on a roller."""
 
-    load: Many
+    load: OfRoller
     """Q [N], pressing roller and raceway apart."""
-    traction: Many
+    traction: OfRoller
     """T [N] on the roller, counter-clockwise about the ring's centre."""
-    arm: Many
+    arm: OfRoller
     """h from the roller's centre [m]."""
-    race_arm: Many
+    race_arm: OfRoller
     """From the ring's centre [m]."""
-    lost_in_sliding: Many
+    lost_in_sliding: OfRoller
     """Power of the traction [W]."""
-    lost_in_damping: Many
+    lost_in_damping: OfRoller
     """Power of Q beyond its elastic part [W]."""
 
 
@@ -51,8 +51,10 @@ class RacewayConstants(NamedTuple):
     curve: TractionCurve
 
 
-def outer_contact(at: RacewayConstants, radius: Many, radial: Many, orbit: Many, spin: Many) -> RacewayForces:
-    """The outer raceway on each roller; T and Q are along the tangent and against the radius at the roller."""
+def outer_contact(
+    at: RacewayConstants, radius: OfRoller, radial: OfRoller, orbit: OfRoller, spin: OfRoller
+) -> RacewayForces:
+    """The outer raceway on a roller; T and Q are along the tangent and against the radius at the roller."""
     overlap = radius + at.half - at.radius
     load, elastic = line_load(overlap, radial, at.stiffness, at.damping, at.smoothing)
     arm = at.half - overlap / 2
@@ -62,8 +64,10 @@ def outer_contact(at: RacewayConstants, radius: Many, radial: Many, orbit: Many,
     return RacewayForces(load, traction, arm, race_arm, traction * sliding, (load - elastic) * radial)
 
 
-def inner_contact(at: RacewayConstants, distance: Many, away: Many, across: Many, spin: Many) -> RacewayForces:
-    """The inner raceway on each roller.
+def inner_contact(
+    at: RacewayConstants, distance: OfRoller, away: OfRoller, across: OfRoller, spin: OfRoller
+) -> RacewayForces:
+    """The inner raceway on a roller.
 
     **Arguments:** distance of the roller's centre from the ring's [m]; velocity of the roller relative to the ring's
     centre, away from it and across (counter-clockwise) [m/s]; spin.
@@ -78,20 +82,20 @@ def inner_contact(at: RacewayConstants, distance: Many, away: Many, across: Many
 
 
 class PocketForces(NamedTuple):
-    """Of the bars on each roller."""
+    """Of the bars on a roller."""
 
-    along: Many
+    along: OfRoller
     """Force on the roller along the pocket's tangent t_j [N]."""
-    out: Many
+    out: OfRoller
     """Force on the roller along the pocket's radius n_j [N]."""
-    roller_moment: Many
+    roller_moment: OfRoller
     """Moment on the roller [N m]."""
-    cage_moment: Many
+    cage_moment: OfRoller
     """Moment on the cage about its centre [N m]."""
-    normal: Many
+    normal: OfRoller
     """N [N]."""
-    lost_in_sliding: Many
-    lost_in_damping: Many
+    lost_in_sliding: OfRoller
+    lost_in_damping: OfRoller
 
 
 class PocketConstants(NamedTuple):
@@ -105,9 +109,15 @@ class PocketConstants(NamedTuple):
 
 
 def pocket_contact(
-    at: PocketConstants, out: Many, along: Many, v_out: Many, v_along: Many, spin: Many, cage_speed: Scalar
+    at: PocketConstants,
+    out: OfRoller,
+    along: OfRoller,
+    v_out: OfRoller,
+    v_along: OfRoller,
+    spin: OfRoller,
+    cage_speed: Scalar,
 ) -> PocketForces:
-    """The bars on each roller.
+    """The bars on a roller.
 
     **Arguments:** place of the roller's centre from the cage's, along n_j and t_j of its pocket [m]; velocity of the
     roller's centre relative to the cage's, not to the turning pocket [m/s]; spin and cage speed [rad/s].

@@ -1,5 +1,6 @@
 """Energy that the bearing has at a moment, and the angular momentum of its cage."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
@@ -33,11 +34,12 @@ def contact_energies(at: BearingAtSpeed, state: BearingState) -> Array:
     rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
     g, half, law = at._geometry(rollers, cage, state.clock[0]), at.pocket.half, at.pocket.law
     stiffness, width = at.outer_race.stiffness, at.outer_race.smoothing
-    outer = contact_energy(rollers.radius + half - at.outer_race.radius, width)
-    inner = contact_energy(at.inner_race.radius + half - g.distance, width)
+    energy = jax.vmap(contact_energy, in_axes=(0, None, None))
+    outer = energy(rollers.radius + half - at.outer_race.radius, width, 10 / 9)
+    inner = energy(at.inner_race.radius + half - g.distance, width, 10 / 9)
     along = rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin)
     exponent = 1.0 if law.pocket_law == "linear" else law.pocket_exponent
-    bar = contact_energy(jnp.abs(along) - at.pocket.clearance / 2, law.pocket_smoothing, exponent)
+    bar = energy(jnp.abs(along) - at.pocket.clearance / 2, law.pocket_smoothing, exponent)
     bar = law.pocket_stiffness * law.pocket_reference ** (1 - exponent) * bar
     dx, dy = (cage.x - cage.ring_x, cage.y - cage.ring_y) if at.inner_guided else (cage.x, cage.y)
     land, c = at.guide.land, at.guide.land.clearance

@@ -9,9 +9,11 @@ too) and the moment tau_C of the contacts about C:
     M C'' = F_C + M e (omega^2 n - omega' t),   J_G omega' = tau_C - e M g cos theta - e t.F_C.
 """
 
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -36,6 +38,11 @@ from ._state import BearingState, Bodies, Rates, Rollers
 
 
 Many = Float[Array, " rollers"]
+
+
+def _of_each(law: Any) -> Any:
+    """A law of one roller, with constants first, for all of them."""
+    return lambda constants, *rollers: jax.vmap(partial(law, constants))(*rollers)
 
 
 class Geometry(NamedTuple):
@@ -155,31 +162,31 @@ class BearingAtSpeed(eqx.Module):
         ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
         ring_across = cage.ring_vy * g.cos - cage.ring_vx * g.sin
         dv_out, dv_across = rollers.radial - ring_out, across - ring_across
-        inner = inner_contact(
+        inner = _of_each(inner_contact)(
             self.inner_race,
             g.distance,
             g.inner_out * dv_out + g.inner_across * dv_across,
             g.inner_out * dv_across - g.inner_across * dv_out,
             rollers.spin,
         )
-        outer = outer_contact(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
-        pocket = pocket_contact(
+        outer = _of_each(outer_contact)(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
+        turning = partial(pocket_contact, cage_speed=cage.cage_speed)
+        pocket = _of_each(turning)(
             self.pocket,
             rollers.radius * g.lag_cos - (cage.x * g.pocket_cos + cage.y * g.pocket_sin),
             rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin),
             rollers.radial * g.lag_cos - across * g.lag_sin - (cage.vx * g.pocket_cos + cage.vy * g.pocket_sin),
             rollers.radial * g.lag_sin + across * g.lag_cos - (cage.vy * g.pocket_cos - cage.vx * g.pocket_sin),
             rollers.spin,
-            cage.cage_speed,
         )
         if self.inner_guided:
             from_land = cage.x - cage.ring_x, cage.y - cage.ring_y, cage.vx - cage.ring_vx, cage.vy - cage.ring_vy
             land = land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
         else:
             land = land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
-        fast, turning = magnitude(rollers.radial, across), jnp.abs(rollers.spin)
+        fast = magnitude(rollers.radial, across)
         drag_out, drag_across = quadratic(rollers.radial, fast, self.drag), quadratic(across, fast, self.drag)
-        churning = quadratic(rollers.spin, turning, self.churning)
+        churning = quadratic(rollers.spin, jnp.abs(rollers.spin), self.churning)
         power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
         return Forces(g, outer, inner, pocket, land, drag_out, drag_across, churning, power)
 
@@ -187,7 +194,7 @@ class BearingAtSpeed(eqx.Module):
         cos, sin = cos_sin(angle)
         table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
         pocket_cos, pocket_sin = cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
-        lag_cos, lag_sin = cos_sin(rollers.lag)
+        lag_cos, lag_sin = jax.vmap(cos_sin)(rollers.lag)
         c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
         out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
         across = cage.ring_x * s - cage.ring_y * c

@@ -2,7 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from ..._parameters import choice, parameter
 from ..._types import Scalar
@@ -31,7 +31,7 @@ class Pockets(eqx.Module):
         "linear", "power", text="force of a bar: linear in the overlap or a power", default="linear"
     )
 
-    def elastic(self, overlap: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    def elastic(self, overlap: Scalar) -> Array:
         """Elastic force [N] at an overlap (negative: apart) [m]."""
         pressed = smooth_plus(overlap, self.pocket_smoothing)
         if self.pocket_law == "linear":
@@ -41,9 +41,9 @@ class Pockets(eqx.Module):
         return self.pocket_stiffness * pressed * ratio ** (self.pocket_exponent - 1)
 
 
-def saturated(sliding: Float[Array, "*n"], speed: Scalar) -> Float[Array, "*n"]:
+def saturated(sliding: Scalar, speed: Scalar) -> Array:
     """Odd and smooth stand-in for the sign of a sliding speed [m/s]: its slope at rest is 1/`speed`."""
-    return sliding / jnp.sqrt(sliding * sliding + speed * speed)
+    return jnp.asarray(sliding / jnp.sqrt(sliding * sliding + speed * speed))
 
 
 def bar_stiffness(

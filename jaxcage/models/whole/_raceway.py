@@ -8,7 +8,7 @@ is the slope of the coefficient of restitution over the approach speed: K. H. Hu
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from ..._parameters import parameter
 from ..._types import Scalar
@@ -31,9 +31,7 @@ def hunt_crossley(restitution_slope: Scalar) -> Scalar:
     return 1.5 * restitution_slope
 
 
-def line_load(
-    overlap: Float[Array, "*n"], rate: Float[Array, "*n"], stiffness: Scalar, damping: Scalar, width: Scalar
-) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
+def line_load(overlap: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar, width: Scalar) -> tuple[Array, Array]:
     """Load of a line contact, and its elastic part [N].
 
     **Arguments:** overlap (negative: apart) [m] and its rate [m/s]; stiffness [N/m^(10/9)], damping [s/m], and the
@@ -46,7 +44,7 @@ def line_load(
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 
-def contact_energy(overlap: Float[Array, "*n"], width: Scalar, exponent: Scalar = 10 / 9) -> Float[Array, "*n"]:
+def contact_energy(overlap: Scalar, width: Scalar, exponent: Scalar = 10 / 9) -> Array:
     """Integral of p^exponent over the overlap, p being the overlap cut off smoothly: the energy stored over stiffness.
 
     Closed form beyond `width`, a quadrature before it.

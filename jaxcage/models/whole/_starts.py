@@ -1,5 +1,6 @@
 """States to start from, and the magnitude of each part of a state."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -30,7 +31,7 @@ def rolling_start(model: BearingModel, speed: Scalar, cage: int = 0, turning: Sc
     centrifugal = bearing.roller_mass * pitch * omega**2
     approach = down * jnp.sin(angles) - bearing.radial_clearance / 2
     _, outer = raceway_loads_of_all(approach, stiff, stiff, centrifugal)
-    radius = pitch + line_contact_approach(stiff, outer)
+    radius = pitch + jax.vmap(line_contact_approach, in_axes=(None, 0))(stiff, outer)
     x, y, vx, vy = CAGE_STARTS[cage]
     lag = jnp.arcsin(c * (y * jnp.cos(angles) - x * jnp.sin(angles)) / radius)
     full = lambda value: jnp.ones((n,)) * value

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from ..._errors import ArgumentError
 from ..._parameters import parameter
@@ -26,7 +26,7 @@ class TractionCurve(eqx.Module):
     smoothing: Scalar
     """u_s, the sliding speed below which the law is linear [m/s]."""
 
-    def __call__(self, sliding: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    def __call__(self, sliding: Scalar) -> Array:
         """Traction coefficient at a sliding speed [m/s], of its sign."""
         speed = jnp.sqrt(sliding * sliding + self.smoothing * self.smoothing)
         return sliding / speed * ((self.a + self.b * speed) * jnp.exp(-self.c * speed) + self.d)
