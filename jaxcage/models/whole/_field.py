@@ -226,7 +226,8 @@ class BearingAtSpeed(eqx.Module):
                 (across * per_mass - 2 * rollers.radial * rollers.orbit) / rollers.radius,
             ]
         )
-        slip = 1 - rollers.spin / self.rolling_spin
+        turns = self.rolling_spin != 0
+        slip = jnp.where(turns, 1 - rollers.spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
         sums = jnp.sum(
             jnp.stack(
                 [

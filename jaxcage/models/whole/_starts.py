@@ -16,6 +16,10 @@ CAGE_STARTS = ((0.0, -0.9, 0.0, 0.0), (0.4, 0.3, 0.0, 0.0), (-0.6, 0.1, 0.2, -0.
 place, and twice inside the clearance."""
 
 
+LEAST_DEPTH, LEAST_SPEED = 1e-5, 1e-3
+"""Of a contact over the roller's diameter, and of the cage over the radial frequency of the rollers, for a scale."""
+
+
 def rolling_start(model: BearingModel, speed: Scalar, cage: int = 0, turning: Scalar = 1.0) -> BearingState:
     """Rollers in the middle of their pockets, rolling without slip, pressed as in a static bearing; one at the bottom.
 
@@ -47,11 +51,14 @@ def state_scale(model: BearingModel, speed: Scalar) -> BearingState:
     Lengths of the cage in clearances, those of contacts in the approach of one raceway under the most loaded roller.
     """
     bearing, c, n = model.bearing, model.clearance, model.bearing.n_rollers
-    omega, spin = jnp.abs(model.rolling_cage_speed(speed)), jnp.abs(model.rolling_spin(speed))
     pitch, stiff = model.outer_radius - bearing.roller_diameter / 2, bearing.raceway_stiffness
-    force = 4 * model.load / n + bearing.roller_mass * (pitch * omega**2 + model.gravity)
-    depth = line_contact_approach(stiff, force)
-    fast = jnp.sqrt(force / (depth * bearing.roller_mass))
+    # A bearing at rest and without load too has a depth of contact and a speed in whose units errors can be stated.
+    least = stiff * (LEAST_DEPTH * bearing.roller_diameter) ** (10 / 9)
+    force = 4 * model.load / n + bearing.roller_mass * (pitch * model.rolling_cage_speed(speed) ** 2 + model.gravity)
+    depth = line_contact_approach(stiff, force + least)
+    fast = jnp.sqrt((force + least) / (depth * bearing.roller_mass))
+    omega = jnp.hypot(model.rolling_cage_speed(speed), LEAST_SPEED * fast)
+    spin = 2 * pitch / bearing.roller_diameter * omega
     full = lambda value: jnp.ones((n,)) * value
     lag = (bearing.pocket_clearance / 2 + 1e-5 * bearing.roller_diameter) / pitch
     rollers = Rollers(full(lag), full(spin), full(depth), full(depth * fast), full(omega))
