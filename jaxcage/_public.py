@@ -16,6 +16,7 @@ from ._parameters import parameter_info as parameter_info, parameters as paramet
 from .analysis import (
     Sweep as Sweep,
     Zones as Zones,
+    bearing_measures as bearing_measures,
     equilibrium as equilibrium,
     orbit_measures as orbit_measures,
     survival as survival,
@@ -24,18 +25,23 @@ from .analysis import (
 from .bearing import Bearing as Bearing, Lubricant as Lubricant
 from .design import DesignSpace as DesignSpace, fit_edges as fit_edges, optimise as optimise
 from .integrate import (
+    BearingRun as BearingRun,
     Trajectory as Trajectory,
+    bearing_over_time as bearing_over_time,
     controlled as controlled,
     method as method,
     ramp as ramp,
     simulate as simulate,
+    simulate_bearing as simulate_bearing,
     strobe_map as strobe_map,
 )
 from .models import (
+    BearingModel as BearingModel,
     CageModel as CageModel,
     ForcedOscillator as ForcedOscillator,
     ForcedSystem as ForcedSystem,
     case as case,
+    whole_bearing as whole_bearing,
 )
 from .orbits import (
     Branch as Branch,

@@ -11,9 +11,15 @@
 | `_transients`   | an attractor or a chaotic transient: mean life with its error, coexisting ends       |
 | `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
+| `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
+from ._bearing_measures import (
+    BearingMeasures as BearingMeasures,
+    bearing_measures as bearing_measures,
+    cage_state as cage_state,
+)
 from ._equilibrium import (
     Equilibrium as Equilibrium,
     FilmCoefficients as FilmCoefficients,

@@ -14,9 +14,16 @@
 | `_strobe`      | the strobe map that everything uses                                                |
 | `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |
 | `_simulate`    | time histories, speed ramps                                                        |
+| `_lanes`       | the whole bearing over a stretch of angle or time, many lanes at once              |
+| `_bearing`     | time histories of the whole bearing                                                |
 | `_results`     | how an integration ended                                                           |
 """
 
+from ._bearing import (
+    BearingRun as BearingRun,
+    bearing_over_time as bearing_over_time,
+    simulate_bearing as simulate_bearing,
+)
 from ._controlled import (
     DEFAULT_ERROR as DEFAULT_ERROR,
     ControlledSteps as ControlledSteps,

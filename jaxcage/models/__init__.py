@@ -12,6 +12,7 @@
 | `_constants`      | what the paper leaves out, in sets                                               |
 | `_printed`        | a model as people read it                                                        |
 | `_user_law`       | what goes wrong in a law of the user's, in a sentence                            |
+| `whole`           | the whole bearing: rollers, pockets, cage, guiding land, inner ring              |
 """
 
 from ._cage import CageModel as CageModel
@@ -40,4 +41,10 @@ from ._system import (
     AbstractForcedSystem as AbstractForcedSystem,
     ForcedOscillator as ForcedOscillator,
     ForcedSystem as ForcedSystem,
+)
+from .whole import (
+    BearingModel as BearingModel,
+    BearingState as BearingState,
+    rolling_start as rolling_start,
+    whole_bearing as whole_bearing,
 )

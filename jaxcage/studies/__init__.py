@@ -25,6 +25,7 @@ from ._check import (
     OldStore as OldStore,
     StoreState as StoreState,
     check_study as check_study,
+)
 from ._ensemble import (
     ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
     REVOLUTIONS as REVOLUTIONS,

@@ -9,6 +9,7 @@
 | `_integrate`  | revolutions and the growth of a tangent vector                               |
 | `_shooting`   | orbits and bifurcations by Newton's method                                   |
 | `_random`     | random legal models by seed                                                  |
+| `_whole`      | the whole bearing: rollers, cage and ring as free bodies                     |
 
 Formulas come from the physics page and, where that leaves a detail open, from the package's docstrings; none of its
 code is used but what makes a model and lists its numbers. The film of finite length is left out. Shared by the tests
@@ -38,3 +39,4 @@ from ._random import (
 )
 from ._shooting import bifurcation as bifurcation
 from ._statics import half_angle as half_angle, hunt_crossley_number as hunt_crossley_number, viscosity as viscosity
+from ._whole import WholeBearing as WholeBearing, gupta as gupta

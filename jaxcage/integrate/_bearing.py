@@ -1,0 +1,225 @@
+"""Time histories of the whole bearing: over the cage's angle, with slips, forces and losses; or over time."""
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import require_x64
+from .._errors import ArgumentError
+from .._types import Scalar
+from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
+from ._lanes import By, Controls, Lanes, advance, begin
+from ._results import INACCURATE, OUTCOMES
+
+
+TURN = 2 * np.pi
+FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
+"""First, longest and shortest step [rad] of the cage's angle."""
+STALLED = 0.05
+"""Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
+MOST_STEPS = 200_000
+"""In a part of a revolution between two samples."""
+HALF = 16.0
+"""A tolerance so many times smaller makes steps of fourth order about half as long."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BearingRun:
+    """What a bearing did: samples at equal angles of the cage, or at given times, and what was gathered between."""
+
+    time: Float[np.ndarray, " n"]
+    """[s]."""
+    angle: Float[np.ndarray, " n"]
+    """Of the cage [rad]."""
+    rollers: Float[np.ndarray, "n 5 rollers"]
+    """Lag, spin, radius and its rate, orbital speed: rows as in `jaxcage.models.whole.Rollers`, SI."""
+    bodies: Float[np.ndarray, "n 9"]
+    """Cage and inner ring, as in `jaxcage.models.whole.Bodies`, SI."""
+    integrals: Float[np.ndarray, "n integrals"]
+    """At each sample, from the beginning: energies [J] and others as in `LEDGER` and `MEANS`."""
+    peaks: Float[np.ndarray, "parts peaks"]
+    """Largest values between two samples, as in `PEAKS`."""
+    outcome: str
+    """`successful`, or the name of what went wrong."""
+    error: float
+    """How far the state at a sample moves if it is reached from the one before it by about half as many steps, in units
+    of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples."""
+    estimate: float
+    """Sum of the embedded error estimates of the steps between two samples, the largest of them."""
+    steps: float
+    """Mean number of steps of a revolution (or of the whole stretch of time)."""
+
+    @property
+    def last(self) -> BearingState:
+        """The state at the end."""
+        as_array = lambda x: jnp.asarray(x)
+        clock = np.array([self.angle[-1], self.time[-1]])
+        return BearingState(as_array(self.rollers[-1]), as_array(self.bodies[-1]), as_array(clock))
+
+    def total(self, name: str) -> float:
+        """An integral over the whole run, by its name."""
+        i = (*LEDGER, *MEANS).index(name)
+        return float(self.integrals[-1, i] - self.integrals[0, i])
+
+    def largest(self, name: str) -> float:
+        """The largest value of a quantity that is followed, by its name."""
+        return float(np.max(self.peaks[:, PEAKS.index(name)]))
+
+
+@eqx.filter_jit
+def _begun(model: BearingModel, speed: Scalar, state: BearingState, step: Scalar) -> Lanes:
+    return begin(*_twice((model.at_speed(speed), state)), step)
+
+
+def _twice(tree: Any) -> Any:
+    """Two lanes of the same: one runs by steps of the tolerance, the other by about half as many."""
+    return jax.tree.map(lambda x: jnp.stack([jnp.asarray(x, dtype=float)] * 2, axis=-1), tree)
+
+
+@eqx.filter_jit
+def _run(
+    model: BearingModel,
+    speed: Scalar,
+    lanes: Lanes,
+    spans: Float[Array, " parts"],
+    limits: tuple[Scalar, Scalar, Scalar],
+    tolerance: Scalar,
+    by: By,
+) -> tuple[Lanes, tuple[Array, ...]]:
+    """One span after the other; what there was at each end, peaks, errors and steps between."""
+    at, scale = _twice((model.at_speed(speed), state_scale(model, speed)))
+    slowest = jnp.abs(at.rolling_cage_speed) * (STALLED if by == "angle" else 0.0)
+    controls = Controls(tolerance * jnp.array([1.0, HALF]), limits[1], limits[2], MOST_STEPS, slowest)
+
+    def part(lanes: Lanes, span: Array) -> tuple[Lanes, tuple[Array, ...]]:
+        together = lambda x: jnp.stack([x[..., 0]] * 2, axis=-1)
+        fresh = lanes._replace(
+            packed=together(lanes.packed),
+            rates=together(lanes.rates),
+            peaks=jnp.full_like(lanes.peaks, -jnp.inf),
+            steps=0 * lanes.steps,
+            error=0 * lanes.error,
+            outcome=together(lanes.outcome),
+        )
+        failed = (fresh.outcome != 0) & (fresh.outcome != INACCURATE)
+        after = advance(at, scale, fresh, jnp.where(failed, 0.0, span), controls, by)
+        apart = jax.tree.map(lambda x, s: jnp.max(jnp.abs(x[..., 0] - x[..., 1]) / s[..., 0]), after.state, scale)
+        error = jnp.maximum(apart.rollers, apart.bodies)
+        return after, (after.packed[:, 0], after.peaks[:, 0], error, after.error[0], after.steps[0])
+
+    return jax.lax.scan(part, lanes, spans)
+
+
+def simulate_bearing(
+    model: BearingModel,
+    speed: Scalar,
+    *,
+    revolutions: int,
+    discard: int = 0,
+    samples: int = 64,
+    start: BearingState | None = None,
+    tolerance: float = 1e-5,
+    allowed: float = 1e-2,
+) -> BearingRun:
+    """Time history of the whole bearing at one shaft speed, over revolutions of the cage.
+
+    **Arguments:** model; shaft speed [rad/s], of either sign; revolutions of the cage recorded, and discarded before;
+    samples per revolution; initial state, by default `rolling_start(model, speed)`; largest estimated error of a step
+    and largest measured error between two samples, in units of `state_scale`.
+
+    **Returns:** `BearingRun`. Steps are as short as the tolerance asks for. From sample to sample the run is made a
+    second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
+    enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions part within a revolution or
+    two: longer stretches cannot be compared. A cage that comes to rest, or leaves its land, is `outside`: follow it
+    over time, with `bearing_over_time`.
+
+    **Raises:** `ValueError` for a speed that is zero or no number, or impossible counts.
+    """
+    require_x64()
+    value = float(speed)
+    if not np.isfinite(value) or value == 0:
+        raise ArgumentError("speed", said=f"must be a speed other than 0, but {value:g} rad/s was given.")
+    if revolutions < 1 or samples < 1 or discard < 0:
+        raise ArgumentError(
+            "revolutions",
+            "samples",
+            "discard",
+            said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
+        )
+    state = rolling_start(model, value) if start is None else start
+    span = np.full(samples * (discard + revolutions), TURN / samples)
+    return _recorded(
+        model, value, state, span, (FIRST, LONGEST, SHORTEST), tolerance, allowed, "angle", samples, discard
+    )
+
+
+def bearing_over_time(
+    model: BearingModel,
+    speed: Scalar,
+    times: Float[np.ndarray, " n"],
+    *,
+    start: BearingState,
+    tolerance: float = 1e-5,
+    allowed: float = 1e-2,
+) -> BearingRun:
+    """Time history over time: starting up, coasting, free flight, where the cage's angle is no measure.
+
+    **Arguments:** model; shaft speed [rad/s]; times of the samples, growing, of which the first is that of `start` [s];
+    the rest as in `simulate_bearing`.
+
+    **Returns:** `BearingRun`.
+    """
+    require_x64()
+    spans = np.diff(np.asarray(times, dtype=float))
+    if spans.size < 1 or not np.all(spans > 0):
+        raise ArgumentError("times", said="must be two or more that grow.")
+    whole = float(np.sum(spans))
+    limits = (whole * 1e-5, whole, whole * 1e-10)
+    return _recorded(model, float(speed), start, spans, limits, tolerance, allowed, "time", spans.size, 0)
+
+
+def _recorded(
+    model: BearingModel,
+    speed: float,
+    state: BearingState,
+    spans: np.ndarray,
+    limits: tuple[float, float, float],
+    tolerance: float,
+    allowed: float,
+    by: By,
+    samples: int,
+    discard: int,
+) -> BearingRun:
+    """The run, and its last revolution again."""
+    omega = jnp.asarray(speed)
+    lanes = _begun(model, omega, state, jnp.asarray(limits[0]))
+    parts, first = [], np.asarray(lanes.packed).T[:1]
+    for turn in np.split(spans, len(spans) // samples):
+        lanes, found = _run(
+            model, omega, lanes, jnp.asarray(turn), tuple(map(jnp.asarray, limits)), jnp.asarray(tolerance), by
+        )
+        parts.append(tuple(map(np.asarray, found)))
+    numbers, peaks, errors, estimates, steps = (np.concatenate(part) for part in zip(*parts, strict=True))
+    numbers = np.concatenate([first, numbers])[discard * samples :]
+    error = float(errors.max())
+    code = int(lanes.outcome[0])
+    if code == 0 and not error <= allowed:
+        code = INACCURATE
+    n, m = numbers.shape[1] - len(LEDGER) - len(MEANS), len(numbers)
+    return BearingRun(
+        time=numbers[:, n - 1],
+        angle=numbers[:, n - 2],
+        rollers=numbers[:, : n - 11].reshape(m, 5, -1),
+        bodies=numbers[:, n - 11 : n - 2],
+        integrals=numbers[:, n:],
+        peaks=peaks[discard * samples :],
+        outcome=OUTCOMES[code],
+        error=error,
+        estimate=float(estimates.max()),
+        steps=float(steps.sum() / len(parts)),
+    )

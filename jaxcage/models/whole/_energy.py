@@ -1,0 +1,63 @@
+"""Energy that the bearing has at a moment, and the angular momentum of its cage."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from ...forces._phase import cos_sin
+from ._field import BearingAtSpeed
+from ._raceway import contact_energy
+from ._state import BearingState, Bodies, Rollers
+
+
+def kinetic_energy(at: BearingAtSpeed, state: BearingState) -> Array:
+    """Of rollers, cage (about its mass centre) and the inner ring's centre [J]."""
+    rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+    square = rollers.radial**2 + (rollers.radius * rollers.orbit) ** 2
+    of_rollers = jnp.sum(at.roller_mass * square + at.roller_inertia * rollers.spin**2) / 2
+    vx, vy = mass_centre(at, state)[2:]
+    of_cage = (at.cage_mass * (vx * vx + vy * vy) + at.cage_inertia * cage.cage_speed**2) / 2
+    return of_rollers + of_cage + at.ring_mass * (cage.ring_vx**2 + cage.ring_vy**2) / 2
+
+
+def potential_energy(at: BearingAtSpeed, state: BearingState) -> Array:
+    """Of weight, load and all contacts [J]."""
+    rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+    geometry = at._geometry(rollers, cage, state.clock[0])
+    weight = at.cage_mass * mass_centre(at, state)[1] + at.ring_mass * cage.ring_y
+    weight = weight + at.roller_mass * jnp.sum(rollers.radius * geometry.sin)
+    return weight * at.gravity + at.load * cage.ring_y + contact_energies(at, state)
+
+
+def contact_energies(at: BearingAtSpeed, state: BearingState) -> Array:
+    """Elastic energy of raceways, pockets and land [J]."""
+    rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+    g, half, law = at._geometry(rollers, cage, state.clock[0]), at.pocket.half, at.pocket.law
+    stiffness, width = at.outer_race.stiffness, at.outer_race.smoothing
+    energy = jax.vmap(contact_energy, in_axes=(0, None, None))
+    outer = energy(rollers.radius + half - at.outer_race.radius, width, 10 / 9)
+    inner = energy(at.inner_race.radius + half - g.distance, width, 10 / 9)
+    along = rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin)
+    exponent = 1.0 if law.pocket_law == "linear" else law.pocket_exponent
+    bar = energy(jnp.abs(along) - at.pocket.clearance / 2, law.pocket_smoothing, exponent)
+    bar = law.pocket_stiffness * law.pocket_reference ** (1 - exponent) * bar
+    dx, dy = (cage.x - cage.ring_x, cage.y - cage.ring_y) if at.inner_guided else (cage.x, cage.y)
+    land, c = at.guide.land, at.guide.land.clearance
+    depth = c * land.place(dx, dy, 0.0, 0.0).gap
+    touch = at.guide.contact.stiffness * contact_energy(depth, c * land.onset_width)
+    return jnp.sum(stiffness * (outer + inner) + bar) + touch
+
+
+def mass_centre(at: BearingAtSpeed, state: BearingState) -> tuple[Array, Array, Array, Array]:
+    """Place [m] and velocity [m/s] of the cage's mass centre."""
+    cage, e = Bodies(*state.bodies), at.eccentricity
+    cos, sin = cos_sin(state.clock[0])
+    turn = e * cage.cage_speed
+    as_array = lambda *parts: tuple(map(jnp.asarray, parts))
+    return as_array(cage.x + e * cos, cage.y + e * sin, cage.vx - turn * sin, cage.vy + turn * cos)
+
+
+def cage_angular_momentum(at: BearingAtSpeed, state: BearingState) -> Array:
+    """About the outer ring's centre [N m s]."""
+    x, y, vx, vy = mass_centre(at, state)
+    return jnp.asarray(at.cage_mass * (x * vy - y * vx) + at.cage_inertia * Bodies(*state.bodies).cage_speed)

@@ -1,0 +1,318 @@
+"""Equations of motion of the whole bearing at one shaft speed.
+
+Rollers are an axis of arrays. One routine works out each contact, and both bodies get the same numbers of it: forces
+and moments inside the bearing cancel to rounding. Rates of the rollers contain the cage's speed, but not its
+acceleration, so that rollers know of each other only through cage and inner ring.
+
+Cage, with mass centre G at distance e from C along n = (cos theta, sin theta), t across, all outer forces F_C (weight
+too) and the moment tau_C of the contacts about C:
+    M C'' = F_C + M e (omega^2 n - omega' t),   J_G omega' = tau_C - e M g cos theta - e t.F_C.
+"""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..._types import Scalar
+from ...forces import Land
+from ...forces._phase import cos_sin
+from ._contacts import (
+    PocketConstants,
+    PocketForces,
+    RacewayConstants,
+    RacewayForces,
+    inner_contact,
+    outer_contact,
+    pocket_contact,
+)
+from ._drag import magnitude, quadratic
+from ._guide import Guide, LandForces, land_forces
+from ._model import BearingModel
+from ._raceway import hunt_crossley
+from ._state import BearingState, Bodies, Rates, Rollers
+
+
+Many = Float[Array, " rollers"]
+
+
+def _of_each(law: Any) -> Any:
+    """A law of one roller, with constants first, for all of them."""
+    return lambda constants, *rollers: jax.vmap(partial(law, constants))(*rollers)
+
+
+class Geometry(NamedTuple):
+    """Where things are: directions of pockets, and of rollers from both ring centres."""
+
+    pocket_cos: Many
+    pocket_sin: Many
+    lag_cos: Many
+    lag_sin: Many
+    cos: Many
+    """Of the angle of the roller about the outer ring's centre."""
+    sin: Many
+    distance: Many
+    """From the inner ring's centre [m]."""
+    inner_out: Many
+    """Direction from the inner ring's centre to the roller, along the roller's radius and across."""
+    inner_across: Many
+
+
+class Forces(NamedTuple):
+    """All contacts of the bearing at one moment."""
+
+    geometry: Geometry
+    outer: RacewayForces
+    inner: RacewayForces
+    pocket: PocketForces
+    land: LandForces
+    drag_out: Many
+    drag_across: Many
+    churning: Many
+    drag_power: Many
+
+
+class BearingAtSpeed(eqx.Module):
+    """The bearing's laws with everything that does not change worked out once."""
+
+    n_rollers: int = eqx.field(static=True)
+    held: bool = eqx.field(static=True)
+    inner_guided: bool = eqx.field(static=True)
+    speed: Scalar
+    """Of the inner ring [rad/s]."""
+    outer_speed: Scalar
+    outer_race: RacewayConstants
+    inner_race: RacewayConstants
+    pocket: PocketConstants
+    guide: Guide
+    roller_mass: Scalar
+    roller_inertia: Scalar
+    drag: Scalar
+    churning: Scalar
+    cage_mass: Scalar
+    cage_inertia: Scalar
+    eccentricity: Scalar
+    ring_mass: Scalar
+    mounting_damping: Scalar
+    gravity: Scalar
+    load: Scalar
+    rolling_cage_speed: Scalar
+    rolling_spin: Scalar
+
+    @classmethod
+    def of(cls, model: BearingModel, speed: Scalar) -> "BearingAtSpeed":
+        """Work out the constants of `model` at the shaft speed `speed` [rad/s]."""
+        bearing, races, c = model.bearing, model.raceways, model.clearance
+        half = bearing.roller_diameter / 2
+        shared = (
+            bearing.raceway_stiffness,
+            hunt_crossley(races.raceway_damping),
+            races.raceway_smoothing,
+            model.traction.curve,
+        )
+        contact, film, drag = model.contact, model.film, model.drag
+        density = drag.oil_share * model.lubricant.density
+        length = bearing.roller_length
+        return cls(
+            n_rollers=bearing.n_rollers,
+            held=model.cage_rotation == "held",
+            inner_guided=model.guidance == "inner",
+            speed=speed,
+            outer_speed=model.outer_speed,
+            outer_race=RacewayConstants(half, model.outer_radius, model.outer_speed, *shared),
+            inner_race=RacewayConstants(half, model.inner_radius, speed, *shared),
+            pocket=PocketConstants(half, bearing.pocket_clearance, model.pockets),
+            guide=Guide(
+                film=film.at(model, speed),
+                contact=contact.at(model, speed),
+                land=Land(c, 1 / c, contact.onset, contact.smoothing / c, film.smoothing / c),
+                friction=model.land_friction,
+                saturation_speed=model.pockets.saturation_speed,
+                arm=model.land_radius if model.guidance == "outer" else -model.land_radius,
+            ),
+            roller_mass=bearing.roller_mass,
+            roller_inertia=bearing.roller_mass * half**2 / 2,
+            drag=drag.drag_coefficient * density * half * length,
+            churning=drag.churning_coefficient * density * half**4 * length / 2,
+            cage_mass=model.cage_mass,
+            cage_inertia=model.cage_inertia,
+            eccentricity=model.eccentricity,
+            ring_mass=model.ring.ring_mass,
+            mounting_damping=model.ring.mounting_damping,
+            gravity=model.gravity,
+            load=model.load,
+            rolling_cage_speed=model.rolling_cage_speed(speed),
+            rolling_spin=model.rolling_spin(speed),
+        )
+
+    @property
+    def places(self) -> np.ndarray:
+        """Angles of the pockets in the cage [rad]."""
+        return 2 * np.pi / self.n_rollers * np.arange(self.n_rollers)
+
+    def forces(self, state: BearingState) -> Forces:
+        """Every contact at a state."""
+        rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+        g = self._geometry(rollers, cage, state.clock[0])
+        across = rollers.radius * rollers.orbit
+        ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
+        ring_across = cage.ring_vy * g.cos - cage.ring_vx * g.sin
+        dv_out, dv_across = rollers.radial - ring_out, across - ring_across
+        inner = _of_each(inner_contact)(
+            self.inner_race,
+            g.distance,
+            g.inner_out * dv_out + g.inner_across * dv_across,
+            g.inner_out * dv_across - g.inner_across * dv_out,
+            rollers.spin,
+        )
+        outer = _of_each(outer_contact)(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
+        turning = partial(pocket_contact, cage_speed=cage.cage_speed)
+        pocket = _of_each(turning)(
+            self.pocket,
+            rollers.radius * g.lag_cos - (cage.x * g.pocket_cos + cage.y * g.pocket_sin),
+            rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin),
+            rollers.radial * g.lag_cos - across * g.lag_sin - (cage.vx * g.pocket_cos + cage.vy * g.pocket_sin),
+            rollers.radial * g.lag_sin + across * g.lag_cos - (cage.vy * g.pocket_cos - cage.vx * g.pocket_sin),
+            rollers.spin,
+        )
+        if self.inner_guided:
+            from_land = cage.x - cage.ring_x, cage.y - cage.ring_y, cage.vx - cage.ring_vx, cage.vy - cage.ring_vy
+            land = land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
+        else:
+            land = land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
+        fast = magnitude(rollers.radial, across)
+        drag_out, drag_across = quadratic(rollers.radial, fast, self.drag), quadratic(across, fast, self.drag)
+        churning = quadratic(rollers.spin, jnp.abs(rollers.spin), self.churning)
+        power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
+        return Forces(g, outer, inner, pocket, land, drag_out, drag_across, churning, power)
+
+    def _geometry(self, rollers: Rollers, cage: Bodies, angle: Scalar) -> Geometry:
+        cos, sin = cos_sin(angle)
+        table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
+        pocket_cos, pocket_sin = cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
+        lag_cos, lag_sin = jax.vmap(cos_sin)(rollers.lag)
+        c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
+        out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
+        across = cage.ring_x * s - cage.ring_y * c
+        distance = jnp.sqrt(out * out + across * across)
+        return Geometry(pocket_cos, pocket_sin, lag_cos, lag_sin, c, s, distance, out / distance, across / distance)
+
+    def __call__(self, state: BearingState) -> Rates:
+        """Rates over time."""
+        return self.rates(state, self.forces(state))
+
+    def rates(self, state: BearingState, f: Forces) -> Rates:
+        """Rates over time at a state with these forces."""
+        rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+        g, inner, outer, pocket, land = f.geometry, f.inner, f.outer, f.pocket, f.land
+        inner_out = inner.load * g.inner_out - inner.traction * g.inner_across
+        inner_across = inner.load * g.inner_across + inner.traction * g.inner_out
+        out = inner_out - outer.load + pocket.out * g.lag_cos + pocket.along * g.lag_sin + f.drag_out
+        across = inner_across + outer.traction + pocket.along * g.lag_cos - pocket.out * g.lag_sin + f.drag_across
+        out = out - self.roller_mass * self.gravity * g.sin
+        across = across - self.roller_mass * self.gravity * g.cos
+        moment = outer.arm * outer.traction - inner.arm * inner.traction + pocket.roller_moment + f.churning
+        per_mass = 1 / self.roller_mass
+        roller_rates = jnp.stack(
+            [
+                rollers.orbit - cage.cage_speed,
+                moment / self.roller_inertia,
+                rollers.radial,
+                out * per_mass + rollers.radius * rollers.orbit * rollers.orbit,
+                (across * per_mass - 2 * rollers.radial * rollers.orbit) / rollers.radius,
+            ]
+        )
+        turns = self.rolling_spin != 0
+        slip = jnp.where(turns, 1 - rollers.spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
+        sums = jnp.sum(
+            jnp.stack(
+                [
+                    pocket.out * g.pocket_cos - pocket.along * g.pocket_sin,
+                    pocket.out * g.pocket_sin + pocket.along * g.pocket_cos,
+                    pocket.cage_moment,
+                    inner_out * g.cos - inner_across * g.sin,
+                    inner_out * g.sin + inner_across * g.cos,
+                    inner.traction * inner.race_arm,
+                    outer.traction * outer.race_arm,
+                    inner.lost_in_sliding + outer.lost_in_sliding,
+                    inner.lost_in_damping + outer.lost_in_damping,
+                    pocket.lost_in_sliding,
+                    pocket.lost_in_damping,
+                    f.drag_power,
+                    pocket.normal,
+                    rollers.spin / self.n_rollers,
+                ]
+            ),
+            axis=1,
+        )
+        peaks = jnp.stack([jnp.max(pocket.normal), land.size, jnp.max(slip), land.eps])
+        return self._bodies(state, cage, roller_rates, sums, land, peaks)
+
+    def _bodies(
+        self, state: BearingState, cage: Bodies, roller_rates: Array, sums: Array, land: LandForces, peaks: Array
+    ) -> Rates:
+        """Cage and inner ring, under the sums over all rollers; the ledger."""
+        (on_rollers_x, on_rollers_y, pocket_moment, inner_x, inner_y, inner_moment, outer_moment) = sums[:7]
+        (traction, raceway, friction, pocket_damping, drag, pocket_sum, spin) = sums[7:]
+        mass, e, g = self.cage_mass, self.eccentricity, self.gravity
+        cos, sin = cos_sin(state.clock[0])
+        contact_x, contact_y = land.x - on_rollers_x, land.y - on_rollers_y
+        moment = pocket_moment + land.moment
+        down = contact_y - mass * g
+        drive = moment - e * mass * g * cos - e * (cos * down - sin * contact_x)
+        if self.held:
+            turning, hold = jnp.zeros_like(drive), -drive
+        else:
+            turning, hold = drive / self.cage_inertia, jnp.zeros_like(drive)
+        swing = e * cage.cage_speed * cage.cage_speed
+        cage_x = contact_x / mass + swing * cos + e * turning * sin
+        cage_y = down / mass + swing * sin - e * turning * cos
+
+        from_land = self.inner_guided
+        ring_x = -inner_x - self.mounting_damping * cage.ring_vx - (land.x if from_land else 0.0)
+        ring_y = -inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
+        ring_y = ring_y - self.load - self.ring_mass * g
+        body_rates = jnp.stack(
+            [
+                cage.vx,
+                cage.vy,
+                cage_x,
+                cage_y,
+                turning,
+                cage.ring_vx,
+                cage.ring_vy,
+                ring_x / self.ring_mass,
+                ring_y / self.ring_mass,
+            ]
+        )
+        on_inner = -inner_moment + (land.land_moment if from_land else 0.0)
+        on_outer = -outer_moment + (0.0 if from_land else land.land_moment)
+        mounting = self.mounting_damping * (cage.ring_vx**2 + cage.ring_vy**2)
+        paid = -on_inner * self.speed - on_outer * self.outer_speed + hold * cage.cage_speed
+        about_origin = moment + cage.x * contact_y - cage.y * contact_x - mass * g * (cage.x + e * cos) + hold
+        integrals = jnp.stack(
+            [
+                paid,
+                traction,
+                raceway,
+                friction,
+                pocket_damping,
+                land.lost_in_film,
+                land.lost_in_contact,
+                drag,
+                mounting,
+                about_origin,
+                pocket_sum,
+                land.eps,
+                land.whirl,
+                cage.cage_speed,
+                spin,
+                hold,
+            ]
+        )
+        clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
+        return Rates(BearingState(roller_rates, body_rates, clock), integrals, peaks)
