@@ -139,8 +139,7 @@ def on_dask(store: pathlib.Path, size: float) -> dict[str, Any]:
 
 def adaptive_map(size: float, persist: int) -> dict[str, Any]:
     """An adaptive map and the full grid of the same labels; `persist` as for `jaxcage.label_map`."""
-    from jaxcage.studies import found_share
-    from jaxcage.studies._adaptive import changes
+    from jaxcage.studies import changes, found_share
 
     side = max(20, round(SIDE * math.sqrt(size)))
     x, y = {"speed": jc.rpm(4000, 27500, side)}, {"guidance_gap": np.linspace(0.35e-3, 0.60e-3, side)}

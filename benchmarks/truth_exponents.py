@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.analysis._observe import _start_tangents
+from jaxcage.analysis import start_tangents
 from tests import reference
 
 from .truth_models import Subject, by_kind
@@ -56,7 +56,7 @@ def beside(model: jc.CageModel, rpm: float, state: np.ndarray, method: Any = Non
     speed = float(jc.rpm(rpm))
     options = dict(discard=0, revolutions=REVOLUTIONS, blocks=REVOLUTIONS, method=method, confirm=False, horizon=0)
     ours = jc.sweep(model, speed, starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
-    along = [float(c) for c in _start_tangents(state.size, 1)[0]]
+    along = [float(c) for c in start_tangents(state.size, 1)[0]]
     try:
         theirs = reference.growth(reference.field(model, speed), state, REVOLUTIONS, direction=along, budget=BUDGET)
     except (reference.TooLong, ValueError, ArithmeticError):

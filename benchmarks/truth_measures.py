@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.analysis._labels import CLOSING_TOLERANCE
+from jaxcage.analysis import CLOSING_TOLERANCE
 from tests import reference
 
 from .truth_exponents import settled

@@ -5,14 +5,11 @@ import functools
 from collections.abc import Iterable
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import pint
 import pytest
 
 import jaxcage as jc
-from jaxcage import parameter_info
-from jaxcage._parameters import get, parameter_paths
 
 
 UNITS = pint.UnitRegistry()
@@ -29,10 +26,10 @@ def unit_exponents(unit: str) -> dict[str, float]:
 
 def in_other_units(model: jc.CageModel, base: str, factor: float) -> jc.CageModel:
     """The same model with the unit of `base` (mass, length or time) made `factor` times smaller."""
-    info = parameter_info(model)
-    paths = list(parameter_paths(model).items())
-    leaves = [get(model, path) * factor ** unit_exponents(info[name].unit)[base] for name, path in paths]
-    return eqx.tree_at(lambda m: [get(m, path) for _, path in paths], model, leaves)
+    info, values = jc.parameter_info(model), jc.parameters(model)
+    return jc.replace(
+        model, **{name: value * factor ** unit_exponents(info[name].unit)[base] for name, value in values.items()}
+    )
 
 
 def elastic(model: jc.CageModel, mass: float = 1.0, stiffness: float = 5e7, damping: float = 500.0) -> jc.CageModel:
@@ -70,7 +67,7 @@ def unforced(model: jc.CageModel) -> jc.CageModel:
         "amplitude",
         "eccentricity",
     )
-    names = parameter_paths(model)
+    names = jc.parameters(model)
     chosen = [n if n in names else n.split(".")[-1] for n in zero]
     return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})
 

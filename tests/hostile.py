@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import equinox as eqx
 import hypothesis.strategies as st
 import numpy as np
 
 import jaxcage as jc
-from jaxcage._parameters import ParameterInfo, walk
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import (
     _bearing,
@@ -153,10 +153,20 @@ def leaves(table: dict[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[
             yield (*path, name), value
 
 
+def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], dataclasses.Field]]:
+    """Every parameter, choice and count of a module with its path of attribute names."""
+    for field in dataclasses.fields(module):
+        value, here = getattr(module, field.name), (*path, field.name)
+        if isinstance(value, eqx.Module):
+            yield from declared(value, here)
+        elif {"parameter", "choice", "count"} & set(field.metadata):
+            yield here, field
+
+
 _ELASTIC = jc.replace(jc.case("2a"), rib=jc.forces.ElasticRib(mass=1.0, stiffness=5e7, damping=500.0))
 _ROLLER_PASS = jc.replace(jc.case("3b"), impact=jc.forces.RollerPassImpact(jc.forces.PocketImpact()))
 MODELS = (*map(jc.case, PUBLISHED_CASES), _ELASTIC, _ROLLER_PASS)
-FIELDS = {path: field for model in MODELS for path, field in walk(model)}
+FIELDS = {path: field for model in MODELS for path, field in declared(model)}
 """Everything that a file may give: its place and declaration."""
 KEYS = (*FIELDS, ("base",), ("lubricant", "grade"), ("bearing", "designation"), ("impact", "kind"), ("rib", "kind"))
 
@@ -165,7 +175,7 @@ USUAL = {path: value for model in MODELS for path, value in leaves(configuration
 
 
 @st.composite
-def numbers(draw: Any, path: tuple[str, ...], info: ParameterInfo) -> float | str:
+def numbers(draw: Any, path: tuple[str, ...], info: Any) -> float | str:
     """A number of the declared range, mostly close to the usual one, with a unit or without."""
     close = st.floats(0.98, 1.02).map(lambda factor: min(max(factor * USUAL[path], info.lower), info.upper))
     number = draw(mostly(close, finite(info.lower, info.upper) | st.sampled_from([info.lower, info.upper]), 5))

@@ -14,8 +14,7 @@ from jaxcage.orbits import (
     SynchronousOrbits,
     loss_zones,
 )
-from jaxcage.report import Axis, Findings
-from jaxcage.report._findings import Map
+from jaxcage.report import Axis, Findings, Map
 
 
 PER_RPM = np.pi / 30

@@ -7,7 +7,7 @@ from scipy.special import beta
 
 import jaxcage.bearing as jb
 from jaxcage import replace
-from jaxcage.validation._statics import loads_by_scipy
+from jaxcage.validation import loads_by_scipy
 
 
 RPM = np.pi / 30

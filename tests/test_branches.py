@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 import jaxcage as jc
-from jaxcage.orbits._normal_form import around, coefficient, critical_vectors, criticality
+from jaxcage.orbits import critical_vectors, criticality, normal_form_coefficient, normal_form_places
 from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
@@ -493,7 +493,7 @@ def test_normal_forms_of_maps():
     exact = p @ second(q, np.linalg.solve(np.eye(2) - matrix, second(q, q))) / 2
     for kind, slope, value in (("period-doubling", henon, exact), ("Neimark-Sacker", logistic, -1.0)):
         critical = critical_vectors(kind, slope(np.zeros(2)))
-        found = coefficient(critical, jax.vmap(slope)(around(critical)))
+        found = normal_form_coefficient(critical, jax.vmap(slope)(normal_form_places(critical)))
         np.testing.assert_allclose(found.value, value, rtol=1e-10)
         assert found.error < 1e-10 and criticality(kind, *found) == "supercritical"
         assert criticality(kind, -found.value, found.error) == "subcritical"

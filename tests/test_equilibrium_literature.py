@@ -16,6 +16,7 @@ import pytest
 
 from jaxcage import replace
 from jaxcage.analysis import (
+    LARGEST_WHIRLING,
     attitude_angle,
     dimensional,
     eccentricity_ratio,
@@ -27,7 +28,6 @@ from jaxcage.analysis import (
     stability_chart,
     whirl_threshold,
 )
-from jaxcage.analysis._equilibrium import LARGEST_WHIRLING
 from jaxcage.forces import ElasticRib, RibFilm, film_scale
 from jaxcage.integrate import simulate
 from jaxcage.models import case

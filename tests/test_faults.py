@@ -29,8 +29,7 @@ from jaxcage.cli import _page, _sweep, _validate, main
 from jaxcage.cli._job import save_figure
 from jaxcage.io import load_sweep, open_sweep, replacing, save_model, save_sweep, write_columns, write_template
 from jaxcage.plotting import new_figure
-from jaxcage.studies import Plan, Study, open_study, run_study
-from jaxcage.studies._store import Store
+from jaxcage.studies import Plan, Store, Study, open_study, run_study
 from jaxcage.validation import Comparison
 
 

@@ -14,11 +14,9 @@ import pytest
 from helpers import raw_sweep
 
 import jaxcage as jc
-from jaxcage._parameters import parameter
 from jaxcage.analysis import Edge, Zone
-from jaxcage.design import matched
-from jaxcage.design._fit import NORMAL_95, determined
-from jaxcage.design._measured import inside_zones
+from jaxcage.design import determined, inside_zones, matched
+from jaxcage.forces import parameter
 
 
 METHOD = jc.method("rk4", steps=64)
@@ -159,7 +157,7 @@ def test_combinations_of_a_known_matrix():
     """Residuals 10 (a + b) and nothing else: a + b is known to 0.0707 along its unit vector, a - b not at all."""
     covariance, combinations = determined(np.array([[10.0, 10.0]]), ["a", "b"])
     best, worst = combinations
-    assert best.half_width == pytest.approx(NORMAL_95 / np.hypot(10, 10))
+    assert best.half_width == pytest.approx(1.959963985 / np.hypot(10, 10))
     assert best.weights["a"] == pytest.approx(best.weights["b"])
     assert np.isinf(worst.half_width)
     assert np.all(np.isinf(np.diag(covariance)))

@@ -13,7 +13,6 @@ from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
 import jaxcage as jc
-from jaxcage.forces._reynolds import STATIONS
 from jaxcage.models import FORCES
 
 
@@ -88,8 +87,8 @@ def forces(model, speed, tau, state):
 @given(designs, speeds, angles, states(0.0, 1.2), angles)
 def test_turned_states_have_turned_forces(film, design, speed, tau, state, angle):
     """All but weight and synchronous impact, with an isotropic support; the unbalance with its phase."""
-    if film == "finite_length":  # its stations must come to lie on stations
-        angle = 2 * np.pi / STATIONS * np.round(angle / (2 * np.pi / STATIONS))
+    if film == "finite_length":  # its 64 stations must come to lie on stations
+        angle = 2 * np.pi / 64 * np.round(angle / (2 * np.pi / 64))
     model = jc.replace(CASE, **{**design, "stiffness_y": design["stiffness_x"], "film.model": film})
     y = in_si(model, speed, state)
     here = forces(model, speed, tau, y)

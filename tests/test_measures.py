@@ -9,8 +9,7 @@ import pytest
 
 import jaxcage.integrate as ji
 from jaxcage import replace
-from jaxcage.analysis import cage_forces, equilibrium, film_drag_power, orbit_measures
-from jaxcage.analysis._measures import relative_state, winding
+from jaxcage.analysis import cage_forces, equilibrium, film_drag_power, orbit_measures, relative_state, winding
 from jaxcage.forces import ElasticRib, PocketImpact, RollerPassImpact
 from jaxcage.models import case
 

@@ -51,13 +51,13 @@ def test_loss_zones_say_their_edges():
 
 
 def test_words_are_escaped():
-    from jaxcage._notebook import notebook_html
-
     class Result:
+        _repr_html_ = jc.Zones._repr_html_
+
         def __str__(self) -> str:
             return "a < b\n  c & d:  1"
 
-    assert notebook_html(Result()) == (
+    assert Result()._repr_html_() == (
         '<div><strong>a &lt; b</strong><table><tbody><tr><td style="text-align: left">c &amp; d:</td>'
         '<td style="text-align: left">1</td></tr></tbody></table></div>'
     )

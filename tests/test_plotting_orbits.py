@@ -14,15 +14,19 @@ from test_io_dataset import sweep_of
 
 from jaxcage.orbits import Branch, CodimensionTwo, Curve, Point, Sensitivity
 from jaxcage.plotting import (
+    BLUE,
+    GREY,
+    MARKS,
+    ORANGE,
     branch_diagram,
     elasticity_bars,
+    move_apart,
     multiplier_circle,
     new_figure,
     orbit_diagram_with_branches,
+    polyline,
     stability_map,
 )
-from jaxcage.plotting._branches import MARKS, move_apart, polyline
-from jaxcage.plotting._style import BLUE, GREY, ORANGE
 
 
 PER_RPM = np.pi / 30

@@ -13,15 +13,15 @@ from helpers import raw_sweep, wide_but
 
 import jaxcage as jc
 from jaxcage.forces import (
+    axial_profiles,
     film_drive,
     film_pressure_field,
     finite_film_force,
     pressure_force,
     short_film_excess,
     short_film_force,
+    solve_ring,
 )
-from jaxcage.forces._axial import axial_profiles
-from jaxcage.forces._ring import solve_ring
 from jaxcage.io import load_model
 
 

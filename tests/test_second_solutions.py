@@ -6,16 +6,25 @@ import numpy as np
 import pytest
 from helpers import slow_but, wide_but
 
-from jaxcage.validation import DUFFING_DOUBLINGS, EXPONENTS
-from jaxcage.validation._finite_volumes import equations, film_pressure, full_bearing
-from jaxcage.validation._shooting import UEDA, doubling, duffing, largest_exponent, pendulum
-from jaxcage.validation._statics import load_integral
+from jaxcage.validation import (
+    DUFFING_DOUBLINGS,
+    EXPONENTS,
+    UEDA,
+    doubling,
+    duffing,
+    film_equations,
+    film_pressure,
+    full_bearing,
+    largest_exponent,
+    load_integral,
+    pendulum,
+)
 
 
 @pytest.mark.parametrize("slenderness, eps", [(1.0, 0.8), (0.25, 0.4)])
 def test_finite_volumes_solve_the_complementarity_problem(slenderness: float, eps: float):
     """p >= 0, no cell takes in more than flows out, and both at once nowhere."""
-    matrix, source = equations(slenderness, eps, 120, 8)
+    matrix, source = film_equations(slenderness, eps, 120, 8)
     pressure, _ = film_pressure(slenderness, eps, 120, 8)
     p = pressure.ravel()
     excess = matrix @ p - source

@@ -22,8 +22,7 @@ import xarray as xr
 from scipy import stats
 
 import jaxcage as jc
-from jaxcage.studies import KINDS, LABELS, OtherStudy, Plan, Study, _dask, kinds, label_names, with_values
-from jaxcage.studies._store import Store
+from jaxcage.studies import KINDS, LABELS, OtherStudy, Plan, Store, Study, _dask, kinds, label_names, with_values
 
 
 class Duffing(eqx.Module):

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.studies import LABELS, PENDING, AdaptiveGrid, found_share, kinds, refine
-from jaxcage.studies._adaptive import UNKNOWN, changes, first_stride
+from jaxcage.studies import LABELS, PENDING, UNKNOWN, AdaptiveGrid, changes, found_share, kinds, refine
 
 
 SIDE = 300
@@ -62,12 +61,12 @@ def test_changes_of_a_grid_of_300_are_found_with_few_points(name: str):
 
 def test_what_is_missed_is_what_the_coarse_picture_cannot_see():
     """An island of three cells away from every edge and lattice point is not found; beside an edge it is."""
-    assert first_stride((SIDE, SIDE)) == 8
     field = (X > 0.5).astype(int)
     field[20 + 1 : 20 + 4, 33:36] = 1
     field[139:142, 199:202] = 1  # between the lattice's lines too; 149 is the last place below the edge
-    grid = refine(lambda p: field[tuple(p.T)], field.shape)
-    assert np.all(grid.filled[21:24, 33:36] == 0)
+    seen: list[AdaptiveGrid] = []
+    grid = refine(lambda p: field[tuple(p.T)], field.shape, report=seen.append)
+    assert seen[0].stride == 8 and np.all(grid.filled[21:24, 33:36] == 0)
     assert np.array_equal(grid.filled[130:], field[130:])
 
 

@@ -15,21 +15,26 @@ from matplotlib.text import Text
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.models import FORCES
-from jaxcage.plotting import STYLES, load_bars, new_figure, orbit_diagram, restyle
-from jaxcage.plotting._branches import _PERIOD_COLOURS, MARKS
-from jaxcage.plotting._elasticities import _COLOURS as ELASTICITIES
-from jaxcage.plotting._section import _COLOURS as STARTS
-from jaxcage.plotting._style import (
+from jaxcage.plotting import (
     BLACK,
     BLUE,
+    EDGE_COLOURS,
     FORCE_COLOURS,
     GREY,
     KIND_COLOURS,
+    MARKS,
     OWN_COLOURS,
     PAPER,
+    PERIOD_COLOURS,
+    START_COLOURS,
+    STYLES,
     ZONE,
     Halo,
     lighter,
+    load_bars,
+    new_figure,
+    orbit_diagram,
+    restyle,
 )
 
 
@@ -48,9 +53,9 @@ CYCLES = {
     "forces": tuple(FORCE_COLOURS.values()),
     "forces of one's own": OWN_COLOURS,
     "kinds of bifurcation": tuple(mark.colour for mark in MARKS.values()),
-    "periods": tuple(_PERIOD_COLOURS.values()),
-    "edges": tuple(ELASTICITIES),
-    "starts": tuple(STARTS),
+    "periods": tuple(PERIOD_COLOURS.values()),
+    "edges": tuple(EDGE_COLOURS),
+    "starts": tuple(START_COLOURS),
 }
 CLEARLY_APART = 12.0
 """Five times the just noticeable CIE 1976 difference of 2.3."""

@@ -12,7 +12,6 @@ import reference
 
 import jaxcage as jc
 from benchmarks import truth, truth_exponents
-from jaxcage.integrate._controlled import DEFAULT_ERROR
 from jaxcage.io import model_from, template
 
 
@@ -29,7 +28,9 @@ def assert_closes(model, sweep, i, j):
     period = int(sweep.label[i, j].partition("-")[2])
     field = reference.field(model, float(sweep.speed[i]))
     back = reference.revolutions(field, sweep.last[i, j], period).strobe[-1]
-    np.testing.assert_allclose(back / field.scale, sweep.last[i, j] / field.scale, rtol=0, atol=DEFAULT_ERROR)
+    np.testing.assert_allclose(
+        back / field.scale, sweep.last[i, j] / field.scale, rtol=0, atol=float(jc.controlled().tolerance)
+    )
 
 
 @pytest.mark.wide
@@ -83,7 +84,7 @@ def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
         model = jc.replace(MODEL, **{n: jc.parameters(drawn)[n] for n in same})
         found = jc.sweep(model, reference.random_speeds(seed, 3, wide), **SHORT)
         error = found.error[~found.failed]
-        assert np.all(error > 0) and np.all(error <= DEFAULT_ERROR)
+        assert np.all(error > 0) and np.all(error <= float(jc.controlled().tolerance))
         assert np.all(np.isnan(found.last[found.failed])) and np.all(found.label[found.failed] != "chaotic")
         finished += error.size
     assert finished >= 18

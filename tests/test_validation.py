@@ -8,14 +8,17 @@ import pytest
 from helpers import wide_but
 
 from jaxcage.cli import main
-from jaxcage.validation import FEIGENBAUM, TOPICS, Comparison, page
-from jaxcage.validation._bifurcations import pendulum_comparisons
-from jaxcage.validation._film import (
+from jaxcage.validation import (
+    FEIGENBAUM,
     FULL_BEARINGS,
+    TOPICS,
+    Comparison,
     full_bearing_comparisons,
     grooved_whirl,
     lund_thomsen_comparisons,
     nicholas_comparisons,
+    page,
+    pendulum_comparisons,
 )
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxcage.analysis import zero_one
-from jaxcage.analysis._zero_one import mean_square_displacement
+from jaxcage.analysis import mean_square_displacement, zero_one
 
 
 def logistic(a, n=1000, discard=2000, x=0.3):

@@ -21,6 +21,7 @@ from ._bearing_measures import (
     cage_state as cage_state,
 )
 from ._equilibrium import (
+    LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,
     FilmCoefficients as FilmCoefficients,
     StabilityChart as StabilityChart,
@@ -44,6 +45,7 @@ from ._escapes import (
 )
 from ._labels import (
     CHAOS_THRESHOLD as CHAOS_THRESHOLD,
+    CLOSING_TOLERANCE as CLOSING_TOLERANCE,
     closing_period as closing_period,
     label_lanes as label_lanes,
     too_few_revolutions as too_few_revolutions,
@@ -54,6 +56,8 @@ from ._measures import (
     cage_moments as cage_moments,
     film_drag_power as film_drag_power,
     orbit_measures as orbit_measures,
+    relative_state as relative_state,
+    winding as winding,
 )
 from ._observe import (
     Lane as Lane,
@@ -63,6 +67,7 @@ from ._observe import (
     Room as Room,
     observe as observe,
     settle as settle,
+    start_tangents as start_tangents,
 )
 from ._spectra import (
     OrderSpectrum as OrderSpectrum,
@@ -83,5 +88,5 @@ from ._transients import (
     survival as survival,
     when_t0_doubles as when_t0_doubles,
 )
-from ._zero_one import zero_one as zero_one
+from ._zero_one import mean_square_displacement as mean_square_displacement, zero_one as zero_one
 from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones

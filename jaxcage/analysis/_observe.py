@@ -117,7 +117,7 @@ def _blank(y: State, outcome: Int[Array, ""]) -> State:
     return tuple(jnp.where(outcome == 0, c, jnp.nan) for c in y)
 
 
-def _start_tangents(dimension: int, exponents: int) -> Tangents:
+def start_tangents(dimension: int, exponents: int) -> Tangents:
     """Generic directions: no component zero, so that none is orthogonal to a coordinate axis."""
     wave = lambda i, d: jnp.cos(jnp.asarray((i + 1.0) * (d + 1) * 1.234 + d))
     return orthonormalise(tuple(tuple(wave(i, d) for d in range(dimension)) for i in range(exponents)))[0]
@@ -175,7 +175,7 @@ def observe(strobe: StrobeMap, lane: Lane, lengths: Lengths, room: Room) -> Obse
             total = jnp.where((n + 1) % lengths.block == 0, zero, total)
             return lane, record(ring, jnp.maximum(n, 0), lane), tangents, total, doubt, sums
 
-        carry = (lane, ring, _start_tangents(dim, room.exponents), zero, zero, sums)
+        carry = (lane, ring, start_tangents(dim, room.exponents), zero, zero, sums)
         lane, ring, _, _, doubt, sums = jax.lax.fori_loop(-lengths.align, observed, follow, carry)
         growth, doubt = sums[:-1] / lengths.block.astype(float), doubt / observed.astype(float)
     strobe_states = jnp.roll(ring, -(observed % room.keep), axis=0)

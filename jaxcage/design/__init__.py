@@ -25,10 +25,16 @@ from ._edges import (
     FollowedEdges as FollowedEdges,
     zone_width as zone_width,
 )
-from ._fit import Combination as Combination, Fit as Fit, FittedEdge as FittedEdge, fit_edges as fit_edges
+from ._fit import (
+    Combination as Combination,
+    Fit as Fit,
+    FittedEdge as FittedEdge,
+    determined as determined,
+    fit_edges as fit_edges,
+)
 from ._land import LandMeasure as LandMeasure, land_loads as land_loads
 from ._margin import StabilityMargin as StabilityMargin
-from ._measured import MeasuredEdge as MeasuredEdge, matched as matched
+from ._measured import MeasuredEdge as MeasuredEdge, inside_zones as inside_zones, matched as matched
 from ._objective import (
     AbstractObjective as AbstractObjective,
     DesignSpace as DesignSpace,

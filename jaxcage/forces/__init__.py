@@ -23,6 +23,7 @@ Frame: x to the right, y up, rotation positive counter-clockwise; forces act on 
 """
 
 from .._parameters import choice as choice, count as count, parameter as parameter
+from ._axial import axial_profiles as axial_profiles
 from ._contact import (
     ContactForce as ContactForce,
     LandContact as LandContact,
@@ -81,6 +82,7 @@ from ._reynolds import (
     pressure_force as pressure_force,
 )
 from ._rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
+from ._ring import solve_ring as solve_ring
 from ._smooth import (
     power_10_9 as power_10_9,
     root_9 as root_9,

@@ -39,6 +39,12 @@ from ._lens import pick as pick
 from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._mechanism import Explained as Explained, explain as explain
 from ._multiplier import LeadingMultiplier as LeadingMultiplier, leading_multiplier as leading_multiplier
+from ._normal_form import (
+    critical_vectors as critical_vectors,
+    criticality as criticality,
+    normal_form_coefficient as normal_form_coefficient,
+    normal_form_places as normal_form_places,
+)
 from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
 from ._point import Point as Point
 from ._search import (

@@ -63,7 +63,7 @@ def critical_vectors(kind: str, monodromy: Float[Array | np.ndarray, "n n"]) -> 
     return Critical(np.exp(1j * np.angle(mu[i])), v[:, i], _solved(v, np.eye(len(v)))[i])
 
 
-def around(critical: Critical, steps: tuple[float, ...] = STEPS) -> Float[np.ndarray, "places n"]:
+def normal_form_places(critical: Critical, steps: tuple[float, ...] = STEPS) -> Float[np.ndarray, "places n"]:
     """Where the derivative of the map is needed, from the fixed point, in units of the system's scale."""
     q = critical.right
     along = np.stack([np.real(q), np.imag(q)] if np.iscomplexobj(q) else [q])
@@ -72,10 +72,10 @@ def around(critical: Critical, steps: tuple[float, ...] = STEPS) -> Float[np.nda
     return np.concatenate([np.zeros((1, q.size)), moved.reshape(-1, q.size)])
 
 
-def coefficient(
+def normal_form_coefficient(
     critical: Critical, derivatives: Float[Array | np.ndarray, "places n n"], steps: tuple[float, ...] = STEPS
 ) -> Coefficient:
-    """The coefficient from the derivative of the map at the places of `around`."""
+    """The coefficient from the derivative of the map at the places of `normal_form_places`."""
     mu, q, p = critical
     derivatives = np.asarray(derivatives)
     a, n = derivatives[0], q.size
@@ -174,7 +174,7 @@ def coefficients(
     if mine:
         derivatives = plane.derivative(take(points, mine))
         critical = [critical_vectors(kinds[i], m) for i, m in zip(mine, derivatives, strict=True)]
-        ways = [around(c, steps) for c in critical]
+        ways = [normal_form_places(c, steps) for c in critical]
         lane, counts = np.repeat(mine, [len(w) for w in ways]), np.cumsum([len(w) for w in ways])
         at = points.u[lane]
         at[:, :n] += np.concatenate(ways) @ plane.basis.T
@@ -182,7 +182,7 @@ def coefficients(
         for count in (points.steps[lane], (points.steps[lane] + 1) // 2):
             moved = plane.returned(curves.take(lane), at, points.tangent[lane], count)
             parts = np.split(plane.derivative(moved), counts[:-1])
-            each.append([coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
+            each.append([normal_form_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
         found[mine] = [with_half(fine, coarse) for fine, coarse in zip(*each, strict=True)]
         if finer is not None:
             longer = np.stack([plane.basis @ c.right for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]

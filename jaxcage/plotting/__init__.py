@@ -22,12 +22,16 @@
 """
 
 from ._branches import (
+    MARKS as MARKS,
+    PERIOD_COLOURS as PERIOD_COLOURS,
     branch_diagram as branch_diagram,
+    move_apart as move_apart,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
+    polyline as polyline,
 )
 from ._chance import chance_of_chaos as chance_of_chaos
 from ._design import design_figure as design_figure, design_history as design_history
-from ._elasticities import elasticity_bars as elasticity_bars
+from ._elasticities import EDGE_COLOURS as EDGE_COLOURS, elasticity_bars as elasticity_bars
 from ._history import (
     force_history as force_history,
     orbit as orbit,
@@ -49,14 +53,25 @@ from ._orbit_diagram import (
     zoomed_diagram as zoomed_diagram,
 )
 from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
-from ._section import strobe_section as strobe_section
+from ._section import START_COLOURS as START_COLOURS, strobe_section as strobe_section
 from ._shaft import add_shaft_axes as add_shaft_axes
 from ._stability_map import stability_map as stability_map
 from ._statics import load_bars as load_bars
 from ._style import (
+    BLACK as BLACK,
+    BLUE as BLUE,
+    FORCE_COLOURS as FORCE_COLOURS,
+    GREY as GREY,
+    KIND_COLOURS as KIND_COLOURS,
+    ORANGE as ORANGE,
+    OWN_COLOURS as OWN_COLOURS,
+    PAPER as PAPER,
     STYLES as STYLES,
+    ZONE as ZONE,
+    Halo as Halo,
     Style as Style,
     enlarge_dots as enlarge_dots,
+    lighter as lighter,
     new_figure as new_figure,
     restyle as restyle,
 )

@@ -47,7 +47,7 @@ MARKS = {
     "branch-point": Mark("^", PURPLE, "BP"),
 }
 """Every figure of bifurcations uses these."""
-_PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
+PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
 _LABEL_SIZE = 7.5
 
 
@@ -63,7 +63,7 @@ def words(kind: str) -> str:
 
 def period_colour(periods: int) -> str:
     """Colour of the branches of period-`periods` orbits; long periods share one."""
-    return _PERIOD_COLOURS.get(periods, GREEN)
+    return PERIOD_COLOURS.get(periods, GREEN)
 
 
 def branch_diagram(

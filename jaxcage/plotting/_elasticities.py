@@ -12,7 +12,7 @@ from ._style import BAND, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, ax
 
 FIRST = ("guidance_gap", "eccentricity")
 """The two quantities a designer asks for are always on top."""
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+EDGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 
 
 def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None, most: int = 12) -> Axes:
@@ -37,7 +37,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
         value = np.array([s.elasticity.get(name, np.nan) for name in names])
         place = np.arange(len(names)) + (i - (count - 1) / 2) * thick
         note = "" if s.trusted else ", not trusted"
-        style = {"color": _COLOURS[i % len(_COLOURS)], "alpha": 1.0 if s.trusted else 0.45}
+        style = {"color": EDGE_COLOURS[i % len(EDGE_COLOURS)], "alpha": 1.0 if s.trusted else 0.45}
         label = f"{s.name} ({s.value_rpm:.0f} rpm{note})"
         hatch = None if s.trusted else "///"
         ax.barh(place, value, height=0.9 * thick, **style, hatch=hatch, edgecolor="white", linewidth=0, label=label)

@@ -20,7 +20,7 @@ from ._style import (
 )
 
 
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)
+START_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)
 
 
 def strobe_section(
@@ -45,7 +45,7 @@ def strobe_section(
         closed = _spread(across) < 1e-3 * _spread(x)
         size = 14.0 - 4 * min(i, 2) if closed else 7.0 if across.size <= 100 else 2.5
         label = names[i] if names else f"start {i + 1}"
-        style = dots(_COLOURS[i % len(_COLOURS)], size)
+        style = dots(START_COLOURS[i % len(START_COLOURS)], size)
         ax.plot(across, up, **style, alpha=0.7, rasterized=across.size > 5000, label=label)
     ax.set(xlabel=place.label, ylabel=velocity.label, xlim=_not_too_narrow(x), ylim=_not_too_narrow(y))
     place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": len(x)}

@@ -40,6 +40,7 @@ from ._design_tables import (
 from ._findings import (
     AllFailed as AllFailed,
     Findings as Findings,
+    Map as Map,
     examine as examine,
     require_some as require_some,
 )
@@ -71,7 +72,7 @@ from ._orbit_tables import (
     stretch_table as stretch_table,
     unsettled_notes as unsettled_notes,
 )
-from ._page import Judged as Judged, judge as judge, page as page
+from ._page import Judged as Judged, calmest as calmest, judge as judge, page as page
 from ._paper_tables import (
     compared_table as compared_table,
     ranges_table as ranges_table,

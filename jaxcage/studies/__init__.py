@@ -19,7 +19,13 @@
 | `_label_map` | that grid over two parameters of a system                                    |
 """
 
-from ._adaptive import AdaptiveGrid as AdaptiveGrid, found_share as found_share, refine as refine
+from ._adaptive import (
+    UNKNOWN as UNKNOWN,
+    AdaptiveGrid as AdaptiveGrid,
+    changes as changes,
+    found_share as found_share,
+    refine as refine,
+)
 from ._check import (
     DamagedStore as DamagedStore,
     OldStore as OldStore,
@@ -41,7 +47,7 @@ from ._ensemble import (
 from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map
 from ._plan import Plan as Plan
 from ._run import run_study as run_study, study as study
-from ._store import OtherStudy as OtherStudy, label_names as label_names, open_study as open_study
+from ._store import OtherStudy as OtherStudy, Store as Store, label_names as label_names, open_study as open_study
 from ._study import (
     LABELS as LABELS,
     OIL as OIL,

@@ -17,12 +17,24 @@
 
 from collections.abc import Callable, Mapping
 
-from ._bifurcations import bifurcation_comparisons
+from ._bifurcations import bifurcation_comparisons, pendulum_comparisons as pendulum_comparisons
 from ._cage import cage_comparisons
 from ._comparison import Comparison as Comparison
 from ._contact import contact_comparisons
 from ._exponents import exponent_comparisons
-from ._film import film_comparisons
+from ._film import (
+    FULL_BEARINGS as FULL_BEARINGS,
+    film_comparisons,
+    full_bearing_comparisons as full_bearing_comparisons,
+    grooved_whirl as grooved_whirl,
+    lund_thomsen_comparisons as lund_thomsen_comparisons,
+    nicholas_comparisons as nicholas_comparisons,
+)
+from ._finite_volumes import (
+    film_equations as film_equations,
+    film_pressure as film_pressure,
+    full_bearing as full_bearing,
+)
 from ._literature import (
     DUFFING_DOUBLINGS as DUFFING_DOUBLINGS,
     DUFFING_FOLDS as DUFFING_FOLDS,
@@ -39,7 +51,14 @@ from ._literature import (
     Number as Number,
 )
 from ._page import page as page
-from ._statics import statics_comparisons
+from ._shooting import (
+    UEDA as UEDA,
+    doubling as doubling,
+    duffing as duffing,
+    largest_exponent as largest_exponent,
+    pendulum as pendulum,
+)
+from ._statics import load_integral as load_integral, loads_by_scipy as loads_by_scipy, statics_comparisons
 
 
 TOPICS: Mapping[str, Callable[[], list[Comparison]]] = {

@@ -57,7 +57,7 @@ def film_pressure(
 
     The set of nodes that carry pressure is changed until it is right; that of a coarser grid, `wet`, is a good first.
     """
-    matrix, source = equations(slenderness, eps, around, across)
+    matrix, source = film_equations(slenderness, eps, around, across)
     if wet is None:
         on = np.repeat(np.arange(1, around) < 0.55 * around, across)
     else:
@@ -75,7 +75,7 @@ def film_pressure(
     return p.reshape(around - 1, across), on.reshape(around - 1, across)
 
 
-def equations(slenderness: float, eps: float, around: int, across: int) -> tuple[Any, np.ndarray]:
+def film_equations(slenderness: float, eps: float, around: int, across: int) -> tuple[Any, np.ndarray]:
     """Matrix and right-hand side over the inner nodes: flow out of a cell, and what the wedge brings in."""
     h, k = 2 * math.pi / around, 1 / across
     theta = h * np.arange(1, around)
