@@ -274,14 +274,15 @@ def test_a_design_is_judged_alike_whatever_it_is_swept_with():
 def test_loads_of_the_land_are_those_of_a_time_history():
     space, width = cage_at_speeds(discard=60, revolutions=20)
     places = np.array([[1.0, 0.33], [0.0, 0.98]])
-    wear, peak = (jc.design.LandMeasure(width, what) for what in ("wear load", "peak land force"))
+    # Where motion is chaotic two integrations part: they are compared over two revolutions.
+    wear, peak = (jc.design.LandMeasure(width, what, revolutions=2) for what in ("wear load", "peak land force"))
     got = wear.at_speeds(space, places), peak.at_speeds(space, places)
     last = width.run(space, places).last
     touched = 0
     for k, place in enumerate(places):
         model = space.model(place)
         for i, speed in enumerate(width.speeds):
-            runs = [jc.simulate(model, speed, revolutions=8, samples=1024, start=tuple(y)) for y in last[k, i]]
+            runs = [jc.simulate(model, speed, revolutions=2, samples=1024, start=tuple(y)) for y in last[k, i]]
             seen = [jc.orbit_measures(model, run) for run in runs]
             load = np.mean([o.mean_contact_force for o in seen]) * speed * float(model.land_radius)
             assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
