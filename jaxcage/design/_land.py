@@ -45,7 +45,7 @@ class LandMeasure(AbstractObjective):
 
     chaos: ChaosMeasure
     what: str = "wear load"
-    revolutions: int = 8
+    revolutions: int = 4
 
     def __post_init__(self):
         if self.what not in MEASURES:
@@ -89,7 +89,7 @@ def _loads(
     models: Sequence[Any],
     speeds: Float[np.ndarray, " speeds"],
     last: Float[np.ndarray, "k speeds starts dim"],
-    revolutions: int = 8,
+    revolutions: int = 4,
     error: float | None = None,
 ) -> dict[str, Float[np.ndarray, "k speeds"]]:
     starts = last.shape[2]

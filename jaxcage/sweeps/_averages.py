@@ -14,8 +14,9 @@ from ..models import AbstractForcedSystem
 from ._engine import Designs, Part, over_lanes, run_parts
 
 
-SAMPLES = 256
-"""Phases of a revolution at which the motion is read: a blow on the land lasts for some hundredths of a radian."""
+SAMPLES = 512
+"""Phases of a revolution at which the motion is read. A blow on the land lasts for some hundredths of a radian: its peak
+is read up to 5 % too low (case 1b at 9000 and 27500 rpm beside 4096 phases), its impulse to 0.5 %."""
 
 Reading = Callable[[Any, Any, Any, Any], tuple[Any, ...]]
 """What is read: (system, speed, phase, state) -> numbers."""
@@ -52,13 +53,13 @@ def averages(
     states: Float[np.ndarray, "lanes dim"],
     which: Int[np.ndarray, " lanes"],
     read: Reading,
-    revolutions: int = 8,
+    revolutions: int = 4,
     error: float | None = None,
 ) -> tuple[Float[np.ndarray, "lanes numbers"], Float[np.ndarray, "lanes numbers"]]:
     """What `read` sees over some revolutions from given states, in every lane.
 
     **Arguments:** systems of one structure; speed [rad/s], state at phase 0 [SI] and system of each lane; what is read
-    at 256 phases of a revolution; revolutions; error of a revolution, by default that of `jaxcage.controlled`.
+    at 512 phases of a revolution; revolutions; error of a revolution, by default that of `jaxcage.controlled`.
 
     **Returns:** means and largest values; NaN where a lane is not known to the error.
     """
