@@ -128,12 +128,13 @@ def test_a_measured_stiffness_decides():
 
 
 def test_verdicts_and_lanes_that_failed():
-    assert [verdict_of(p) for p in (0.05, 0.051, 0.95, np.nan)] == ["calm", "not decided", "chaotic", "unknown"]
-    found = by_stiffness(4)
-    lost = np.zeros((4, 4), dtype=bool)
+    assert [verdict_of(p, 64) for p in (0.05, 0.051, 0.95)] == ["calm", "not decided", "chaotic"]
+    assert verdict_of(0.0, 28) == "too few draws" and binomial_interval(0, 29)[1] < 0.12
+    found = by_stiffness()
+    lost = np.zeros((64, 4), dtype=bool)
     lost[:, 3] = True
     failed = Ensemble(*(lost if name == "failed" else value for name, value in vars(found).items()))
-    assert failed.verdict[3] == "unknown" and np.isnan(failed.chance[3])
+    assert failed.verdict[3] == "too few draws" and np.isnan(failed.chance[3])
 
 
 def test_commands_answer_a_file_with_ranges_by_chances(

@@ -28,6 +28,8 @@ LADDER = (*(("rk4", 64 << i) for i in range(6)), *(("rodas4", 512 << i) for i in
 """Steps of the draws: some are far stiffer than any cage, and a lane that wants more steps counts as failed."""
 RARE = 0.05
 """Chance below which a speed is called calm, and above one less which it is called chaotic."""
+FEWEST = 29
+"""Draws without which nothing is called calm: of so many none would be chaotic, once in 20 times, if 10 % were."""
 CONFIDENCE = 0.95
 BINS = 4
 """Parts of a range whose chances are compared, to tell what an unknown has to say."""
@@ -96,8 +98,8 @@ class Ensemble:
 
     @property
     def verdict(self) -> list[str]:
-        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided` or `unknown` at each speed."""
-        return [verdict_of(p) for p in self.chance]
+        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided`, or `too few draws` at each speed."""
+        return [verdict_of(p, int(n)) for p, n in zip(self.chance, self.counts[1], strict=True)]
 
     @property
     def undecided(self) -> Bool[np.ndarray, " speeds"]:
@@ -121,10 +123,10 @@ class Ensemble:
         return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
 
 
-def verdict_of(chance: float) -> str:
-    """What a chance of chaos means."""
-    if not np.isfinite(chance):
-        return "unknown"
+def verdict_of(chance: float, draws: int) -> str:
+    """What a chance of chaos means that `draws` draws have."""
+    if draws < FEWEST:
+        return "too few draws"
     return "calm" if chance <= RARE else "chaotic" if chance >= 1 - RARE else "not decided"
 
 
