@@ -169,3 +169,24 @@ def test_draws_that_run():
         base, [STIFF], jc.rpm(6000, 7000, 2), draws=2, discard=20, revolutions=20, method=jc.method("rk4", steps=256)
     )
     assert found.chaotic.shape == (2, 2) and not np.any(found.chaotic | found.failed)
+
+
+def test_unknowns_names_the_measurement(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+):
+    """A verdict that hangs on the support alone: its total index is 1, those of the others 0."""
+    path = str(write_template(tmp_path / "mine.toml"))
+    labels = [u.label for u in read_bearing(path).unknowns]
+    column = labels.index("support.stiffness")
+
+    def stub(model: Any, unknowns: Any, speeds: np.ndarray, place: np.ndarray, **options: Any) -> np.ndarray:
+        return (place[column] < 0.4).astype(float)[None]
+
+    monkeypatch.setattr("jaxcage.cli._unknowns.chaotic_shares", stub)
+    assert main(["unknowns", path, "--samples", "256", "--out", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["measure"]["what"] == "support.stiffness" and found["designs"] == 256 * (len(labels) + 2)
+    assert found["total"]["support.stiffness"] == pytest.approx(1.0, abs=0.1)
+    assert all(abs(v) < 0.05 for n, v in found["total"].items() if n != "support.stiffness")
+    assert main(["unknowns", "1a", "--out", str(tmp_path)]) == 2
+    assert "Case 1a must be a TOML file with ranges" in capsys.readouterr().err

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..design import SobolIndices
 from ..io import Unknown
 from ..studies import Band, Ensemble, verdict_of
 from ._operating import Operating
@@ -137,3 +138,16 @@ def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: fl
         ("cage speed", "shaft speed", "chance of chaos", "verdict", "measure"),
         rows,
     )
+
+
+def verdict_table(name: str, shares: SobolIndices, sources: Mapping[str, str]) -> Table:
+    """What each unknown does to the chaotic share, alone and with the others, and how to measure it."""
+    cell = lambda value, pair: f"{value:+.2f} ({pair[0]:+.2f} to {pair[1]:+.2f})"
+    columns = {
+        "value": str,
+        "alone": lambda n: cell(shares.first[n], shares.first_interval[n]),
+        "with the others": lambda n: cell(shares.total[n], shares.total_interval[n]),
+        "measure": lambda n: sources[n],
+    }
+    title = f"Sobol indices of the chaotic share of {name}, {shares.evaluations} draws"
+    return Table.of(title, columns, sorted(shares.total, key=lambda n: -shares.total[n]))

@@ -187,20 +187,7 @@ def ensemble(
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
     place = sobol(len(unknowns), draws, seed)
-    start = tuple(float(c) for c in model.starts(float(speeds[0]))[0])
-    found = sweep_designs(
-        draw(model, unknowns, place),
-        speeds,
-        starts=[start],
-        discard=discard,
-        revolutions=revolutions,
-        confirm=False,
-        horizon=0,
-        blocks=blocks,
-        keep=32,
-        method=controlled(ERROR, LADDER) if method is None else method,
-        progress=progress,
-    )
+    found = _run(draw(model, unknowns, place), speeds, discard, revolutions, blocks, method, progress)
     info = parameter_info(model)
     return Ensemble(
         tuple(unknowns),
@@ -213,6 +200,49 @@ def ensemble(
         discard,
         revolutions,
     )
+
+
+def _run(
+    models: Sequence[CageModel],
+    speeds: Float[np.ndarray, " speeds"],
+    discard: int,
+    revolutions: int,
+    blocks: int,
+    method: AbstractMethod | None,
+    progress: Any,
+) -> list[Sweep]:
+    """Every design once at every speed, from the conventional start."""
+    start = tuple(float(c) for c in models[0].starts(float(speeds[0]))[0])
+    return sweep_designs(
+        models,
+        speeds,
+        starts=[start],
+        discard=discard,
+        revolutions=revolutions,
+        confirm=False,
+        horizon=0,
+        blocks=blocks,
+        keep=32,
+        method=controlled(ERROR, LADDER) if method is None else method,
+        progress=progress,
+    )
+
+
+def chaotic_shares(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    speeds: Float[np.ndarray, " speeds"],
+    place: np.ndarray,
+    *,
+    method: AbstractMethod | None = None,
+    progress: Any = None,
+) -> np.ndarray:
+    """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
+    flat = place.reshape(len(unknowns), -1)
+    models = draw(model, unknowns, flat.T)
+    found = _run(models, speeds, REVOLUTIONS, REVOLUTIONS, 20, method, progress)
+    shares = [float(np.nanmean(s.chaotic_share)) if not np.all(s.failed) else 0.0 for s in found]
+    return np.array(shares).reshape(1, *place.shape[1:])
 
 
 def sobol(unknowns: int, draws: int, seed: int) -> Float[np.ndarray, "draws unknowns"]:
