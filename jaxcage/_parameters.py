@@ -15,6 +15,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, PyTree
 
 from ._errors import ArgumentError
@@ -298,7 +299,7 @@ def allowed(info: ParameterInfo) -> str:
 
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
     """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
-    if isinstance(value, jax.core.Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
+    if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
         return
     numbers = np.asarray(value, dtype=float)
     wrong = numbers[~((numbers >= info.lower) & (numbers <= info.upper))]

@@ -216,10 +216,19 @@ def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_mo
     model = jc.case("1a")
     found = edge("zone 1 onset", 7000.0, gravity=0.5, cage_mass=-0.75, guidance_gap=0.1)
     table = gradient_table("1a", model, found)
-    assert [row[0] for row in table.rows] == ["guidance_gap", "eccentricity", "cage_mass", "gravity"]
+    assert [row[0] for row in table.rows] == [
+        "guidance_gap",
+        "eccentricity",
+        "gap at fixed rho",
+        "cage_mass",
+        "gravity",
+    ]
+    assert table.rows[2][-1] == "+0.100000"
+    printed = edge("zone 1 exit", 12355.5, guidance_gap=-0.2783, eccentricity=0.2849)
+    assert gradient_table("1a", model, printed).rows[2] == ("gap at fixed rho", "", "", "", "+0.006600")
     assert table.rows[0] == ("guidance_gap", "0.00045", "m", "+1.55556e+06", "+0.100000")
     assert table.rows[1][3:] == ("+0", "0")
-    assert table.title.startswith("Zone 1 onset of 1a: 7000.000 ± 0.002 rpm, fold; ")
+    assert table.title.startswith("Zone 1 onset of 1a: 7000.000 ± 0.002 rpm (shaft 17446 rpm), fold; ")
     assert f"; {len(jc.parameters(model)) - 4} other parameters do not move it" in table.title
 
 

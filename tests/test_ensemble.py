@@ -128,12 +128,13 @@ def test_a_measured_stiffness_decides():
 
 
 def test_verdicts_and_lanes_that_failed():
-    assert [verdict_of(p) for p in (0.05, 0.051, 0.95, np.nan)] == ["calm", "not decided", "chaotic", "unknown"]
-    found = by_stiffness(4)
-    lost = np.zeros((4, 4), dtype=bool)
+    assert [verdict_of(p, 64) for p in (0.05, 0.051, 0.95)] == ["calm", "not decided", "chaotic"]
+    assert verdict_of(0.0, 28) == "too few draws" and binomial_interval(0, 29)[1] < 0.12
+    found = by_stiffness()
+    lost = np.zeros((64, 4), dtype=bool)
     lost[:, 3] = True
     failed = Ensemble(*(lost if name == "failed" else value for name, value in vars(found).items()))
-    assert failed.verdict[3] == "unknown" and np.isnan(failed.chance[3])
+    assert failed.verdict[3] == "too few draws" and np.isnan(failed.chance[3])
 
 
 def test_commands_answer_a_file_with_ranges_by_chances(
@@ -168,3 +169,24 @@ def test_draws_that_run():
         base, [STIFF], jc.rpm(6000, 7000, 2), draws=2, discard=20, revolutions=20, method=jc.method("rk4", steps=256)
     )
     assert found.chaotic.shape == (2, 2) and not np.any(found.chaotic | found.failed)
+
+
+def test_unknowns_names_the_measurement(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+):
+    """A verdict that hangs on the support alone: its total index is 1, those of the others 0."""
+    path = str(write_template(tmp_path / "mine.toml"))
+    labels = [u.label for u in read_bearing(path).unknowns]
+    column = labels.index("support.stiffness")
+
+    def stub(model: Any, unknowns: Any, speeds: np.ndarray, place: np.ndarray, **options: Any) -> np.ndarray:
+        return (place[column] < 0.4).astype(float)[None]
+
+    monkeypatch.setattr("jaxcage.cli._unknowns.chaotic_shares", stub)
+    assert main(["unknowns", path, "--samples", "256", "--out", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["measure"]["what"] == "support.stiffness" and found["designs"] == 256 * (len(labels) + 2)
+    assert found["total"]["support.stiffness"] == pytest.approx(1.0, abs=0.1)
+    assert all(abs(v) < 0.05 for n, v in found["total"].items() if n != "support.stiffness")
+    assert main(["unknowns", "1a", "--out", str(tmp_path)]) == 2
+    assert "Case 1a must be a TOML file with ranges" in capsys.readouterr().err

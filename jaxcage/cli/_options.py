@@ -415,6 +415,23 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class UnknownsOptions(_Range, IntegrationOptions):
+    """Which measurement would decide: Sobol indices of the chaotic share over the ranges of a TOML file."""
+
+    speeds: Annotated[int, whole(1)] = 8
+    """Speeds at which a draw is judged."""
+    samples: FromTwo = 16
+    """Base samples of the Sobol indices, a power of 2; so many times the number of ranges and 2 are run."""
+    seed: FromZero = 0
+    """Seed of the draws."""
+
+    def check(self) -> None:
+        super().check()
+        if self.samples & (self.samples - 1):
+            raise InputError(f"Option --samples must be a power of 2, but {self.samples} was given.")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
@@ -435,6 +452,7 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "study": (StudyOptions, "_study.study"),
     "design": (DesignOptions, "_design.design"),
     "sensitivity": (SensitivityOptions, "_design.sensitivity"),
+    "unknowns": (UnknownsOptions, "_unknowns.unknowns"),
     "poincare": (PoincareOptions, "_one_speed.poincare_at"),
     "statics": (StaticsOptions, "_bearing.statics"),
     "impact": (ImpactOptions, "_bearing.impact"),

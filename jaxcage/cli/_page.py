@@ -7,6 +7,7 @@ from typing import Any
 from .. import report
 from .._errors import InputError
 from ..sweeps import rpm
+from ._chances import drawn_chances
 from ._console import visible
 from ._job import Job, blocks_of
 from ._options import ReportOptions
@@ -36,16 +37,20 @@ def report_on(job: Job[ReportOptions]) -> Report:
             orbit_method=job.asked,
             progress=say,
         )
-    html = report.page(
-        findings, operating, table=None if job.file is None else job.file.table, command=_command(options)
-    )
+        drawn = drawn_chances(job, options.draws, say) if job.unknowns and options.draws else None
+    table, left = (None, ()) if job.file is None else (job.file.table, job.file.left)
+    html = report.page(findings, operating, table=table, command=_command(options), chances=drawn, left=left)
     job.text(html, job.path(".html"), "report")
     judged = report.judge(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())
     document = _document(findings, judged) | {"failed": failed, "stages": findings.seconds, "bytes": size}
+    known = [] if drawn is None else report.chances_tables(job.name, drawn)
+    if drawn is not None:
+        document |= report.chances_document(drawn)
+        known = [*([report.operating_chances(drawn, operating, job.ratio)] if operating else []), *known]
     stages = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in findings.seconds.items())
     notes = [f"Failed simulations: {failed}", f"Stages: {stages}", f"Size: {size / 1e6:.1f} MB"]
-    return Report(document, _tables(findings, judged), notes)
+    return Report(document, [*known, *_tables(findings, judged)], notes)
 
 
 def _command(options: ReportOptions) -> str:

@@ -49,6 +49,7 @@ from ._scatter import (
     ToleranceBudget as ToleranceBudget,
     global_sensitivity as global_sensitivity,
     pareto_front as pareto_front,
+    sobol_of as sobol_of,
     tolerance_budget as tolerance_budget,
 )
 from ._screen import Candidate as Candidate, screen as screen

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -96,19 +97,40 @@ def global_sensitivity(
             )
         return found[None]
 
-    from scipy.stats import sobol_indices, uniform  # takes half a second to load
+    return sobol_of(evaluate, space.names, samples=samples, seed=seed)
 
-    found = sobol_indices(func=evaluate, n=samples, dists=[uniform()] * len(space.names), rng=seed)
-    spread = found.bootstrap(confidence_level=0.95)
-    named = lambda row: dict(zip(space.names, np.ravel(row).tolist(), strict=True))
+
+def sobol_of(
+    evaluate: Callable[[np.ndarray], np.ndarray], names: Sequence[str], *, samples: int, seed: int = 0
+) -> SobolIndices:
+    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values; all of
+    them 0 if it does not vary."""
+    from scipy.stats import DegenerateDataWarning, sobol_indices, uniform  # takes half a second to load
+
+    values: list[np.ndarray] = []
+
+    def kept(x: np.ndarray) -> np.ndarray:
+        values.append(evaluate(x))
+        return values[-1]
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = sobol_indices(func=kept, n=samples, dists=[uniform()] * len(names), rng=seed)
+        number = samples * (len(names) + 2)
+        if all(np.ptp(v) == 0 and v.flat[0] == values[0].flat[0] for v in values):
+            none, nowhere = dict.fromkeys(names, 0.0), dict.fromkeys(names, (0.0, 0.0))
+            return SobolIndices(none, none, nowhere, nowhere, number, samples)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DegenerateDataWarning)  # of what has no influence at all
+            spread = found.bootstrap(confidence_level=0.95)
+    named = lambda row: dict(zip(names, np.ravel(row).tolist(), strict=True))
     ends = lambda ci: zip(np.ravel(ci.low).tolist(), np.ravel(ci.high).tolist(), strict=True)
-    pairs = lambda ci: dict(zip(space.names, ends(ci), strict=True))
+    pairs = lambda ci: dict(zip(names, ends(ci), strict=True))
     return SobolIndices(
         named(found.first_order),
         named(found.total_order),
         pairs(spread.first_order.confidence_interval),
         pairs(spread.total_order.confidence_interval),
-        samples * (len(space.names) + 2),
+        number,
         samples,
     )
 

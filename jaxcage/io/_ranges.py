@@ -41,9 +41,9 @@ class Range:
     @property
     def best(self) -> float:
         """The best guess [SI]: as given, or the middle."""
-        return float(self.at(np.array(0.5))) if self.given is None else self.given
+        return float(self.at(0.5)) if self.given is None else self.given
 
-    def at(self, place: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    def at(self, place: float | Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
         """Values [SI] below which the shares `place` of all values lie."""
         if self.is_normal:
             from scipy.stats import truncnorm  # takes half a second to load

@@ -5,6 +5,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jax.core import Tracer
 
 from .._errors import ArgumentError
 from ._cage import CageModel
@@ -55,7 +56,7 @@ def require_known(function: str, instead: str, *arguments: Any) -> None:
 
 
 def _is_traced(arguments: Any) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(arguments))
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(arguments))
 
 
 INSTEAD = (

@@ -122,17 +122,21 @@ def exponent_strip(sweep: Sweep, ax: Axes | None = None) -> Axes:
     ax.plot(sweep.rpm, top, color=BLUE, linewidth=0.9, label="largest of the starts")
     ax.set(
         xlim=_speed_limits(sweep),
-        ylim=_exponent_limits(largest),
+        ylim=_exponent_limits(largest, top, band),
         ylabel=quantity("largest_exponent").symbol,
     )
     return label_speed(ax)
 
 
-def _exponent_limits(values: np.ndarray) -> tuple[float, float]:
+def _exponent_limits(values: np.ndarray, top: np.ndarray, band: np.ndarray) -> tuple[float, float]:
+    """Every exponent and bar above zero is seen; of a bearing that is calm all over, the line of its largest ones."""
     finite = values[np.isfinite(values)]
-    high = max(0.1, 1.15 * float(finite.max())) if finite.size else 0.1
-    low = float(finite.min()) if finite.size else 0.0
-    return max(min(1.15 * low, -0.05), -high), high
+    seen = (top + band)[np.isfinite(top + band)]
+    if finite.size == 0:
+        return -0.05, 0.1
+    high = max(0.1, 1.15 * float(finite.max()), 1.05 * float(seen.max(initial=0.0)))
+    calm = float(np.nanmin(top)) if float(finite.max()) <= 0 else 0.0
+    return max(min(1.15 * float(finite.min()), -0.05), min(1.15 * calm, -high)), high
 
 
 def sweep_figure(

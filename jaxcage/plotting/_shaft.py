@@ -1,5 +1,6 @@
 """The shaft's speed beneath the cage's, on figures over speed."""
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
@@ -28,7 +29,9 @@ def add_shaft_axes(figure: Figure, cage_speed_ratio: float) -> Figure:
 
 def _add_below(ax: Axes, ratio: float) -> None:
     move = lambda points: offset_copy(ax.transAxes, ax.figure, y=-points, units="points")  # pyright: ignore
-    shaft = ax.secondary_xaxis(0.0, functions=(lambda x: x / ratio, lambda x: x * ratio), transform=move(BELOW))
+    shaft = ax.secondary_xaxis(
+        0.0, functions=(lambda x: np.asarray(x) / ratio, lambda x: np.asarray(x) * ratio), transform=move(BELOW)
+    )
     shaft.set_xlabel("Shaft speed [rpm]")
     shaft.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
     shaft.tick_params(color=GREY, labelsize=9)

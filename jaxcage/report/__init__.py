@@ -28,6 +28,7 @@ from ._chances import (
     measures as measures,
     operating_chances as operating_chances,
     unknowns_table as unknowns_table,
+    verdict_table as verdict_table,
 )
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..design import SobolIndices
 from ..io import Unknown
 from ..studies import Band, Ensemble, verdict_of
 from ._operating import Operating
@@ -43,7 +44,7 @@ def chances_table(name: str, found: Ensemble) -> Table:
             part = slice(first, i)
             p = found.chance[part]
             said = "not decided by what is known" if verdict[first] == "not decided" else verdict[first]
-            chance = "-" if verdict[first] == "unknown" else _span(p)
+            chance = _span(p[np.isfinite(p)])
             bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
             rows.append((number(float(found.rpm[first])), number(float(found.rpm[i - 1])), said, chance, bar))
             first = i
@@ -52,6 +53,8 @@ def chances_table(name: str, found: Ensemble) -> Table:
 
 
 def _span(p: np.ndarray) -> str:
+    if p.size == 0:
+        return "-"
     low, high = 100 * float(np.min(p)), 100 * float(np.max(p))
     return f"{low:.0f} %" if round(low) == round(high) else f"{low:.0f} to {high:.0f} %"
 
@@ -103,6 +106,8 @@ def chances_notes(found: Ensemble) -> list[str]:
     open_ = found.rpm[found.undecided]
     if open_.size:
         notes.insert(0, f"Not decided by what is known at {open_.size} of {found.rpm.size} speeds. {measures(clues)}")
+    elif "too few draws" in found.verdict:
+        notes.insert(0, "Too few draws finished to call a speed calm or chaotic: take more --draws.")
     else:
         notes.insert(0, "What is known decides at every speed.")
     return notes
@@ -124,7 +129,7 @@ def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: fl
         which = found.between(at.low_rpm, at.high_rpm)
         done = ~np.any(found.failed[:, which], axis=1) | np.any(found.chaotic[:, which], axis=1)
         chance = float(np.mean(np.any(found.chaotic[done][:, which], axis=1))) if np.any(done) else float("nan")
-        verdict = verdict_of(chance)
+        verdict = verdict_of(chance, int(np.sum(done)))
         said = "not decided by what is known" if verdict == "not decided" else verdict
         measure = measures(found.clues(which)) if verdict == "not decided" else "-"
         rows.append((str(at), str(at.of_shaft(ratio)), f"{100 * chance:.0f} %", said, measure))
@@ -133,3 +138,16 @@ def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: fl
         ("cage speed", "shaft speed", "chance of chaos", "verdict", "measure"),
         rows,
     )
+
+
+def verdict_table(name: str, shares: SobolIndices, sources: Mapping[str, str]) -> Table:
+    """What each unknown does to the chaotic share, alone and with the others, and how to measure it."""
+    cell = lambda value, pair: f"{value:+.2f} ({pair[0]:+.2f} to {pair[1]:+.2f})"
+    columns = {
+        "value": str,
+        "alone": lambda n: cell(shares.first[n], shares.first_interval[n]),
+        "with the others": lambda n: cell(shares.total[n], shares.total_interval[n]),
+        "measure": lambda n: sources[n],
+    }
+    title = f"Sobol indices of the chaotic share of {name}, {shares.evaluations} draws"
+    return Table.of(title, columns, sorted(shares.total, key=lambda n: -shares.total[n]))

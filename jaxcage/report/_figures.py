@@ -16,6 +16,7 @@ from ..orbits import Sensitivity
 from ..plotting import (
     Style,
     add_shaft_axes,
+    chance_of_chaos,
     elasticity_bars,
     load_bars,
     mark_operating,
@@ -27,6 +28,7 @@ from ..plotting import (
     sweep_figure,
     zone_strip,
 )
+from ..studies import Ensemble
 from ._findings import MAP_PARAMETER, Findings
 from ._operating import Operating
 from ._page_tables import with_full_names
@@ -52,9 +54,24 @@ class Picture:
     """Size [px at 96 per inch]."""
 
 
-def pictures(findings: Findings, operating: list[Operating]) -> dict[str, Picture]:
+def pictures(findings: Findings, operating: list[Operating], chances: Ensemble | None = None) -> dict[str, Picture]:
     """All figures that the findings allow, by name."""
-    return {picture.key: picture for picture in _draw(findings, operating)}
+    drawn = {picture.key: picture for picture in _draw(findings, operating)}
+    return drawn if chances is None else drawn | {"chance": _chance(findings, operating, chances)}
+
+
+def _chance(findings: Findings, operating: list[Operating], found: Ensemble) -> Picture:
+    bands = [(b.name, b.rpm) for b in found.bands]
+    figure = _alone(9.5, 4.6, lambda ax: chance_of_chaos(found.rpm, found.chance, found.interval, bands, ax))
+    mark_operating(figure.axes[0], [(at.low_rpm, at.high_rpm) for at in operating])
+    return _picture(
+        float(findings.model.bearing.cage_speed_ratio),
+        "chance",
+        figure,
+        f"Chance of chaos of {findings.name} over cage speed with 95 % bars, and bands of the edges beneath.",
+        f"Share of {found.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars; beneath, where "
+        "the edges lie in 90 % of the draws that have them.",
+    )
 
 
 def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:

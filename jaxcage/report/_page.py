@@ -13,6 +13,8 @@ import numpy as np
 from .._parameters import parameter_info, parameters
 from ..analysis import Zone
 from ..bearing import design_rule_violations
+from ..studies import Ensemble
+from ._chances import chances_notes, chances_tables, operating_chances
 from ._figures import pictures
 from ._findings import Findings
 from ._operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict
@@ -59,24 +61,34 @@ def page(
     *,
     table: Mapping[str, Any] | None = None,
     command: str = "",
+    chances: Ensemble | None = None,
+    left: Sequence[str] = (),
 ) -> str:
     """The report as HTML.
 
     **Arguments:** findings; operating speeds; the nested mapping that the design was read from (None: a published
-    case); the command line that asked for it.
+    case); the command line that asked for it; what draws from its ranges do (None: all is known); values that are
+    still those of the template, by dotted name.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     judged = judge(findings, operating)
-    return environment.get_template("page.html.j2").render(_context(findings, judged, table, command))
+    return environment.get_template("page.html.j2").render(_context(findings, judged, table, command, chances, left))
 
 
-def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] | None, command: str) -> dict[str, Any]:
+def _context(
+    findings: Findings,
+    judged: list[Judged],
+    table: Mapping[str, Any] | None,
+    command: str,
+    chances: Ensemble | None,
+    left: Sequence[str],
+) -> dict[str, Any]:
     name, model, swept, found = findings.name, findings.model, findings.sweep, findings.found
     span = float(swept.rpm[0]), float(swept.rpm[-1])
     what = f"Case {name}" if findings.published is not None else name
-    drawn = pictures(findings, [j.at for j in judged])
+    drawn = pictures(findings, [j.at for j in judged], chances)
     ratio = float(model.bearing.cage_speed_ratio)
     both = lambda table: with_shaft(table, ratio)
     slopes, statics, at_rest = slope_tables(findings), findings.statics, f"At rest under {float(model.load):g} N"
@@ -85,7 +97,9 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
         "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage "
         f"({span[0] / ratio:.0f} to {span[1] / ratio:.0f} rpm of the shaft)"
         + (", quick report: no gradients, a coarser sweep" if findings.quick else ""),
-        "summary": _summary(findings, judged),
+        "summary": [*_summary(findings, judged), *_of_the_unknown(findings, chances, left)],
+        "known_tables": [both(t) for t in _known_tables(findings, judged, chances)],
+        "known_notes": [] if chances is None else chances_notes(chances),
         "key_figures": _key_figures(findings),
         "pictures": drawn,
         "operating": [_operating_rows(findings, j) for j in judged],
@@ -106,7 +120,7 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
         "warnings": design_rule_violations(model.bearing, model.guidance_gap),
         "parameters": [
             (group, list(rows))
-            for group, rows in itertools.groupby(parameter_rows(model, table), key=lambda row: row.group)
+            for group, rows in itertools.groupby(parameter_rows(model, table, left), key=lambda row: row.group)
         ],
         "checks": checks_table(findings),
         "published_table": published_table(findings),
@@ -116,13 +130,14 @@ def _context(findings: Findings, judged: list[Judged], table: Mapping[str, Any] 
         "date": datetime.date.today().isoformat(),
     }
     there = {"operating": bool(judged), "map": "map" in drawn, "gradients": bool(slopes)}
-    there["statics"] = statics is not None
+    there |= {"statics": statics is not None, "known": chances is not None}
     return context | {"sections": [(k, text) for k, text in _SECTIONS.items() if there.get(k, True)]}
 
 
 _SECTIONS = {
     "result": "In short",
     "operating": "Operating speeds",
+    "known": "What is known",
     "zones": "Zones",
     "stability": "Synchronous orbit",
     "map": "Map",
@@ -156,6 +171,27 @@ def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
     if np.any(swept.failed):
         said.append(f"{int(np.sum(swept.failed))} of {swept.failed.size} simulations failed: nothing is known of them.")
     return said
+
+
+def _of_the_unknown(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -> list[str]:
+    """What the zones are worth where values are not known, or are those of another bearing."""
+    said = []
+    if chances is not None:
+        said.append(
+            f"All zones of this page are those of the best guesses: {len(chances.unknowns)} values are known within "
+            f"ranges only. {chances_notes(chances)[0]}"
+        )
+    if left:
+        said.append(f"{len(left)} values are still those of the template, another bearing's: {', '.join(left)}.")
+    return said
+
+
+def _known_tables(findings: Findings, judged: list[Judged], chances: Ensemble | None) -> list[Table]:
+    if chances is None:
+        return []
+    ratio = float(findings.model.bearing.cage_speed_ratio)
+    at = [operating_chances(chances, [j.at for j in judged], ratio)] if judged else []
+    return [*at, *chances_tables(findings.name, chances)]
 
 
 def _named_edges(findings: Findings) -> Table:

@@ -1,10 +1,11 @@
 """Every parameter of a model with its unit, and where its value comes from."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import EXTRA, get, walk
+from ..io import is_range
 from ..models import CageModel
 
 
@@ -50,10 +51,11 @@ class Row:
         return ".".join(self.path[1:] or self.path)
 
 
-def parameter_rows(model: CageModel, table: Mapping[str, Any] | None) -> list[Row]:
+def parameter_rows(model: CageModel, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> list[Row]:
     """All parameters of `model` in the units people read.
 
-    **Arguments:** the model; the nested mapping that it was read from, None for a published case.
+    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still
+    those of the template, by dotted name.
     """
     rows = []
     for path, field in walk(model):
@@ -63,7 +65,7 @@ def parameter_rows(model: CageModel, table: Mapping[str, Any] | None) -> list[Ro
             info = field.metadata["parameter"]
             text, (unit, value) = info.text, shown(float(value), info.unit)
             value = f"{value:.6g}"
-        rows.append(Row(path, text, str(value), unit, _source(model, path, field, table)))
+        rows.append(Row(path, text, str(value), unit, _source(model, path, field, table, left)))
     return rows
 
 
@@ -78,7 +80,15 @@ def shown(value: float, unit: str) -> tuple[str, float]:
     return name, value * factor + shift
 
 
-def _source(model: CageModel, path: tuple[str, ...], field: dataclasses.Field, table: Mapping[str, Any] | None) -> str:
+def _source(
+    model: CageModel,
+    path: tuple[str, ...],
+    field: dataclasses.Field,
+    table: Mapping[str, Any] | None,
+    left: Sequence[str],
+) -> str:
+    if {".".join(path), ".".join(path).removesuffix("_x").removesuffix("_y")} & set(left):
+        return "the template's, not yours"
     if path[0] == EXTRA:
         return "a force of your own"
     if table is None:
@@ -89,8 +99,10 @@ def _source(model: CageModel, path: tuple[str, ...], field: dataclasses.Field, t
     here: Any = table
     for name in path:
         here = here.get(name) if isinstance(here, Mapping) else None
+    if here is None and path[-1] in ("stiffness_x", "stiffness_y") and isinstance(table.get(path[0]), Mapping):
+        here = table[path[0]].get("stiffness")
     if here is not None:
-        return "this file"
+        return "best guess in a range of this file" if isinstance(here, str) and is_range(here) else "this file"
     for (part, key), words in _READY_MADE.items():
         given = table.get(part)
         if path[0] == part and isinstance(given, Mapping) and key in given:

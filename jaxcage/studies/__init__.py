@@ -39,6 +39,7 @@ from ._ensemble import (
     Clue as Clue,
     Ensemble as Ensemble,
     binomial_interval as binomial_interval,
+    chaotic_shares as chaotic_shares,
     draw as draw,
     ensemble as ensemble,
     sobol as sobol,

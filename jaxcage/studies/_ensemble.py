@@ -28,6 +28,8 @@ LADDER = (*(("rk4", 64 << i) for i in range(6)), *(("rodas4", 512 << i) for i in
 """Steps of the draws: some are far stiffer than any cage, and a lane that wants more steps counts as failed."""
 RARE = 0.05
 """Chance below which a speed is called calm, and above one less which it is called chaotic."""
+FEWEST = 29
+"""Draws without which nothing is called calm: of so many none would be chaotic, once in 20 times, if 10 % were."""
 CONFIDENCE = 0.95
 BINS = 4
 """Parts of a range whose chances are compared, to tell what an unknown has to say."""
@@ -96,8 +98,8 @@ class Ensemble:
 
     @property
     def verdict(self) -> list[str]:
-        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided` or `unknown` at each speed."""
-        return [verdict_of(p) for p in self.chance]
+        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided`, or `too few draws` at each speed."""
+        return [verdict_of(p, int(n)) for p, n in zip(self.chance, self.counts[1], strict=True)]
 
     @property
     def undecided(self) -> Bool[np.ndarray, " speeds"]:
@@ -121,10 +123,10 @@ class Ensemble:
         return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
 
 
-def verdict_of(chance: float) -> str:
-    """What a chance of chaos means."""
-    if not np.isfinite(chance):
-        return "unknown"
+def verdict_of(chance: float, draws: int) -> str:
+    """What a chance of chaos means that `draws` draws have."""
+    if draws < FEWEST:
+        return "too few draws"
     return "calm" if chance <= RARE else "chaotic" if chance >= 1 - RARE else "not decided"
 
 
@@ -185,20 +187,7 @@ def ensemble(
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
     place = sobol(len(unknowns), draws, seed)
-    start = tuple(float(c) for c in model.starts(float(speeds[0]))[0])
-    found = sweep_designs(
-        draw(model, unknowns, place),
-        speeds,
-        starts=[start],
-        discard=discard,
-        revolutions=revolutions,
-        confirm=False,
-        horizon=0,
-        blocks=blocks,
-        keep=32,
-        method=controlled(ERROR, LADDER) if method is None else method,
-        progress=progress,
-    )
+    found = _run(draw(model, unknowns, place), speeds, discard, revolutions, blocks, method, progress)
     info = parameter_info(model)
     return Ensemble(
         tuple(unknowns),
@@ -211,6 +200,49 @@ def ensemble(
         discard,
         revolutions,
     )
+
+
+def _run(
+    models: Sequence[CageModel],
+    speeds: Float[np.ndarray, " speeds"],
+    discard: int,
+    revolutions: int,
+    blocks: int,
+    method: AbstractMethod | None,
+    progress: Any,
+) -> list[Sweep]:
+    """Every design once at every speed, from the conventional start."""
+    start = tuple(float(c) for c in models[0].starts(float(speeds[0]))[0])
+    return sweep_designs(
+        models,
+        speeds,
+        starts=[start],
+        discard=discard,
+        revolutions=revolutions,
+        confirm=False,
+        horizon=0,
+        blocks=blocks,
+        keep=32,
+        method=controlled(ERROR, LADDER) if method is None else method,
+        progress=progress,
+    )
+
+
+def chaotic_shares(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    speeds: Float[np.ndarray, " speeds"],
+    place: np.ndarray,
+    *,
+    method: AbstractMethod | None = None,
+    progress: Any = None,
+) -> np.ndarray:
+    """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
+    flat = place.reshape(len(unknowns), -1)
+    models = draw(model, unknowns, flat.T)
+    found = _run(models, speeds, REVOLUTIONS, REVOLUTIONS, 20, method, progress)
+    shares = [float(np.nanmean(s.chaotic_share)) if not np.all(s.failed) else 0.0 for s in found]
+    return np.array(shares).reshape(1, *place.shape[1:])
 
 
 def sobol(unknowns: int, draws: int, seed: int) -> Float[np.ndarray, "draws unknowns"]:

@@ -15,8 +15,8 @@ from ._engine import Designs, Part, over_lanes, run_parts
 
 
 SAMPLES = 512
-"""Phases of a revolution at which the motion is read. A blow on the land lasts for some hundredths of a radian: its peak
-is read up to 5 % too low (case 1b at 9000 and 27500 rpm beside 4096 phases), its impulse to 0.5 %."""
+"""Phases of a revolution at which the motion is read. A blow on the land lasts for some hundredths of a radian: its
+peak is read up to 5 % too low (case 1b at 9000 and 27500 rpm beside 4096 phases), its impulse to 0.5 %."""
 
 Reading = Callable[[Any, Any, Any, Any], tuple[Any, ...]]
 """What is read: (system, speed, phase, state) -> numbers."""
