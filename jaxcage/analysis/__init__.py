@@ -14,6 +14,7 @@
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
+from .._arguments import check_layer
 from ._equilibrium import (
     Equilibrium as Equilibrium,
     FilmCoefficients as FilmCoefficients,
@@ -79,3 +80,10 @@ from ._transients import (
 )
 from ._zero_one import zero_one as zero_one
 from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones
+
+
+check_layer(
+    globals(),
+    "cage_forces cage_moments equilibrium film_coefficients film_whirl_speed orbit_measures "
+    "order_spectrum stability_chart survival waterfall zero_one zones",
+)

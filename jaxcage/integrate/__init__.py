@@ -17,6 +17,7 @@
 | `_results`     | how an integration ended                                                           |
 """
 
+from .._arguments import check_layer
 from ._controlled import (
     ControlledSteps as ControlledSteps,
     controlled as controlled,
@@ -50,3 +51,9 @@ from ._rosenbrock import (
 )
 from ._simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate
 from ._strobe import StrobeMap as StrobeMap, strobe_map as strobe_map
+
+
+check_layer(
+    globals(),
+    "controlled method ramp simulate strobe_map",
+)

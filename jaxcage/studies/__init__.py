@@ -18,6 +18,7 @@
 | `_label_map` | that grid over two parameters of a system                                    |
 """
 
+from .._arguments import check_layer
 from ._adaptive import AdaptiveGrid as AdaptiveGrid, found_share as found_share, refine as refine
 from ._check import (
     DamagedStore as DamagedStore,
@@ -39,3 +40,9 @@ from ._study import (
     with_values as with_values,
 )
 from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance
+
+
+check_layer(
+    globals(),
+    "check_study label_map open_study study",
+)

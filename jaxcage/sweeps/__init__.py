@@ -8,6 +8,7 @@
 | `_carried` | run-up and run-down with the state carried along   |
 """
 
+from .._arguments import check_layer
 from ._carried import (
     Hysteresis as Hysteresis,
     run_up_down as run_up_down,
@@ -23,4 +24,10 @@ from ._speed import (
     settings_of as settings_of,
     sweep as sweep,
     sweep_designs as sweep_designs,
+)
+
+
+check_layer(
+    globals(),
+    "monodromy rpm run_up_down run_up_down_designs sweep sweep_designs",
 )
