@@ -245,10 +245,11 @@ class Bench:
     def again(self, store: Path, differing: list[int]) -> None:
         """Run the study again: what differs is computed, and the store is as it was."""
         computed: list[int] = []
+        results = self.results
 
-        def chunk(_: Study, number: int) -> dict[str, np.ndarray]:
+        def chunk(self: Study, number: int) -> dict[str, np.ndarray]:
             computed.append(number)
-            return self.results[number]
+            return results[number]
 
         true, Study.chunk = Study.chunk, chunk
         try:

@@ -18,6 +18,7 @@
 | `_scatter`  | Sobol indices, tolerance budgets, Pareto fronts                               |
 """
 
+from .._arguments import check_layer
 from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
 from ._edges import (
     EdgeClearance as EdgeClearance,
@@ -56,3 +57,9 @@ from ._screen import Candidate as Candidate, screen as screen
 from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motion as regular_motion
 from ._tracked import TrackedEdges as TrackedEdges
 from ._unknowns import Unknown as Unknown
+
+
+check_layer(
+    globals(),
+    "fit_edges global_sensitivity optimise pareto_front screen tolerance_budget",
+)

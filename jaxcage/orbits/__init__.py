@@ -29,6 +29,7 @@
 | `_cascade`     | period-doubling cascades and their limit                                           |
 """
 
+from .._arguments import check_layer
 from ._arclength import Steps as Steps
 from ._bifurcation import bifurcation as bifurcation
 from ._branch import Branch as Branch, branch as branch, branches as branches
@@ -59,4 +60,11 @@ from ._sensitivity import (
     sensitivities as sensitivities,
     sensitivity as sensitivity,
     width as width,
+)
+
+
+check_layer(
+    globals(),
+    "bifurcation branch branches cascade coexisting_orbits curve doubled_branch "
+    "explain leading_multiplier loss_zones periodic_orbit sensitivities sensitivity synchronous_orbits",
 )

@@ -1,0 +1,220 @@
+"""Arguments of public functions compared with their declarations before anything is done: one mechanism for all.
+
+What an argument may be is read off its annotation: whole numbers, numbers, real arrays, names of a choice, models. How
+large a count may be is said once, by its name. What is traced passes: it has no value yet.
+"""
+
+import functools
+import inspect
+import math
+import sys
+import types
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+
+from ._errors import ArgumentError
+
+
+MOST = 10_000_000
+"""Of anything that is counted: more ends in no memory, or in no lifetime."""
+LEAST: dict[str, int] = {
+    **dict.fromkeys(["blocks", "keep", "count", "steps", "lanes", "period", "rows", "columns", "starts", "workers"], 1),
+    **dict.fromkeys(["discard", "horizon", "exponents", "strobe", "samples", "seed", "persist"], 0),
+}
+"""Of counts by their names; others have a least value of their own, which their function knows."""
+CHECKED: dict[str, Callable[..., Any]] = {}
+"""Functions that compare their arguments, by their names."""
+SPEEDS = frozenset({"speed", "first", "last"})
+"""Names of single speeds, which are above 0 and finite."""
+FASTEST = 1e6
+"""Of speeds [rad/s]: beyond, nothing that is computed means anything."""
+_REAL = "biuf"
+_ARRAYS = (jax.Array, np.ndarray, np.generic)
+
+
+def check_layer(layer: dict[str, Any], names: str) -> None:
+    """Have these functions of a layer compare their arguments; called at the end of its `__init__`."""
+    for name in names.split():
+        f = CHECKED[name] = layer[name]
+        layer[name] = checked(f)
+        setattr(sys.modules[f.__module__], f.__name__, layer[name])  # where pickle looks for it
+
+
+def checked(f: Callable[..., Any]) -> Callable[..., Any]:
+    """`f`, which compares its arguments with their declarations first."""
+
+    @functools.wraps(f)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        check_call(f, *args, **kwargs)
+        return f(*args, **kwargs)
+
+    return run
+
+
+def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
+    """Compare arguments with the declarations of `f`; some of them may be missing.
+
+    **Raises:** `ArgumentError` for the first that is not what is declared.
+    """
+    signature = _signature(f)
+    try:
+        given = signature.bind_partial(*args, **kwargs).arguments
+    except TypeError:
+        return  # Python says it as it always does, where `f` is called
+    for name, value in given.items():
+        parameter = signature.parameters[name]
+        if parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
+            continue
+        if said := wrong(name, parameter.annotation, value):
+            raise ArgumentError(name, said=f"must be {said}, but {_shown(value)} was given.")
+
+
+@functools.lru_cache(maxsize=1024)
+def _signature(f: Callable[..., Any]) -> inspect.Signature:
+    return inspect.signature(f)
+
+
+def options(annotation: Any) -> tuple[Any, ...]:
+    """The members of a union, or the annotation alone."""
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return tuple(one for member in typing.get_args(annotation) for one in options(member))
+    return (annotation,)
+
+
+def wrong(name: str, annotation: Any, value: Any) -> str:
+    """What an argument must be, empty if it is that or if its declaration does not say."""
+    members = options(annotation)
+    if _is_traced(value) or (value is None and types.NoneType in members):
+        return ""
+    members = tuple(m for m in members if m is not types.NoneType)
+    arrays = [m for m in members if is_array_type(m)]
+    if isinstance(value, _ARRAYS) and not _is_real(value, any("Complex" in str(m) for m in members)):
+        return "of real numbers, without a mask"
+    if bool in members:
+        return "" if isinstance(value, bool | np.bool_) or len(members) > 1 else "True or False"
+    if int in members and float not in members:
+        if isinstance(value, _ARRAYS) and any(np.ndim(value) for _ in arrays):
+            return ""
+        others = [m for m in members if m is not int and not is_array_type(m)]
+        fits = _is_count(name, value) or any(not _wrong_one(name, m, value) for m in others)
+        return "" if fits else _count_words(name, value)
+    if float in members:
+        return _wrong_number(name, members, bool([m for m in arrays if not _is_scalar(m)]), value)
+    if all(typing.get_origin(m) is typing.Literal for m in members):
+        known = [option for m in members for option in typing.get_args(m)]
+        return "" if isinstance(value, str) and value in known else f"one of {', '.join(map(str, known))}"
+    if arrays and len(arrays) == len(members):
+        return "" if _is_real(value, any("Complex" in str(m) for m in members)) else "an array of numbers"
+    if all(is_plain_class(m) for m in members):
+        names = " or ".join(m.__name__ for m in members)
+        return "" if isinstance(value, members) else f"of kind {names}"
+    said = [_wrong_one(name, member, value) for member in members]
+    return " or ".join(said) if all(said) else ""
+
+
+def _wrong_one(name: str, kind: Any, value: Any) -> str:
+    """The same for a member of a union: a class, a function, a mapping or a row of something."""
+    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    if origin is None:
+        return wrong(name, kind, value) if is_plain_class(kind) or is_array_type(kind) else ""
+    if origin is Callable:
+        return "" if callable(value) else "something that can be called"
+    if not inspect.isclass(origin) or not issubclass(origin, Mapping | Sequence):
+        return ""
+    if issubclass(origin, Mapping):
+        if not isinstance(value, Mapping):
+            return "a mapping"
+        said = [wrong("", inside[1], each) for each in value.values()]
+        return f"a mapping to what is {next(filter(None, said))}" if any(said) else ""
+    if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray | jax.Array):
+        return "a row of things"
+    if np.ndim(value) == 0 and isinstance(value, _ARRAYS):
+        return "a row of things"
+    each = inside[:1] * len(value) if issubclass(origin, tuple) is False or inside[-1] is ... else inside
+    if len(each) != len(value):
+        return f"a row of {len(each)}"
+    said = [wrong("", kind, x) for kind, x in zip(each, value, strict=True)]
+    return f"a row of things, each {next(filter(None, said))}" if any(said) else ""
+
+
+def _is_traced(value: Any) -> bool:
+    """Whether a value, or anything in a row of them, is still to come."""
+    return any(isinstance(x, Tracer) for x in (value if isinstance(value, tuple | list) else (value,)))
+
+
+def is_array_type(kind: Any) -> bool:
+    """Whether an annotation is one of jaxtyping's."""
+    return getattr(kind, "dtypes", None) is not None
+
+
+def is_plain_class(kind: Any) -> bool:
+    """Whether an annotation is a class whose instances can be told."""
+    simple = inspect.isclass(kind) and not is_array_type(kind) and typing.get_origin(kind) is None
+    return simple and kind is not typing.Any and not getattr(kind, "_is_protocol", False)
+
+
+def _is_scalar(kind: Any) -> bool:
+    return getattr(kind, "dim_str", None) == ""
+
+
+def _is_real(value: Any, with_imaginary: bool) -> bool:
+    """Whether an array holds numbers and nothing else."""
+    if isinstance(value, np.ma.MaskedArray):
+        return False
+    try:
+        kind = value.dtype.kind if isinstance(value, _ARRAYS) else np.asarray(value).dtype.kind
+    except (ValueError, TypeError):
+        return False
+    return kind in _REAL or (with_imaginary and kind == "c") or (kind == "V" and isinstance(value, jax.Array))
+
+
+def _is_count(name: str, value: Any) -> bool:
+    if isinstance(value, bool | np.bool_):
+        return False
+    if isinstance(value, _ARRAYS) and np.ndim(value) == 0 and value.dtype.kind in "iu":
+        value = int(value)
+    return isinstance(value, int) and LEAST.get(name, -MOST) <= value <= MOST
+
+
+def _count_words(name: str, value: Any) -> str:
+    least = LEAST.get(name)
+    if least is not None and type(value) is int and value < least:
+        return f"at least {least}"
+    return "a whole number" if least is None else f"a whole number from {least} to {MOST}"
+
+
+def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: Any) -> str:
+    single = isinstance(value, int | float | np.number) or (isinstance(value, _ARRAYS) and np.ndim(value) == 0)
+    if not single:
+        if or_array and _is_real(value, False):
+            return ""
+        others = tuple(m for m in members if is_plain_class(m) and m not in (int, float))
+        return "" if isinstance(value, others) else "a number or an array of numbers" if or_array else "a number"
+    if isinstance(value, bool | np.bool_):
+        return "a number"
+    try:
+        number = float(value)
+    except (OverflowError, TypeError):
+        return "a number"
+    if name in SPEEDS and not 0 < number <= FASTEST:
+        return f"positive and finite, at most {FASTEST:g} rad/s"
+    return "a number" if name and math.isnan(number) else ""
+
+
+def _shown(value: Any) -> str:
+    """A value as a message shows it."""
+    if isinstance(value, bool | int | float | complex | str | np.generic):
+        try:
+            text = repr(value) if isinstance(value, str | complex) else str(value)
+        except ValueError:  # of thousands of digits
+            return f"a very large {type(value).__name__}"
+        return text if len(text) < 100 else f"{text[:100]}..."
+    if isinstance(value, _ARRAYS):
+        kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
+        return f"{kind} of shape {np.shape(value)} and kind {value.dtype}"
+    return f"something of kind {type(value).__name__}"
