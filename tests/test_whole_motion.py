@@ -1,5 +1,7 @@
 """The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, the cage alone."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -106,7 +108,7 @@ def test_rollers_that_do_not_slip():
     r_o, r_i, m = float(model.outer_radius), float(model.inner_radius), float(model.bearing.roller_mass)
     omega = 0.401 * SPEED
     push = lambda r: k * ((r + half - r_o) ** (10 / 9) - (r_i + half - r) ** (10 / 9)) - m * r * omega**2
-    r = brentq(push, r_o - half, r_i + half, xtol=1e-16)
+    r: Any = brentq(push, r_o - half, r_i + half, xtol=1e-16)
     h_o, h_i = half - (r + half - r_o) / 2, half - (r_i + half - r) / 2
     cage = SPEED * (r - h_i) / (r * (1 + h_i / h_o))
     off = 1e-3 * np.cos(np.arange(13))
@@ -142,7 +144,7 @@ def shared(bend):
     k, t = 8.06e10 * 0.027 ** (8 / 9) / 2 ** (10 / 9), 2 * np.pi / 13 * np.arange(13)
     approach = lambda d: np.maximum(d * np.cos(t) - 20e-6 - bend * (d * np.sin(t)) ** 2 / (2 * 0.04052), 0.0)
     upward = lambda d: k * approach(d) ** (10 / 9) * np.cos(t + bend * d * np.sin(t) / 0.04052)
-    shift = brentq(lambda d: upward(d).sum() - 4450, 21e-6, 40e-6, xtol=1e-18)
+    shift: Any = brentq(lambda d: upward(d).sum() - 4450, 21e-6, 40e-6, xtol=1e-18)
     return 1e6 * shift, float(k * approach(shift)[0] ** (10 / 9))
 
 

@@ -16,7 +16,8 @@ from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import check_writable, load_model, replacing, write_columns
-from ..models import CageModel, case
+from ..models import BearingModel, CageModel, case, whole_bearing
+from ..models.whole import WHOLE_BEARINGS
 from ..plotting import Style, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
@@ -41,8 +42,13 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            self.name, self.model, self.published = _subject(options.case)
+            if options.case.lower() in WHOLE_BEARINGS:
+                self.name, self.whole = options.case.lower(), _whole_bearing(options.case, command)
+            else:
+                self.name, self.model, self.published = _subject(options.case)
 
+    whole: BearingModel | None = None
+    """The whole bearing, if the case is one; there is no `model` then."""
     model: CageModel
     published: PublishedCase | None
 
@@ -123,6 +129,12 @@ def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     with replacing(path) as temporary:
         restyle(figure, style).savefig(temporary, dpi=figure.dpi)
     return path
+
+
+def _whole_bearing(name: str, command: str) -> BearingModel:
+    if command != "simulate":
+        raise InputError(f"Case '{name}' is a whole bearing, of which only `jaxcage simulate` knows so far.")
+    return whole_bearing(name)
 
 
 def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None]:

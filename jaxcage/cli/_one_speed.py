@@ -15,12 +15,18 @@ from ..report import Table, chosen, number, require_some
 from ..sweeps import rpm, sweep
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import PoincareOptions, SimulateOptions
+from ._readers import ShaftSpeed
 from ._show import Report
+from ._whole import bearing_at
 
 
 def simulate_at(job: Job[SimulateOptions]) -> Report:
     """`jaxcage simulate`: time history, orbit and each force at one speed."""
+    if job.whole is not None:
+        return bearing_at(job, job.whole)
     options, model = job.options, job.model
+    if isinstance(options.speed, ShaftSpeed):
+        options = dataclasses.replace(options, speed=float(model.bearing.cage_speed(options.speed)))
     with job.computing():
         samples = samples_per_revolution(job.method, 128)
         length = job.given("revolutions discard")

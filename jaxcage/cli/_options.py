@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 import tyro
 
 from .._errors import InputError
-from ._readers import is_within, number, text, two, whole
+from ._readers import is_within, number, speed, text, two, whole
 
 
 SIDE = range(2, 10_001)
@@ -333,8 +333,11 @@ class PoincareOptions(_AtSpeed, _Length, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SimulateOptions(_AtSpeed, IntegrationOptions):
-    """Time history, orbit and each force at one speed."""
+    """Time history, orbit and each force at one speed; slips, forces and losses of a whole bearing (nu2310)."""
 
+    speed: Annotated[float, speed()]  # pyright: ignore[reportIncompatibleVariableOverride]
+    """Cage speed [rpm], or with a unit, e.g. "900 rad/s", or the shaft's: "10000 rpm shaft". A whole bearing's speed is
+    that of the shaft."""
     revolutions: FromOne = 20
     """Revolutions recorded."""
     discard: FromZero = 0

@@ -72,6 +72,23 @@ def _plain(text: str) -> float:
         raise ValueError(f'must be a number, but is "{text}".') from None
 
 
+class ShaftSpeed(float):
+    """A speed that was said to be the shaft's [rpm]."""
+
+
+def speed() -> Any:
+    """A speed above 0 in rpm, with "shaft" behind it if it is the shaft's."""
+
+    def read(text: str) -> float:
+        of_shaft = text.strip().lower().endswith("shaft")
+        value = read_quantity(text.strip()[:-5].strip() if of_shaft else text, "rpm")
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"must be a speed above 0 rpm, but {value:g} was given.")
+        return ShaftSpeed(value) if of_shaft else value
+
+    return _option("RPM", read)
+
+
 def whole(least: int, of: int = 1) -> Any:
     """A count that is not too small, a multiple `of` something, nor beyond all use."""
     allowed = f"at least {least}" if of == 1 else f"a multiple of {of} above 0"

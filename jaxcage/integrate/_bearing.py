@@ -73,7 +73,8 @@ class BearingRun:
 
 @eqx.filter_jit
 def _begun(model: BearingModel, speed: Scalar, state: BearingState, step: Scalar) -> Lanes:
-    return begin(*_twice((model.at_speed(speed), state)), step)
+    at, states = _twice((model.at_speed(speed), state))
+    return begin(at, states, step)
 
 
 def _twice(tree: Any) -> Any:
@@ -196,13 +197,12 @@ def _recorded(
     discard: int,
 ) -> BearingRun:
     """The run, and its last revolution again."""
-    omega = jnp.asarray(speed)
-    lanes = _begun(model, omega, state, jnp.asarray(limits[0]))
+    omega, (first_step, longest, shortest) = jnp.asarray(speed), limits
+    bounds = (jnp.asarray(first_step), jnp.asarray(longest), jnp.asarray(shortest))
+    lanes = _begun(model, omega, state, bounds[0])
     parts, first = [], np.asarray(lanes.packed).T[:1]
     for turn in np.split(spans, len(spans) // samples):
-        lanes, found = _run(
-            model, omega, lanes, jnp.asarray(turn), tuple(map(jnp.asarray, limits)), jnp.asarray(tolerance), by
-        )
+        lanes, found = _run(model, omega, lanes, jnp.asarray(turn), bounds, jnp.asarray(tolerance), by)
         parts.append(tuple(map(np.asarray, found)))
     numbers, peaks, errors, estimates, steps = (np.concatenate(part) for part in zip(*parts, strict=True))
     numbers = np.concatenate([first, numbers])[discard * samples :]

@@ -194,7 +194,7 @@ class BearingAtSpeed(eqx.Module):
         cos, sin = cos_sin(angle)
         table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
         pocket_cos, pocket_sin = cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
-        lag_cos, lag_sin = jax.vmap(cos_sin)(rollers.lag)
+        lag_cos, lag_sin = map(jnp.asarray, jax.vmap(cos_sin)(rollers.lag))
         c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
         out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
         across = cage.ring_x * s - cage.ring_y * c

@@ -1,0 +1,52 @@
+"""What a whole bearing does at one shaft speed: slips, forces, losses, the cage's motion."""
+
+import dataclasses
+
+from .._errors import InputError, NoResult
+from ..analysis import BearingMeasures, bearing_measures
+from ..integrate import simulate_bearing
+from ..models import BearingModel
+from ..report import Table, chosen
+from ..sweeps import rpm
+from ._job import Job
+from ._options import SimulateOptions
+from ._show import Report
+
+
+SAMPLES = 64
+"""Of a revolution of the cage."""
+
+
+def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
+    """`jaxcage simulate` of a whole bearing."""
+    options = job.options
+    if options.solver is not None or options.steps is not None:
+        raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
+    speed = float(rpm(options.speed))
+    tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
+    run = simulate_bearing(model, speed, **job.given("revolutions discard"), samples=SAMPLES, **tolerance)
+    if run.outcome not in ("successful", "inaccurate"):
+        raise NoResult(f"The simulation at {options.speed:g} rpm of the shaft failed ({run.outcome}).")
+    measures = bearing_measures(model, run, speed)
+    document = {
+        "shaft_speed_rpm": float(options.speed),
+        **chosen(options, "revolutions discard"),
+        **chosen(run, "outcome error estimate steps"),
+        **dataclasses.asdict(measures),
+    }
+    title = f"{job.name}, {options.speed:g} rpm of the shaft, {options.revolutions} revolutions of the cage"
+    said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
+    return Report(document, [Table(title, ("measure", "value", "unit"), _rows(measures))], [said])
+
+
+def _rows(measures: BearingMeasures) -> list[tuple[str, str, str]]:
+    """Measures with their own words; the parts of the power one by one."""
+    rows = []
+    for field in dataclasses.fields(measures):
+        value, unit = getattr(measures, field.name), field.metadata["unit"]
+        if isinstance(value, dict):
+            rows += [(f"of it {name.replace('_', ' ')}", f"{part:.4g}", unit) for name, part in value.items()]
+        else:
+            shown = value if isinstance(value, str) else f"{value:.4g}"
+            rows.append((field.metadata["text"], shown, "" if unit == "1" else unit))
+    return rows
