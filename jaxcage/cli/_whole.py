@@ -13,8 +13,10 @@ from ._options import SimulateOptions
 from ._show import Report
 
 
-SAMPLES = 64
+SAMPLES = 32
 """Of a revolution of the cage."""
+TOLERANCE = 1e-5
+"""Of a step, in units of the state's scale."""
 
 
 def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
@@ -23,8 +25,8 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     if options.solver is not None or options.steps is not None:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
     speed = float(rpm(options.speed))
-    tolerance = {} if options.tolerance is None else {"tolerance": options.tolerance}
-    run = simulate_bearing(model, speed, **job.given("revolutions discard"), samples=SAMPLES, **tolerance)
+    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    run = simulate_bearing(model, speed, **job.given("revolutions discard"), samples=SAMPLES, tolerance=tolerance)
     if run.outcome not in ("successful", "inaccurate"):
         raise NoResult(f"The simulation at {options.speed:g} rpm of the shaft failed ({run.outcome}).")
     measures = bearing_measures(model, run, speed)
