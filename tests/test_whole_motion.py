@@ -283,3 +283,21 @@ def test_a_cage_at_rest_is_not_followed_over_its_angle():
         jc.simulate_bearing(model, 0.0, revolutions=1)
     with pytest.raises(ValueError, match="revolutions"):
         jc.simulate_bearing(model, SPEED, revolutions=0)
+
+
+@pytest.mark.wide
+def test_a_quasi_static_ring():
+    """It is where the contacts carry the load, and close to where a ring with mass is."""
+    dynamic, still = bearing(), bearing(**{"ring.ring_motion": "quasi_static"})
+    start = rolling_start(dynamic, SPEED, cage=1)
+    runs = [
+        jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-6)
+        for model in (dynamic, still)
+    ]
+    heavy = float(still.load + still.ring.ring_mass * still.gravity)
+    assert [run.outcome for run in runs] == ["successful"] * 2
+    assert runs[1].largest("ring_imbalance") < 1e-9 * heavy and runs[0].largest("ring_imbalance") == 0
+    x, y = np.diff([run.bodies[8:, 5:7].mean(axis=0) for run in runs], axis=0)[0]
+    assert abs(x) < 0.3e-6 and abs(y) < 0.3e-6 and np.all(runs[1].bodies[:, 7:9] == 0)
+    slips = [jc.bearing_measures(dynamic, run, SPEED).cage_slip for run in runs]
+    assert slips[0] == pytest.approx(slips[1], rel=0.1)

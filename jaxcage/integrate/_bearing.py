@@ -24,6 +24,8 @@ STALLED = 0.05
 """Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
 MOST_STEPS = 200_000
 """In a part of a revolution between two samples."""
+IMBALANCE = 1e-6
+"""Of the load, by which a quasi-static ring may be out of balance."""
 HALF = 16.0
 """A tolerance so many times smaller makes steps of fourth order about half as long."""
 
@@ -210,6 +212,9 @@ def _recorded(
     code = int(lanes.outcome[0])
     if code == 0 and not error <= allowed:
         code = INACCURATE
+    heavy = float(model.load + model.ring.ring_mass * model.gravity)
+    if code == 0 and peaks[:, PEAKS.index("ring_imbalance")].max() > IMBALANCE * heavy:
+        code = OUTCOMES.index("nonlinear_divergence")
     n, m = numbers.shape[1] - len(LEDGER) - len(MEANS), len(numbers)
     return BearingRun(
         time=numbers[:, n - 1],
