@@ -71,6 +71,25 @@ def test_energy(run):
     assert abs(ran.total("input") - sum(lost) - gain) < 1e-8 * ran.total("input")
 
 
+KINDS = {
+    "inner": {"guidance": "inner", "eccentricity": 2e-4, "drag_coefficient": 1.0, "churning_coefficient": 0.5},
+    "outer ring turns": {"outer_speed": -300.0, "pockets.pocket_law": "power", "rest": 0.005},
+    "held": {"cage_rotation": "held", "film.model": "full", "supply_pressure": 0.0},
+}
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_of_other_kinds(kind):
+    model = bearing(**KINDS[kind])
+    start = rolling_start(model, SPEED, cage=2)
+    ran = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=3e-7)
+    gain = float(energy_and_momentum(model, ran.last)[0] - energy_and_momentum(model, start)[0])
+    lost = sum(ran.total(name) for name in LEDGER[1:])
+    assert ran.outcome == "successful"
+    assert abs(ran.total("input") - lost - gain) < 1e-8 * abs(lost)
+
+
 def test_angular_momentum_of_the_cage(run):
     """About the outer ring's centre: the integral of the moments of pockets, land and weight."""
     model, start, ran = run
