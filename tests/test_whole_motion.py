@@ -1,5 +1,7 @@
 """The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, the cage alone."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -69,6 +71,25 @@ def test_energy(run):
     assert abs(ran.total("input") - sum(lost) - gain) < 1e-8 * ran.total("input")
 
 
+KINDS = {
+    "inner": {"guidance": "inner", "eccentricity": 2e-4, "drag_coefficient": 1.0, "churning_coefficient": 0.5},
+    "outer ring turns": {"outer_speed": -300.0, "pockets.pocket_law": "power", "rest": 0.005},
+    "held": {"cage_rotation": "held", "film.model": "full", "supply_pressure": 0.0},
+}
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_of_other_kinds(kind):
+    model = bearing(**KINDS[kind])
+    start = rolling_start(model, SPEED, cage=2)
+    ran = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=3e-7)
+    gain = float(energy_and_momentum(model, ran.last)[0] - energy_and_momentum(model, start)[0])
+    lost = sum(ran.total(name) for name in LEDGER[1:])
+    assert ran.outcome == "successful"
+    assert abs(ran.total("input") - lost - gain) < 1e-8 * abs(lost)
+
+
 def test_angular_momentum_of_the_cage(run):
     """About the outer ring's centre: the integral of the moments of pockets, land and weight."""
     model, start, ran = run
@@ -106,7 +127,7 @@ def test_rollers_that_do_not_slip():
     r_o, r_i, m = float(model.outer_radius), float(model.inner_radius), float(model.bearing.roller_mass)
     omega = 0.401 * SPEED
     push = lambda r: k * ((r + half - r_o) ** (10 / 9) - (r_i + half - r) ** (10 / 9)) - m * r * omega**2
-    r = brentq(push, r_o - half, r_i + half, xtol=1e-16)
+    r: Any = brentq(push, r_o - half, r_i + half, xtol=1e-16)
     h_o, h_i = half - (r + half - r_o) / 2, half - (r_i + half - r) / 2
     cage = SPEED * (r - h_i) / (r * (1 + h_i / h_o))
     off = 1e-3 * np.cos(np.arange(13))
@@ -142,7 +163,7 @@ def shared(bend):
     k, t = 8.06e10 * 0.027 ** (8 / 9) / 2 ** (10 / 9), 2 * np.pi / 13 * np.arange(13)
     approach = lambda d: np.maximum(d * np.cos(t) - 20e-6 - bend * (d * np.sin(t)) ** 2 / (2 * 0.04052), 0.0)
     upward = lambda d: k * approach(d) ** (10 / 9) * np.cos(t + bend * d * np.sin(t) / 0.04052)
-    shift = brentq(lambda d: upward(d).sum() - 4450, 21e-6, 40e-6, xtol=1e-18)
+    shift: Any = brentq(lambda d: upward(d).sum() - 4450, 21e-6, 40e-6, xtol=1e-18)
     return 1e6 * shift, float(k * approach(shift)[0] ** (10 / 9))
 
 
@@ -281,3 +302,21 @@ def test_a_cage_at_rest_is_not_followed_over_its_angle():
         jc.simulate_bearing(model, 0.0, revolutions=1)
     with pytest.raises(ValueError, match="revolutions"):
         jc.simulate_bearing(model, SPEED, revolutions=0)
+
+
+@pytest.mark.wide
+def test_a_quasi_static_ring():
+    """It is where the contacts carry the load, and close to where a ring with mass is."""
+    dynamic, still = bearing(), bearing(**{"ring.ring_motion": "quasi_static"})
+    start = rolling_start(dynamic, SPEED, cage=1)
+    runs = [
+        jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-6)
+        for model in (dynamic, still)
+    ]
+    heavy = float(still.load + still.ring.ring_mass * still.gravity)
+    assert [run.outcome for run in runs] == ["successful"] * 2
+    assert runs[1].largest("ring_imbalance") < 1e-9 * heavy and runs[0].largest("ring_imbalance") == 0
+    x, y = np.diff([run.bodies[8:, 5:7].mean(axis=0) for run in runs], axis=0)[0]
+    assert abs(x) < 0.3e-6 and abs(y) < 0.3e-6 and np.all(runs[1].bodies[:, 7:9] == 0)
+    slips = [jc.bearing_measures(dynamic, run, SPEED).cage_slip for run in runs]
+    assert slips[0] == pytest.approx(slips[1], rel=0.1)

@@ -15,18 +15,83 @@
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
-from ._bearing_measures import (BearingMeasures as BearingMeasures, bearing_measures as bearing_measures, cage_state as cage_state)
-from ._equilibrium import (Equilibrium as Equilibrium, FilmCoefficients as FilmCoefficients, LARGEST_WHIRLING as LARGEST_WHIRLING, StabilityChart as StabilityChart, WhirlThreshold as WhirlThreshold, attitude_angle as attitude_angle, dimensional as dimensional, eccentricity_ratio as eccentricity_ratio, equilibrium as equilibrium, film_coefficients as film_coefficients, film_whirl_speed as film_whirl_speed, load_number as load_number, stability_chart as stability_chart, whirl_threshold as whirl_threshold)
-from ._escapes import (CONFIRM as CONFIRM, calm_at_the_end as calm_at_the_end, calm_threshold as calm_threshold, dips as dips, escape_times as escape_times)
-from ._labels import (CHAOS_THRESHOLD as CHAOS_THRESHOLD, CLOSING_TOLERANCE as CLOSING_TOLERANCE, closing_period as closing_period, label_lanes as label_lanes, too_few_revolutions as too_few_revolutions)
-from ._measures import (OrbitMeasures as OrbitMeasures, cage_forces as cage_forces, cage_moments as cage_moments, film_drag_power as film_drag_power, orbit_measures as orbit_measures, relative_state as relative_state, winding as winding)
-from ._observe import (Lane as Lane, Lengths as Lengths, Observation as Observation, Plan as Plan, Room as Room, observe as observe, settle as settle, start_tangents as start_tangents)
-from ._spectra import (OrderSpectrum as OrderSpectrum, Peak as Peak, Waterfall as Waterfall, dominant_orders as dominant_orders, order_spectrum as order_spectrum, waterfall as waterfall, whirl_spectrum as whirl_spectrum)
-from ._sweep import (Confirmation as Confirmation, LIFE_BLOCK as LIFE_BLOCK, Sweep as Sweep)
-from ._transients import (Comparison as Comparison, Share as Share, Survival as Survival, coexisting as coexisting, compare as compare, survival as survival, when_t0_doubles as when_t0_doubles)
-from ._zero_one import (mean_square_displacement as mean_square_displacement, zero_one as zero_one)
-from ._zones import (CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones)
-from .._arguments import (check_layer)
+from .._arguments import check_layer
+from ._bearing_measures import (
+    BearingMeasures as BearingMeasures,
+    bearing_measures as bearing_measures,
+    cage_state as cage_state,
+)
+from ._equilibrium import (
+    LARGEST_WHIRLING as LARGEST_WHIRLING,
+    Equilibrium as Equilibrium,
+    FilmCoefficients as FilmCoefficients,
+    StabilityChart as StabilityChart,
+    WhirlThreshold as WhirlThreshold,
+    attitude_angle as attitude_angle,
+    dimensional as dimensional,
+    eccentricity_ratio as eccentricity_ratio,
+    equilibrium as equilibrium,
+    film_coefficients as film_coefficients,
+    film_whirl_speed as film_whirl_speed,
+    load_number as load_number,
+    stability_chart as stability_chart,
+    whirl_threshold as whirl_threshold,
+)
+from ._escapes import (
+    CONFIRM as CONFIRM,
+    calm_at_the_end as calm_at_the_end,
+    calm_threshold as calm_threshold,
+    dips as dips,
+    escape_times as escape_times,
+)
+from ._labels import (
+    CHAOS_THRESHOLD as CHAOS_THRESHOLD,
+    CLOSING_TOLERANCE as CLOSING_TOLERANCE,
+    closing_period as closing_period,
+    label_lanes as label_lanes,
+    too_few_revolutions as too_few_revolutions,
+)
+from ._measures import (
+    OrbitMeasures as OrbitMeasures,
+    cage_forces as cage_forces,
+    cage_moments as cage_moments,
+    film_drag_power as film_drag_power,
+    orbit_measures as orbit_measures,
+    relative_state as relative_state,
+    winding as winding,
+)
+from ._observe import (
+    Lane as Lane,
+    Lengths as Lengths,
+    Observation as Observation,
+    Plan as Plan,
+    Room as Room,
+    observe as observe,
+    settle as settle,
+    start_tangents as start_tangents,
+)
+from ._spectra import (
+    OrderSpectrum as OrderSpectrum,
+    Peak as Peak,
+    Waterfall as Waterfall,
+    dominant_orders as dominant_orders,
+    order_spectrum as order_spectrum,
+    waterfall as waterfall,
+    whirl_spectrum as whirl_spectrum,
+)
+from ._sweep import LIFE_BLOCK as LIFE_BLOCK, Confirmation as Confirmation, Sweep as Sweep
+from ._transients import (
+    Comparison as Comparison,
+    Share as Share,
+    Survival as Survival,
+    coexisting as coexisting,
+    compare as compare,
+    survival as survival,
+    when_t0_doubles as when_t0_doubles,
+)
+from ._zero_one import mean_square_displacement as mean_square_displacement, zero_one as zero_one
+from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones
+
 
 check_layer(
     globals(),

@@ -11,6 +11,7 @@
 | `_show`     | result as tables or as JSON                                                 |
 | `_bearing`  | `init`, `statics`, `impact`                                                 |
 | `_one_speed` | `simulate`, `poincare`                                                     |
+| `_whole`     | `simulate` of a whole bearing                                              |
 | `_sweep`    | `sweep`, `zones`                                                            |
 | `_orbits`   | `bifurcations`, `gradient`                                                  |
 | `_map`, `_label_map` | `map`, `map --points`                                              |

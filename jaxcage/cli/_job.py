@@ -18,7 +18,8 @@ from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import BearingFile, Unknown, Whose, cage_rpm, check_writable, read_bearing, replacing, write_columns
-from ..models import FASTEST, CageModel, case, fastest_speed
+from ..models import FASTEST, BearingModel, CageModel, case, fastest_speed, whole_bearing
+from ..models.whole import WHOLE_BEARINGS
 from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
@@ -47,9 +48,14 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            self.name, self.model, self.published, self.file = _subject(options.case)
-            self.options = self._of_the_cage(options)
+            if options.case.lower() in WHOLE_BEARINGS:
+                self.name, self.whole = options.case.lower(), _whole_bearing(options.case, command)
+            else:
+                self.name, self.model, self.published, self.file = _subject(options.case)
+                self.options = self._of_the_cage(options)
 
+    whole: BearingModel | None = None
+    """The whole bearing, if the case is one; there is no `model` then."""
     model: CageModel
     published: PublishedCase | None
     file: BearingFile | None = None
@@ -182,6 +188,12 @@ def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     with replacing(path) as temporary:
         restyle(figure, style).savefig(temporary, dpi=figure.dpi)
     return path
+
+
+def _whole_bearing(name: str, command: str) -> BearingModel:
+    if command != "simulate":
+        raise InputError(f"Case '{name}' is a whole bearing, of which only `jaxcage simulate` knows so far.")
+    return whole_bearing(name)
 
 
 def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None, BearingFile | None]:

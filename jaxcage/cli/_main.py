@@ -104,13 +104,13 @@ def _complete(job: "Job[Any]", report: "Report") -> "Report":
         f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in job.files.items() if path is not None
     ]
     document = {**case, **report.document, **read, **time, **job.files}
-    tables = [with_shaft(table, job.ratio) if job.name else table for table in report.tables]
+    tables = [with_shaft(table, job.ratio) if job.name and job.whole is None else table for table in report.tables]
     return dataclasses.replace(report, document=document, tables=tables, notes=[*report.notes, *named, *said, *files])
 
 
 def _readings(job: "Job[Any]", found: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """How the model reads what the paper leaves open, and its speeds, for programs and for people."""
-    if not job.name:
+    if not job.name or job.whole is not None:
         return {}, []
     from ..report import readings_document, readings_words
 

@@ -16,10 +16,13 @@ from ..sweeps import rpm, sweep
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import PoincareOptions, SimulateOptions
 from ._show import Report
+from ._whole import bearing_at
 
 
 def simulate_at(job: Job[SimulateOptions]) -> Report:
     """`jaxcage simulate`: time history, orbit and each force at one speed."""
+    if job.whole is not None:
+        return bearing_at(job, job.whole)
     options, model = job.options, job.model
     with job.computing():
         samples = samples_per_revolution(job.method, 128)

@@ -338,7 +338,8 @@ class _AtSpeed(Options):
     timed: ClassVar[bool] = False
 
     speed: Speed
-    """Cage speed [rpm], or with a unit or of the shaft, e.g. "900 rad/s", "20000 rpm shaft"."""
+    """Cage speed [rpm], or with a unit or of the shaft, e.g. "900 rad/s", "20000 rpm shaft". A whole bearing's is the
+    shaft's."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -351,7 +352,7 @@ class PoincareOptions(_AtSpeed, _Length, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SimulateOptions(_AtSpeed, IntegrationOptions):
-    """Time history, orbit and each force at one speed."""
+    """Time history, orbit and each force at one speed; slips, forces and losses of a whole bearing (nu2310)."""
 
     revolutions: FromOne = 20
     """Revolutions recorded."""

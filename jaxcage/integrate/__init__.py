@@ -19,19 +19,44 @@
 | `_results`     | how an integration ended                                                           |
 """
 
-from ._bearing import (BearingRun as BearingRun, bearing_over_time as bearing_over_time, simulate_bearing as simulate_bearing)
-from ._controlled import (ControlledSteps as ControlledSteps, DEFAULT_ERROR as DEFAULT_ERROR, controlled as controlled, finer as finer, stated as stated)
-from ._explicit import (ClassicalRK4 as ClassicalRK4)
-from ._march import (compiled as compiled, march as march, march_with_tangents as march_with_tangents)
-from ._method import (AbstractMethod as AbstractMethod, AdaptiveSteps as AdaptiveSteps, FixedSteps as FixedSteps, REVOLUTION as REVOLUTION, Stretch as Stretch, method as method)
-from ._moved import (Moved as Moved)
-from ._newmark import (NewmarkBeta as NewmarkBeta)
-from ._results import (OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code)
-from ._revolution import (pushed as pushed, revolution as revolution)
-from ._rosenbrock import (RODAS3 as RODAS3, RODAS4 as RODAS4, Rodas3 as Rodas3, Rodas4 as Rodas4, RosenbrockTableau as RosenbrockTableau, rosenbrock_step as rosenbrock_step)
-from ._simulate import (Trajectory as Trajectory, ramp as ramp, simulate as simulate)
-from ._strobe import (StrobeMap as StrobeMap, strobe_map as strobe_map)
-from .._arguments import (check_layer)
+from .._arguments import check_layer
+from ._bearing import (
+    BearingRun as BearingRun,
+    bearing_over_time as bearing_over_time,
+    simulate_bearing as simulate_bearing,
+)
+from ._controlled import (
+    DEFAULT_ERROR as DEFAULT_ERROR,
+    ControlledSteps as ControlledSteps,
+    controlled as controlled,
+    finer as finer,
+    stated as stated,
+)
+from ._explicit import ClassicalRK4 as ClassicalRK4
+from ._march import compiled as compiled, march as march, march_with_tangents as march_with_tangents
+from ._method import (
+    REVOLUTION as REVOLUTION,
+    AbstractMethod as AbstractMethod,
+    AdaptiveSteps as AdaptiveSteps,
+    FixedSteps as FixedSteps,
+    Stretch as Stretch,
+    method as method,
+)
+from ._moved import Moved as Moved
+from ._newmark import NewmarkBeta as NewmarkBeta
+from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
+from ._revolution import pushed as pushed, revolution as revolution
+from ._rosenbrock import (
+    RODAS3 as RODAS3,
+    RODAS4 as RODAS4,
+    Rodas3 as Rodas3,
+    Rodas4 as Rodas4,
+    RosenbrockTableau as RosenbrockTableau,
+    rosenbrock_step as rosenbrock_step,
+)
+from ._simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate
+from ._strobe import StrobeMap as StrobeMap, strobe_map as strobe_map
+
 
 check_layer(
     globals(),

@@ -24,6 +24,8 @@ STALLED = 0.05
 """Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
 MOST_STEPS = 200_000
 """In a part of a revolution between two samples."""
+IMBALANCE = 1e-6
+"""Of the load, by which a quasi-static ring may be out of balance."""
 HALF = 16.0
 """A tolerance so many times smaller makes steps of fourth order about half as long."""
 
@@ -73,7 +75,8 @@ class BearingRun:
 
 @eqx.filter_jit
 def _begun(model: BearingModel, speed: Scalar, state: BearingState, step: Scalar) -> Lanes:
-    return begin(*_twice((model.at_speed(speed), state)), step)
+    at, states = _twice((model.at_speed(speed), state))
+    return begin(at, states, step)
 
 
 def _twice(tree: Any) -> Any:
@@ -196,13 +199,12 @@ def _recorded(
     discard: int,
 ) -> BearingRun:
     """The run, and its last revolution again."""
-    omega = jnp.asarray(speed)
-    lanes = _begun(model, omega, state, jnp.asarray(limits[0]))
+    omega, (first_step, longest, shortest) = jnp.asarray(speed), limits
+    bounds = (jnp.asarray(first_step), jnp.asarray(longest), jnp.asarray(shortest))
+    lanes = _begun(model, omega, state, bounds[0])
     parts, first = [], np.asarray(lanes.packed).T[:1]
     for turn in np.split(spans, len(spans) // samples):
-        lanes, found = _run(
-            model, omega, lanes, jnp.asarray(turn), tuple(map(jnp.asarray, limits)), jnp.asarray(tolerance), by
-        )
+        lanes, found = _run(model, omega, lanes, jnp.asarray(turn), bounds, jnp.asarray(tolerance), by)
         parts.append(tuple(map(np.asarray, found)))
     numbers, peaks, errors, estimates, steps = (np.concatenate(part) for part in zip(*parts, strict=True))
     numbers = np.concatenate([first, numbers])[discard * samples :]
@@ -210,6 +212,9 @@ def _recorded(
     code = int(lanes.outcome[0])
     if code == 0 and not error <= allowed:
         code = INACCURATE
+    heavy = float(model.load + model.ring.ring_mass * model.gravity)
+    if code == 0 and peaks[:, PEAKS.index("ring_imbalance")].max() > IMBALANCE * heavy:
+        code = OUTCOMES.index("nonlinear_divergence")
     n, m = numbers.shape[1] - len(LEDGER) - len(MEANS), len(numbers)
     return BearingRun(
         time=numbers[:, n - 1],

@@ -71,10 +71,12 @@ def unpacked(numbers: Array) -> tuple[BearingState, Array]:
     return BearingState(rollers, numbers[n - 11 : n - 2], numbers[n - 2 : n]), numbers[n:]
 
 
-def _field(at: BearingAtSpeed, numbers: Array) -> tuple[Array, Array]:
-    """Rates over time of packed numbers, and what peaks are taken of."""
-    rates = at(unpacked(numbers)[0])
-    return packed(rates.state, rates.integrals), rates.peaks
+def _field(at: BearingAtSpeed, numbers: Array) -> tuple[Array, Array, Array]:
+    """Packed numbers, settled; their rates over time, and what peaks are taken of."""
+    state, integrals = unpacked(numbers)
+    state = at.settled(state)
+    rates = at(state)
+    return packed(state, integrals), packed(rates.state, rates.integrals), rates.peaks
 
 
 class Controls(NamedTuple):
@@ -100,7 +102,7 @@ def begin(at: BearingAtSpeed, state: BearingState, step: Scalar) -> Lanes:
     """Lanes at their beginning."""
     lanes = state.bodies.shape[-1]
     y = packed(state, jnp.zeros((INTEGRALS, lanes)))
-    rates, peaks = _over(_field, at, y)
+    y, rates, peaks = _over(_field, at, y)
     count = jnp.zeros((lanes,), jnp.int32)
     return Lanes(y, rates, peaks, jnp.ones((lanes,)) * step, jnp.zeros((lanes,)), count, count, count)
 
@@ -128,8 +130,7 @@ def advance(
             _, _, k, total = c
             share, weight = jnp.asarray((0.5, 0.5, 1.0, 0.0))[i], jnp.asarray((2.0, 2.0, 1.0, 0.0))[i]
             way = jnp.where(i == 3, total / 6, share * k)  # the last stage is the first of the next step
-            moved = move(y, h, way)
-            rates, peaks = _over(_field, at, moved)
+            moved, rates, peaks = _over(_field, at, move(y, h, way))
             new = slope(rates)
             return (moved, rates, peaks), k, new, total + weight * new
 

@@ -19,16 +19,48 @@
 | `_label_map` | that grid over two parameters of a system                                    |
 """
 
-from ._adaptive import (AdaptiveGrid as AdaptiveGrid, UNKNOWN as UNKNOWN, changes as changes, found_share as found_share, refine as refine)
-from ._check import (DamagedStore as DamagedStore, OldStore as OldStore, StoreState as StoreState, check_study as check_study)
-from ._ensemble import (Band as Band, Clue as Clue, ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS, Ensemble as Ensemble, REVOLUTIONS as REVOLUTIONS, binomial_interval as binomial_interval, chaotic_shares as chaotic_shares, draw as draw, ensemble as ensemble, sobol as sobol, verdict_of as verdict_of)
-from ._label_map import (KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map)
-from ._plan import (Plan as Plan)
-from ._run import (run_study as run_study, study as study)
-from ._store import (OtherStudy as OtherStudy, Store as Store, label_names as label_names, open_study as open_study)
-from ._study import (LABELS as LABELS, OIL as OIL, PENDING as PENDING, SPEED as SPEED, Study as Study, too_short as too_short, with_values as with_values)
-from ._vary import (Between as Between, Spread as Spread, Tolerance as Tolerance)
-from .._arguments import (check_layer)
+from .._arguments import check_layer
+from ._adaptive import (
+    UNKNOWN as UNKNOWN,
+    AdaptiveGrid as AdaptiveGrid,
+    changes as changes,
+    found_share as found_share,
+    refine as refine,
+)
+from ._check import (
+    DamagedStore as DamagedStore,
+    OldStore as OldStore,
+    StoreState as StoreState,
+    check_study as check_study,
+)
+from ._ensemble import (
+    ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
+    REVOLUTIONS as REVOLUTIONS,
+    Band as Band,
+    Clue as Clue,
+    Ensemble as Ensemble,
+    binomial_interval as binomial_interval,
+    chaotic_shares as chaotic_shares,
+    draw as draw,
+    ensemble as ensemble,
+    sobol as sobol,
+    verdict_of as verdict_of,
+)
+from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map
+from ._plan import Plan as Plan
+from ._run import run_study as run_study, study as study
+from ._store import OtherStudy as OtherStudy, Store as Store, label_names as label_names, open_study as open_study
+from ._study import (
+    LABELS as LABELS,
+    OIL as OIL,
+    PENDING as PENDING,
+    SPEED as SPEED,
+    Study as Study,
+    too_short as too_short,
+    with_values as with_values,
+)
+from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance
+
 
 check_layer(
     globals(),

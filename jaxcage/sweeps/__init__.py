@@ -9,12 +9,21 @@
 | `_carried` | run-up and run-down with the state carried along   |
 """
 
-from ._averages import (averages as averages)
-from ._carried import (Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs)
-from ._engine import (Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes)
-from ._monodromy import (monodromy as monodromy)
-from ._speed import (initial_states as initial_states, make_plan as make_plan, require_persist as require_persist, rpm as rpm, settings_of as settings_of, sweep as sweep, sweep_designs as sweep_designs)
-from .._arguments import (check_layer)
+from .._arguments import check_layer
+from ._averages import averages as averages
+from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs
+from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
+from ._monodromy import monodromy as monodromy
+from ._speed import (
+    initial_states as initial_states,
+    make_plan as make_plan,
+    require_persist as require_persist,
+    rpm as rpm,
+    settings_of as settings_of,
+    sweep as sweep,
+    sweep_designs as sweep_designs,
+)
+
 
 check_layer(
     globals(),

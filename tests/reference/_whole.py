@@ -31,7 +31,8 @@ def gupta(rest: float, peak: float, limit: float, speed: float) -> tuple[float, 
     a = rest - limit
     top = lambda b: (a + b * speed) * math.exp(-b * speed / (a + b * speed)) + limit - peak
     lowest = max(0.0, -a / speed)
-    b = brentq(top, lowest * (1 + 1e-9) + 1e-12, lowest + 10 * (peak - limit) * math.e / speed, xtol=1e-16, rtol=1e-15)
+    highest = lowest + 10 * (peak - limit) * math.e / speed
+    b: Any = brentq(top, lowest * (1 + 1e-9) + 1e-12, highest, xtol=1e-16, rtol=1e-15)
     return a, b, b / (a + b * speed), limit
 
 

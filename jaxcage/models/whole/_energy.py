@@ -53,8 +53,8 @@ def mass_centre(at: BearingAtSpeed, state: BearingState) -> tuple[Array, Array, 
     cage, e = Bodies(*state.bodies), at.eccentricity
     cos, sin = cos_sin(state.clock[0])
     turn = e * cage.cage_speed
-    as_array = lambda *parts: tuple(map(jnp.asarray, parts))
-    return as_array(cage.x + e * cos, cage.y + e * sin, cage.vx - turn * sin, cage.vy + turn * cos)
+    x, y = jnp.asarray(cage.x + e * cos), jnp.asarray(cage.y + e * sin)
+    return x, y, jnp.asarray(cage.vx - turn * sin), jnp.asarray(cage.vy + turn * cos)
 
 
 def cage_angular_momentum(at: BearingAtSpeed, state: BearingState) -> Array:

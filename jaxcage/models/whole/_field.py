@@ -39,6 +39,9 @@ from ._state import BearingState, Bodies, Rates, Rollers
 
 Many = Float[Array, " rollers"]
 
+NEWTON_STEPS, LONGEST_STEP = 5, 1e-3
+"""For the place of a quasi-static ring, and how far each goes at most, over the roller's radius."""
+
 
 def _of_each(law: Any) -> Any:
     """A law of one roller, with constants first, for all of them."""
@@ -81,6 +84,8 @@ class BearingAtSpeed(eqx.Module):
 
     n_rollers: int = eqx.field(static=True)
     held: bool = eqx.field(static=True)
+    settles: bool = eqx.field(static=True)
+    """Whether the inner ring is quasi-static."""
     inner_guided: bool = eqx.field(static=True)
     speed: Scalar
     """Of the inner ring [rad/s]."""
@@ -120,6 +125,7 @@ class BearingAtSpeed(eqx.Module):
         return cls(
             n_rollers=bearing.n_rollers,
             held=model.cage_rotation == "held",
+            settles=model.ring.ring_motion == "quasi_static",
             inner_guided=model.guidance == "inner",
             speed=speed,
             outer_speed=model.outer_speed,
@@ -194,15 +200,48 @@ class BearingAtSpeed(eqx.Module):
         cos, sin = cos_sin(angle)
         table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
         pocket_cos, pocket_sin = cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
-        lag_cos, lag_sin = jax.vmap(cos_sin)(rollers.lag)
+        lag_cos, lag_sin = map(jnp.asarray, jax.vmap(cos_sin)(rollers.lag))
         c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
         out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
         across = cage.ring_x * s - cage.ring_y * c
         distance = jnp.sqrt(out * out + across * across)
         return Geometry(pocket_cos, pocket_sin, lag_cos, lag_sin, c, s, distance, out / distance, across / distance)
 
+    def settled(self, state: BearingState) -> BearingState:
+        """The state with a quasi-static inner ring where the contacts carry load and weight, and at rest.
+
+        Newton's method from where the ring is; its velocity enters no contact. Of a dynamic ring, the state as it is.
+        """
+        if not self.settles:
+            return state
+        at_rest = state.bodies.at[7:9].set(0.0)
+        placed = lambda place: state._replace(bodies=at_rest.at[5:7].set(place))
+        little = jnp.eye(2) * self.load / self.inner_race.half  # where no contact is left to hold it
+
+        def better(_: Array, place: Array) -> Array:
+            push = lambda p: self._on_ring(placed(p))
+            (xx, xy), (yx, yy) = -jax.jacfwd(push)(place) + little
+            fx, fy = push(place)
+            step = jnp.stack([yy * fx - xy * fy, xx * fy - yx * fx]) / (xx * yy - xy * yx)
+            most = LONGEST_STEP * self.inner_race.half
+            return place + step * jnp.minimum(1.0, most / jnp.sqrt(jnp.sum(step * step) + 1e-30))
+
+        return placed(jax.lax.fori_loop(0, NEWTON_STEPS, better, state.bodies[5:7]))
+
+    def _on_ring(self, state: BearingState) -> Array:
+        """All forces on the inner ring [N]."""
+        f, ring = self.forces(state), Bodies(*state.bodies)
+        g, inner = f.geometry, f.inner
+        out = inner.load * g.inner_out - inner.traction * g.inner_across
+        across = inner.load * g.inner_across + inner.traction * g.inner_out
+        x = -jnp.sum(out * g.cos - across * g.sin) - self.mounting_damping * ring.ring_vx
+        y = -jnp.sum(out * g.sin + across * g.cos) - self.mounting_damping * ring.ring_vy
+        if self.inner_guided:
+            x, y = x - f.land.x, y - f.land.y
+        return jnp.stack([x, y - self.load - self.ring_mass * self.gravity])
+
     def __call__(self, state: BearingState) -> Rates:
-        """Rates over time."""
+        """Rates over time, of a quasi-static ring those of a state that is `settled`."""
         return self.rates(state, self.forces(state))
 
     def rates(self, state: BearingState, f: Forces) -> Rates:
@@ -249,7 +288,7 @@ class BearingAtSpeed(eqx.Module):
             ),
             axis=1,
         )
-        peaks = jnp.stack([jnp.max(pocket.normal), land.size, jnp.max(slip), land.eps])
+        peaks = jnp.stack([jnp.max(pocket.normal), land.size, jnp.max(slip), jnp.zeros_like(land.eps), land.eps])
         return self._bodies(state, cage, roller_rates, sums, land, peaks)
 
     def _bodies(
@@ -276,6 +315,10 @@ class BearingAtSpeed(eqx.Module):
         ring_x = -inner_x - self.mounting_damping * cage.ring_vx - (land.x if from_land else 0.0)
         ring_y = -inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
         ring_y = ring_y - self.load - self.ring_mass * g
+        ring_rates = cage.ring_vx, cage.ring_vy, ring_x / self.ring_mass, ring_y / self.ring_mass
+        if self.settles:
+            peaks = peaks.at[-2].set(jnp.sqrt(ring_x * ring_x + ring_y * ring_y))
+            ring_rates = (jnp.zeros_like(ring_x),) * 4
         body_rates = jnp.stack(
             [
                 cage.vx,
@@ -283,10 +326,7 @@ class BearingAtSpeed(eqx.Module):
                 cage_x,
                 cage_y,
                 turning,
-                cage.ring_vx,
-                cage.ring_vy,
-                ring_x / self.ring_mass,
-                ring_y / self.ring_mass,
+                *ring_rates,
             ]
         )
         on_inner = -inner_moment + (land.land_moment if from_land else 0.0)

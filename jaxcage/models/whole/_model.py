@@ -24,6 +24,12 @@ class InnerRing(eqx.Module):
 
     ring_mass: Scalar = parameter("kg", 1e-3, 1e4, "mass of the inner ring with its share of the shaft", default=2.0)
     mounting_damping: Scalar = parameter("N s/m", 0.0, 1e7, "damping of the inner ring's mounting", default=500.0)
+    ring_motion: str = choice(
+        "dynamic",
+        "quasi_static",
+        text="the inner ring moves by its mass, or is always where contacts carry the load",
+        default="dynamic",
+    )
 
 
 class BearingModel(eqx.Module):

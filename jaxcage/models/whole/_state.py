@@ -72,9 +72,10 @@ MEANS = ("cage_moment", "pocket_force", "eccentricity", "whirl", "cage_speed", "
 """Other quantities that are integrated over time: moment of all outer forces on the cage about the outer ring's centre
 [N m], sum of the pocket forces [N], eccentricity ratio, angular speed of the cage's centre about the land's [rad/s],
 cage speed [rad/s], mean spin of the rollers [rad/s], torque that holds the cage's speed [N m]."""
-PEAKS = ("pocket_force", "land_force", "roller_slip", "eccentricity")
+PEAKS = ("pocket_force", "land_force", "roller_slip", "ring_imbalance", "eccentricity")
 """Largest values that are followed: of a pocket force [N], of the land's whole force on the cage [N], of the slip of a
-roller's spin against pure rolling, and of the eccentricity ratio."""
+roller's spin against pure rolling, of the force by which a quasi-static ring is out of balance [N], and of the
+eccentricity ratio, the last."""
 
 
 class Rates(NamedTuple):
