@@ -106,6 +106,7 @@ def test_stability_changes_at_the_folds_and_nowhere_else(over_speed):
 
 def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     """Damping is all that shrinks areas; the strobe map does not know of the continuation."""
+    np.testing.assert_allclose(over_speed.speed_rpm / 60 * 2 * np.pi, over_speed.speed, rtol=1e-14)
     product = np.prod(over_speed.multipliers, axis=1)
     np.testing.assert_allclose(product, np.exp(-0.1 * 2 * np.pi / over_speed.speed), rtol=1e-6)
     map_of = eqx.filter_jit(jax.vmap(lambda w, y: jnp.stack(jc.strobe_map(hardening(), w, METHOD)((y[0], y[1])).y)))

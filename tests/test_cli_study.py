@@ -20,7 +20,7 @@ from jaxcage.studies import label_names
 
 
 CASE = ["study", "1a", "--vary", "speed=9000:12000rpm:6", "--vary", "guidance_gap=0.4mm:0.5mm:2", "--starts", "2"]
-SMALL = [*CASE, "--discard", "10", "--revolutions", "20", "--steps", "64", "--chunk", "6"]
+SMALL = [*CASE, "--discard", "10", "--revolutions", "20", "--solver", "rk4", "--steps", "128", "--chunk", "6"]
 MAP = ["map", "1a", "--points", "9x7", "--discard", "10", "--revolutions", "20", "--steps", "64"]
 
 
@@ -46,7 +46,7 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     speeds = jc.rpm(9000, 12000, 6)
     np.testing.assert_allclose(stored["speed"], speeds, rtol=1e-14)
     starts = np.array([[[float(c) for c in y] for y in model.starts(s)[:2]] for s in speeds])
-    method = jc.method(steps=64)
+    method = jc.method("rk4", steps=128)
     length = dict(discard=10, revolutions=20, blocks=20, keep=16)
     swept = raw_sweep(model, speeds, starts=starts, method=method, **length)
     mine = stored.isel(guidance_gap=1)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from jaxcage.forces import contact_force, power_10_9, restitution_damping, smooth_plus
+import jaxcage as jc
+from jaxcage.forces import contact_force, power_10_9, restitution_damping, smooth_plus, smooth_plus_slope
 from jaxcage.models import case
 
 
@@ -168,6 +169,13 @@ def test_smooth_plus_is_exact_outside_and_close_inside():
     assert excess.max() == pytest.approx(5 / 32 * WIDTH, rel=1e-12)
 
 
+def test_slope_of_smooth_plus_is_its_derivative():
+    u = jnp.linspace(-1.5, 1.5, 61) * WIDTH
+    exact = jax.vmap(jax.grad(lambda x: smooth_plus(x, WIDTH)))(u)
+    found = jax.vmap(lambda x: smooth_plus_slope(x, WIDTH))(u)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13)
+
+
 def test_power_is_exact_with_finite_derivatives_at_touch():
     p = np.geomspace(1e-12, 1.0, 25)
     np.testing.assert_allclose(jax.vmap(power_10_9)(jnp.asarray(p)), p ** (10 / 9), rtol=1e-14)
@@ -186,3 +194,15 @@ def test_regularised_contact_sets_in_with_three_continuous_derivatives():
         assert float(f(-1.0)) == 0.0
         near, nearer = float(f(-1.0 + 1e-3)), float(f(-1.0 + 1e-4))
         assert np.log10(near / nearer) == pytest.approx(40 / 9 - order, abs=2e-3)
+
+
+def test_slopes_of_the_force_are_its_derivatives():
+    """In contact, approaching and sliding: closed forms of the cage against autodiff, with a restitution below 1."""
+    model, speed = jc.replace(case("1a"), restitution=0.6, **{"film.model": "fixed_half"}), jnp.asarray(1200.0)
+    q, v = jnp.array([0.6, -0.79]) * 0.45e-3, jnp.array([0.03, -0.11])
+    push = model.cage_at(speed).forces(0.3, *q, *v)["contact"]
+    assert np.hypot(*push[:2]) > 1.0
+    law = model.at_speed(speed).acceleration
+    of_q, of_v = jax.jit(jax.jacfwd(lambda q, v: jnp.stack(law(0.3, tuple(q), tuple(v))), argnums=(0, 1)))(q, v)
+    for found, expected in zip(law.slopes(tuple(q), tuple(v)), (of_q, of_v), strict=True):
+        np.testing.assert_allclose(np.array(found), expected, rtol=0, atol=1e-8 * np.abs(expected).max())

@@ -124,7 +124,8 @@ def test_lanes_without_damping_leave_the_model():
     assert np.all(np.isnan(result.chaotic_share))
 
 
-@pytest.mark.parametrize("exponents", [0, pytest.param(4, marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("exponents", [0, 4])
 def test_failed_lanes_whatever_is_observed(exponents):
     settings = SETTINGS | dict(exponents=exponents)
     bad = (2 * C, 0.0, 0.0, 0.0)

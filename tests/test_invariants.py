@@ -82,7 +82,7 @@ def forces(model, speed, tau, state):
     return dict(zip(FORCES, np.asarray(found), strict=True))
 
 
-@pytest.mark.parametrize("film", FILMS)
+@pytest.mark.parametrize("film", wide_but(FILMS, "fixed_half", "finite_length"))
 @random(50)
 @given(designs, speeds, angles, states(0.0, 1.2), angles)
 def test_turned_states_have_turned_forces(film, design, speed, tau, state, angle):

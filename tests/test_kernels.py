@@ -90,7 +90,7 @@ def test_a_march_is_its_steps_one_by_one_in_one_lane_and_in_many():
         np.testing.assert_allclose(got, expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("order, tolerance", [(1, 1e-12), (2, 1e-10), wide(3, 1e-8)])
+@pytest.mark.parametrize("order, tolerance", [wide(1, 1e-12), (2, 1e-10), wide(3, 1e-8)])
 def test_derivatives_of_a_march_of_any_order(order, tolerance):
     """Against the same steps without the primitive; lanes outside the derivative and inside."""
     few = functools.partial(by_march, count=12), functools.partial(by_loop, count=12)
@@ -261,7 +261,9 @@ def derivative(f, order):
 @pytest.mark.parametrize(
     "kind, solver, order",
     [
-        *(("duffing", "rk4", order) for order in (1, 2, 3)),
+        ("duffing", "rk4", 1),
+        ("duffing", "rk4", 2),
+        wide("duffing", "rk4", 3),
         slow("duffing", "tsit5", 3),
         slow("cage", "rk4", 2),
         slow("cage", "rk4", 3),
@@ -390,7 +392,7 @@ def test_first_order_systems_and_oscillators_run_as_kernels():
 
 
 @pytest.mark.parametrize("film", wide_but(["fixed_half", "full"], "fixed_half"))
-@pytest.mark.parametrize("cross", ["circulatory", "as_printed"])
+@pytest.mark.parametrize("cross", wide_but(["circulatory", "as_printed"], "as_printed"))
 def test_analytic_slopes_of_the_cage_against_autodiff(film, cross):
     model = jc.replace(MODEL, supply_pressure=2e4, restitution=0.6, cross_cubic=1e9)
     changed = dataclasses.replace(model.film, model=film), dataclasses.replace(model.support, cross=cross)

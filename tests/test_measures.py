@@ -132,7 +132,7 @@ def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
 def test_forces_of_a_simulation_are_its_acceleration():
     """M r'' from the recorded velocities, by a spectral derivative of a synchronous orbit."""
     model, speed = case("1a", "preliminary"), 16000 * np.pi / 30
-    run = ji.simulate(model, speed, revolutions=1, discard=400, samples=128)
+    run = ji.simulate(model, speed, revolutions=1, discard=400, samples=128, method=ji.method("rk4", steps=512))
     spectrum = np.fft.rfft(run.state[:, 2:], axis=0)
     order = np.arange(len(spectrum))[:, None]
     acceleration = np.fft.irfft(1j * order * speed * spectrum, len(run.tau), axis=0)

@@ -58,6 +58,21 @@ def agrees(ours, number: Number) -> bool:
     return bool(abs(ours - number.value) <= number.tolerance)
 
 
+def test_orbits_in_other_units_are_the_same():
+    """Both wells of an oscillator, and in thousandths: Newton's method starts at its guess, not between the two."""
+
+    def law(tau, q, v, speed):
+        return (-0.3 * v[0] + q[0] - 1e6 * q[0] ** 3 + 0.26e-3 * jnp.cos(tau),)
+
+    small = jc.ForcedOscillator(law, coordinates=1, scale=1e-3)
+    for well in (1.0, -1.0):
+        whole = jc.periodic_orbit(duffing(), 1.2, guess=(well, 0.0), revolutions=400, method=METHOD)
+        assert float(whole.state[0]) * well > 0
+        found = jc.periodic_orbit(small, 1.2, guess=1.001e-3 * whole.state, method=METHOD)
+        np.testing.assert_allclose(1e3 * found.state, whole.state, rtol=1e-9)
+        np.testing.assert_allclose(found.multipliers, whole.multipliers, rtol=1e-8)
+
+
 @pytest.mark.parametrize("periods", DUFFING_DOUBLINGS)
 def test_period_doubling_cascade_of_the_double_well_duffing(periods):
     inside, expected = DUFFING_DOUBLINGS[periods]
@@ -74,6 +89,7 @@ def test_period_doubling_cascade_of_the_double_well_duffing(periods):
     assert int(point.periods) == periods
 
 
+@pytest.mark.wide
 def test_gradient_of_the_first_period_doubling():
     """DOP853 and differences; scaling x shows that the force at any edge goes with b^(-1/2)."""
     system = duffing(g=0.262)

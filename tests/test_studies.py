@@ -63,12 +63,13 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return store
 
 
-def test_lanes_are_those_of_a_sweep(whole: Path):
+@pytest.mark.parametrize("places", [((1, 1),), pytest.param(((0, 0), (0, 2)), marks=pytest.mark.wide)])
+def test_lanes_are_those_of_a_sweep(whole: Path, places: tuple[tuple[int, int], ...]):
     """Labels and exponents of lanes, against sweeps of one system at a time, whose programs hold it as constants."""
     found = jc.open_study(whole)
     assert found["label"].dims == ("sample", "cubic", "speed", "start")
     damping = found["damping"].values
-    for i, j in ((0, 0), (1, 1), (0, 2)):
+    for i, j in places:
         system = eqx.tree_at(
             lambda s: (s.acceleration.damping, s.acceleration.cubic),
             OSCILLATOR,

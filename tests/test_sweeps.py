@@ -20,6 +20,7 @@ def duffing(tau, q, v, speed):
 
 
 HARDENING = jc.ForcedOscillator(duffing, coordinates=1)
+UEDA = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),), coordinates=1)
 FAST = jc.method("rk4", steps=128)
 
 
@@ -47,9 +48,7 @@ def test_kept_states_are_the_last_ones_in_order():
 @pytest.fixture(scope="module")
 def followed():
     """Ueda's oscillator, whose chaos is an attractor at some speeds and a transient at others."""
-    ueda = lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),)
-    system = jc.ForcedOscillator(ueda, coordinates=1)
-    return jc.sweep(system, np.linspace(0.9, 1.2, 60), discard=30, revolutions=60, blocks=6, horizon=700, method=FAST)
+    return jc.sweep(UEDA, np.linspace(0.9, 1.2, 60), discard=30, revolutions=60, blocks=6, horizon=700, method=FAST)
 
 
 def test_chaos_is_followed_to_the_horizon(followed):
@@ -61,7 +60,7 @@ def test_chaos_is_followed_to_the_horizon(followed):
     assert np.all((escape[label == "transient"] > 30) & (escape[label == "transient"] <= followed.horizon))
     assert followed.horizon >= 700 and "chaos followed to" in str(followed)
     late = raw_sweep(
-        jc.ForcedOscillator(lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),), coordinates=1),
+        UEDA,
         followed.speed,
         starts=followed.last,
         discard=0,
@@ -89,13 +88,8 @@ def test_labels_are_confirmed_by_finer_steps(followed):
     first = followed.confirmed[0]
     assert 0 < first.lanes <= followed.outcome.size and first.changed + first.moved <= first.lanes
     coarse = jc.method("rk4", steps=16)
-    system = jc.ForcedOscillator(
-        lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.cos(tau),), coordinates=1
-    )
     length = {"discard": 200, "revolutions": 60, "blocks": 6}
-    rough, sure = (
-        jc.sweep(system, followed.speed, confirm=c, horizon=0, method=coarse, **length) for c in (False, True)
-    )
+    rough, sure = (jc.sweep(UEDA, followed.speed, confirm=c, horizon=0, method=coarse, **length) for c in (False, True))
     assert not rough.confirmed and sure.confirmed[0].changed > 0
     where = rough.label != sure.label
     assert sure.confirmed[0].changed >= np.sum(where) > 0
@@ -242,5 +236,6 @@ def test_the_peak_of_a_sweep_counts_the_state_it_is_observed_from(discard: int):
 
 
 def test_a_lane_that_never_started_has_no_peak():
-    found = raw_sweep(Decay(), np.array([1.0]), starts=[(1.5,)], discard=1, revolutions=1, exponents=0, blocks=1)
+    length = {"discard": 1, "revolutions": 1, "exponents": 0, "blocks": 1}
+    found = raw_sweep(Decay(), np.array([1.0]), starts=[(1.5,)], method=FAST, **length)
     assert found.failed.all() and np.isnan(found.peak).all()

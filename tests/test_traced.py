@@ -109,6 +109,7 @@ def test_a_function_made_within_a_function_has_no_name(folder: pathlib.Path):
     assert program(system, jnp.asarray(1.0)) == 3 and not folder.exists()
 
 
+@pytest.mark.wide
 def test_a_sweep_by_kept_programs_is_the_same(folder: pathlib.Path):
     """Case 1a, one speed; the second model has other numbers and the same program."""
     options = dict(
