@@ -27,5 +27,5 @@ from ._speed import (
 
 check_layer(
     globals(),
-    "monodromy rpm run_up_down run_up_down_designs sweep sweep_designs",
+    "monodromy run_up_down run_up_down_designs sweep sweep_designs",
 )
