@@ -4,6 +4,9 @@ import hashlib
 import os
 import pathlib
 import platform
+import stat
+import tempfile
+import warnings
 
 import platformdirs
 
@@ -21,19 +24,44 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
     **Arguments:** where to keep them, by default the user's cache folder. The environment variable `JAXCAGE_CACHE`
     names another one, or switches this off if it is `off`.
 
-    **Returns:** the folder, None if switched off.
+    What is kept there is run without being looked at: the folder is made for its user alone, and one that belongs to
+    another user, that others may write to, or that cannot be written to is left alone, with a warning.
+
+    **Returns:** the folder, None if switched off or left alone.
     """
     wanted = os.environ.get("JAXCAGE_CACHE", "") or folder or platformdirs.user_cache_path("jaxcage") / "programs"
     if str(wanted) == "off":
         return None
     import jax
 
-    place = pathlib.Path(wanted).expanduser() / _processor()
+    try:
+        place = pathlib.Path(wanted).expanduser() / _processor()
+        reason = _unfit(place)
+    except (OSError, RuntimeError) as error:  # no home folder
+        reason = f"{getattr(error, 'strerror', None) or error}"
+        place = pathlib.Path(wanted)
+    if reason:
+        said = f"Compiled programs are not kept in '{place}' ({reason}): everything is compiled anew."
+        warnings.warn(said, RuntimeWarning, stacklevel=2)
+        return None
     jax.config.update("jax_compilation_cache_dir", str(place))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
     global traced
     traced = place / "traced"
     return place
+
+
+def _unfit(place: pathlib.Path) -> str:
+    """Make a folder for this user alone. **Returns:** why it cannot be used, empty if it can."""
+    place.mkdir(parents=True, exist_ok=True, mode=0o700)
+    about = place.stat()
+    if os.name == "posix":
+        if about.st_uid != os.getuid():
+            return "it belongs to another user"
+        if about.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return "others may write to it: delete it, or take that away by chmod go-w"
+    with tempfile.TemporaryFile(dir=place):
+        return ""
 
 
 def _processor() -> str:

@@ -5,9 +5,10 @@ import os
 import signal
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
@@ -34,6 +35,25 @@ def say(text: str) -> None:
 def visible(text: str) -> str:
     """A text in which nothing moves the cursor or turns the direction of writing: such characters are spelt out."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def tell_of_kept_programs() -> None:
+    """Make one sentence of all that Python and JAX warn of compiled programs that cannot be kept or used."""
+    shown, told = warnings.showwarning, []
+
+    def show(message: Warning | str, *where: Any, **more: Any) -> None:
+        text = str(message)
+        if text.startswith("Compiled programs are not kept"):
+            say(f"Warning: {text}")
+        elif "persistent compilation cache" in text:
+            if not told:
+                say("Warning: a compiled program that was kept cannot be used, or not be kept: it is compiled anew.")
+            told.append(text)
+        else:
+            shown(message, *where, **more)
+
+    if getattr(shown, "__name__", "") != show.__name__:
+        warnings.showwarning = show
 
 
 def warn_of_short(labels: int) -> None:

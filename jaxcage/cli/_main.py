@@ -22,6 +22,7 @@ from ._console import (
     interrupted_status,
     leave_at_once_when_interrupted,
     say,
+    tell_of_kept_programs,
     visible,
 )
 from ._options import COMMANDS, AnyOptions, Command, CommonOptions
@@ -65,10 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _carry_out(options: AnyOptions) -> None:
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
     import jax
 
     jax.config.update("jax_enable_x64", True)
     if isinstance(options, CommonOptions) and not options.no_cache:
+        tell_of_kept_programs()
         keep_compiled_programs()
     command, place = next((name, place) for name, (kind, place) in COMMANDS.items() if kind is type(options))
     module, function = place.split(".")

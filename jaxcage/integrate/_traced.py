@@ -129,13 +129,13 @@ class Kept:
         try:
             about = f"{sources()} {self.name} {jax.dtypes.canonicalize_dtype(float)} {named(args)}"
             path = folder / hashlib.sha256(about.encode()).hexdigest()[:32]
-            made = _read(path)
-            if made is None:
+            program, form = _program_at(path) or (None, None)
+            if program is None:
                 made = self._lowered(args, arrays)
                 _write(path, made)
+                program, form = export.deserialize(bytearray(made[0])), made[1]
         except (Unnamed, NotImplementedError, TypeError, ValueError):
             return None  # what is wrong with it, if anything, is said where it is called without being kept
-        program, form = export.deserialize(bytearray(made[0])), made[1]
         run = jax.jit(program.call, compiler_options=self.options)
         return lambda arrays: _filled(form, run(*arrays))
 
@@ -189,9 +189,24 @@ def _filled(form: Any, arrays: list[Any]) -> Any:
     return getattr(sys.modules[module], name)._make(parts)
 
 
+def _program_at(path: pathlib.Path) -> tuple[Any, Any] | None:
+    """The program that was kept there and the form of its result; None where there is none that can be used."""
+    made = _read(path)
+    if made is None:
+        return None
+    try:
+        program, form = export.deserialize(bytearray(made[0])), made[1]
+        _filled(form, list(range(len(program.out_avals))))
+    except Exception:  # what reads the bytes of a stranger may raise anything
+        return None
+    return program, form
+
+
 def _read(path: pathlib.Path) -> tuple[bytes, Any] | None:
     """What was kept there; nothing where it cannot be read."""
     try:
+        if not path.is_file():  # a pipe would be waited for
+            return None
         digest, whole = path.read_bytes().split(b"\n", 1)
         form, program = whole.split(b"\n", 1)
         return (program, json.loads(form)) if digest == _digest(whole) else None
@@ -207,7 +222,7 @@ def _write(path: pathlib.Path, made: tuple[bytes, Any]) -> None:
     """Keep it in one step, so that nobody reads half of it; where that cannot be, it is not kept."""
     whole = json.dumps(made[1]).encode() + b"\n" + made[0]
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
             file.write(_digest(whole) + b"\n" + whole)
         os.replace(file.name, path)
