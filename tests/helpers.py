@@ -32,6 +32,13 @@ def in_other_units(model: jc.CageModel, base: str, factor: float) -> jc.CageMode
     return jax.tree.map(lambda x: scaled.get(id(x), x), model)  # `replace` would ask for SI
 
 
+def beyond_range(model: jc.CageModel, **values: float) -> jc.CageModel:
+    """The model with values that `replace` would refuse, as limits of what a formula says."""
+    now = jc.parameters(model)
+    new = {id(now[name]): jnp.asarray(value, dtype=float) for name, value in values.items()}
+    return jax.tree.map(lambda x: new.get(id(x), x), model)
+
+
 def elastic(model: jc.CageModel, mass: float = 1.0, stiffness: float = 5e7, damping: float = 500.0) -> jc.CageModel:
     """The model with an elastic rib."""
     return jc.replace(

@@ -32,7 +32,7 @@ WITHIN = {"guidance_gap": (3e-4, 6e-4)}
 STATE = np.zeros(2)
 ROW = np.zeros(3)
 TRAJECTORY = jc.Trajectory(ROW, ROW, np.zeros((3, 4)), ROW, 2, 0.0, "finished")
-
+WHOLE = jc.whole_bearing("nu2310")
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
@@ -74,6 +74,9 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "sweep": lambda m: raw_sweep(OSCILLATOR, SPEEDS),
     "sweep_designs": lambda m: raw_sweeps([OSCILLATOR], SPEEDS),
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
+    "whole_bearing": lambda m: jc.whole_bearing("nu2310"),
+    "simulate_bearing": lambda m: jc.simulate_bearing(WHOLE, 1000.0, revolutions=1),
+    "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=None),
     "waterfall": lambda m: jc.analysis.waterfall(OSCILLATOR, SPEEDS),
 }
 """Every public function that computes in JAX, or makes a model to compute with."""
@@ -86,7 +89,7 @@ OTHERS = {
     *("parameter_info", "parameters", "replace", "nu2310", "published_case", "vg", "open_study"),
     # of what was found before, with its numbers
     *("zones", "loss_zones", "explain", "zero_one", "order_spectrum", "dominant_orders"),
-    *("tolerance_budget", "global_sensitivity"),
+    *("tolerance_budget", "global_sensitivity", "bearing_measures"),
 }
 
 

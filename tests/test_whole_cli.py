@@ -6,7 +6,6 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.cli._readers import ShaftSpeed, speed
 
 
 def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[str]):
@@ -23,12 +22,10 @@ def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[s
     assert found["state"] == expected.state
 
 
-def test_speed_of_the_shaft_or_the_cage():
-    read = speed().instance_from_str
-    assert read(["10000 rpm shaft"]) == 10000 and isinstance(read(["10000 rpm shaft"]), ShaftSpeed)
-    assert read(["4000"]) == 4000 and not isinstance(read(["4000"]), ShaftSpeed)
-    with pytest.raises(ValueError, match="above 0 rpm"):
-        read(["-3 shaft"])
+def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str]):
+    cage = float(jc.whole_bearing("nu2310").rolling_cage_speed(1e4))
+    assert main(["simulate", "nu2310", "--speed", f"{cage!r} rpm cage", "--revolutions", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["shaft_speed_rpm"] == pytest.approx(1e4, rel=1e-12)
 
 
 def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
