@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from helpers import in_other_units, unit_exponents
 from jax.flatten_util import ravel_pytree
 from reference import WholeBearing, gupta
-from test_whole_reference import SPEED, random_state, right_side
+from test_whole_reference import SPEED, everything, random_state, right_side
 
 import jaxcage as jc
 from jaxcage.models.whole import BearingState, Traction, bar_stiffness
@@ -23,12 +22,6 @@ def bearing(**changed):
 
 def some_state(model, seed=0, speed=SPEED, reach=0.985):
     return random_state(WholeBearing(model, speed), seed, reach)
-
-
-@eqx.filter_jit
-def everything(model, speed, state):
-    at = model.at_speed(speed)
-    return at.forces(state), at(state)
 
 
 def cross(a, b):
@@ -137,6 +130,7 @@ def _rates(model, state):
     return model.at_speed(jnp.asarray(SPEED))(state).state.rollers
 
 
+@pytest.mark.wide
 def test_twice_the_rollers_cost_twice_as_much():
     """Operations of a right side, as the compiler counts them."""
     flops = []
@@ -154,7 +148,6 @@ def test_twice_the_rollers_cost_twice_as_much():
 def test_other_units_give_the_same_motion(base):
     """Every declared unit is right, and no number with a unit is hidden in the formulas."""
     model = bearing(**{"drag_coefficient": 1.0, "churning_coefficient": 1.0, "outer_speed": 30.0, "rest": 0.01})
-    model = jc.replace(model, **{"pockets.pocket_law": "power"})
     factor = 1.7
     state, speed = some_state(model, 4), jnp.asarray(SPEED)
     units = (["1", "rad/s", "m", "m/s", "rad/s"], ["m", "m", "m/s", "m/s", "rad/s", "m", "m", "m/s", "m/s"], ["1", "s"])
