@@ -32,8 +32,8 @@ def in_other_units(model: jc.CageModel, base: str, factor: float) -> jc.CageMode
     return jax.tree.map(lambda x: scaled.get(id(x), x), model)  # `replace` would ask for SI
 
 
-def beyond_range(model: jc.CageModel, **values: float) -> jc.CageModel:
-    """The model with values that `replace` would refuse, as limits of what a formula says."""
+def beyond_range(model: Any, **values: Any) -> Any:
+    """The model with values that `replace` may refuse, as limits of what a formula says."""
     now = jc.parameters(model)
     new = {id(now[name]): jnp.asarray(value, dtype=float) for name, value in values.items()}
     return jax.tree.map(lambda x: new.get(id(x), x), model)

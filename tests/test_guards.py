@@ -33,6 +33,7 @@ STATE = np.zeros(2)
 ROW = np.zeros(3)
 TRAJECTORY = jc.Trajectory(ROW, ROW, np.zeros((3, 4)), ROW, 2, 0.0, "finished")
 WHOLE = jc.whole_bearing("nu2310")
+START = jc.models.rolling_start(WHOLE, 1000.0)
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
@@ -76,7 +77,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
     "whole_bearing": lambda m: jc.whole_bearing("nu2310"),
     "simulate_bearing": lambda m: jc.simulate_bearing(WHOLE, 1000.0, revolutions=1),
-    "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=None),
+    "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=START),
     "waterfall": lambda m: jc.analysis.waterfall(OSCILLATOR, SPEEDS),
 }
 """Every public function that computes in JAX, or makes a model to compute with."""

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import elastic, even, in_other_units, raw_sweep, wide_but
+from helpers import beyond_range, elastic, even, in_other_units, raw_sweep, wide_but
 from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
@@ -103,11 +103,11 @@ def test_turned_states_have_turned_forces(film, design, speed, tau, state, angle
 FLIP = np.array([1.0, -1.0])
 
 
-def mirrored(model, **changes):
+def mirrored(model):
     """What a mirror on the x axis shows: gravity up, the impact and the cross-coupling with the other sign."""
     signs = dict.fromkeys(("gravity", "amplitude", "reference_speed", "cross_stiffness", "cross_cubic"), -1.0)
     values = jc.parameters(model)
-    return jc.replace(model, **{n: s * values[n] for n, s in signs.items()}, **changes)
+    return beyond_range(model, **{n: s * values[n] for n, s in signs.items()})
 
 
 @pytest.mark.parametrize(

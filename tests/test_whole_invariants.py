@@ -10,7 +10,7 @@ import pytest
 from helpers import in_other_units, unit_exponents
 from jax.flatten_util import ravel_pytree
 from reference import WholeBearing, gupta
-from test_whole_reference import SPEED, random_state, right_side
+from test_whole_reference import SPEED, everything, random_state, right_side
 
 import jaxcage as jc
 from jaxcage.models.whole import BearingState, Traction, bar_stiffness
@@ -23,12 +23,6 @@ def bearing(**changed):
 
 def some_state(model, seed=0, speed=SPEED, reach=0.985):
     return random_state(WholeBearing(model, speed), seed, reach)
-
-
-@eqx.filter_jit
-def everything(model, speed, state):
-    at = model.at_speed(speed)
-    return at.forces(state), at(state)
 
 
 def cross(a, b):
@@ -137,6 +131,7 @@ def _rates(model, state):
     return model.at_speed(jnp.asarray(SPEED))(state).state.rollers
 
 
+@pytest.mark.wide
 def test_twice_the_rollers_cost_twice_as_much():
     """Operations of a right side, as the compiler counts them."""
     flops = []
@@ -154,7 +149,6 @@ def test_twice_the_rollers_cost_twice_as_much():
 def test_other_units_give_the_same_motion(base):
     """Every declared unit is right, and no number with a unit is hidden in the formulas."""
     model = bearing(**{"drag_coefficient": 1.0, "churning_coefficient": 1.0, "outer_speed": 30.0, "rest": 0.01})
-    model = jc.replace(model, **{"pockets.pocket_law": "power"})
     factor = 1.7
     state, speed = some_state(model, 4), jnp.asarray(SPEED)
     units = (["1", "rad/s", "m", "m/s", "rad/s"], ["m", "m", "m/s", "m/s", "rad/s", "m", "m", "m/s", "m/s"], ["1", "s"])
@@ -204,7 +198,7 @@ def test_traction_curve(values):
     if values[0] in printed:
         np.testing.assert_allclose([found.b, found.c], printed[values[0]], atol=6e-7)
     kappa = jax.jit(lambda u: law.curve(u) - 0.0)
-    sharp = jax.jit(lambda u: jc.replace(law, traction_smoothing=1e-9).curve(u))
+    sharp = jax.jit(lambda u: eqx.tree_at(lambda x: x.traction_smoothing, law, jnp.asarray(1e-9)).curve(u))
     assert float(sharp(values[3])) == pytest.approx(values[1], rel=1e-12)
     assert float(jax.grad(sharp)(values[3])) == pytest.approx(0.0, abs=1e-12)
     assert float(kappa(-0.37)) == -float(kappa(0.37))

@@ -1,14 +1,18 @@
-"""The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, the cage alone."""
+"""The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, the cage alone; the command."""
 
+import json
 from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import beyond_range
 from scipy.optimize import brentq, fsolve
+from test_whole_reference import everything
 
 import jaxcage as jc
+from jaxcage.cli import main
 from jaxcage.models.whole import (
     LEDGER,
     BearingState,
@@ -28,19 +32,14 @@ NO_LAND = {"lubricant.density": 0.0, "stiffness": 0.0}
 
 
 def bearing(**changed):
-    return jc.replace(jc.whole_bearing("nu2310"), **changed)
+    beyond = {name: changed.pop(name) for name in NO_LAND if name in changed}
+    return beyond_range(jc.replace(jc.whole_bearing("nu2310"), **changed), **beyond)
 
 
 @eqx.filter_jit
 def energy_and_momentum(model, state):
     at = model.at_speed(jnp.asarray(SPEED))
     return kinetic_energy(at, state) + potential_energy(at, state), cage_angular_momentum(at, state)
-
-
-@eqx.filter_jit
-def everything(model, speed, state):
-    at = model.at_speed(speed)
-    return at.forces(state), at(state)
 
 
 def moving(model, **parts):
@@ -320,3 +319,43 @@ def test_a_quasi_static_ring():
     assert abs(x) < 0.3e-6 and abs(y) < 0.3e-6 and np.all(runs[1].bodies[:, 7:9] == 0)
     slips = [jc.bearing_measures(dynamic, run, SPEED).cage_slip for run in runs]
     assert slips[0] == pytest.approx(slips[1], rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_lightly_loaded_bearing_skids():
+    """At 100 N the slip passes 5 % and grows; at 4450 N it stays below 2 %."""
+    slips = {}
+    for load in (100.0, 4450.0):
+        model = bearing(load=load)
+        ran = jc.simulate_bearing(model, SPEED, revolutions=20, discard=10, samples=32)
+        assert ran.outcome == "successful"
+        slips[load] = jc.bearing_measures(model, ran, SPEED)
+    assert slips[100.0].cage_slip > 0.05 and slips[100.0].cage_slip_drift > 0.02
+    assert 0.005 < slips[4450.0].cage_slip < 0.02 and abs(slips[4450.0].cage_slip_drift) < 1e-3
+
+
+def test_simulate_prints_slips_forces_and_losses(capsys: pytest.CaptureFixture[str]):
+    asked = ["simulate", "nu2310", "--speed", "10000 rpm shaft", "--revolutions", "1", "--json"]
+    assert main(asked) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["outcome"] == "successful" and found["shaft_speed_rpm"] == 10000
+    assert found["friction_power_W"] == pytest.approx(sum(found["power_parts_W"].values()))
+    run = jc.simulate_bearing(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, samples=32)
+    expected = jc.bearing_measures(jc.whole_bearing("nu2310"), run, float(jc.rpm(10000)))
+    names = "cage_slip roller_slip_max pocket_force_max_N pocket_force_mean_sum_N land_force_max_N eccentricity_mean"
+    for name in names.split():
+        assert found[name] == pytest.approx(getattr(expected, name), rel=1e-12)
+    assert found["state"] == expected.state
+
+
+def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str]):
+    cage = float(jc.whole_bearing("nu2310").rolling_cage_speed(1e4))
+    assert main(["simulate", "nu2310", "--speed", f"{cage!r} rpm cage", "--revolutions", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["shaft_speed_rpm"] == pytest.approx(1e4, rel=1e-12)
+
+
+def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
+    assert main(["sweep", "nu2310"]) == 2
+    assert "only `jaxcage simulate`" in capsys.readouterr().err
+    assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
+    assert "--solver" in capsys.readouterr().err

@@ -49,8 +49,14 @@ def random_state(theirs, seed, reach):
 
 
 @eqx.filter_jit
+def everything(model, speed, state):
+    """All forces and all rates: one program for the tests of a right side."""
+    at = model.at_speed(speed)
+    return at.forces(state), at(state)
+
+
 def right_side(model, speed, state):
-    return model.at_speed(speed)(state).state
+    return everything(model, speed, state)[1].state
 
 
 @pytest.mark.parametrize("kind", wide_but(KINDS, "plain", "inner"))

@@ -179,10 +179,10 @@ class WholeBearing:
 
         turned.terminal = True  # pyright: ignore[reportFunctionMemberAccess]
         y0 = np.concatenate([rollers.ravel(), bodies, [angle]])
-        small = np.concatenate([np.repeat([1e-11, 1e-6, 1e-15, 1e-10, 1e-8], shape[1]), np.full(10, 1e-11)])
-        small[n + np.array([5, 6])] = 1e-15
+        small = np.concatenate([np.repeat([1e-10, 1e-5, 1e-14, 1e-9, 1e-7], shape[1]), np.full(10, 1e-10)])
+        small[n + np.array([5, 6])] = 1e-14
         end = 2 * span / bodies[4]
-        done = solve_ivp(rate, (0, end), y0, "DOP853", events=turned, rtol=1e-11, atol=small, max_step=end / 50)
+        done = solve_ivp(rate, (0, end), y0, "DOP853", events=turned, rtol=1e-9, atol=small, max_step=end / 50)
         assert done.success and done.t_events[0].size == 1, done.message
         y = done.y_events[0][0]
         return y[:n].reshape(shape), y[n:-1]
