@@ -525,7 +525,7 @@ def lines(draw: Any) -> Line:
             given[name] = [draw(_texts(name, str))]
             arguments += given[name]
             continue
-        flag = "--" + {"verify": "check"}.get(name, name.replace("_", "-"))
+        flag = "--" + str({"verify": "check"}.get(name, name.replace("_", "-")))
         if hints[name] is bool:
             given[name] = [""]
             arguments.append(flag)

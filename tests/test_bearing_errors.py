@@ -66,8 +66,8 @@ def test_an_oil_does_not_thicken_when_hot(first, second):
 
 
 @pytest.mark.parametrize("load, force, said", [
-    (1e300, 0.0, "`load` must be at most 1e.07 N, but 1e.300"),
-    (4450.0, 1e300, "`centrifugal_force` must be at most 1e.07 N, but 1e.300"),
+    (1e300, 0.0, "`load` must be at most 1e.12 N, but 1e.300"),
+    (4450.0, 1e300, "`centrifugal_force` must be at most 1e.12 N, but 1e.300"),
     (1.0, 1e7, "`load` and `centrifugal_force` must be of sizes that can be added, but 1 and 1e.07 N were given"),
 ])  # fmt: skip
 def test_loads_beyond_all_sense(load, force, said):

@@ -32,8 +32,9 @@ NO_LAND = {"lubricant.density": 0.0, "stiffness": 0.0}
 
 
 def bearing(**changed):
-    beyond = {name: changed.pop(name) for name in NO_LAND if name in changed}
-    return beyond_range(jc.replace(jc.whole_bearing("nu2310"), **changed), **beyond)
+    model = jc.whole_bearing("nu2310")
+    numbers = {name: changed.pop(name) for name in jc.parameters(model) if name in changed}
+    return beyond_range(jc.replace(model, **changed), **numbers)
 
 
 @eqx.filter_jit
@@ -253,6 +254,7 @@ def cage_alone():
         guidance_gap=same.guidance_gap,
         eccentricity=same.eccentricity,
         clearance_reading="radial",
+        unbalance="physical",
     )
     return same, cage
 

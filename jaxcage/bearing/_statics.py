@@ -17,7 +17,7 @@ from ._validate import require_at_most, require_not_negative, require_positive
 
 Guidance = Literal["outer_rib", "inner_rib", "roller"]
 
-LARGEST = 1e7
+LARGEST = 1e12
 """Of loads [N]."""
 DEFAULT_SHAFT_LOAD = 4450.0
 """Shaft load F [N]; the paper does not print it."""
