@@ -100,7 +100,7 @@ def _title(job: Job[SweepOptions], found: Sweep) -> str:
     what = job.name if job.published is None else f"Case {job.name}"
     gap, e = 1e3 * float(job.model.guidance_gap), 1e6 * float(job.model.eccentricity)
     lasting = f", chaos followed to {found.horizon} revolutions" if found.horizon else ""
-    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm, {report.short_readings(job.model)}{lasting}"
+    return f"{what}: guidance gap {gap:.3g} mm, eccentricity {e:.3g} µm\n{report.short_readings(job.model)}{lasting}"
 
 
 def _zoom(job: Job[SweepOptions], found: Sweep, edges: Zones) -> None:
