@@ -102,6 +102,9 @@ def chances_notes(found: Ensemble) -> list[str]:
         f"One start for each draw, {found.discard} revolutions left out, {found.revolutions} observed: chaos that dies "
         "out later counts too."
     ]
+    if np.any(found.failed):
+        lost = f"{int(np.sum(found.failed))} of {found.failed.size}"
+        notes.append(f"{lost} simulations failed: they are in no chance, and a verdict holds whatever they would do.")
     clues = found.clues()
     open_ = found.rpm[found.undecided]
     if open_.size:
@@ -128,8 +131,9 @@ def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: fl
     for at in operating:
         which = found.between(at.low_rpm, at.high_rpm)
         done = ~np.any(found.failed[:, which], axis=1) | np.any(found.chaotic[:, which], axis=1)
-        chance = float(np.mean(np.any(found.chaotic[done][:, which], axis=1))) if np.any(done) else float("nan")
-        verdict = verdict_of(chance, int(np.sum(done)))
+        hits, of = int(np.sum(np.any(found.chaotic[done][:, which], axis=1))), int(np.sum(done))
+        chance = hits / of if of else float("nan")
+        verdict = verdict_of(hits, of, len(done))
         said = "not decided by what is known" if verdict == "not decided" else verdict
         measure = measures(found.clues(which)) if verdict == "not decided" else "-"
         rows.append((str(at), str(at.of_shaft(ratio)), f"{100 * chance:.0f} %", said, measure))

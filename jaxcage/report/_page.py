@@ -182,7 +182,7 @@ def _of_the_unknown(findings: Findings, chances: Ensemble | None, left: Sequence
             f"ranges only. {chances_notes(chances)[0]}"
         )
     if left:
-        said.append(f"{len(left)} values are still those of the template, another bearing's: {', '.join(left)}.")
+        said.append(f"Values that are still the template's, another bearing's: {', '.join(left)}.")
     return said
 
 
