@@ -500,7 +500,7 @@ def lines(draw: Any) -> Line:
             given[name] = [draw(_texts(name, str))]
             arguments += given[name]
             continue
-        flag = "--" + {"verify": "check"}.get(name, name.replace("_", "-"))
+        flag = "--check" if name == "verify" else "--" + name.replace("_", "-")
         if hints[name] is bool:
             given[name] = [""]
             arguments.append(flag)
