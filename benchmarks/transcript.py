@@ -54,7 +54,7 @@ def main() -> None:
         print(f'$ grep -E "{pattern}" {FILE}  # after editing')
         print("\n".join(x for x in path.read_text(encoding="utf-8").splitlines() if re.match(pattern, x)), end="\n\n")
         show(f"jaxcage statics {FILE}", folder)
-        show(f"jaxcage sweep {FILE}", folder)
+        show(f"jaxcage sweep {FILE} --nominal", folder)
         show(f"jaxcage design {FILE} --quick --starts 2 --steps 8", folder)
         show(f"jaxcage report {FILE} --quick --operating '5000-8000 rpm'", folder)
 
