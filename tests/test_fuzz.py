@@ -198,7 +198,10 @@ def test_nothing_beside_a_unit_is_passed_over(text: str):
 @pytest.mark.parametrize(
     "given, said",
     [
-        ("[lubricant]\nviscosity_1 = 1e-6\nviscosity_2 = 1e-6\nreference_viscosity = 1e-5", "`lubricant` must have a viscosity"),
+        (
+            "[lubricant]\nviscosity_1 = 1e-6\nviscosity_2 = 1e-6\nreference_viscosity = 1e-5",
+            "`lubricant` must have a viscosity",
+        ),
         ("load = 1" + "0" * 400, "`load` must be a number from 0 to 1e+07 N, but is 1000"),
         ("load = 0x" + "f" * 5000, "`load` must be a number from 0 to 1e+07 N, but is a very large int."),
         ("load = " + "9" * 5000, "must be valid TOML, but is not: Exceeds the limit"),
