@@ -31,7 +31,7 @@ CHECKED: dict[str, Callable[..., Any]] = {}
 """Functions that compare their arguments, by their names."""
 SPEEDS = frozenset({"speed", "first", "last"})
 """Names of single speeds, which are above 0 and finite."""
-FASTEST = 1e6
+FASTEST = 1e9
 """Of speeds [rad/s]: beyond, nothing that is computed means anything."""
 _REAL = "biuf"
 _ARRAYS = (jax.Array, np.ndarray, np.generic)

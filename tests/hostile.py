@@ -580,6 +580,7 @@ HEAVY = (
     (_one_speed, "simulate"),
     (_orbits, "synchronous_orbits"),
     (_label_map, "label_map"),
+    (_design, "_objective"),
     (_design, "optimise"),
     (_design, "global_sensitivity"),
     (_unknowns, "sobol_of"),

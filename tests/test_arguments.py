@@ -103,7 +103,7 @@ SPEEDS = np.array([1.0, 1.1])
         (lambda: jc.sweep_designs(DUFFING, SPEEDS), "`systems` must be a row of things, but something of kind Forced"),
         (
             lambda: jc.simulate(DUFFING, 1e300, revolutions=2),
-            "`speed` must be positive and finite, at most 1e.06",
+            "`speed` must be positive and finite, at most 1e.09",
         ),
         (lambda: jc.simulate(DUFFING, 1.0, revolutions=10**9), "`revolutions` must be a whole number"),
         (lambda: jc.periodic_orbit(DUFFING, 1.0, method="rk4"), "`method` must be of kind AbstractMethod, but 'rk4'"),
