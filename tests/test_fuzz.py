@@ -197,11 +197,7 @@ def test_nothing_beside_a_unit_is_passed_over(text: str):
     "given, said",
     [
         (
-<<<<<<< HEAD
             "[lubricant]\nviscosity_1 = 2e-6\nviscosity_2 = 1e-6\nreference_viscosity = 1e-5",
-=======
-            "[lubricant]\nviscosity_1 = 1e-6\nviscosity_2 = 1e-6\nreference_viscosity = 1e-5",
->>>>>>> store
             "`lubricant` must have a viscosity",
         ),
         ("load = 1" + "0" * 400, "`load` must be a number from 0 to 1e+07 N, but is 1000"),

@@ -3,6 +3,8 @@
 Parameters, speeds and states are drawn from physical ranges. One program serves all draws of a test.
 """
 
+from unittest import mock
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -304,6 +306,7 @@ def test_revolutions_in_other_units(kind, design, speed, cage, rib, scales):
 @pytest.mark.wide
 @random(15)
 @given(speeds, between(0.95, 1.05), units)
+@mock.patch("jaxcage.models._door.FASTEST", np.inf)
 def test_exponents_in_other_units(speed, gap, scales):
     """Of ten revolutions, from three starts."""
     model = jc.replace(CASE, guidance_gap=float(CASE.guidance_gap) * gap)
@@ -317,6 +320,7 @@ def test_exponents_in_other_units(speed, gap, scales):
 @pytest.mark.wide
 @random(12)
 @given(between(jc.rpm(14000.0), jc.rpm(19000.0)), units)
+@mock.patch("jaxcage.models._door.FASTEST", np.inf)
 def test_orbits_in_other_units(speed, scales):
     here = jc.periodic_orbit(CASE, speed, revolutions=60, method=EXPLICIT)
     other = rescaled(CASE, jnp.asarray(scales))
