@@ -18,7 +18,6 @@ from ..models import CageModel
 from ._manifest import ABOUT, FOLDER, FORMAT, describing, is_as_marked, make_way, mark, write_entry
 from ._plan import SAMPLE
 from ._study import LABELS, OIL, PENDING, SPEED, Study
-from ._zarr import compressors
 
 
 def create(path: Path, study: Study) -> None:
@@ -51,6 +50,8 @@ def mend(path: Path, study: Study) -> None:
 def _write(path: Path, study: Study) -> None:
     import xarray as xr
     import zarr
+
+    from ._zarr import compressors
 
     plan, shape = study.plan, _shapes(study)
     coordinates = _coordinates(study, shape)
