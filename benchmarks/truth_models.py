@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.models import CageModel
+from jaxcage.models import CageModel, fastest_speed
 from tests import reference
 
 
@@ -30,12 +30,12 @@ class Subject:
         """Ascending random speeds [rad/s]."""
         if self.kind == "cases":
             return random_case_speeds(self.seed, count)
-        return reference.random_speeds(self.seed, count, self.kind == "wide")
+        return reference.random_speeds(self.seed, count, self.kind == "wide", fastest_speed(self.model))
 
     def grid(self, count: int) -> np.ndarray:
         """Speeds [rad/s] with equal ratios, from end to end."""
-        low, high = reference.SPEEDS[self.kind == "wide"]
-        return np.geomspace(low, high, count) * math.pi / 30
+        low, high = (rpm * math.pi / 30 for rpm in reference.SPEEDS[self.kind == "wide"])
+        return np.geomspace(low, min(high, fastest_speed(self.model)), count)
 
 
 def random_case_speeds(seed: int, count: int) -> np.ndarray:

@@ -55,7 +55,7 @@ def test_revolutions_per_minute_for_radians_are_refused(run):
 
 
 def test_the_fastest_cage_is_the_one_that_bursts():
-    """200 m/s at the land: hoop stress rho v^2 of 340 MPa in brass; the paper's 27500 rpm are well below."""
+    """300 m/s at the land: hoop stress rho v^2 of 765 MPa in brass; the paper's 27500 rpm are well below."""
     assert fastest_speed(CASE) * float(CASE.land_radius) == pytest.approx(FASTEST)
     assert float(jc.rpm(27500.0)) < 0.7 * fastest_speed(CASE)
 

@@ -53,10 +53,10 @@ def test_ends_of_a_range_may_belong_to_either(mine: str):
 
 def test_a_cage_that_would_burst_is_refused():
     with pytest.raises(
-        InputError, match="Option --speed must be a cage speed of at most 41.* rpm, .*60000 rpm was given"
+        InputError, match="Option --speed must be a cage speed of at most 61.* rpm, .*100000 rpm was given"
     ):
-        asked("simulate", "1a", "--speed", "60000")
-    assert asked("simulate", "1a", "--speed", "60000 rpm shaft").speed == pytest.approx(60000 * RATIO)
+        asked("simulate", "1a", "--speed", "100000")
+    assert asked("simulate", "1a", "--speed", "100000 rpm shaft").speed == pytest.approx(100000 * RATIO)
 
 
 @pytest.mark.parametrize("text", ["20000 rpm shaft cage", "20000 rpm spindle", "20000 shafts"])

@@ -95,9 +95,10 @@ def _wide(rng: np.random.Generator, model: CageModel) -> dict[str, float]:
     return found
 
 
-def random_speeds(seed: int, count: int, wide: bool = False) -> np.ndarray:
-    """Ascending cage speeds [rad/s], logarithmically spread."""
-    low, high = np.log(SPEEDS[wide])
+def random_speeds(seed: int, count: int, wide: bool = False, fastest: float = math.inf) -> np.ndarray:
+    """Ascending cage speeds [rad/s], logarithmically spread up to the `fastest` that this cage may run."""
+    low, high = SPEEDS[wide]
+    low, high = math.log(low), math.log(min(high, fastest * 30 / math.pi))
     return np.sort(np.exp(np.random.default_rng([seed, wide, 1]).uniform(low, high, count))) * math.pi / 30
 
 
