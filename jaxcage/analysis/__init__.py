@@ -9,6 +9,7 @@
 | `_zero_one`     | the 0-1 test for chaos                                                               |
 | `_escapes`      | when lanes left chaos for good                                                       |
 | `_transients`   | an attractor or a chaotic transient: mean life with its error, coexisting ends       |
+| `_hazard`       | the rate of escapes as it depends on speed and design                                |
 | `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
@@ -44,6 +45,7 @@ from ._escapes import (
     dips as dips,
     escape_times as escape_times,
 )
+from ._hazard import Hazard as Hazard, hazard as hazard
 from ._labels import (
     CHAOS_THRESHOLD as CHAOS_THRESHOLD,
     CLOSING_TOLERANCE as CLOSING_TOLERANCE,

@@ -11,6 +11,7 @@
 | `_smooth`   | manufacturing cost, measures of regular motion                                |
 | `_margin`   | how far the synchronous orbit is from losing its stability                    |
 | `_edges`    | widths of zones and distances from edges, exact                               |
+| `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
@@ -34,6 +35,7 @@ from ._fit import (
     fit_edges as fit_edges,
 )
 from ._land import LandMeasure as LandMeasure, land_loads as land_loads
+from ._lasting import LastingEdge as LastingEdge, lasting_edge as lasting_edge, lasting_width as lasting_width
 from ._margin import StabilityMargin as StabilityMargin
 from ._measured import MeasuredEdge as MeasuredEdge, inside_zones as inside_zones, matched as matched
 from ._objective import (

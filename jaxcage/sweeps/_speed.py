@@ -123,7 +123,7 @@ def sweep(
 
 def sweep_designs(
     systems: Sequence[AbstractForcedSystem],
-    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"] | Float[np.ndarray, "systems speeds"],
     *,
     starts: int | Sequence[State] | Float[np.ndarray, "speeds starts dim"] | None = None,
     discard: int = 300,
@@ -138,25 +138,25 @@ def sweep_designs(
 ) -> list[Sweep]:
     """`sweep` for several designs or cases at once, all lanes in one batch: one program, full chunks.
 
-    **Arguments:** systems that differ in their numbers only; the rest as for `sweep`.
+    **Arguments:** systems that differ in their numbers only; speeds of all of them, or a row for each; the rest as for
+    `sweep`.
 
     **Returns:** a `Sweep` for each system, the same as one by one to rounding (which chaos makes large).
     """
     require_x64()
     require_known("sweep", INSTEAD, systems, speeds)
-    speed = checked_speeds(speeds)
-    for system in systems[:1]:
-        require_speeds(system, speed, "speeds")
-    chosen = controlled() if method is None else method
     if not systems:
         raise ArgumentError("systems", said="must hold at least one system, but it is empty.")
+    speed = _speeds_of_each(speeds, len(systems))
+    require_speeds(systems[0], speed, "speeds")
+    chosen = controlled() if method is None else method
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
-    y0 = np.stack([initial_states(s, speed, starts) for s in systems])  # systems, speeds, starts, dim
+    y0 = np.stack([initial_states(*each, starts) for each in zip(systems, speed, strict=True)])  # ..., starts, dim
     shape = y0.shape[1:3]
     each = shape[0] * shape[1]
     which = np.repeat(np.arange(len(systems)), each)
-    lane_speed = np.tile(np.repeat(speed, shape[1]), len(systems))
+    lane_speed = np.repeat(speed.ravel(), shape[1])
     lane_start = y0.reshape(-1, dim)
     how = settings_of(chosen)
 
@@ -166,7 +166,7 @@ def sweep_designs(
 
     def each_system(seen: Observation) -> list[Sweep]:
         parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
-        return [assemble(s, speed, how, plan, part, shape) for s, part in zip(systems, parts, strict=True)]
+        return [assemble(s, v, how, plan, part, shape) for s, v, part in zip(systems, speed, parts, strict=True)]
 
     seen = run(plan, np.arange(which.size))
     found = each_system(seen)
@@ -193,6 +193,15 @@ def sweep_designs(
         dataclasses.replace(s, escape=e.reshape(shape), horizon=lasting.horizon, confirmed=rounds)
         for s, e in zip(each_system(seen), escapes, strict=True)
     ]
+
+
+def _speeds_of_each(speeds: Any, systems: int) -> Float[np.ndarray, "systems speeds"]:
+    """The speeds of each system: its own, or those of all."""
+    if np.ndim(speeds) != 2:
+        return np.broadcast_to(speed := checked_speeds(speeds), (systems, speed.size))
+    if len(speeds) != systems:
+        raise ArgumentError("speeds", said=f"must have a row for each of {systems} systems, but has {len(speeds)}.")
+    return np.stack([checked_speeds(row) for row in speeds])
 
 
 def _judged(found: Sequence[Sweep]) -> Judged:
