@@ -57,8 +57,8 @@ def hazard(
     if min(np.sum(escaped), np.sum(survived)) < FEWEST_ESCAPES:
         raise ArgumentError(
             "times",
-            said=f"must have at least {FEWEST_ESCAPES} escapes after {t0:g} revolutions and as many blocks "
-            f"survived, but of {late.size} chaotic lanes {np.sum(escaped)} escaped and {np.sum(survived):.0f} blocks were survived.",
+            said=f"must have at least {FEWEST_ESCAPES} escapes after {t0:g} revolutions and as many blocks survived; "
+            f"{np.sum(escaped)} of {late.size} chaotic lanes escaped, and {np.sum(survived):.0f} blocks were survived.",
         )
     design = np.column_stack([np.ones(late.size), x])
     guess = np.zeros(design.shape[1])
@@ -93,9 +93,10 @@ def _of_lanes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minus the logarithm of what each lane did, so many blocks survived and then an escape or the end, with its first
     and second derivatives by log kappa."""
-    rate = block * np.exp(np.clip(design @ beta, -60.0, 5.0))
-    left = rate / np.expm1(rate)
-    cost = rate * survived - escaped * np.log(-np.expm1(-rate))
+    rate = block * np.exp(np.clip(design @ beta, -60.0, 60.0))
+    gone = -np.expm1(-rate)
+    left = rate * np.exp(-rate) / gone
+    cost = rate * survived - escaped * np.log(gone)
     return cost, rate * survived - escaped * left, rate * survived + escaped * left * (left + rate - 1)
 
 

@@ -14,6 +14,7 @@
 | `_whole`     | `simulate` of a whole bearing                                              |
 | `_sweep`    | `sweep`, `zones`                                                            |
 | `_orbits`   | `bifurcations`, `gradient`                                                  |
+| `_lasting`  | `gradient --lasting`                                                        |
 | `_map`, `_label_map` | `map`, `map --points`                                              |
 | `_design`   | `design`, `sensitivity`                                                     |
 | `_study`, `_page`, `_reproduce`, `_validate` | `study`, `report`, `reproduce`, `validate` |

@@ -155,6 +155,25 @@ class SearchOptions(_Range, IntegrationOptions):
 class GradientOptions(SearchOptions):
     """Derivatives of the synchronous-loss edges, and of the width of zone 1, by every parameter."""
 
+    lasting: bool = False
+    """Instead, of the edges and widths of zones of chaos that lasts, with standard errors, after a sweep (minutes)."""
+    zone: FromZero = 0
+    """With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all."""
+    by: tuple[str, ...] = ("guidance_gap", "eccentricity")
+    """With --lasting: parameters."""
+    designs: FromTwo = 64
+    """With --lasting: designs around this one in each of four rounds, from which an edge is estimated."""
+    seed: FromZero = 0
+    """With --lasting: seed of these designs."""
+
+    def check(self) -> None:
+        super().check()
+        names = ("zone", "by", "designs", "seed")
+        if not self.lasting and any(getattr(self, n) != getattr(GradientOptions, n) for n in names):
+            raise InputError("Options --zone, --by, --designs and --seed go with --lasting.")
+        if self.lasting and self.discard != GradientOptions.discard:
+            raise InputError("Option --discard does not go with --lasting, which sweeps as `jaxcage sweep` does.")
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MapOptions(SearchOptions):

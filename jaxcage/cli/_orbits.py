@@ -7,7 +7,8 @@ from ..orbits import LossZones, SynchronousOrbits, loss_zones, sensitivities, sy
 from ..plotting import elasticity_bars, multiplier_circle, orbit_diagram_with_branches
 from ..sweeps import rpm
 from ._job import Job
-from ._options import SearchOptions
+from ._lasting import lasting_gradient
+from ._options import GradientOptions, SearchOptions
 from ._show import Report
 
 
@@ -68,8 +69,10 @@ def _figures(job: Job[SearchOptions], found: SynchronousOrbits, loss: LossZones)
     job.draw(lambda ax: multiplier_circle(shown, ax), (7.0, 6.0), title, "multipliers", "_multipliers")
 
 
-def gradient(job: Job[SearchOptions]) -> Report:
+def gradient(job: Job[GradientOptions]) -> Report:
     """`jaxcage gradient`: how the synchronous-loss edges, and the width of zone 1, answer to every parameter."""
+    if job.options.lasting:
+        return lasting_gradient(job)
     found, loss = searched(job)
     require_edges(found, loss, "differentiate")
     with job.computing("gradients"):

@@ -35,7 +35,12 @@ from ._fit import (
     fit_edges as fit_edges,
 )
 from ._land import LandMeasure as LandMeasure, land_loads as land_loads
-from ._lasting import LastingEdge as LastingEdge, lasting_edge as lasting_edge, lasting_width as lasting_width
+from ._lasting import (
+    LastingEdge as LastingEdge,
+    LastingWidth as LastingWidth,
+    lasting_edge as lasting_edge,
+    lasting_edges as lasting_edges,
+)
 from ._margin import StabilityMargin as StabilityMargin
 from ._measured import MeasuredEdge as MeasuredEdge, inside_zones as inside_zones, matched as matched
 from ._objective import (

@@ -51,8 +51,9 @@ class LastingEdge:
     covariance: Float[np.ndarray, "1+n 1+n"]
     """Of the speed [rpm], then of the elasticities."""
     horizon: int
+    middle_rpm: float
     window_rpm: float
-    """Half the width of the speeds at which lanes ran."""
+    """Middle of the speeds at which lanes ran in the end, and half their width."""
     steepness: float
     """Change of the logarithm of the escape rate with speed [1/rpm]."""
     fit: Hazard
@@ -70,8 +71,9 @@ class LastingEdge:
     @property
     def status(self) -> str:
         """`converged`, or why the numbers should not be used."""
-        if not self.standard_error_rpm < self.window_rpm / CERTAIN:
-            return "no edge: the mean life does not pass the horizon"
+        away = abs(self.speed_rpm - self.middle_rpm)
+        if not max(away, CERTAIN * self.standard_error_rpm) < self.window_rpm:
+            return "no edge: the mean life does not pass the horizon among these speeds"
         return "converged" if self.fit.p_value >= LIKELY else "the rate of escapes is not log-linear here"
 
     def sum_of(self, *names: str) -> tuple[float, float]:
@@ -88,6 +90,29 @@ class LastingEdge:
         return "\n".join([head, *rows])
 
     _repr_html_ = notebook_html
+
+
+@dataclasses.dataclass(frozen=True)
+class LastingWidth:
+    """Width of a zone of lasting chaos; its edges come from lanes of their own, and so do their errors."""
+
+    onset: LastingEdge
+    exit: LastingEdge
+
+    @property
+    def width_rpm(self) -> float:
+        """Exit less onset."""
+        return self.exit.speed_rpm - self.onset.speed_rpm
+
+    @property
+    def standard_error_rpm(self) -> float:
+        """Of the width."""
+        return math.hypot(self.onset.standard_error_rpm, self.exit.standard_error_rpm)
+
+    def change(self, *names: str) -> tuple[float, float]:
+        """Change of the width when parameters grow together [rpm by their relative change], with its standard error."""
+        ends = [edge.speed_rpm * np.array(edge.sum_of(*names)) for edge in (self.exit, self.onset)]
+        return float(ends[0][0] - ends[1][0]), math.hypot(ends[0][1], ends[1][1])
 
 
 def lasting_edge(
@@ -139,28 +164,23 @@ def lasting_edge(
         speed, times = np.append(speed, np.repeat(at, each)), np.append(times, new)
         change = np.vstack([change, np.repeat(moved, each, axis=0)])
         found = _fitted(speed, change, times, edge, window, end, names, base)
-        edge, elasticity = found.speed_rpm, found.elasticity
+        edge, elasticity = edge + float(np.clip(found.speed_rpm - edge, -window, window)), found.elasticity
         window = float(np.clip(REACH / max(abs(found.steepness), 1e-12), window / 2, 2 * window))
     assert found is not None
     return found
 
 
-def lasting_width(
-    model: CageModel, zone: Zone, **options: Any
-) -> tuple[dict[str, LastingEdge], Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """How the width of a zone of lasting chaos changes [rpm by a relative change of each parameter]: its edges, that,
-    and its standard error. An open zone has one edge.
+def lasting_edges(model: CageModel, zone: Zone, **options: Any) -> dict[str, LastingEdge]:
+    """Edges of a zone of lasting chaos: `onset`, `exit`, or one of them where it is open.
 
-    **Arguments:** the design; a zone of `jaxcage.zones`; options of `lasting_edge`.
+    **Arguments:** the design; one of `jaxcage.zones`; options of `lasting_edge`.
     """
-    edges, total, variance = {}, 0.0, 0.0
-    for end, sign in (("onset", -1.0), ("exit", 1.0)):
-        given = getattr(zone, end)
-        if given is not None:
-            edges[end] = found = lasting_edge(model, given.speed_rpm, given.uncertainty_rpm, **options)
-            total = total + sign * found.elasticity * found.speed_rpm
-            variance = variance + (found.elasticity_error * found.speed_rpm) ** 2
-    return edges, np.asarray(total), np.sqrt(variance)
+    ends = {end: getattr(zone, end) for end in ("onset", "exit")}
+    return {
+        end: lasting_edge(model, edge.speed_rpm, edge.uncertainty_rpm, **options)
+        for end, edge in ends.items()
+        if edge is not None
+    }
 
 
 def _escapes(
@@ -202,25 +222,38 @@ def _fitted(
     """The edge as the lanes tell it."""
     scale = np.maximum(np.std(change, axis=0), 1e-12)
     u = (rpm - edge) / window
-    fit = hazard(times, horizon, np.column_stack([u, u**2, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
-    b0, b1, b2, *b = fit.coefficients
-    at = _nearest_root(b2, b1, b0 + math.log(horizon))  # where the rate is one escape in a horizon
-    steep = b1 + 2 * b2 * at
+    of = lambda *x: hazard(times, horizon, np.column_stack([*x, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
+    fit, order = of(u), 1
+    bent = of(u, u**2)
+    if _steep(bent, _root(bent, horizon)):
+        fit, order = bent, 2
+    beta, n = fit.coefficients, len(names)
+    at = _root(fit, horizon) if order == 2 else -(beta[0] + math.log(horizon)) / beta[1]
+    powers = at ** np.arange(order + 1.0)  # log rate = sum of beta u^k + ..., and its slope by u:
+    by_slope = np.concatenate([[0.0, 1.0], 2 * powers[1:order], np.zeros(n)])
+    steep = float(by_slope @ beta)
     speed = edge + window * at
-    slope = -window * np.asarray(b) / steep / scale  # rpm by relative change
-    # Derivatives of the speed and of slope / speed by the coefficients.
-    of_at = np.concatenate([-np.array([1.0, at, at**2]) / steep, np.zeros(len(b))])
-    of_steep = np.concatenate([[0.0, 1.0, 2 * at], np.zeros(len(b))]) + 2 * b2 * of_at
+    slope = -window * beta[order + 1 :] / steep / scale  # rpm by relative change
+    # Derivatives of the speed, and of slope / speed, by the coefficients.
+    of_at = -np.concatenate([powers, np.zeros(n)]) / steep
+    of_steep = by_slope + (2 * beta[2] if order == 2 else 0.0) * of_at
     of_slope = -np.outer(slope / steep, of_steep)
-    of_slope[:, 3:] += np.diag(-window / steep / scale)
+    of_slope[:, order + 1 :] -= np.diag(window / steep / scale)
     jacobian = np.vstack([window * of_at, (of_slope - np.outer(slope / speed, window * of_at)) / speed])
     covariance = jacobian @ fit.covariance @ jacobian.T
     return LastingEdge(
-        speed, tuple(names), slope / speed, slope / base, covariance, horizon, window, steep / window, fit
+        speed, tuple(names), slope / speed, slope / base, covariance, horizon, edge, window, steep / window, fit
     )
 
 
-def _nearest_root(a: float, b: float, c: float) -> float:
-    """Of a u^2 + b u + c, the real root nearest to 0; the place nearest to one if there is none."""
-    roots = np.roots([a, b, c])
-    return float(min(roots, key=abs).real)
+def _root(bent: Hazard, horizon: int) -> float:
+    """Where a law with a square in it is one escape in a horizon [windows]: nearest to 0, NaN if nowhere."""
+    roots = np.roots(bent.coefficients[2::-1] + np.array([0.0, 0.0, math.log(horizon)]))
+    real = roots[np.isreal(roots)].real
+    return float(min(real, key=abs, default=math.nan))
+
+
+def _steep(bent: Hazard, at: float) -> bool:
+    """Whether the law is at its edge half as steep as in the middle at least: near its vertex there is no edge."""
+    b, c = bent.coefficients[1:3].tolist()
+    return abs(b + 2 * c * at) > abs(b) / 2  # false for NaN

@@ -6,6 +6,7 @@
 | `_zone_tables`   | chaotic zones beside published ones                                         |
 | `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
 | `_slopes`        | how every exact edge answers to the design                                  |
+| `_lasting`       | how edges of lasting chaos answer to the design, with error bars           |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
 | `_statics`       | statics and the impact of a roller as tables                                |
@@ -44,6 +45,11 @@ from ._findings import (
     Map as Map,
     examine as examine,
     require_some as require_some,
+)
+from ._lasting import (
+    lasting_document as lasting_document,
+    lasting_table as lasting_table,
+    lasting_width_table as lasting_width_table,
 )
 from ._map import (
     RPM as RPM,
