@@ -60,7 +60,18 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
     assert "Balance may only get better: eccentricity of at most 23 um" in text
     worse = document(capsys, *DESIGN, "--worse-balance", "--out", str(tmp_path))
-    assert worse["vary"]["eccentricity"] == pytest.approx([5e-6, 60e-6])
+    assert worse["vary"]["eccentricity"] == pytest.approx([5e-6, 60e-6]) and worse["trade_offs"] is None
+    terms = [lambda m: m.guidance_gap, lambda m: m.eccentricity, bowl, bowl]
+
+    def trade_off(model: Any, vary: Any, asked: Any, **given: Any) -> Any:
+        return jc.design.trade_off(model, vary, dict(zip(asked, map(jc.design.Smooth, terms), strict=True)), **given)
+
+    monkeypatch.setattr(_design, "trade_off", trade_off)
+    front = document(capsys, *DESIGN, "--front", "8", "--out", str(tmp_path))
+    assert len(front["trade_offs"]) == 10 and front["trade_offs"][-1]["efficient"]  # no other has as little of the bowl
+    assert front["trade_offs"][-1]["guidance_gap"] == pytest.approx(front["optimum"]["guidance_gap"])
+    assert front["trade_offs"][-2]["wear load [N m/s]"] == pytest.approx(23e-6)
+    assert Path(front["figure"]).stat().st_size > 10_000 and Path(front["front"]).stat().st_size > 10_000
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.design import COSTS
+from jaxcage.design import COSTS, Smooth, trade_off
 from tests.test_identification import DOUBLING, FOLD, METHOD, TRUTH, DoubleWell
 
 
@@ -302,3 +302,28 @@ def test_sobol_indices_say_when_they_are_not_to_be_believed():
     assert above.doubtful == ("gap",) and "between 0 and 1" in str(above.warning)
     wide = dataclasses.replace(sure, first_interval=dict(gap=(-0.1, 1.1)))  # 1.2 wide: 16 times the samples for .3
     assert wide.doubtful == ("gap",) and wide.samples_wanted == 1024 and "1024 base samples" in str(wide)
+
+
+def test_designs_that_no_other_beats_are_found_among_all():
+    """Squares around two centres: on the line between these neither becomes smaller but at the price of the other."""
+    vary = {"guidance_gap": (3e-4, 6e-4), "eccentricity": (5e-6, 6e-5)}
+    share = lambda m: (m.guidance_gap - 3e-4) / 3e-4
+    far = lambda m: (m.eccentricity - 5e-6) / 5.5e-5
+    first = Smooth(lambda m: (share(m) - 0.2) ** 2 + far(m) ** 2)
+    second = Smooth(lambda m: (share(m) - 0.7) ** 2 + far(m) ** 2)
+    line = np.array([[0.2, 0.0], [0.45, 0.0], [0.7, 0.0], [0.1, 0.0], [0.45, 0.5]])
+    found = trade_off(jc.case("1a"), vary, {"a": first, "b": second}, designs=16, beside=line)
+    assert found.values.shape == (21, 2)
+    assert found.efficient[-5:].tolist() == [True, True, True, False, False]
+    assert found.parameters(16)["guidance_gap"] == pytest.approx(3.6e-4)
+    for i in np.flatnonzero(~found.efficient):
+        beaten = np.all(found.values <= found.values[i], axis=1) & np.any(found.values < found.values[i], axis=1)
+        assert np.any(beaten)
+    lost = dataclasses.replace(found, values=np.where(np.arange(21)[:, None] == 17, np.nan, found.values))
+    assert not lost.efficient[17] and lost.efficient[16]
+    assert str(found).startswith(f"{np.sum(found.efficient)} of 21 designs that no other beats")
+
+
+def test_a_trade_off_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="`objectives` must hold at least one"):
+        trade_off(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, {})

@@ -14,23 +14,26 @@ from .. import report
 from .._errors import InputError
 from ..analysis import Sweep, zones
 from ..design import (
+    MEASURES,
     AbstractObjective,
     ChaosMeasure,
     DesignSpace,
     LandMeasure,
     Optimised,
     Robust,
+    TradeOff,
     chaotic_width,
     cost,
     global_sensitivity,
     land_loads,
     optimise,
     tolerance_budget,
+    trade_off,
 )
 from ..integrate import DEFAULT_ERROR
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
-from ..plotting import design_figure, elasticity_bars
+from ..plotting import design_figure, elasticity_bars, trade_off_diagram
 from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job
@@ -71,6 +74,7 @@ def design(job: Job[DesignOptions]) -> Report:
             report=lambda step, _: say("search", step, options.steps),
         )
         searched = job.seconds
+        front = _front(job, width, vary, found, say) if options.front else None
         models = {"before": job.model, "after": found.best.model}
         say("fresh sweeps", 0, 1)
         checked = {name: _check(model, options) for name, model in models.items()}
@@ -80,6 +84,8 @@ def design(job: Job[DesignOptions]) -> Report:
             with concurrent.futures.ThreadPoolExecutor() as pool:  # a search keeps one core busy
                 loss = dict(zip(models, pool.map(search, models.values()), strict=True))
     job.figure(design_figure(found, checked["before"], checked["after"]))
+    if front is not None:
+        job.draw(lambda ax: trade_off_diagram(front, ax), (9.0, 6.0), f"{job.name}: trade-offs", "front", "_front")
     kept.unlink(missing_ok=True)
     chaotic = {name: zones(swept) for name, swept in checked.items()}
     document = {
@@ -95,11 +101,13 @@ def design(job: Job[DesignOptions]) -> Report:
         "chaotic_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in chaotic.items()},
         "synchronous_loss_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in loss.items()},
         "search_seconds": round(searched, 1),
+        "trade_offs": None if front is None else report.trade_off_document(front),
     }
     tables = [
         report.parameters_table(job.name, job.model, found, document),
         report.optima_table(found),
         *report.before_and_after_tables(document),
+        *([] if front is None else [report.trade_off_table(job.name, front)]),
     ]
     return Report(document, tables, [*_notes(document, found), *([balance] if balance else [])])
 
@@ -126,6 +134,22 @@ def _objective(job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tup
     prices = {"wear load": options.wear, "peak land force": options.force}
     terms = [LandMeasure(width, what).relative(space, price) for what, price in prices.items() if price]
     return sum(terms, start=width)
+
+
+def _front(
+    job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tuple[float, float]], found: Optimised, say: Say
+) -> TradeOff:
+    """Designs all over the bounds by what each term of the objective measures, with the design and its optimum."""
+    say("front", 0, 1)
+    terms = {"chaotic speeds [rpm]": width} | {
+        f"{what} [{unit}]": LandMeasure(width, what) for what, unit in MEASURES.items()
+    }
+    space = found.space
+    best = np.array([u.place(found.best.values[u.name]) for u in space.unknowns])
+    beside = np.stack([np.clip(space.place, 0.0, 1.0), best])
+    return trade_off(
+        job.model, vary, terms | {"cost": cost()}, designs=job.options.front, seed=job.options.seed, beside=beside
+    )
 
 
 def _loads(models: Mapping[str, CageModel], checked: Mapping[str, Sweep]) -> dict[str, dict[str, float]]:

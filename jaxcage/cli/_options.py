@@ -311,6 +311,9 @@ class DesignOptions(VaryOptions):
     """What the wear load of the guiding land as it is now is worth, in rpm of chaotic speeds."""
     force: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What the peak force on the guiding land as it is now is worth, in rpm of chaotic speeds."""
+    front: FromZero = 0
+    """Designs all over the bounds, of which those are listed that no other beats in chaotic speeds, wear load, peak
+    force and cost at once; 0 lists none."""
     worse_balance: bool = False
     """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
     scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()

@@ -16,6 +16,7 @@
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
 | `_optimise` | designs made better by gradient                                               |
+| `_trade_off`| several objectives at once: designs that no other beats in everything        |
 | `_scatter`  | Sobol indices, tolerance budgets, Pareto fronts                               |
 """
 
@@ -34,7 +35,7 @@ from ._fit import (
     determined as determined,
     fit_edges as fit_edges,
 )
-from ._land import LandMeasure as LandMeasure, land_loads as land_loads
+from ._land import MEASURES as MEASURES, LandMeasure as LandMeasure, land_loads as land_loads
 from ._lasting import (
     LastingEdge as LastingEdge,
     LastingWidth as LastingWidth,
@@ -63,10 +64,11 @@ from ._scatter import (
 from ._screen import Candidate as Candidate, screen as screen
 from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motion as regular_motion
 from ._tracked import TrackedEdges as TrackedEdges
+from ._trade_off import TradeOff as TradeOff, trade_off as trade_off
 from ._unknowns import Unknown as Unknown
 
 
 check_layer(
     globals(),
-    "fit_edges global_sensitivity optimise pareto_front screen tolerance_budget",
+    "fit_edges global_sensitivity optimise pareto_front screen tolerance_budget trade_off",
 )

@@ -30,7 +30,11 @@ from ._branches import (
     polyline as polyline,
 )
 from ._chance import chance_of_chaos as chance_of_chaos
-from ._design import design_figure as design_figure, design_history as design_history
+from ._design import (
+    design_figure as design_figure,
+    design_history as design_history,
+    trade_off_diagram as trade_off_diagram,
+)
 from ._elasticities import EDGE_COLOURS as EDGE_COLOURS, elasticity_bars as elasticity_bars
 from ._history import (
     force_history as force_history,

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..analysis import Sweep
-from ..design import Optimised
+from ..design import Optimised, TradeOff
 from ._orbit_diagram import exponent_strip, orbit_diagram
 from ._style import BLUE, GREY, VERMILION, axes_or_new, new_figure
 
@@ -26,6 +26,23 @@ def design_history(found: Optimised, ax: Axes | None = None) -> Axes:
             ax.plot(value, color=GREY, linewidth=0.9)
     ax.set(xlabel="Step", ylabel="Objective [rpm]")
     ax.legend(loc="upper right", frameon=False)
+    return ax
+
+
+def trade_off_diagram(found: TradeOff, ax: Axes | None = None) -> Axes:
+    """All designs by their first two objectives; those that no other beats in everything in colour, the design itself
+    and its optimum, which come last, marked."""
+    ax = axes_or_new(ax, height=5.0)
+    x, y = found.values[:, 0], found.values[:, 1]
+    good = found.efficient
+    ax.plot(x[~good], y[~good], "o", color=GREY, markersize=4, label="beaten by another in everything")
+    ax.plot(x[good], y[good], "o", color=BLUE, markersize=6, label="beaten by none")
+    for i, name, marker in ((-2, "before", "s"), (-1, "after", "D")):
+        ax.plot(x[i], y[i], marker, color=VERMILION, markersize=10, fillstyle="none", linestyle="", label=name)
+    ax.set(xlabel=found.names[0].capitalize(), ylabel=found.names[1].capitalize())
+    if np.nanmin(y) > 0 and np.nanmax(y) > 30 * np.nanmin(y):
+        ax.set_yscale("log")
+    ax.legend(loc="best", frameon=False)
     return ax
 
 

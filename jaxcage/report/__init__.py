@@ -38,6 +38,8 @@ from ._design_tables import (
     optima_table as optima_table,
     parameters_table as parameters_table,
     sobol_table as sobol_table,
+    trade_off_document as trade_off_document,
+    trade_off_table as trade_off_table,
 )
 from ._findings import (
     AllFailed as AllFailed,
