@@ -39,7 +39,8 @@ def trade_off_diagram(found: TradeOff, ax: Axes | None = None) -> Axes:
     ax.plot(x[good], y[good], "o", color=BLUE, markersize=6, label="beaten by none")
     for i, name, marker in ((-2, "before", "s"), (-1, "after", "D")):
         ax.plot(x[i], y[i], marker, color=VERMILION, markersize=10, fillstyle="none", linestyle="", label=name)
-    ax.set(xlabel=found.names[0].capitalize(), ylabel=found.names[1].capitalize())
+    upper = lambda name: name[:1].upper() + name[1:]
+    ax.set(xlabel=upper(found.names[0]), ylabel=upper(found.names[1]))
     if np.nanmin(y) > 0 and np.nanmax(y) > 30 * np.nanmin(y):
         ax.set_yscale("log")
     ax.legend(loc="best", frameon=False)
