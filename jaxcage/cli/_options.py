@@ -433,6 +433,22 @@ class UnknownsOptions(_Range, IntegrationOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class CompareOptions(_Length, _Range, IntegrationOptions):
+    """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land."""
+
+    other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")]
+    """The design to compare it with, a case or a TOML file. Both run at the same speeds of the shaft."""
+    count: Annotated[int, whole(2)] = 126
+    """Number of speeds."""
+    at: str = ""
+    """Speeds to be shown in a table, e.g. "8500, 12000" [rpm] or "20000 rpm shaft"; five of the range if left out."""
+    confirm: bool = True
+    """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
+    horizon: FromZero = 3000
+    """Revolutions to which chaos is followed, to tell how long it lasts; 0 does not ask."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
@@ -449,6 +465,7 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "zones": (ZonesOptions, "_sweep.zones_over_speed"),
     "bifurcations": (SearchOptions, "_orbits.bifurcations"),
     "gradient": (GradientOptions, "_orbits.gradient"),
+    "compare": (CompareOptions, "_compare.compare"),
     "map": (MapOptions, "_map.map_of"),
     "study": (StudyOptions, "_study.study"),
     "design": (DesignOptions, "_design.design"),

@@ -16,6 +16,7 @@
 | `_elasticities`  | elasticities of edges as bars                                           |
 | `_zone_strip`    | zones of both kinds and operating speeds as bars                        |
 | `_chance`        | chance of chaos over speed with its error bars                          |
+| `_compare`       | two designs beside each other on one scale                              |
 | `_design`        | a search for a better design, and what came of it                       |
 | `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
@@ -30,6 +31,7 @@ from ._branches import (
     polyline as polyline,
 )
 from ._chance import chance_of_chaos as chance_of_chaos
+from ._compare import over_speed as over_speed, sweeps_beside as sweeps_beside
 from ._design import design_figure as design_figure, design_history as design_history
 from ._elasticities import EDGE_COLOURS as EDGE_COLOURS, elasticity_bars as elasticity_bars
 from ._history import (
