@@ -449,6 +449,20 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class RunUpOptions(_Range, IntegrationOptions):
+    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs."""
+
+    called: ClassVar[Mapping[str, str]] = {"settle": "discard"}
+
+    rate: Annotated[float, number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0
+    """Speed gained per second [rpm/s], in the mean over the ramp; the cage's, or the shaft's if the file says so."""
+    windows: FromTwo = 100
+    """Parts into which each ramp is cut, in each of which the orbit's size is read."""
+    discard: FromZero = 100
+    """Revolutions at the first speed before the ramp begins."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
@@ -466,6 +480,7 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "bifurcations": (SearchOptions, "_orbits.bifurcations"),
     "gradient": (GradientOptions, "_orbits.gradient"),
     "compare": (CompareOptions, "_compare.compare"),
+    "runup": (RunUpOptions, "_runup.runup"),
     "map": (MapOptions, "_map.map_of"),
     "study": (StudyOptions, "_study.study"),
     "design": (DesignOptions, "_design.design"),
