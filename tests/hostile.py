@@ -32,6 +32,7 @@ from jaxcage.cli import (
     _bearing,
     _compare,
     _design,
+    _identify,
     _label_map,
     _main,
     _one_speed,
@@ -420,7 +421,7 @@ DEFAULT_TABLES = (("rib",), ("bearing", "roller_material"), ("impact", "oscillat
 
 COMMANDS = {name: (kind, typing.get_type_hints(kind)) for name, (kind, _) in _options.COMMANDS.items()}
 """Command -> its options and their types."""
-PLACED = {"case", "other", "path"}
+PLACED = {"case", "other", "path", "measured"}
 """Options that go without their names."""
 NAMES = (*(".".join(path[-1:]) for path in FIELDS), "speed", "oil", "support.damping", "film.smoothing")
 SPEEDS = "8500, 8500 rpm, 900 rad/s, 2500, 27500, 12000, 1e-3, 1e308".split(", ")
@@ -592,6 +593,7 @@ HEAVY = (
     (_design, "optimise"),
     (_design, "global_sensitivity"),
     (_unknowns, "sobol_of"),
+    (_identify, "identify"),
     (_runup, "ramp_up_down"),
     (_study, "run_study"),
     (_page.report, "examine"),

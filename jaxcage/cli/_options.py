@@ -463,6 +463,21 @@ class RunUpOptions(_Range, IntegrationOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class IdentifyOptions(IntegrationOptions):
+    """Narrow the ranges of a TOML file by what was measured on the machine, and write them to a new file."""
+
+    measured: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CSV")]
+    """Measurements: a file with the columns quantity, speed, value, tolerance; a quantity is `whirl frequency` [Hz],
+    `orbit size` [mm], or without a value `rattles` or `calm`."""
+    draws: Annotated[int, whole(16)] = 128
+    """Draws from the ranges, in each stage."""
+    stages: FromOne = 4
+    """Times that the ranges close around the best draws, at most."""
+    seed: FromZero = 0
+    """Seed of the draws."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
@@ -486,6 +501,7 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "design": (DesignOptions, "_design.design"),
     "sensitivity": (SensitivityOptions, "_design.sensitivity"),
     "unknowns": (UnknownsOptions, "_unknowns.unknowns"),
+    "identify": (IdentifyOptions, "_identify.identify_from"),
     "poincare": (PoincareOptions, "_one_speed.poincare_at"),
     "statics": (StaticsOptions, "_bearing.statics"),
     "impact": (ImpactOptions, "_bearing.impact"),

@@ -13,6 +13,7 @@
 | `_sources`       | every parameter with its unit and where its value comes from                |
 | `_findings`      | everything that a page shows, computed                                      |
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
+| `_narrowed`      | ranges that measurements narrowed                                           |
 | `_compare`       | two designs side by side                                                    |
 | `_design_tables` | designs and their tolerances                                                |
 | `_paper_tables`  | the paper's results beside ours                                             |
@@ -65,6 +66,11 @@ from ._map import (
     largest_exponents as largest_exponents,
     parameter_axis as parameter_axis,
     speed_axis as speed_axis,
+)
+from ._narrowed import (
+    measured_table as measured_table,
+    narrowed_document as narrowed_document,
+    narrowed_table as narrowed_table,
 )
 from ._operating import (
     Operating as Operating,
