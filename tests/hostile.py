@@ -30,7 +30,9 @@ import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import (
     _bearing,
+    _compare,
     _design,
+    _identify,
     _label_map,
     _main,
     _one_speed,
@@ -38,6 +40,7 @@ from jaxcage.cli import (
     _orbits,
     _page,
     _reproduce,
+    _runup,
     _study,
     _sweep,
     _unknowns,
@@ -418,6 +421,8 @@ DEFAULT_TABLES = (("rib",), ("bearing", "roller_material"), ("impact", "oscillat
 
 COMMANDS = {name: (kind, typing.get_type_hints(kind)) for name, (kind, _) in _options.COMMANDS.items()}
 """Command -> its options and their types."""
+PLACED = {"case", "other", "path", "measured"}
+"""Options that go without their names."""
 NAMES = (*(".".join(path[-1:]) for path in FIELDS), "speed", "oil", "support.damping", "film.smoothing")
 SPEEDS = "8500, 8500 rpm, 900 rad/s, 2500, 27500, 12000, 1e-3, 1e308".split(", ")
 WRONG_NUMBERS = (
@@ -450,6 +455,7 @@ TEXTS: dict[str, Sequence[str]] = {
     "vary": VARIED,
     "scatter": ["guidance_gap=10%", "eccentricity=rayleigh", "guidance_gap=nan%", "x=1%", "guidance_gap=0.1", "=", "x"],
     "topics": ["film", "statics, contact", "film,film", ",", "film;oil", "exponents bifurcations"],
+    "at": ["8500", "8500, 12000", "900 rad/s", "21000 rpm shaft", ",", "nan", "5-4", "0", "...", "1e400"],
     "operating": [
         "8500",
         "8500, 12000-15000",
@@ -497,11 +503,13 @@ class Line:
 def _texts(name: str, kind: Any) -> st.SearchStrategy[str]:
     if name in TEXTS:
         return mostly(st.sampled_from(TEXTS[name][:2]), st.sampled_from(TEXTS[name]) | NOISE, 5)
-    if name in ("case", "path"):
+    if name in PLACED:
         named = (
-            CASES if name == "case" else ["new.toml", "folder/new.toml", "valid.toml", "a.txt", "é.toml", "\udcff.toml"]
+            CASES
+            if name in ("case", "other")
+            else ["new.toml", "folder/new.toml", "valid.toml", "a.txt", "é.toml", "\udcff.toml"]
         )
-        right = st.sampled_from(named[: 10 if name == "case" else 2])
+        right = st.sampled_from(named[: 10 if name in ("case", "other") else 2])
         return mostly(right, st.sampled_from(named) | NOISE.filter(lambda s: not s.startswith("-")), 9)
     usual = (
         COUNTS if "int" in str(kind) else SPEEDS if UNIT_OF.get(name) == "rpm" else ["0.5", "1", "5", "1e-6", "4 kN"]
@@ -517,11 +525,11 @@ def lines(draw: Any) -> Line:
     options, hints = COMMANDS[command]
     fields = {f.name: f for f in dataclasses.fields(options)}
     required = [n for n, f in fields.items() if f.default is dataclasses.MISSING]
-    some = draw(st.lists(st.sampled_from(sorted(set(fields) - {"case", "path"})), max_size=4))
+    some = draw(st.lists(st.sampled_from(sorted(set(fields) - PLACED)), max_size=4))
     given: dict[str, list[str]] = {}
     arguments = [command]
     for name in [*required, *some]:
-        if name in ("case", "path"):
+        if name in PLACED:
             given[name] = [draw(_texts(name, str))]
             arguments += given[name]
             continue
@@ -576,6 +584,7 @@ def _would_run(*args: Any, **kwargs: Any) -> Any:
 
 HEAVY = (
     (_sweep, "sweep"),
+    (_compare, "sweep"),
     (_one_speed, "sweep"),
     (_one_speed, "simulate"),
     (_orbits, "synchronous_orbits"),
@@ -584,6 +593,8 @@ HEAVY = (
     (_design, "optimise"),
     (_design, "global_sensitivity"),
     (_unknowns, "sobol_of"),
+    (_identify, "identify"),
+    (_runup, "ramp_up_down"),
     (_study, "run_study"),
     (_page.report, "examine"),
     (_reproduce, "run_all"),

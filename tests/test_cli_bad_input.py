@@ -25,8 +25,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 WHOLE = "Interrupted: files of earlier runs are as they were, and the same command starts over.\n"
 COMMANDS = (
-    "init, simulate, sweep, zones, bifurcations, gradient, map, study, design, "
-    "sensitivity, unknowns, poincare, statics, impact, reproduce, validate, report"
+    "init, simulate, sweep, zones, bifurcations, gradient, compare, runup, map, study, design, "
+    "sensitivity, unknowns, identify, poincare, statics, impact, reproduce, validate, report"
 )
 
 

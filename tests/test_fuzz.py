@@ -136,7 +136,7 @@ def test_nan_and_infinity_are_refused_in_every_option(capsys: pytest.CaptureFixt
     kind, _ = hostile.COMMANDS[command]
     with hostile.playground(tmp_path), hostile.without_computing():
         for name in (name for of, name in NUMBERS if of == command):
-            required = {"case": "1a", "speed": "--speed=8500"}
+            required = {"case": "1a", "other": "1b", "measured": "data.txt", "speed": "--speed=8500"}
             needed = [required[n] for n in required if n != name and n in kind.__dataclass_fields__]
             needed = [n for n in needed if command != "map" or n == "1a"]
             flag = "--" + name.replace("_", "-")

@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -51,7 +51,7 @@ class Job(Generic[Given]):
             if options.case.lower() in WHOLE_BEARINGS:
                 self.name, self.whole = options.case.lower(), _whole_bearing(options.case, command)
             else:
-                self.name, self.model, self.published, self.file = _subject(options.case)
+                self.name, self.model, self.published, self.file = read_subject(options.case)
                 self.options = self._of_the_cage(options)
 
     whole: BearingModel | None = None
@@ -196,8 +196,20 @@ def _whole_bearing(name: str, command: str) -> BearingModel:
     return whole_bearing(name)
 
 
-def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None, BearingFile | None]:
-    """Name and model of a case or TOML file; a broken design rule is said on standard error."""
+class Subject(NamedTuple):
+    """A case or a TOML file."""
+
+    name: str
+    model: CageModel
+    published: PublishedCase | None
+    file: BearingFile | None
+
+
+def read_subject(given: str) -> Subject:
+    """A case or TOML file by its name; a broken design rule is said on standard error.
+
+    **Raises:** `InputError`.
+    """
     file = None
     if given in PUBLISHED_CASES:
         name, model, published = given, case(given), PUBLISHED_CASES[given]
@@ -212,7 +224,7 @@ def _subject(given: str) -> tuple[str, CageModel, PublishedCase | None, BearingF
     broken = design_rule_violations(model.bearing, model.guidance_gap)
     if broken:
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
-    return name, model, published, file
+    return Subject(name, model, published, file)
 
 
 def _method(options: IntegrationOptions) -> AbstractMethod | None:

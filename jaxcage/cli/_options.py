@@ -455,6 +455,51 @@ class UnknownsOptions(_Range, IntegrationOptions):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class CompareOptions(_Length, _Range, IntegrationOptions):
+    """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land."""
+
+    other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")]
+    """The design to compare it with, a case or a TOML file. Both run at the same speeds of the shaft."""
+    count: Annotated[int, whole(2)] = 126
+    """Number of speeds."""
+    at: str = ""
+    """Speeds to be shown in a table, e.g. "8500, 12000" [rpm] or "20000 rpm shaft"; five of the range if left out."""
+    confirm: bool = True
+    """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
+    horizon: FromZero = 3000
+    """Revolutions to which chaos is followed, to tell how long it lasts; 0 does not ask."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunUpOptions(_Range, IntegrationOptions):
+    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs."""
+
+    called: ClassVar[Mapping[str, str]] = {"settle": "discard"}
+
+    rate: Annotated[float, number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0
+    """Speed gained per second [rpm/s], in the mean over the ramp; the cage's, or the shaft's if the file says so."""
+    windows: FromTwo = 100
+    """Parts into which each ramp is cut, in each of which the orbit's size is read."""
+    discard: FromZero = 100
+    """Revolutions at the first speed before the ramp begins."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class IdentifyOptions(IntegrationOptions):
+    """Narrow the ranges of a TOML file by what was measured on the machine, and write them to a new file."""
+
+    measured: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CSV")]
+    """Measurements: a file with the columns quantity, speed, value, tolerance; a quantity is `whirl frequency` [Hz],
+    `orbit size` [mm], or without a value `rattles` or `calm`."""
+    draws: Annotated[int, whole(16)] = 128
+    """Draws from the ranges, in each stage."""
+    stages: FromOne = 4
+    """Times that the ranges close around the best draws, at most."""
+    seed: FromZero = 0
+    """Seed of the draws."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class InitOptions(AnyOptions):
     """A commented TOML file that describes a bearing, to be changed and given to the other commands."""
 
@@ -471,11 +516,14 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "zones": (ZonesOptions, "_sweep.zones_over_speed"),
     "bifurcations": (SearchOptions, "_orbits.bifurcations"),
     "gradient": (GradientOptions, "_orbits.gradient"),
+    "compare": (CompareOptions, "_compare.compare"),
+    "runup": (RunUpOptions, "_runup.runup"),
     "map": (MapOptions, "_map.map_of"),
     "study": (StudyOptions, "_study.study"),
     "design": (DesignOptions, "_design.design"),
     "sensitivity": (SensitivityOptions, "_design.sensitivity"),
     "unknowns": (UnknownsOptions, "_unknowns.unknowns"),
+    "identify": (IdentifyOptions, "_identify.identify_from"),
     "poincare": (PoincareOptions, "_one_speed.poincare_at"),
     "statics": (StaticsOptions, "_bearing.statics"),
     "impact": (ImpactOptions, "_bearing.impact"),

@@ -63,13 +63,13 @@ def _run(
     system: AbstractForcedSystem,
     method: ControlledSteps,
     speeds: Float[Array, " revolutions"],
-    rise: Scalar,
+    rises: Float[Array, " revolutions"],
     y0: State,
     samples: int,
 ) -> tuple[Float[Array, "revolutions samples dim"], Float[Array, " revolutions"], Float[Array, " revolutions"], Array]:
-    """Whole revolutions one after the other; within one the speed rises by `rise`, in `samples` small steps."""
+    """Whole revolutions one after the other; within one the speed rises by one of `rises`, in `samples` steps."""
 
-    def part(carry: tuple, i: Array, first: Array) -> tuple[tuple, Array]:
+    def part(carry: tuple, i: Array, first: Array, rise: Array) -> tuple[tuple, Array]:
         y, peak, error, outcome = carry
         strobe = strobe_map(system, first + rise * (i.astype(float) + 0.5) / samples, method)
         stretch = strobe.part(y, i, samples)
@@ -79,15 +79,15 @@ def _run(
         y1 = tuple(jnp.where(code == 0, c, jnp.nan) for c in stretch.y)
         return (y1, jnp.maximum(peak, stretch.peak), error, code), jnp.stack(y)
 
-    def revolution(carry: tuple, first: Array) -> tuple[tuple, tuple[Array, ...]]:
+    def revolution(carry: tuple, speeds: tuple[Array, Array]) -> tuple[tuple, tuple[Array, ...]]:
         carry = (carry[0], jnp.asarray(system.excursion(carry[0]), dtype=float), jnp.zeros(()), carry[3])
-        carry, states = jax.lax.scan(lambda c, i: part(c, i, first), carry, jnp.arange(samples))
+        carry, states = jax.lax.scan(lambda c, i: part(c, i, *speeds), carry, jnp.arange(samples))
         return carry, (states, *carry[1:3])
 
     admitted = outcome_code(strobe_map(system, speeds[0], method).admit(y0))
     y0 = tuple(jnp.where(admitted == 0, c, jnp.nan) for c in y0)
     start = (y0, jnp.zeros(()), jnp.zeros(()), admitted)
-    (*_, code), (states, peaks, errors) = jax.lax.scan(revolution, start, speeds)
+    (*_, code), (states, peaks, errors) = jax.lax.scan(revolution, start, (speeds, rises))
     return states, peaks, errors, code
 
 
@@ -157,7 +157,7 @@ def simulate(
     require_speeds(system, value)
     chosen = _method(method, samples)
     speeds = np.full(discard + revolutions, value)
-    ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(0.0), _start(system, value, start), samples)
+    ran = _run(system, chosen, jnp.asarray(speeds), jnp.zeros(speeds.size), _start(system, value, start), samples)
     return _trajectory(ran, speeds, 0.0, samples, discard)
 
 
@@ -168,6 +168,7 @@ def ramp(
     *,
     revolutions: int,
     samples: int = 64,
+    discard: int = 0,
     start: State | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
@@ -176,18 +177,19 @@ def ramp(
     Within a revolution the speed rises in `samples` steps. The tangential force M e dw/dt of the unbalance is left out:
     its ratio to M e w^2 is the relative change of speed in one radian.
 
-    **Arguments:** system; first and last speed [rad/s]; number of revolutions of the whole ramp; the rest as in
-    `simulate`.
+    **Arguments:** system; first and last speed [rad/s]; number of revolutions of the whole ramp; `discard`:
+    revolutions at the first speed before it, which are left out; the rest as in `simulate`.
 
     **Returns:** `Trajectory` with the speed of each sample.
     """
     require_x64()
     require_known("ramp", INSTEAD, system, first, last, start)
     low, high = float(first), float(last)
-    _check(min(low, high), revolutions, samples)
+    _check(min(low, high), revolutions, samples, discard)
     require_speeds(system, max(low, high))
     chosen = _method(method, samples)
     rise = (high - low) / revolutions
-    speeds = low + rise * np.arange(revolutions)
-    ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(rise), _start(system, low, start), samples)
-    return _trajectory(ran, speeds, rise, samples, 0)
+    speeds = low + rise * np.maximum(np.arange(-discard, revolutions), 0)
+    rises = np.where(np.arange(-discard, revolutions) < 0, 0.0, rise)
+    ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(rises), _start(system, low, start), samples)
+    return _trajectory(ran, speeds, rise, samples, discard)

@@ -7,6 +7,8 @@
 | `_config`       | TOML to `CageModel`, with every value checked                             |
 | `_write_config` | `CageModel` to nested mapping or TOML                                     |
 | `_ranges`       | values that are known within a range only                                 |
+| `_measurements` | what was measured on a machine, from CSV                                  |
+| `_narrow`       | a TOML file with other ranges                                             |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
 | `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
@@ -45,6 +47,8 @@ from ._files import (
     replacing as replacing,
     sync as sync,
 )
+from ._measurements import Measurement as Measurement, read_measurements as read_measurements
+from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
 from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner

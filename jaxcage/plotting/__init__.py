@@ -16,6 +16,8 @@
 | `_elasticities`  | elasticities of edges as bars                                           |
 | `_zone_strip`    | zones of both kinds and operating speeds as bars                        |
 | `_chance`        | chance of chaos over speed with its error bars                          |
+| `_compare`       | two designs beside each other on one scale                              |
+| `_ramp`          | run-up and run-down                                                     |
 | `_design`        | a search for a better design, and what came of it                       |
 | `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
@@ -30,6 +32,7 @@ from ._branches import (
     polyline as polyline,
 )
 from ._chance import chance_of_chaos as chance_of_chaos
+from ._compare import over_speed as over_speed, sweeps_beside as sweeps_beside
 from ._design import (
     design_figure as design_figure,
     design_history as design_history,
@@ -57,6 +60,7 @@ from ._orbit_diagram import (
     zoomed_diagram as zoomed_diagram,
 )
 from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
+from ._ramp import ramp_figure as ramp_figure
 from ._section import START_COLOURS as START_COLOURS, strobe_section as strobe_section
 from ._shaft import add_shaft_axes as add_shaft_axes
 from ._stability_map import stability_map as stability_map

@@ -6,7 +6,8 @@ from matplotlib.figure import Figure
 
 from ..analysis import Sweep
 from ..design import Optimised, TradeOff
-from ._orbit_diagram import exponent_strip, orbit_diagram
+from ._compare import draw_beside
+from ._orbit_diagram import legend_below
 from ._style import BLUE, GREY, VERMILION, axes_or_new, new_figure
 
 
@@ -48,15 +49,12 @@ def trade_off_diagram(found: TradeOff, ax: Axes | None = None) -> Axes:
 
 
 def design_figure(found: Optimised, before: Sweep, after: Sweep) -> Figure:
-    """The search above; orbit diagrams and exponents of the first design and the chosen one below."""
+    """The search above; orbit diagrams and exponents of the first design and the chosen one below,
+    both on the scale that holds both."""
     figure = new_figure(12.0, 8.0)
     grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.6, 1.0))
     design_history(found, figure.add_subplot(grid[0, :]))
-    shared = None
-    for column, (name, sweep) in enumerate((("before", before), ("after", after))):
-        above = figure.add_subplot(grid[1, column], sharey=shared)
-        shared = shared or above
-        orbit_diagram(sweep, 1, above)
-        above.set_title(name, loc="left", fontsize=10)
-        exponent_strip(sweep, figure.add_subplot(grid[2, column], sharex=above))
+    cells = grid[1:, :].subgridspec(2, 2, height_ratios=(1.6, 1.0)).subplots(sharex="col")
+    draw_beside(np.asarray(cells), ("before", "after"), (before, after))
+    legend_below(figure, *np.asarray(cells).ravel())
     return figure

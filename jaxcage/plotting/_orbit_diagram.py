@@ -157,12 +157,12 @@ def sweep_figure(
             mark_published(ax, published, text=ax is above)
     above.set_xlabel("")
     below.set_ylabel("largest exponent\nper revolution " + quantity("largest_exponent").symbol)
-    _legend_below(figure, above, below)
+    legend_below(figure, above, below)
     above.set_title(title, loc="left", fontsize=11, pad=18 if published is not None else 8)
     return figure
 
 
-def _legend_below(figure: Figure, *axes: Axes) -> None:
+def legend_below(figure: Figure, *axes: Axes) -> None:
     """One legend for all axes beneath them, where it hides no point."""
     entries = {}
     for ax in axes:

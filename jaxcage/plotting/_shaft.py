@@ -1,5 +1,7 @@
 """The shaft's speed beneath the cage's, on figures over speed."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,14 +16,14 @@ BELOW = 36.0
 """From the axis of the cage speed to that of the shaft speed [points]."""
 
 
-def add_shaft_axes(figure: Figure, cage_speed_ratio: float) -> Figure:
+def add_shaft_axes(figure: Figure, cage_speed_ratio: float, axes: Sequence[Axes] | None = None) -> Figure:
     """A second axis, of the shaft, under every axis of `figure` that is named as the cage's speed.
 
-    **Arguments:** figure; cage speed over shaft speed.
+    **Arguments:** figure; cage speed over shaft speed; those of its axes that are meant, all if left out.
 
     **Returns:** the same figure.
     """
-    for ax in list(figure.axes):
+    for ax in list(figure.axes if axes is None else axes):
         if ax.get_xlabel() == quantity("speed_rpm").label:
             _add_below(ax, cage_speed_ratio)
     return figure

@@ -14,6 +14,8 @@
 | `_sources`       | every parameter with its unit and where its value comes from                |
 | `_findings`      | everything that a page shows, computed                                      |
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
+| `_narrowed`      | ranges that measurements narrowed                                           |
+| `_compare`       | two designs side by side                                                    |
 | `_design_tables` | designs and their tolerances                                                |
 | `_paper_tables`  | the paper's results beside ours                                             |
 | `_page_tables`   | tables that no command prints                                               |
@@ -30,6 +32,15 @@ from ._chances import (
     operating_chances as operating_chances,
     unknowns_table as unknowns_table,
     verdict_table as verdict_table,
+)
+from ._compare import (
+    Compared as Compared,
+    at_speeds_compared as at_speeds_compared,
+    compared_document as compared_document,
+    compared_zones_table as compared_zones_table,
+    differences as differences,
+    differences_table as differences_table,
+    overall_table as overall_table,
 )
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (
@@ -63,6 +74,11 @@ from ._map import (
     largest_exponents as largest_exponents,
     parameter_axis as parameter_axis,
     speed_axis as speed_axis,
+)
+from ._narrowed import (
+    measured_table as measured_table,
+    narrowed_document as narrowed_document,
+    narrowed_table as narrowed_table,
 )
 from ._operating import (
     Operating as Operating,

@@ -15,6 +15,7 @@
 | `_run`      | runs what a store lacks, in this process                                      |
 | `_dask`     | or on dask.distributed                                                        |
 | `_adaptive` | a grid of labels refined where the label changes                              |
+| `_identify` | ranges narrowed by what was measured                                           |
 | `_ensemble` | chances of chaos of a cage that is known within ranges only                   |
 | `_label_map` | that grid over two parameters of a system                                    |
 """
@@ -46,6 +47,7 @@ from ._ensemble import (
     sobol as sobol,
     verdict_of as verdict_of,
 )
+from ._identify import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow
 from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map
 from ._plan import Plan as Plan
 from ._run import run_study as run_study, study as study

@@ -6,7 +6,9 @@
 | `_speed`   | sweeps over speed from several starts              |
 | `_monodromy` | monodromy matrices of many lanes                 |
 | `_averages` | means and peaks of forces and the like over revolutions |
+| `_motion`  | size of the motion and frequency of the whirl      |
 | `_carried` | run-up and run-down with the state carried along   |
+| `_ramps`   | true ramps of the speed, up and down               |
 """
 
 from .._arguments import check_layer
@@ -14,6 +16,13 @@ from ._averages import averages as averages
 from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs
 from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
+from ._motion import Motion as Motion, motions as motions
+from ._ramps import (
+    Ramped as Ramped,
+    RampUpDown as RampUpDown,
+    ramp_revolutions as ramp_revolutions,
+    ramp_up_down as ramp_up_down,
+)
 from ._speed import (
     initial_states as initial_states,
     make_plan as make_plan,

@@ -1,0 +1,42 @@
+"""What measurements leave of the ranges of a file, as documents and tables."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..io import Measurement
+from ..studies import Narrowed
+from ._table import Table
+
+
+def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[str, Any]:
+    """For programs."""
+    ends = lambda r: [r.lower, r.upper]
+    pairs = zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True)
+    return {
+        "draws": found.draws,
+        "stages": found.stages,
+        "accepted": found.accepted,
+        "measurements": [
+            {"what": str(m), "off_by_tolerances": float(off)} for m, off in zip(measured, found.nearest, strict=True)
+        ],
+        "ranges": {
+            u.label: {"before": ends(u.range), "after": ends(r), "share": float(share), "narrowed": bool(worth)}
+            for u, r, share, worth in pairs
+        },
+    }
+
+
+def measured_table(found: Narrowed, measured: Sequence[Measurement]) -> Table:
+    """How near the best draw comes to each measurement."""
+    rows = [(str(m), f"{off:.2g}") for m, off in zip(measured, found.nearest, strict=True)]
+    return Table("Measurements, and how far the nearest draw is off [tolerances]", ("measured", "off"), rows)
+
+
+def narrowed_table(found: Narrowed) -> Table:
+    """Each range before and after."""
+    ends = lambda r: f"{r.lower:.4g} to {r.upper:.4g}"
+    rows = [
+        (u.label, ends(u.range), ends(r) if worth else "as it was", f"{share:.0%}")
+        for u, r, share, worth in zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True)
+    ]
+    return Table("Ranges [SI units]", ("value", "before", "after", "left of it"), rows)
