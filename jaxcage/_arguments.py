@@ -32,6 +32,12 @@ CHECKED: dict[str, Callable[..., Any]] = {}
 """Functions that compare their arguments, by their names."""
 SPEEDS = frozenset({"speed", "first", "last"})
 """Names of single speeds, which are above 0 and finite."""
+POSITIVE = frozenset(
+    "cage_diameter inner_radius outer_radius palmgren_constant pitch_diameter pitch_radius pocket_radius "
+    "raceway_diameter radius rib_diameter roller_diameter slenderness temperature temperature_1 temperature_2 "
+    "viscosity viscosity_1 viscosity_2 width".split()
+)
+"""Names of other numbers that are above 0 and finite in every formula."""
 FASTEST = 1e9
 """Of speeds [rad/s]: beyond, nothing that is computed means anything."""
 _REAL = "biuf"
@@ -209,6 +215,8 @@ def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: An
         return "a number"
     if name in SPEEDS and not 0 < number <= FASTEST:
         return f"positive and finite, at most {FASTEST:g} rad/s"
+    if name in POSITIVE and not 0 < number < math.inf:
+        return "positive and finite"
     return "a number" if math.isnan(number) else ""
 
 

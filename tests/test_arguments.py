@@ -82,6 +82,7 @@ def test_numbers_are_real(f: Callable[..., Any], parameter: inspect.Parameter):
     wrong = [1j, np.nan, np.array([1j, 2]), np.array([None, 1]), {}]
     wrong += [] if _has(parameter, str) else ["x"]
     wrong += [0.0, -3.0, np.inf, 1e300] if parameter.name in _arguments.SPEEDS else []
+    wrong += [0.0, -3.0, np.inf] if parameter.name in _arguments.POSITIVE else []
     for value in wrong:
         with pytest.raises(ArgumentError, match=f"`{parameter.name}` must be "):
             check_call(f, **{parameter.name: value})

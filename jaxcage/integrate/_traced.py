@@ -46,7 +46,8 @@ def sources() -> str:
     """All that the package is made of and traced by, as a digest."""
     digest = hashlib.sha256()
     root = pathlib.Path(__file__).parents[1]
-    for path in sorted(root.rglob("*.py")):
+    files = list(root.rglob("*.py")) or list(root.rglob("*.pyc"))  # installed without sources there is bytecode alone
+    for path in sorted(files):
         digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
     digest.update(repr([importlib.metadata.version(name) for name in TRACERS]).encode())
     return digest.hexdigest()
