@@ -1,8 +1,8 @@
-"""Random and hostile files and command lines by the thousand: `python -m benchmarks.fuzz [--count 10000] [--seed 0]`.
+"""Random and hostile files, command lines and calls: `python -m benchmarks.fuzz [--count 10000] [--seed 0]`.
 
-Half of them are TOML files, half are command lines, whose computations are not carried out. Each is refused with one
-sentence, or means what it says: see `tests/hostile.py` for how they are made and what is checked. Prints one JSON
-document; exit status 1 if anything else happened.
+A third are TOML files, a third command lines, whose computations are not carried out, and a third calls of public
+functions with strange arguments. Each is refused with one sentence, or means what it says: see `tests/hostile.py` for
+how they are made and what is checked. Prints one JSON document; exit status 1 if anything else happened.
 """
 
 import argparse
@@ -69,11 +69,14 @@ def run(count: int, start: int) -> dict[str, Any]:
         folder = pathlib.Path(place)
         toml = folder / "fuzzed.toml"
         read = lambda data: "files accepted" if hostile.check_file(data, toml) else "files refused"
-        many(hostile.files(), count - count // 2, start, lambda data: tally.note(lambda: read(data), data))
+        third = count // 3
+        many(hostile.files(), count - 2 * third, start, lambda data: tally.note(lambda: read(data), data))
         toml.unlink()
         with hostile.playground(folder), hostile.without_computing() as understood:
             carry_out = lambda line: f"commands {hostile.check_line(line, understood)}"
-            many(hostile.lines(), count // 2, start, lambda line: tally.note(lambda: carry_out(line), line.arguments))
+            many(hostile.lines(), third, start, lambda line: tally.note(lambda: carry_out(line), line.arguments))
+    call = lambda given: f"calls {hostile.check_function(*given)}"
+    many(hostile.calls(), third, start, lambda given: tally.note(lambda: call(given), given))
     counts = dict.fromkeys(["tracebacks", *KINDS.values()], 0) | dict(sorted(tally.count.items()))
     seconds = round(time.perf_counter() - begin, 1)
     return {"inputs": sum(counts.values()), **counts, "seconds": seconds, "wrong": tally.wrong}
@@ -82,7 +85,7 @@ def run(count: int, start: int) -> dict[str, Any]:
 def main() -> None:
     """Run and report."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--count", type=int, default=10_000, help="files and command lines in all")
+    parser.add_argument("--count", type=int, default=10_000, help="files, command lines and calls in all")
     parser.add_argument("--seed", type=int, default=0, help="another seed makes other ones")
     chosen = parser.parse_args()
     found = run(chosen.count, chosen.seed)

@@ -24,6 +24,7 @@ MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
 LEAST: dict[str, int] = {
     **dict.fromkeys(["blocks", "keep", "count", "steps", "lanes", "period", "rows", "columns", "starts", "workers"], 1),
+    **dict.fromkeys(["coordinates", "dimension", "n_rollers", "profiles", "stations", "substeps"], 1),
     **dict.fromkeys(["discard", "horizon", "exponents", "strobe", "samples", "seed", "persist"], 0),
 }
 """Of counts by their names; others have a least value of their own, which their function knows."""
@@ -31,6 +32,12 @@ CHECKED: dict[str, Callable[..., Any]] = {}
 """Functions that compare their arguments, by their names."""
 SPEEDS = frozenset({"speed", "first", "last"})
 """Names of single speeds, which are above 0 and finite."""
+POSITIVE = frozenset(
+    "cage_diameter inner_radius outer_radius palmgren_constant pitch_diameter pitch_radius pocket_radius "
+    "raceway_diameter radius rib_diameter roller_diameter slenderness temperature temperature_1 temperature_2 "
+    "viscosity viscosity_1 viscosity_2 width".split()
+)
+"""Names of other numbers that are above 0 and finite in every formula."""
 FASTEST = 1e9
 """Of speeds [rad/s]: beyond, nothing that is computed means anything."""
 _REAL = "biuf"
@@ -70,8 +77,10 @@ def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
         parameter = signature.parameters[name]
         if parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
             continue
+        if parameter.annotation is inspect.Parameter.empty:  # `self`
+            continue
         if said := wrong(name, parameter.annotation, value):
-            raise ArgumentError(name, said=f"must be {said}, but {_shown(value)} was given.")
+            raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
 
 
 @functools.lru_cache(maxsize=1024)
@@ -194,7 +203,10 @@ def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: An
         if or_array and _is_real(value, False):
             return ""
         others = tuple(m for m in members if is_plain_class(m) and m not in (int, float))
-        return "" if isinstance(value, others) else "a number or an array of numbers" if or_array else "a number"
+        rows = [m for m in members if typing.get_origin(m) is not None]
+        if isinstance(value, others) or any(not _wrong_one(name, m, value) for m in rows):
+            return ""
+        return "a number or an array of numbers" if or_array else "a number or a row of them" if rows else "a number"
     if isinstance(value, bool | np.bool_):
         return "a number"
     try:
@@ -203,10 +215,12 @@ def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: An
         return "a number"
     if name in SPEEDS and not 0 < number <= FASTEST:
         return f"positive and finite, at most {FASTEST:g} rad/s"
-    return "a number" if name and math.isnan(number) else ""
+    if name in POSITIVE and not 0 < number < math.inf:
+        return "positive and finite"
+    return "a number" if math.isnan(number) else ""
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """A value as a message shows it."""
     if isinstance(value, bool | int | float | complex | str | np.generic):
         try:
@@ -217,4 +231,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, _ARRAYS):
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
         return f"{kind} of shape {np.shape(value)} and kind {value.dtype}"
+    if isinstance(value, tuple | list) and all(isinstance(x, bool | int | float | complex | str) for x in value):
+        text = repr(value)
+        return text if len(text) < 100 else f"{text[:100]}..."
     return f"something of kind {type(value).__name__}"

@@ -10,6 +10,8 @@ import warnings
 
 import platformdirs
 
+from ._errors import ArgumentError
+
 
 traced: pathlib.Path | None = None
 """Where lowered programs are kept too; None before `keep_compiled_programs` was called."""
@@ -29,6 +31,8 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
 
     **Returns:** the folder, None if switched off or left alone.
     """
+    if not isinstance(folder, str | os.PathLike | None):
+        raise ArgumentError("folder", said=f"must be a path, but {folder!r} was given.")
     wanted = os.environ.get("JAXCAGE_CACHE", "") or folder or platformdirs.user_cache_path("jaxcage") / "programs"
     if str(wanted) == "off":
         return None

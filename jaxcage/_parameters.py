@@ -18,7 +18,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, PyTree
 
-from ._errors import ArgumentError
+from ._errors import ArgumentError, InputError
 
 
 M = TypeVar("M", bound=eqx.Module)
@@ -64,6 +64,16 @@ def _as_leaf(x: Any) -> Any:
     return jnp.asarray(np.asarray(x, dtype=float)) if isinstance(x, int | float) else x
 
 
+_NO_NUMBERS = (str, bytes, bool, complex, list, tuple, dict, set, np.ma.MaskedArray)
+
+
+def _leaf_of(info: "ParameterInfo", x: Any) -> Any:
+    """The same for a declared parameter. **Raises:** `ValueError` for what is no number and no array of real ones."""
+    if isinstance(x, _NO_NUMBERS) or (isinstance(x, np.ndarray | np.generic) and x.dtype.kind not in "iuf"):
+        raise InputError(f"The {info.text} {allowed(info)}, but {x!r} was given.")
+    return _as_leaf(x)
+
+
 def parameter(
     unit: str,
     lower: float,
@@ -84,7 +94,7 @@ def parameter(
     if unit != UNKNOWN:
         unit_dimensions(unit)
     info = ParameterInfo(unit, lower, upper, text, kind, within, source or SOURCES[kind])
-    return eqx.field(converter=_as_leaf, metadata={"parameter": info}, **kwargs)
+    return eqx.field(converter=functools.partial(_leaf_of, info), metadata={"parameter": info}, **kwargs)
 
 
 def choice(*options: str, text: str, **kwargs: Any) -> Any:
@@ -192,14 +202,28 @@ def parameter_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
 
 
 def parameters(module: eqx.Module) -> dict[str, Array]:
-    """All differentiable parameters of `module` by name, in SI units."""
+    """All differentiable parameters of `module` by name, in SI units.
+
+    **Raises:** `ValueError` for what is no model.
+    """
+    _require_module(module)
     return {name: get(module, path) for name, path in parameter_paths(module).items()}
 
 
 def parameter_info(module: eqx.Module) -> dict[str, ParameterInfo]:
-    """Unit, range and description of every differentiable parameter of `module`, by name."""
+    """Unit, range and description of every differentiable parameter of `module`, by name.
+
+    **Raises:** `ValueError` for what is no model.
+    """
+    _require_module(module)
     infos = {path: field.metadata["parameter"] for path, field in walk(module) if "parameter" in field.metadata}
     return {name: infos[path] for name, path in parameter_paths(module).items()}
+
+
+def _require_module(module: Any) -> None:
+    if not isinstance(module, eqx.Module):
+        given = repr(module) if isinstance(module, str | int | float) else f"something of kind {type(module).__name__}"
+        raise ArgumentError("module", said=f"must be a model or a part of one, but {given} was given.")
 
 
 _BASES = {  # exponents of mass, length and time
@@ -262,6 +286,7 @@ def replace(module: M, **values: PyTree) -> M:
 
     **Raises:** `ValueError` for a name the module does not have, or an option a choice does not offer.
     """
+    _require_module(module)
     leaves, choices = parameter_paths(module), choice_paths(module)
     parts = [
         f.name for f in dataclasses.fields(module) if f.name == EXTRA or isinstance(getattr(module, f.name), eqx.Module)
@@ -299,6 +324,8 @@ def allowed(info: ParameterInfo) -> str:
 
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
     """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
+    if isinstance(value, _NO_NUMBERS):
+        raise ArgumentError(name, said=f"{allowed(info)}, but {value!r} was given.")
     if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
         return
     numbers = np.asarray(value, dtype=float)

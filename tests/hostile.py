@@ -8,6 +8,7 @@ import contextlib
 import copy
 import dataclasses
 import datetime
+import inspect
 import io
 import json
 import math
@@ -475,6 +476,9 @@ CASES = [
     "wrong.toml",
     "4z",
     "nowhere.toml",
+    "pipe.toml",
+    "endless.toml",
+    "valid\u202elmot.toml",
     "folder",
     ".",
     "data.txt",
@@ -487,7 +491,7 @@ RIGHT = {
     "first": ["2500", "300 rad/s", "4000rpm"],
     "last": ["27500", "9e3", "12000 rpm", "2000 rad/s"],
 }
-COUNTS = "1, 2, 4, 10, 20, 40, 64, 100, 128, 251, 300".split(", ")
+COUNTS = "1, 2, 4, 10, 20, 40, 64, 100, 128, 251, 300, 10000000".split(", ")
 UNIT_OF = {"load": "N", "duration": "ms"} | dict.fromkeys(("first", "last", "speed", "shaft_speed"), "rpm")
 
 
@@ -676,7 +680,11 @@ def playground(folder: Path) -> Iterator[None]:
     (folder / "folder").mkdir(exist_ok=True)
     (folder / "valid.toml").write_text(as_toml(plain_template()), encoding="utf-8")
     (folder / "wrong.toml").write_text("base = '1a'\nguidence_gap = 4e-4\n")
+    (folder / "valid\u202elmot.toml").write_text("base = '1a'\n", encoding="utf-8")
     (folder / "data.txt").write_bytes(b"\x80\x04\x95")
+    if not os.path.lexists(folder / "pipe.toml"):
+        os.mkfifo(folder / "pipe.toml")
+        (folder / "endless.toml").symlink_to("/dev/zero")
     os.chdir(folder)
     try:
         yield
@@ -684,7 +692,7 @@ def playground(folder: Path) -> Iterator[None]:
         os.chdir(before)
 
 
-_OWN = {"folder", "valid.toml", "wrong.toml", "data.txt"}
+_OWN = {"folder", "valid.toml", "wrong.toml", "data.txt", "pipe.toml", "endless.toml", "valid\u202elmot.toml"}
 
 
 def _tidy() -> None:
@@ -717,7 +725,9 @@ def check_line(line: Line, understood: list[Any]) -> str:
         check_writes(seen, getattr(options, "out", getattr(options, "path", None)))
     finally:
         _tidy()
-    sentences = [text for text in said.splitlines() if not text.startswith("Warning: ")]
+    sentences = [text for text in said.splitlines() if not text.startswith(("Warning: ", "Estimate: "))]
+    if "\u202e" in printed + said:
+        raise Unclear(f"the direction of writing is turned: {printed!r}, {said!r}")
     if status == 2:
         if printed or len(sentences) != 1:
             raise Unclear(f"printed {printed!r}, said {said!r}")
@@ -780,3 +790,98 @@ def check_called(options: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) ->
             if isinstance(options, _options.MapOptions) and options.points is not None:
                 continue
             raise SilentDefault(f"--{name} {rpm!r} is not among {numbers[:6]}")
+
+
+# Calls of the library.
+
+LAYERS = (jc.bearing, jc.forces, jc.models, jc.integrate, jc.analysis, jc.sweeps, jc.orbits, jc.design, jc.studies)
+FUNCTIONS = {
+    f"{layer.__name__}.{name}": f
+    for layer in LAYERS
+    for name, f in sorted(vars(layer).items())
+    if inspect.isfunction(f) and f is not inspect.unwrap(f) and not name.startswith("_")
+}
+"""Public functions that look at their arguments before they do anything."""
+
+
+class Stranger:
+    """Nothing that any argument may be."""
+
+
+NEVER: list[Any] = [
+    Stranger(),
+    np.ma.array([1.0, 2.0], mask=[False, True]),
+    np.array(["2020-01-01"], dtype="datetime64[D]"),
+    np.array([None, 1.0]),
+]
+"""Never right, where a declaration says anything."""
+STRANGE: list[Any] = [
+    *NEVER,
+    *(None, True, np.nan, math.inf, -math.inf, 0, -0.0, -1, -20, 2.5, 3, 1e300, 5e-324, 10**400, -(10**400), 1j, 2**63),
+    *(
+        "",
+        "x",
+        "1a",
+        "speed",
+        "\0",
+        b"x",
+        [],
+        [1.0],
+        [math.nan],
+        ["a"],
+        [[1], [1, 2]],
+        (),
+        (math.nan, 1.0),
+        {},
+        {"a": 1},
+    ),
+    *({"speed": [1.0]}, {"speed": "x"}, set(), frozenset(), slice(None), Stranger, abs, lambda *x: x, iter([])),
+    *(
+        np.array([]),
+        np.array(3.0),
+        np.array([1, 2]),
+        np.zeros((2, 2)),
+        np.array([1j]),
+        np.array(["a"]),
+        np.float32(3.0),
+    ),
+    *(np.array([math.nan, 1.0]), np.array([1.0, math.inf]), np.array([2.0, 1.0]), np.int8(3), np.bool_(True)),
+    jc.ForcedOscillator(lambda tau, q, v, speed: (-q[0],), coordinates=1),
+    jc.forces.PocketImpact(),
+    jc.bearing.nu2310(),
+    jc.case("1a"),
+]
+
+
+@st.composite
+def calls(draw: Any) -> tuple[str, dict[str, Any]]:
+    """A function and some of its arguments, at least one of them strange."""
+    name = draw(st.sampled_from(sorted(FUNCTIONS)))
+    parameters = inspect.signature(FUNCTIONS[name]).parameters.values()
+    named = [p.name for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    chosen = draw(st.lists(st.sampled_from(named), min_size=1, max_size=2, unique=True))
+    return name, {argument: draw(st.sampled_from(STRANGE)) for argument in chosen}
+
+
+def check_function(name: str, given: dict[str, Any]) -> str:
+    """Call a function with a few arguments. **Returns:** `refused`, `incomplete` or `done`.
+
+    **Raises:** `SilentDefault` where a value was taken that is never right, `Unclear`, or what should not have come.
+    """
+    f = FUNCTIONS[name]
+    try:
+        f(**given)
+        became = "done"
+    except ValueError as error:
+        check_sentence(str(error))
+        return "refused"
+    except TypeError as error:
+        if not re.search(r"missing \d+ required", str(error)):
+            raise
+        became = "incomplete"
+    parameters = inspect.signature(f).parameters
+    for argument, value in given.items():
+        declared = parameters[argument].annotation
+        if any(value is each for each in NEVER) and declared not in (Any, inspect.Parameter.empty):
+            raise SilentDefault(f"{name}({argument}={value!r}) was taken")
+    return became

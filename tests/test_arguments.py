@@ -33,10 +33,19 @@ def arguments() -> Iterator[Any]:
 def test_the_table_has_what_is_at_the_top():
     """All functions that compute, and no others are left out but those that only look something up."""
     top = {n for n, o in vars(jc).items() if inspect.isfunction(inspect.unwrap(o)) and not n.startswith("_")}
-    looked_up = {"case", "rpm", "parameters", "parameter_info", "replace", "enable_x64", "keep_compiled_programs"}
-    looked_up |= {"whole_bearing", "bearing_measures"}
-    themselves = {"simulate_bearing", "bearing_over_time"}  # a shaft may turn either way
-    assert top - set(FUNCTIONS) <= looked_up | themselves and len(FUNCTIONS) > 40
+    themselves = {"rpm", "parameters", "parameter_info", "replace", "enable_x64", "keep_compiled_programs"}
+    themselves |= {"simulate_bearing", "bearing_over_time", "bearing_measures"}  # a shaft may turn either way
+    assert top - set(FUNCTIONS) <= themselves and len(FUNCTIONS) > 100
+
+
+@pytest.mark.parametrize("layer", [jc.bearing, jc.forces, jc.models], ids=lambda layer: layer.__name__)
+def test_every_formula_is_in_the_table(layer: Any):
+    """But for what makes declarations, what takes no argument, and what only asks about what it is given."""
+    public = {n for n, o in vars(layer).items() if inspect.isfunction(inspect.unwrap(o)) and not n.startswith("_")}
+    declare = {"parameter", "choice", "count", "check_layer"}
+    asked = {"is_concrete", "require_known", "require_speeds", "divide", "multiply", "axial_profiles"}
+    plain = {n for n in public if not inspect.signature(vars(layer)[n]).parameters}
+    assert public - declare - asked - plain <= set(FUNCTIONS)
 
 
 class Stranger:
@@ -56,10 +65,8 @@ def _has(parameter: inspect.Parameter, kind: type) -> bool:
     return kind in _arguments.options(parameter.annotation)
 
 
-@pytest.mark.parametrize("f, parameter", [p for p in arguments() if _has(p.values[1], int)])
+@pytest.mark.parametrize("f, parameter", [p for p in arguments() if _has(p.values[1], int) > _has(p.values[1], float)])
 def test_counts_are_whole_and_sensible(f: Callable[..., Any], parameter: inspect.Parameter):
-    if _has(parameter, float):
-        pytest.skip("a number")
     wrong = [2.5, True, "3", 1e3, 3j, 10**400, np.nan, {}, [3]]
     wrong += [] if any(map(_arguments.is_array_type, _arguments.options(parameter.annotation))) else [np.array([])]
     wrong += [-20] if parameter.name in _arguments.LEAST else []
@@ -75,6 +82,7 @@ def test_numbers_are_real(f: Callable[..., Any], parameter: inspect.Parameter):
     wrong = [1j, np.nan, np.array([1j, 2]), np.array([None, 1]), {}]
     wrong += [] if _has(parameter, str) else ["x"]
     wrong += [0.0, -3.0, np.inf, 1e300] if parameter.name in _arguments.SPEEDS else []
+    wrong += [0.0, -3.0, np.inf] if parameter.name in _arguments.POSITIVE else []
     for value in wrong:
         with pytest.raises(ArgumentError, match=f"`{parameter.name}` must be "):
             check_call(f, **{parameter.name: value})
@@ -115,6 +123,49 @@ SPEEDS = np.array([1.0, 1.1])
 def test_what_was_taken_in_silence(call: Callable[[], Any], said: str):
     with pytest.raises(ValueError, match=said):
         call()
+
+
+DUFFING_LAW = DUFFING.acceleration
+unwrap = inspect.unwrap
+"""Without the types that tests check."""
+
+
+@pytest.mark.parametrize(
+    "call, said",
+    [
+        (lambda: unwrap(jc.rpm)("a"), "`first` must be a finite number, but 'a'"),
+        (lambda: jc.rpm(np.nan), "`first` must be a finite number, but nan"),
+        (lambda: jc.rpm(1, 2, -3), "`count` must be at least 1, but -3"),
+        (lambda: unwrap(jc.rpm)(1, 2, 2.5), "`count` must be a whole number"),
+        (lambda: unwrap(jc.parameters)(3), "`module` must be a model or a part of one, but 3"),
+        (lambda: unwrap(jc.parameter_info)("1a"), "`module` must be a model or a part of one, but '1a'"),
+        (lambda: unwrap(jc.replace)("1a", load=1.0), "`module` must be a model"),
+        (lambda: jc.replace(jc.case("1a"), load="x"), "`load` must be a number from 0 to 1e.07 N, but 'x'"),
+        (lambda: jc.replace(jc.case("1a"), load=True), "`load` must be a number from 0 to 1e.07 N, but True"),
+        (lambda: jc.bearing.Material("brass", 1e11, 0.3), "must be a number from .* but 'brass' was given"),
+        (lambda: unwrap(jc.keep_compiled_programs)(3), "`folder` must be a path, but 3"),
+        (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
+        (lambda: jc.ForcedOscillator(DUFFING_LAW, coordinates=-1), "`coordinates` must be at least 1, but -1"),
+        (lambda: jc.ForcedSystem(DUFFING_LAW, 2.5), "`dimension` must be a whole number"),
+        (lambda: jc.ForcedOscillator(DUFFING_LAW, 1, scale="x"), "`scale` must be a number or a row of them, but 'x'"),
+        (lambda: jc.simulate(DUFFING, 1.0, revolutions=1, start=(np.nan, 0.0)), r"each a number, but \(nan, 0.0\)"),
+        (lambda: jc.periodic_orbit(DUFFING, 1.0, guess="x"), "`guess` must be a state of 2 numbers, but 'x'"),
+        (lambda: jc.periodic_orbit(DUFFING, 1.0, guess=3), "`guess` must be a state of 2 numbers, but 3"),
+        (lambda: jc.bifurcation(DUFFING, "fold", SPEEDS), "`guess` must be a number, a state and a number, an `Orbit`"),
+        (lambda: jc.bifurcation(DUFFING, "fold", (1, 2, 3)), r"`guess` must be .*, but \(1, 2, 3\) was given"),
+    ],
+)
+def test_what_was_said_by_others(call: Callable[[], Any], said: str):
+    """By Python, NumPy or JAX, in words of theirs, or by nobody."""
+    with pytest.raises(ValueError, match=said):
+        call()
+
+
+def test_models_take_what_they_are_made_for():
+    assert jc.ForcedOscillator(DUFFING_LAW, 1, scale=(1.0, 2.0), starts=((0.0, 1.0),)).dimension == 2
+    assert np.isclose(jc.rpm(30), np.pi) and jc.rpm(1, 2, 3).size == 3 and jc.rpm(-30.0) < 0
+    gradient = jax.grad(lambda gap: jc.replace(jc.case("1a"), guidance_gap=gap).clearance)(4e-4)
+    assert gradient > 0
 
 
 def test_what_is_traced_has_no_value_yet():

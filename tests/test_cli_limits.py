@@ -33,9 +33,13 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     "line, said",
     [
         ("sweep 1a --count 10000000", "30000000 lanes of 600 revolutions, about 212 GB of memory, but 8 GB are free"),
+        ("sweep 1a --count 350000", " GB of memory, but 8 GB are free, of which 90% may be taken: choose"),
         ("zones 1a --count 10000000", "about 212 GB of memory, but 8 GB are free: choose a smaller --count"),
         ("sweep 1a --revolutions 10000000 --count 10000", "about 347 days, more than the 90 days"),
-        ("simulate 1a --speed 8500 --revolutions 10000000", "about 205 GB of memory, but 8 GB are free"),
+        (
+            "simulate 1a --speed 8500 --revolutions 10000000",
+            "for 1 lane of 10000000 revolutions, about 205 GB",
+        ),
         ("bifurcations 1a --count 10000000", "GB of memory, but 8 GB are free: choose a smaller --count"),
         ("map 1a --points 10000x10000", "100000000 lanes of 1100 revolutions, about 245 GB of memory"),
         ("report 1a --count 10000000", "30000000 lanes"),

@@ -63,6 +63,13 @@ def test_command_lines(tmp_path: Path):
         check()
 
 
+@pytest.mark.wide
+@fuzzed
+@given(hostile.calls())
+def test_calls(call: tuple[str, dict[str, Any]]):
+    hostile.check_function(*call)
+
+
 # The checks themselves can fail.
 
 

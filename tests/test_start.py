@@ -48,6 +48,19 @@ def test_names_are_there_without_having_been_used():
     assert set(names.split()) >= offered | {"orbits", "keep_compiled_programs"} and same == "True"
 
 
+def test_the_library_computes_without_loading_tables():
+    """Whoever makes a data set, a store or a figure loads what that takes."""
+    code = """
+import sys
+import jaxcage as jc
+jc.enable_x64()
+jc.case("1a"), jc.sweep, jc.study, jc.open_study, jc.studies.Store
+import jaxcage.io
+print(sorted({"xarray", "pandas", "zarr", "matplotlib", "pint", "tyro", "rich", "jinja2", "dask"} & set(sys.modules)))
+"""
+    assert run(code) == ["[]"]
+
+
 @pytest.mark.parametrize("name", ["no_such_name", "_no_such_name", "__wrapped__"])
 def test_other_names_are_not(name: str):
     with pytest.raises(AttributeError, match=f"module 'jaxcage' has no attribute '{name}'"):

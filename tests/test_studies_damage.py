@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import HealthCheck, settings
+from hypothesis.stateful import run_state_machine_as_test
+from store_life import Other, StoreLife
 
 import jaxcage as jc
 from benchmarks import faults
@@ -73,6 +76,28 @@ def test_a_store_that_is_believed_is_found_out(bench: faults.Bench, monkeypatch:
     for seed in range(3):
         other.one(random.Random(seed))
     assert other.count["false values"] > 0
+
+
+@pytest.fixture(scope="module")
+def other(bench: faults.Bench):
+    process = Other(bench)
+    yield process
+    process.close()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the other process makes children")
+@pytest.mark.parametrize("lives, steps", [(3, 8), pytest.param(30, 20, marks=pytest.mark.wide)])
+def test_any_life_of_a_store(bench: faults.Bench, other: Other, tmp_path: Path, lives: int, steps: int):
+    """Started, killed, damaged, resumed, read, by two processes, in any order."""
+    few = settings(
+        max_examples=lives,
+        stateful_step_count=steps,
+        deadline=None,
+        database=None,
+        derandomize=True,
+        suppress_health_check=list(HealthCheck),
+    )
+    run_state_machine_as_test(lambda: StoreLife(bench, other, tmp_path), settings=few)
 
 
 @pytest.mark.parametrize("name", ["peak", "outcome", "strobe"])

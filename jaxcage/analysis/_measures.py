@@ -7,7 +7,6 @@ sample: with evenly spaced phases and whole revolutions the sum is as good as th
 import dataclasses
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 from jaxtyping import Array, Float
@@ -15,6 +14,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
+from .._recent import jitted
 from ..forces import Force
 from ..integrate import Trajectory
 from ..models import FORCES, CageModel
@@ -46,7 +46,7 @@ def relative_state(
     return q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:]
 
 
-@eqx.filter_jit
+@jitted
 def _forces_at_one_speed(
     model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
 ) -> Histories:
@@ -55,7 +55,7 @@ def _forces_at_one_speed(
     return forces(tau, motion)
 
 
-@eqx.filter_jit
+@jitted
 def _forces(
     model: CageModel,
     speed: Float[Array, " n"],

@@ -14,6 +14,7 @@
 | `_cases` | the six published cases and the axis limits of the published figures |
 """
 
+from .._arguments import check_layer
 from ._cage_mass import (
     CageGeometry as CageGeometry,
     cage_mass as cage_mass,
@@ -73,3 +74,13 @@ from ._statics import (
     static_cage_displacement as static_cage_displacement,
 )
 from ._validate import is_concrete as is_concrete
+
+
+check_layer(
+    globals(),
+    "cage_mass cage_speed cage_speed_ratio centrifugal_force clipped_pocket_area "
+    "design_rule_violations guidance_gap guiding_radius line_contact_approach line_contact_load "
+    "line_contact_stiffness load_distribution loaded_half_angle published_case raceway_loads "
+    "raceway_surface_speed relative_cage_speed relative_mass_eccentricity roller_angles "
+    "series_stiffness static_cage_displacement vg walther_viscosity",
+)

@@ -45,9 +45,9 @@ class LoadDistribution(eqx.Module):
     """Half angle of the loaded zone, (2) [rad]."""
 
 
-def roller_angles(n_rollers: int, first: Scalar = -jnp.pi / 2) -> Float[Array, " rollers"]:
-    """Angles of equally spaced rollers from +x, counter-clockwise, the first at `first` [rad]."""
-    return jnp.asarray(first) + 2 * jnp.pi / n_rollers * jnp.arange(n_rollers, dtype=float)
+def roller_angles(n_rollers: int, first_angle: Scalar = -jnp.pi / 2) -> Float[Array, " rollers"]:
+    """Angles of equally spaced rollers from +x, counter-clockwise, the first at `first_angle` [rad]."""
+    return jnp.asarray(first_angle) + 2 * jnp.pi / n_rollers * jnp.arange(n_rollers, dtype=float)
 
 
 def loaded_half_angle(radial_clearance: Scalar, shaft_shift: Scalar) -> Array:

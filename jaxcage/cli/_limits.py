@@ -50,10 +50,14 @@ class Demand:
         """On all cores."""
         return self.lanes * self.revolutions / (self.rate * (cores() if self.lanes > 1 else 1))
 
+    @property
+    def work(self) -> str:
+        """Lanes and revolutions."""
+        return f"{self.lanes} {'lane' if self.lanes == 1 else 'lanes'} of {self.revolutions} revolutions"
+
     def __str__(self) -> str:
         disk = f", {_size(self.disk)} on disk" if self.disk else ""
-        lanes = f"{self.lanes} lanes of {self.revolutions} revolutions"
-        return f"{lanes}, about {_size(self.memory)} of memory{disk} and {_duration(self.seconds)}"
+        return f"{self.work}, about {_size(self.memory)} of memory{disk} and {_duration(self.seconds)}"
 
 
 def demand_of(options: CommonOptions, model: CageModel | None) -> Demand:
@@ -98,14 +102,15 @@ def check_demand(demand: Demand, folder: Path, given: str) -> None:
 
     **Raises:** `InputError` with the number.
     """
-    asks = f"This asks for {demand.lanes} lanes of {demand.revolutions} revolutions, about"
+    asks = f"This asks for {demand.work}, about"
     there = {
         "of memory": (demand.memory, free_memory()),
         "on disk": (demand.disk, float(shutil.disk_usage(_existing(folder)).free)),
     }
     for where, (wanted, free) in there.items():
         if wanted > SHARE * free:
-            but = f"but {_size(free)} are free: choose a smaller {given}"
+            part = "" if wanted > free else f", of which {SHARE:.0%} may be taken"
+            but = f"but {_size(free)} are free{part}: choose a smaller {given}"
             raise InputError(f"{asks} {_size(wanted)} {where}, {but}.")
     if demand.seconds > LONGEST:
         more = f"more than the {_duration(LONGEST)} that a command may take: choose a smaller {given}"

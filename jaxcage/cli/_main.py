@@ -6,6 +6,7 @@ import gc
 import importlib
 import io
 import itertools
+import logging
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -44,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupted, 143 when told to end.
     """
     if arguments is None:  # the process is ours, not a notebook's
+        _open_what_is_closed()
         leave_at_once_when_interrupted()
         gc.set_threshold(200_000, 50, 100)  # looking for dead objects takes a tenth of the time otherwise
     try:
@@ -65,8 +67,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return interrupted_status()
 
 
+def _open_what_is_closed() -> None:
+    """A process that was started without standard output or error has somewhere to write to all the same."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
+
+
 def _carry_out(options: AnyOptions) -> None:
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it keeps fonts if there is no home folder
     import jax
 
     jax.config.update("jax_enable_x64", True)

@@ -9,13 +9,13 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .._parameters import parameters, replace
+from .._recent import jitted
 from ..models import AbstractForcedSystem
 from ._unknowns import Unknown, check_unknowns, slope_in_place, values_at, with_values
 
@@ -155,13 +155,13 @@ def _of_place(function: Callable, system: Any, unknowns: Sequence[Unknown]) -> C
     return at
 
 
-@eqx.filter_jit
+@jitted
 def _value_and_slope(function: Callable, system: Any, unknowns: Any, places: Array) -> tuple[Array, Array]:
     f = _of_place(function, system, unknowns)  # forward mode: few parameters vary, and orbits are simulated
     slope, value = jax.vmap(jax.jacfwd(lambda p: (f(p),) * 2, has_aux=True))(places)
     return value, slope
 
 
-@eqx.filter_jit
+@jitted
 def _values(function: Callable, system: Any, unknowns: Any, places: Array) -> Array:
     return jax.vmap(_of_place(function, system, unknowns))(places)

@@ -22,6 +22,7 @@
 Frame: x to the right, y up, rotation positive counter-clockwise; forces act on the cage.
 """
 
+from .._arguments import check_layer
 from .._parameters import choice as choice, count as count, parameter as parameter
 from ._axial import axial_profiles as axial_profiles
 from ._contact import (
@@ -105,4 +106,16 @@ from ._unbalance import (
     UnbalanceReading as UnbalanceReading,
     effective_eccentricity as effective_eccentricity,
     unbalance_force as unbalance_force,
+)
+
+
+check_layer(
+    globals(),
+    "approach_speed contact_force contact_slopes cross_force cubic_stiffness effective_eccentricity "
+    "film_drive film_pressure film_pressure_field film_resistance film_scale finite_film_force "
+    "fixed_half_resistance full_resistance half_circle_resistance impact_history impact_time_scale "
+    "polar_resistance power_10_9 pressure_force pulse_spectrum pulse_train pulse_train_force "
+    "restitution_damping rib_force root_9 short_film_excess short_film_force smooth_norm smooth_plus "
+    "smooth_plus_slope solve_ring spring_force supply_force support_slopes synchronous_amplitude "
+    "synchronous_force unbalance_force weight",
 )

@@ -3,7 +3,6 @@
 import dataclasses
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +10,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._recent import jitted
 from .._types import Scalar
 from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
 from ._lanes import By, Controls, Lanes, advance, begin
@@ -73,7 +73,7 @@ class BearingRun:
         return float(np.max(self.peaks[:, PEAKS.index(name)]))
 
 
-@eqx.filter_jit
+@jitted
 def _begun(model: BearingModel, speed: Scalar, state: BearingState, step: Scalar) -> Lanes:
     at, states = _twice((model.at_speed(speed), state))
     return begin(at, states, step)
@@ -84,7 +84,7 @@ def _twice(tree: Any) -> Any:
     return jax.tree.map(lambda x: jnp.stack([jnp.asarray(x, dtype=float)] * 2, axis=-1), tree)
 
 
-@eqx.filter_jit
+@jitted
 def _run(
     model: BearingModel,
     speed: Scalar,

@@ -25,7 +25,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
@@ -34,6 +33,7 @@ from jax.core import Tracer, eval_jaxpr
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Int
 
+from .._recent import jitted
 from ._program import CONTROL_FLOW, Numbers, Sizes, Step, pieces, program_of, undisturbed
 from ._traced import Kept, name_of
 
@@ -61,7 +61,7 @@ _ours = contextvars.ContextVar("ours", default=False)
 
 
 def compiled(f: Callable[..., Any], name: str | None = None) -> Callable[..., Any]:
-    """`equinox.filter_jit` for programs that march: the largest kernels are for these alone.
+    """`jitted` for programs that march: the largest kernels are for these alone.
 
     A function of a module is known by its name, another one by the `name` that it is given: later processes find such
     programs traced (`_traced`).
@@ -70,8 +70,7 @@ def compiled(f: Callable[..., Any], name: str | None = None) -> Callable[..., An
     and where it is differentiated or mapped from outside it is compiled with XLA's own.
     """
     kept = Kept(f, name or name_of(f), COMPILER_OPTIONS)
-    jitted = eqx.filter_jit(f, compiler_options=COMPILER_OPTIONS)  # pyright: ignore[reportCallIssue]
-    traced = eqx.filter_jit(f)
+    traced = jitted(f)
 
     @functools.wraps(f)
     @undisturbed
@@ -82,8 +81,7 @@ def compiled(f: Callable[..., Any], name: str | None = None) -> Callable[..., An
             return traced(*args, **kwargs)
         token = _ours.set(True)
         try:
-            there, result = (False, None) if kwargs else kept(args)
-            return result if there else jitted(*args, **kwargs)
+            return kept(*args, **kwargs)
         finally:
             _ours.reset(token)
 

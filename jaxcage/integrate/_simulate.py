@@ -3,7 +3,6 @@
 import dataclasses
 import math
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
+from .._recent import jitted
 from .._types import Scalar, State
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._controlled import ControlledSteps, controlled, stated
@@ -58,7 +58,7 @@ class Trajectory:
     _repr_html_ = notebook_html
 
 
-@eqx.filter_jit
+@jitted
 def _run(
     system: AbstractForcedSystem,
     method: ControlledSteps,

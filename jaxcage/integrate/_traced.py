@@ -19,7 +19,7 @@ import sys
 import tempfile
 import threading
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -28,13 +28,13 @@ import numpy as np
 from jax import export
 
 from .. import _cache
+from .._recent import ARRAYS, Form, program_of, programs, shapes, split
 
 
 TRACERS = ("jax", "jaxlib", "equinox", "diffrax", "numpy")
 """Packages whose versions decide what a program is."""
 OURS = ("jaxcage", "jax", "jaxlib", "equinox", "diffrax", "numpy", "optimistix", "lineax", "builtins")
 """Packages whose functions and classes are known by their names."""
-ARRAYS = (jax.Array, np.ndarray, np.generic)
 
 
 class Unnamed(Exception):
@@ -46,7 +46,8 @@ def sources() -> str:
     """All that the package is made of and traced by, as a digest."""
     digest = hashlib.sha256()
     root = pathlib.Path(__file__).parents[1]
-    for path in sorted(root.rglob("*.py")):
+    files = list(root.rglob("*.py")) or list(root.rglob("*.pyc"))  # installed without sources there is bytecode alone
+    for path in sorted(files):
         digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
     digest.update(repr([importlib.metadata.version(name) for name in TRACERS]).encode())
     return digest.hexdigest()
@@ -97,59 +98,52 @@ def name_of(f: Any) -> str | None:
 
 
 class Kept:
-    """A function of pytrees as programs of arrays, one for each form of its arguments.
+    """A function of pytrees as programs of arrays, one for each form of its arguments, on disk where that can be.
 
     **Arguments:** the function; its name, None where it has none; options for XLA.
     """
 
     def __init__(self, f: Callable[..., Any], name: str | None, options: dict[str, Any]):
         self.f, self.name, self.options = f, name, options
-        self.programs: dict[Any, Callable[..., Any] | None] = {}
         self.lock = threading.Lock()
 
-    def __call__(self, args: tuple[Any, ...]) -> tuple[bool, Any]:
-        """Whether there is such a program, and what it makes of the arguments."""
-        folder = _cache.traced
-        if folder is None or self.name is None or jax.default_backend() != "cpu":
-            return False, None
-        leaves, form = jax.tree.flatten(args)
-        arrays = [x for x in leaves if isinstance(x, ARRAYS)]
-        rest = tuple(None if isinstance(x, ARRAYS) else (type(x), x) for x in leaves)
-        shapes = tuple((np.shape(x), x.dtype, getattr(x, "weak_type", False)) for x in arrays)
-        key = folder, form, rest, shapes
-        with self.lock:
-            if key not in self.programs:
-                self.programs[key] = self._program(folder, args, arrays)
-            program = self.programs[key]
-        return program is not None, program and program(arrays)
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """What the function makes of its arguments."""
+        form, arrays = split((args, kwargs))
+        on_disk = self.name is not None and not kwargs and jax.default_backend() == "cpu"
+        folder = _cache.traced if on_disk else None
+        with self.lock:  # tracing takes long, and is not done twice
+            make = lambda: self._kept(folder, form, arrays) or program_of(self.f, form, self.options)
+            program = programs.get((self, folder, form, shapes(arrays)), make)
+        return program(arrays)
 
-    def _program(
-        self, folder: pathlib.Path, args: tuple[Any, ...], arrays: list[Any]
-    ) -> Callable[[list[Any]], Any] | None:
+    def _kept(
+        self, folder: pathlib.Path | None, form: Form, arrays: list[Any]
+    ) -> Callable[[Sequence[Any]], Any] | None:
+        """The program that is in the folder, put there if need be; None where that cannot be."""
+        if folder is None:
+            return None
         try:
+            args, _ = form.filled(arrays)
             about = f"{sources()} {self.name} {jax.dtypes.canonicalize_dtype(float)} {named(args)}"
             path = folder / hashlib.sha256(about.encode()).hexdigest()[:32]
-            program, form = _program_at(path) or (None, None)
+            program, result = _program_at(path) or (None, None)
             if program is None:
-                made = self._lowered(args, arrays)
+                made = self._lowered(form, arrays)
                 _write(path, made)
-                program, form = export.deserialize(bytearray(made[0])), made[1]
+                program, result = export.deserialize(bytearray(made[0])), made[1]
         except (Unnamed, NotImplementedError, TypeError, ValueError):
             return None  # what is wrong with it, if anything, is said where it is called without being kept
         run = jax.jit(program.call, compiler_options=self.options)
-        return lambda arrays: _filled(form, run(*arrays))
+        return lambda arrays: _filled(result, run(*arrays))
 
-    def _lowered(self, args: tuple[Any, ...], arrays: list[Any]) -> tuple[bytes, Any]:
+    def _lowered(self, form: Form, arrays: list[Any]) -> tuple[bytes, Any]:
         """The program, and the form of its result."""
-        leaves, form = jax.tree.flatten(args)
-        places = [i for i, x in enumerate(leaves) if isinstance(x, ARRAYS)]
         result = []
 
         def flat(*x: Any) -> list[Any]:
-            whole = list(leaves)
-            for i, value in zip(places, x, strict=True):
-                whole[i] = value
-            out, shape = jax.tree.flatten(self.f(*jax.tree.unflatten(form, whole)))
+            args, _ = form.filled(x)
+            out, shape = jax.tree.flatten(self.f(*args))
             if not all(isinstance(y, ARRAYS) for y in out):
                 raise Unnamed
             result.append(_form(jax.tree.unflatten(shape, range(len(out)))))

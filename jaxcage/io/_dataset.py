@@ -3,10 +3,9 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from .._glossary import component_names, quantity
 from ..analysis import Confirmation, Sweep
@@ -15,6 +14,9 @@ from ..models import CageModel
 from ._files import replacing
 from ._write_config import configuration
 
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _DIMENSIONS: dict[str, tuple[str, ...]] = {
     "strobe": ("speed", "start", "revolution", "component"),
@@ -35,7 +37,7 @@ _DERIVED: dict[str, tuple[str, ...]] = {
 }
 
 
-def to_dataset(sweep: Sweep, model: CageModel | None = None) -> xr.Dataset:
+def to_dataset(sweep: Sweep, model: CageModel | None = None) -> "xr.Dataset":
     """A sweep as a labelled data set.
 
     **Arguments:** the sweep; the model it was made with, whose every parameter then goes along (none with forces of
@@ -44,6 +46,8 @@ def to_dataset(sweep: Sweep, model: CageModel | None = None) -> xr.Dataset:
     **Returns:** variables over `speed`, `start`, `revolution`, `component`, `block`, `exponent`
     with units and words; configuration, method and versions in the attributes.
     """
+    import xarray as xr
+
     stored = {name: (dims, getattr(sweep, name)) for name, dims in _DIMENSIONS.items()}
     if sweep.escape is not None:
         stored["escape"] = ("speed", "start"), sweep.escape
@@ -88,7 +92,7 @@ def _attributes(sweep: Sweep, model: CageModel | None) -> dict[str, Any]:
     }
 
 
-def _describe(variable: xr.DataArray, name: str) -> None:
+def _describe(variable: "xr.DataArray", name: str) -> None:
     known = quantity(name)
     variable.attrs |= {"long_name": known.text, "units": known.unit}
 
@@ -98,7 +102,7 @@ def _flags(names: list[str] | tuple[str, ...]) -> dict[str, Any]:
     return {"flag_values": list(range(len(names))), "flag_meanings": " ".join(names)}
 
 
-def from_dataset(dataset: xr.Dataset) -> Sweep:
+def from_dataset(dataset: "xr.Dataset") -> Sweep:
     """The sweep in a data set made by `to_dataset`."""
     stored = {name: np.asarray(dataset[name].values) for name in _DIMENSIONS}
     return Sweep(
@@ -113,7 +117,7 @@ def from_dataset(dataset: xr.Dataset) -> Sweep:
     )
 
 
-def stored_configuration(dataset: xr.Dataset) -> Mapping[str, Any] | None:
+def stored_configuration(dataset: "xr.Dataset") -> Mapping[str, Any] | None:
     """The configuration of the model that made a data set, for `jaxcage.io.model_from`; None if
     there was none.
     """
@@ -131,11 +135,13 @@ def save_sweep(path: str | Path, sweep: Sweep, model: CageModel | None = None) -
     return Path(path)
 
 
-def open_sweep(path: str | Path) -> xr.Dataset:
+def open_sweep(path: str | Path) -> "xr.Dataset":
     """The data set that `save_sweep` wrote, in memory.
 
     **Raises:** `FileNotFoundError`.
     """
+    import xarray as xr
+
     if not Path(path).is_dir():
         raise FileNotFoundError(f"There is no stored sweep at '{path}'.")
     # Nothing but version 3, which we write: version 2 has a codec that unpickles, and so runs what a file says.

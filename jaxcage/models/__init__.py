@@ -15,6 +15,7 @@
 | `whole`           | the whole bearing: rollers, pockets, cage, guiding land, inner ring              |
 """
 
+from .._arguments import check_layer
 from ._cage import CageModel as CageModel
 from ._cage_at_speed import FORCES as FORCES, CageAtSpeed as CageAtSpeed
 from ._cases import case as case
@@ -47,4 +48,10 @@ from .whole import (
     BearingState as BearingState,
     rolling_start as rolling_start,
     whole_bearing as whole_bearing,
+)
+
+
+check_layer(
+    globals(),
+    "case dimensionless_groups fastest_speed rolling_start whole_bearing",
 )

@@ -11,6 +11,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
+from .._arguments import checked
 from .._types import Scalar, State
 from ._field import AbstractField, FirstOrderField, SecondOrderField
 from ._user_law import components
@@ -86,6 +87,7 @@ class ForcedSystem(AbstractForcedSystem):
     _starts: tuple[Any, ...] = eqx.field(static=True)
     _harmonics: int = eqx.field(static=True, default=1)
 
+    @checked
     def __init__(
         self,
         rates: Callable[[Scalar, State, Scalar], State],
@@ -143,6 +145,7 @@ class ForcedOscillator(AbstractForcedSystem):
     _starts: tuple[Any, ...] = eqx.field(static=True)
     _harmonics: int = eqx.field(static=True, default=1)
 
+    @checked
     def __init__(
         self,
         acceleration: Callable[[Scalar, State, State, Scalar], State],

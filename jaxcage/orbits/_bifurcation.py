@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from .._arguments import shown, wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._types import Scalar
@@ -207,11 +208,14 @@ def _read_guess(
         at = getattr(guess, "value", None)
         if at is None or getattr(guess, "parameter", parameter) != parameter:
             at = value_of(system, known_speed, parameter)
-    elif isinstance(guess, tuple):
+    elif isinstance(guess, tuple) and len(guess) == 2:
         state, at = guess
     else:
-        spin, at = True, guess
+        spin, at = True, cast(Any, guess)
         state = None
+    if wrong("guess", Scalar, at):
+        said = "must be a number, a state and a number, an `Orbit` or a `Point`"
+        raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")
     if parameter == SPEED:
         known_speed = at
     if known_speed is None:

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float, Int
 
+from .._arguments import shown
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -291,9 +292,11 @@ def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Any) -> Floa
     """A guess as an array, without derivative."""
     if guess is None:
         guess = system.starts(speed)[0]
-    state = guess.state if isinstance(guess, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in guess])
+    wanted = f"must be a state of {system.dimension} numbers"
+    try:
+        state = guess.state if isinstance(guess, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in guess])
+    except (TypeError, ValueError) as error:  # of another kind, or ragged
+        raise ArgumentError("guess", said=f"{wanted}, but {shown(guess)} was given.") from error
     if state.shape != (system.dimension,):
-        raise ArgumentError(
-            "guess", said=f"must be a state of {system.dimension} numbers, but has shape {state.shape}."
-        )
+        raise ArgumentError("guess", said=f"{wanted}, but has shape {state.shape}.")
     return jax.lax.stop_gradient(state)

@@ -6,10 +6,10 @@ edge is the one whose error is to be looked at.
 
 from collections.abc import Mapping
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._recent import jitted
 from .._types import Scalar
 from ..integrate import AbstractMethod, method as make_method, strobe_map
 from ..models import CageModel
@@ -20,7 +20,7 @@ STEPS = 4096
 """Steps at which an excursion is looked for."""
 
 
-@eqx.filter_jit
+@jitted
 def _largest_eps(
     model: CageModel, speed: Scalar, state: Float[Array, " dim"], method: AbstractMethod
 ) -> Float[Array, ""]:

@@ -42,7 +42,8 @@ _DESCRIPTORS += (types.GetSetDescriptorType, types.MemberDescriptorType, types.C
 def package_digest() -> str:
     """All that this package computes the lanes of a study by."""
     digest, root = hashlib.sha256(), pathlib.Path(__file__).parents[1]
-    for path in sorted([*root.glob("*.py"), *(p for layer in LAYERS for p in (root / layer).glob("*.py"))]):
+    files = lambda ending: [*root.glob(ending), *(p for layer in LAYERS for p in (root / layer).glob(ending))]
+    for path in sorted(files("*.py") or files("*.pyc")):  # installed without sources there is bytecode alone
         digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

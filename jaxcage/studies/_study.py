@@ -16,6 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._errors import ArgumentError
 from .._parameters import replace
+from .._recent import jitted
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
 from ..integrate import AbstractMethod
@@ -203,7 +204,7 @@ def _filled(x: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([x, np.repeat(x[-1:], size - x.shape[0], axis=0)])
 
 
-@eqx.filter_jit
+@jitted
 def _start_and_scale(
     designs: AbstractForcedSystem, speed: Float[Array, " lanes"], start: Int[Array, " lanes"]
 ) -> tuple[Float[Array, "lanes dim"], Float[Array, "lanes dim"]]:

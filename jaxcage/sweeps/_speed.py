@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._recent import jitted
 from .._types import State
 from ..analysis import Confirmation, Observation, Plan, Sweep
 from ..integrate import AbstractMethod, controlled, finer
@@ -25,7 +26,15 @@ from ._lasting import follow
 
 
 def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> Any:
-    """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`."""
+    """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`.
+
+    **Raises:** `ValueError` for what is no finite number, and for a count below 1.
+    """
+    for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
+        if wrong("", float, value) or not math.isfinite(value):
+            raise ArgumentError(name, said=f"must be a finite number, but {value!r} was given.")
+    if said := wrong("count", int, count):
+        raise ArgumentError("count", said=f"must be {said}, but {count!r} was given.")
     if last is None:
         return float(first) * math.pi / 30
     return np.linspace(first, last, count) * math.pi / 30
@@ -268,12 +277,12 @@ def initial_states(
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), system.dimension)).copy()
 
 
-@eqx.filter_jit
+@jitted
 def _scales(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds dim"]:
     return jax.vmap(lambda s: jnp.stack([jnp.asarray(c) for c in system.scale(s)]))(speed)
 
 
-@eqx.filter_jit
+@jitted
 def _own_starts(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds starts dim"]:
     row = lambda y: jnp.stack([jnp.asarray(c) for c in y])
     return jax.vmap(lambda s: jnp.stack([row(y) for y in system.starts(s)]))(speed)

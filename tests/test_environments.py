@@ -1,0 +1,104 @@
+"""The command in other surroundings: home folder, locale, time zone, terminal, paths, no sources; the same numbers."""
+
+import compileall
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import jaxcage
+
+
+PACKAGE = Path(jaxcage.__file__).parent
+OURS = {"PATH": os.environ["PATH"], "PYTHONPATH": str(PACKAGE.parent), "HOME": os.environ.get("HOME", "/")}
+STATICS = ("statics", "1a", "--json", "--out", "out")
+
+
+def command(folder: Path, environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[bytes]:
+    """Run a command in a folder, with no terminal and no more than this environment."""
+    line = [sys.executable, "-m", "jaxcage", *arguments]
+    return subprocess.run(line, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=120)
+
+
+def numbers(found: subprocess.CompletedProcess[bytes]) -> dict[str, object]:
+    """What was found, whatever it was called and however long it took."""
+    assert found.returncode == 0, found.stderr
+    document = json.loads(found.stdout)
+    return {k: v for k, v in document.items() if k not in ("seconds", "figure", "data", "case")}
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    return numbers(command(tmp_path_factory.mktemp("usual"), OURS, *STATICS))
+
+
+def said(found: subprocess.CompletedProcess[bytes]) -> list[str]:
+    return [line for line in found.stderr.decode().splitlines() if "design rule" not in line]
+
+
+WITHOUT = {k: v for k, v in OURS.items() if k != "HOME"}
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize(
+    "environment",
+    [
+        WITHOUT,
+        WITHOUT | {"HOME": "/dev/null/nowhere"},
+        OURS | {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
+        OURS | {"LC_ALL": "de_DE.UTF-8", "LANG": "de_DE.UTF-8", "TZ": "Pacific/Kiritimati", "TERM": "dumb"},
+    ],
+    ids=["no home", "home that cannot be written", "ascii", "another country"],
+)
+def test_surroundings_change_no_number(tmp_path: Path, usual: dict[str, object], environment: dict[str, str]):
+    found = command(tmp_path, environment, *STATICS)
+    assert numbers(found) == usual
+    without_home = environment.get("HOME", "").startswith("/dev/null")
+    assert [line.split(" in ")[0] for line in said(found)] == ["Warning: Compiled programs are not kept"] * without_home
+
+
+@pytest.mark.parametrize("name", ["a b\nc\u202e", pytest.param(os.fsdecode(b"x\xff y"), marks=pytest.mark.wide)])
+def test_any_path_will_do(tmp_path: Path, name: str, usual: dict[str, object]):
+    folder = tmp_path / name
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("the file system has no such names")
+    (folder / "my bearing\n.toml").write_text('base = "1a"\n')
+    found = command(folder, OURS | {"LC_ALL": "C"}, "statics", "my bearing\n.toml", *STATICS[2:])
+    same = ("left_as_in_template",)  # what a file adds
+    assert {k: v for k, v in numbers(found).items() if k not in same} == usual and not said(found)
+    assert (folder / "out").is_dir() and len(list((folder / "out").iterdir())) == 2
+
+
+@pytest.mark.wide
+def test_without_sources_it_is_another_version_by_its_bytecode(tmp_path: Path, usual: dict[str, object]):
+    """Programs that are kept, and stores, are known by what the package is made of."""
+    package = Path(shutil.copytree(PACKAGE, tmp_path / "jaxcage", ignore=shutil.ignore_patterns("__pycache__")))
+    environment = OURS | {"PYTHONPATH": str(tmp_path)}
+    code = "from jaxcage.integrate._traced import sources; from jaxcage.studies._fingerprint import package_digest\n"
+    code += "print(sources(), package_digest())"
+    digests = []
+    for change in ("", "\nMORE = 1\n"):
+        source = (PACKAGE / "forces" / "_rib.py").read_text() + change
+        (package / "forces" / "_rib.py").write_text(source)
+        assert compileall.compile_dir(package, quiet=1, legacy=True)
+        (package / "forces" / "_rib.py").unlink()
+        for path in [p for p in package.rglob("*.py") if not change]:
+            path.rename(path.with_suffix(".kept"))
+        run = [sys.executable, "-c", code]
+        digests.append(subprocess.run(run, cwd=tmp_path, env=environment, capture_output=True, check=True).stdout)
+    assert len(set(b" ".join(digests).split())) == 4
+    assert numbers(command(tmp_path, environment, *STATICS)) == usual
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell of POSIX")
+@pytest.mark.parametrize("closed", ["<&- 2>&-", ">&- 2>&-"])
+def test_nothing_to_write_to_is_no_failure(tmp_path: Path, closed: str):
+    line = f"'{sys.executable}' -m jaxcage init new.toml {closed}"
+    assert subprocess.run(line, shell=True, cwd=tmp_path, env=OURS, capture_output=True).returncode == 0
+    assert (tmp_path / "new.toml").is_file()
