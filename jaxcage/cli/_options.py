@@ -63,7 +63,7 @@ class CommonOptions(AnyOptions):
 @dataclasses.dataclass(frozen=True)
 class _Case:
     case: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CASE")]
-    """A published case (1a, 1b, 2a, 2b, 3a, 3b) or the path of a TOML file."""
+    """A published case (1a, 1b, 2a, 2b, 3a, 3b), a whole bearing (nu2310), or the path of a TOML file."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -358,6 +358,10 @@ class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Revolutions recorded."""
     discard: FromZero = 0
     """Revolutions left out at the beginning."""
+    load: Annotated[float | None, number("be from 0 to 1e7 N", lambda x: x >= 0, "N", "own")] = None
+    """Shaft load [N] of a whole bearing, or with a unit, e.g. "4.45 kN"; its own if left out."""
+    animate: bool = False
+    """Of a whole bearing: an animation of one revolution of the cage as well, a GIF."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -440,6 +444,8 @@ class InitOptions(AnyOptions):
 
     path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
     """Where to write it, e.g. my_bearing.toml; an existing file is left alone."""
+    model: Literal["cage", "bearing"] = "cage"
+    """What it describes: the cage under prescribed forces, or the whole bearing with its rollers."""
 
 
 COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {

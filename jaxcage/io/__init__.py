@@ -4,8 +4,8 @@
 |-----------------|---------------------------------------------------------------------------|
 | `_units`        | texts with a unit to SI numbers                                           |
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
-| `_config`       | TOML to `CageModel`, with every value checked                             |
-| `_write_config` | `CageModel` to nested mapping or TOML                                     |
+| `_config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
+| `_write_config` | a model to nested mapping or TOML                                         |
 | `_ranges`       | values that are known within a range only                                 |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
@@ -19,8 +19,12 @@ from ._config import (
     Unknown as Unknown,
     check_together as check_together,
     load_model as load_model,
+    load_whole_bearing as load_whole_bearing,
     model_from as model_from,
     read_bearing as read_bearing,
+    read_whole_bearing as read_whole_bearing,
+    subject_of as subject_of,
+    whole_bearing_from as whole_bearing_from,
 )
 from ._csv import (
     branch_columns as branch_columns,
@@ -48,7 +52,7 @@ from ._files import (
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
 from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner
-from ._template import template as template, write_template as write_template
+from ._template import Subject as Subject, template as template, write_template as write_template
 from ._units import to_si as to_si
 from ._write_config import (
     configuration as configuration,

@@ -9,6 +9,7 @@
 | `_drag`       | drag and churning                                                           |
 | `_contacts`   | every contact of the rollers, one set of numbers for both bodies            |
 | `_guide`      | film and contact of the guiding land, on cage and ring                      |
+| `_wear`       | Archard's law for the cage                                                  |
 | `_state`      | state, what is integrated beside it                                         |
 | `_field`      | equations of motion at one shaft speed                                      |
 | `_energy`     | energy, angular momentum                                                    |
@@ -38,3 +39,4 @@ from ._state import (
     Rollers as Rollers,
 )
 from ._traction import Traction as Traction, TractionCurve as TractionCurve
+from ._wear import Wear as Wear

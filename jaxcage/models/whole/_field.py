@@ -284,6 +284,7 @@ class BearingAtSpeed(eqx.Module):
                     f.drag_power,
                     pocket.normal,
                     rollers.spin / self.n_rollers,
+                    pocket.rubbing,
                 ]
             ),
             axis=1,
@@ -296,7 +297,7 @@ class BearingAtSpeed(eqx.Module):
     ) -> Rates:
         """Cage and inner ring, under the sums over all rollers; the ledger."""
         (on_rollers_x, on_rollers_y, pocket_moment, inner_x, inner_y, inner_moment, outer_moment) = sums[:7]
-        (traction, raceway, friction, pocket_damping, drag, pocket_sum, spin) = sums[7:]
+        (traction, raceway, friction, pocket_damping, drag, pocket_sum, spin, rubbing) = sums[7:]
         mass, e, g = self.cage_mass, self.eccentricity, self.gravity
         cos, sin = cos_sin(state.clock[0])
         contact_x, contact_y = land.x - on_rollers_x, land.y - on_rollers_y
@@ -352,6 +353,12 @@ class BearingAtSpeed(eqx.Module):
                 cage.cage_speed,
                 spin,
                 hold,
+                rubbing,
+                land.rubbing,
+                -on_rollers_x * cos,
+                -on_rollers_x * sin,
+                -on_rollers_y * cos,
+                -on_rollers_y * sin,
             ]
         )
         clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
