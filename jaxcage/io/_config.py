@@ -1,5 +1,4 @@
 """TOML -> `CageModel` or `BearingModel`: tables mirror the modules, every value is checked against its declaration.
-
 A whole bearing says `model = "bearing"`, or starts from one, `base = "nu2310"`. Of a cage:
 
 base = "1a"                  # optional: start from a published case and change what is listed
