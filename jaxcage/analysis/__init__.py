@@ -12,6 +12,7 @@
 | `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
+| `_bearing_sweep` | the result of a sweep of the whole bearing                                         |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
@@ -20,6 +21,11 @@ from ._bearing_measures import (
     BearingMeasures as BearingMeasures,
     bearing_measures as bearing_measures,
     cage_state as cage_state,
+)
+from ._bearing_sweep import (
+    BearingRecord as BearingRecord,
+    BearingSweep as BearingSweep,
+    summed_up as summed_up,
 )
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
