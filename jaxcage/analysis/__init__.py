@@ -13,6 +13,7 @@
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_bearing_history` | forces and slips of every roller of it, around its circumference; its spectra     |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
+| `_bearing_sweep` | the result of a sweep of the whole bearing                                         |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
@@ -33,6 +34,11 @@ from ._bearing_measures import (
     bearing_measures as bearing_measures,
     cage_state as cage_state,
     synchronous_force as synchronous_force,
+)
+from ._bearing_sweep import (
+    BearingRecord as BearingRecord,
+    BearingSweep as BearingSweep,
+    summed_up as summed_up,
 )
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
