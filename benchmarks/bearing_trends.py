@@ -9,6 +9,7 @@ and says yes, no or undecided by twice the standard error of block means. Both s
 import argparse
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -140,11 +141,11 @@ def trends(starts: int, discard: int, revolutions: int) -> None:
     for rpm, designs in wanted.items():
         distinct = list(dict.fromkeys(designs))
         models = [jc.replace(model, load=load, **dict(inputs)) for load, inputs in distinct]
-        length = dict(starts=starts, discard=discard, revolutions=revolutions, blocks=BLOCKS)
+        length: dict[str, Any] = dict(starts=starts, discard=discard, revolutions=revolutions, blocks=BLOCKS)
         found = jc.sweep_bearings(models, np.array([jc.rpm(rpm)]), **length)
         ran |= {(load, rpm, inputs): sweep for (load, inputs), sweep in zip(distinct, found, strict=True)}
 
-    rows = [("statement", "load, shaft", "from", "to", "in", "verdict")]
+    rows: list[tuple[str, ...]] = [("statement", "load, shaft", "from", "to", "in", "verdict")]
     for each in STATEMENTS:
         for load, rpm in each.conditions:
             all_four = seen([ran[load, rpm, tuple(inputs.items())] for inputs in each.inputs], each.indicator)
@@ -184,10 +185,10 @@ def threshold(discard: int, revolutions: int) -> None:
     model, speed = jc.whole_bearing("nu2310"), float(jc.rpm(SHAFT))
     begin = [rolling_start(jc.replace(model, load=300.0), speed, turning=turning) for turning in (1.0, SLIPPING)]
     models = [jc.replace(model, load=load) for load in LOADS]
-    length = dict(starts=begin, discard=discard, revolutions=revolutions, blocks=BLOCKS, exponents=0)
+    length: dict[str, Any] = dict(starts=begin, discard=discard, revolutions=revolutions, blocks=BLOCKS, exponents=0)
     found = jc.sweep_bearings(models, np.array([speed]), **length)
     print(f"Slip at {SHAFT:.0f} rpm of the shaft, {discard} revolutions left out, {revolutions} observed")
-    rows = [("load [N]", "from rolling", "from slipping", "state", "verdict")]
+    rows: list[tuple[str, ...]] = [("load [N]", "from rolling", "from slipping", "state", "verdict")]
     slips = []
     for load, sweep in zip(LOADS, found, strict=True):
         slip = sweep.block_means["cage_slip"][0]
