@@ -156,7 +156,8 @@ def trends(starts: int, discard: int, revolutions: int) -> None:
         ran[4450.0, SHAFT, (("guidance_gap", gap), ("pocket_clearance", ratio * gap))] for ratio in RATIOS
     ]
     for name, unit in (("cage_slip", "slip"), ("exponent", "exponent")):
-        rows.append(governed(*(seen(of(gap), mean_of(name)) for gap in GAPS), unit))
+        small, large = (seen(of(gap), mean_of(name)) for gap in GAPS)
+        rows.append(governed(small, large, unit))
     print(f"Trends: {starts} starts, {discard} revolutions left out, {revolutions} observed in {BLOCKS} blocks")
     table(rows)
     lanes = [sweep for sweep in ran.values()]

@@ -144,5 +144,6 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     for command in ("zones", "statics", "report"):
         assert main([command, str(path)]) == 2
         said = capsys.readouterr().err
-        assert "is a whole bearing, of which only `jaxcage simulate`" in said and f"`jaxcage {command}` takes" in said
+        assert "is a whole bearing, of which only `jaxcage simulate` and `jaxcage sweep` know" in said
+        assert f"`jaxcage {command}` takes a cage" in said
         assert said.count("\n") == 1

@@ -379,8 +379,8 @@ def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str], tmp_path: pathlib
 
 
 def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
-    assert main(["sweep", "nu2310"]) == 2
-    assert "only `jaxcage simulate`" in capsys.readouterr().err
+    assert main(["zones", "nu2310"]) == 2
+    assert "only `jaxcage simulate` and `jaxcage sweep`" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
     assert "--solver" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "200000"]) == 2

@@ -93,7 +93,7 @@ SHOWN = (
     Shown("lasting", REPRODUCTION, [f"jaxcage sweep {c}{o}" for c in CASES for o in (" --horizon 0", "")], ex.lasting),
     Shown("identify", REPRODUCTION, ["python -m benchmarks.identify"], ex.lines("+-")),
     Shown("bearing-threshold", WHOLE, [f"{TRENDS} threshold --discard 100 --revolutions 50"], ex.printed),
-    Shown("bearing-trends", WHOLE, [f"{TRENDS} trends --starts 2 --discard 20 --revolutions 20"], ex.printed),
+    Shown("bearing-trends", WHOLE, [f"{TRENDS} trends --starts 1 --discard 10 --revolutions 10"], ex.printed),
     Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
     _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),
     _whole("solvers-page", "benchmarks/solvers.md", "python -m benchmarks.solvers", "solvers.md"),

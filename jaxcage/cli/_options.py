@@ -109,10 +109,12 @@ class _Length(Options):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SweepOptions(_Length, _Range, IntegrationOptions):
-    """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones."""
+    """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
+    bearing, whose speeds are the shaft's."""
 
     count: Annotated[int | None, whole(1)] = None
-    """Number of speeds, 251 if left out, 40 where ranges are drawn from; with one, only the first speed is run."""
+    """Number of speeds; if left out 251, of a whole bearing 13, and 40 where ranges are drawn from. With one, only the
+    first speed is run."""
     draws: FromTwo = 64
     """Draws from what the file knows within ranges only, each run once at every speed, 100 revolutions after 100."""
     seed: FromZero = 0

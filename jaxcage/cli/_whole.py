@@ -48,7 +48,7 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
     if options.load is not None:
         model = replace(model, load=options.load)
-    shaft_rpm = _shaft_rpm(model, options.speed, job.speeds)
+    shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
     speed = float(rpm(shaft_rpm))
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     numbers = (5 * model.bearing.n_rollers + 40) * SAMPLES * (options.revolutions + options.discard)
@@ -91,7 +91,7 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     return Report(document, tables, [said])
 
 
-def _shaft_rpm(model: BearingModel, given: float, unsaid: Whose) -> float:
+def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str = "--speed") -> float:
     """The shaft's speed [rpm] that a speed means.
 
     **Raises:** `InputError` for one at which no cage runs.
@@ -103,7 +103,7 @@ def _shaft_rpm(model: BearingModel, given: float, unsaid: Whose) -> float:
     land = abs(float(model.rolling_cage_speed(rpm(shaft)) * model.land_radius))
     if land > FASTEST:
         raise InputError(
-            f"Option --speed must leave the cage at most {FASTEST:g} m/s at its land, but {shaft:g} rpm of the shaft "
+            f"Option {option} must leave the cage at most {FASTEST:g} m/s at its land, but {shaft:g} rpm of the shaft "
             f"make {land:.0f} m/s."
         )
     return shaft

@@ -10,10 +10,12 @@
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
 | `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
+| `_bearing_dataset` | `BearingSweep` to labelled data set and zarr                           |
 | `_csv`          | time histories, strobe points and branches as CSV                         |
 | `_files`        | whole files or none; is a folder writable                                 |
 """
 
+from ._bearing_dataset import bearing_dataset as bearing_dataset, save_bearing_sweep as save_bearing_sweep
 from ._config import (
     BearingFile as BearingFile,
     Unknown as Unknown,

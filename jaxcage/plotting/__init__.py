@@ -26,9 +26,11 @@ from ._bearing import (
     bearing_animation as bearing_animation,
     bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
+    bearing_sweep_figure as bearing_sweep_figure,
     cage_orbit as cage_orbit,
     force_over_time as force_over_time,
     marked_spectrum as marked_spectrum,
+    over_shaft_speed as over_shaft_speed,
     pocket_force_around as pocket_force_around,
     slip_around as slip_around,
 )

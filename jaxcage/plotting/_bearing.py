@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, FancyArrowPatch, Polygon
 
-from ..analysis import Around, BearingHistory, OrderSpectrum
+from ..analysis import Around, BearingHistory, BearingSweep, OrderSpectrum
 from ..integrate import BearingRun
 from ..models import BearingModel
 from ._style import BLACK, BLUE, GREEN, GREY, GRID, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, dress, new_figure
@@ -238,6 +239,45 @@ def force_over_time(history: BearingHistory, ax: Axes | None = None) -> Axes:
     ax.plot(turns, np.hypot(*history.land_on_cage.T), color=BLUE, linewidth=0.8, label="land")
     ax.set(xlim=(0, turns[-1]), xlabel="Revolutions of the cage", ylabel="Force [N]")
     ax.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return ax
+
+
+def bearing_sweep_figure(found: BearingSweep, title: str = "") -> Figure:
+    """Slip, pocket forces, power lost, whirl, largest exponent and equivalent synchronous force over the shaft's speed,
+    a line for each start, with standard errors where they are known.
+    """
+    figure = new_figure(11.5, 8.5)
+    axes = figure.subplots(3, 2, sharex=True)
+    over_shaft_speed(found, 100 * found.cage_slip, "Cage slip [%]", axes[0, 0], 100 * found.standard_error("cage_slip"))
+    force = found.standard_error("pocket_force_mean_sum_N")
+    over_shaft_speed(found, found.pocket_force_mean_sum_N, "Sum of pocket forces, mean [N]", axes[0, 1], force)
+    over_shaft_speed(found, found.pocket_force_max_N, "Largest pocket force [N]", axes[1, 0])
+    lost = found.standard_error("friction_power_W")
+    over_shaft_speed(found, found.friction_power_W, "Power lost [W]", axes[1, 1], lost)
+    over_shaft_speed(found, found.exponent, "Largest exponent per revolution", axes[2, 0], found.exponent_error)
+    synchronous, error = found.synchronous_force_x_N, found.synchronous_force_error_N
+    over_shaft_speed(found, synchronous, "Equivalent synchronous force [N]", axes[2, 1], error)
+    for ax in axes[2]:
+        ax.set_xlabel("Shaft speed [rpm]")
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def over_shaft_speed(
+    found: BearingSweep,
+    values: Float[np.ndarray, "speeds starts"],
+    label: str,
+    ax: Axes | None = None,
+    errors: Float[np.ndarray, "speeds starts"] | None = None,
+) -> Axes:
+    """A quantity of a sweep over the shaft's speed, a line for each start, with bars of one standard error."""
+    ax = axes_or_new(ax, 6.0, 3.2) if ax is None else dress(ax)
+    for i, colour in zip(range(values.shape[1]), MARK_COLOURS, strict=False):
+        bars = None if errors is None else np.where(np.isfinite(errors[:, i]), errors[:, i], 0.0)
+        style: Any = dict(color=colour, linewidth=0.9, marker=".", markersize=5, elinewidth=0.7, label=f"start {i + 1}")
+        ax.errorbar(found.rpm, values[:, i], bars, **style)
+    ax.set_ylabel(label)
     return ax
 
 
