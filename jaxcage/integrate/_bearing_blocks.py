@@ -129,7 +129,7 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     if not tangent.bodies:
         return jnp.ones_like(units.bodies[0])
     parts = [jnp.square(x * u) for x, u in zip(tangent.bodies, units.bodies, strict=True)]
-    squares = [jnp.square(x.reshape(rollers, -1) * u) for x, u in zip(tangent.rollers, units.rollers, strict=True)]
+    squares = [jnp.square(x.reshape(rollers, -1) * u[None]) for x, u in zip(tangent.rollers, units.rollers, strict=True)]
     length = jnp.sqrt(sum(parts) + sum(jnp.sum(x, axis=0) for x in squares))
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
@@ -162,7 +162,7 @@ def run_block(
     sense = jnp.broadcast_to(law.sense, (count,))
     most = MOST_ATTEMPTS * (1 + samples // SAMPLES)
     per_clearance = jnp.asarray(at.guide.land.per_clearance)
-    number = jnp.arange(LONGEST_BLOCK * SAMPLES)[:, None, None]
+    number = jnp.arange(LONGEST_BLOCK * SAMPLES, dtype=float)[:, None, None]
 
     def place(point: Point) -> Array:
         x, y, *_ = point.y.bodies
@@ -185,8 +185,8 @@ def run_block(
 
         *after, taken, hit = lanewise(judge, len(leaves) + 2, tuple(limits), (*leaves, *own))
         point = kept(law, taken, new, old)
-        here = (number == course.reached) & (hit > 0)
-        places = jnp.where(here, place(point), going.place)
+        here = (number == course.reached[None, None]) & (hit > 0)[None, None]
+        places = jnp.where(here, place(point)[None], going.place)
         return _Going(point, jax.tree.unflatten(tree, after), places, going.attempts + 1)
 
     zero = jnp.zeros((count,))
@@ -262,7 +262,7 @@ def lanes_apart(scale: BearingState, a: Point, b: Point) -> Float[Array, " lanes
     """How far two points are apart, in units of the state's scale: the largest of all its parts."""
     units = _inverse(scale)
     count = units.bodies[0].shape[0]
-    rollers = [jnp.abs(x - y).reshape(-1, count) * u for x, y, u in zip(a.y.rollers, b.y.rollers, units.rollers)]
+    rollers = [jnp.abs(x - y).reshape(-1, count) * u[None] for x, y, u in zip(a.y.rollers, b.y.rollers, units.rollers)]
     bodies = [jnp.abs(x - y) * u for x, y, u in zip(a.y.bodies, b.y.bodies, units.bodies)]
     return jnp.max(jnp.stack([*(jnp.max(x, axis=0) for x in rollers), *bodies]), axis=0)
 
