@@ -14,16 +14,17 @@ from jaxtyping import Array, Float, Int
 from .._types import Scalar
 from ..models.whole import BearingAtSpeed, BearingState
 from ._bearing_step import INTEGRATED, Moving, Point, first_point, kept, law_of, step
-from ._lanes import FAR, LEAST, MOST, NOT_FINITE, ORDER, OUTSIDE, SAFETY, TOO_MANY
-from ._march import compiled
+from ._lanes import FAR, LEAST, MOST, NOT_FINITE, OUTSIDE, SAFETY, TOO_MANY
+from ._march import compiled, lanewise
 from ._results import INACCURATE
 
 
 TURN = 2 * np.pi
-SAMPLES = 32
+SAMPLES = 16
 """Of a revolution of the cage."""
-LONGEST_BLOCK = 16
-"""Revolutions in one go: a tangent vector may grow by a factor of 1e12 in each, and its length still is a number."""
+LONGEST_BLOCK = 12
+"""Revolutions in one go: a tangent vector may grow by a factor of 1e20 in each, and its length still is a number."""
+SPACING = TURN / SAMPLES
 FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
 """First, longest and shortest step [rad] of the cage's angle."""
 MOST_ATTEMPTS = 20_000
@@ -52,15 +53,14 @@ class BearingBlock(NamedTuple):
     """Time, and what `INTEGRATED` names."""
     peaks: Float[Array, "followed lanes"]
     """As in `FOLLOWED`."""
-    steps: Int[Array, " lanes"]
+    steps: Float[Array, " lanes"]
     place: Float[Array, "samples 2 lanes"]
     """Of the cage's centre from the land's at the samples, in clearances; NaN where there was none."""
 
 
-class _Going(NamedTuple):
-    """Lanes within a block."""
+class _Course(NamedTuple):
+    """How far lanes are within a block, in floating numbers: one kernel updates them all."""
 
-    point: Point
     base: Array
     """Angle of the last sample."""
     within: Array
@@ -69,11 +69,27 @@ class _Going(NamedTuple):
     """Samples since the block began."""
     step: Array
     outcome: Array
+    steps: Array
     integrals: tuple[Array, ...]
     peaks: tuple[Array, ...]
-    steps: Array
+
+
+class _Going(NamedTuple):
+    """Lanes within a block."""
+
+    point: Point
+    course: _Course
     place: Array
     attempts: Array
+
+
+class _Limits(NamedTuple):
+    """Of a block, shared by all lanes."""
+
+    tolerance: Any
+    samples: Any
+    last_attempt: Any
+    """Whether this is the last attempt."""
 
 
 def _moving(state: BearingState) -> Moving:
@@ -113,7 +129,7 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     if not tangent.bodies:
         return jnp.ones_like(units.bodies[0])
     parts = [jnp.square(x * u) for x, u in zip(tangent.bodies, units.bodies, strict=True)]
-    squares = [jnp.square(x.reshape(rollers, -1) * u) for x, u in zip(tangent.rollers, units.rollers, strict=True)]
+    squares = [jnp.square(x.reshape(rollers, -1) * u[None]) for x, u in zip(tangent.rollers, units.rollers, strict=True)]
     length = jnp.sqrt(sum(parts) + sum(jnp.sum(x, axis=0) for x in squares))
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
@@ -142,11 +158,11 @@ def run_block(
         if lanes.point.tangent.bodies
         else lanes.point
     )
-    spacing = TURN / SAMPLES
-    slowest = STALLED * jnp.abs(jnp.asarray(at.rolling_cage_speed))
+    slowest = jnp.broadcast_to(STALLED * jnp.abs(jnp.asarray(at.rolling_cage_speed)), (count,))
+    sense = jnp.broadcast_to(law.sense, (count,))
     most = MOST_ATTEMPTS * (1 + samples // SAMPLES)
-    number = jnp.arange(count)
     per_clearance = jnp.asarray(at.guide.land.per_clearance)
+    number = jnp.arange(LONGEST_BLOCK * SAMPLES, dtype=float)[:, None, None]
 
     def place(point: Point) -> Array:
         x, y, *_ = point.y.bodies
@@ -154,66 +170,91 @@ def run_block(
             x, y = x - point.y.bodies[5], y - point.y.bodies[6]
         return jnp.stack([x * per_clearance, y * per_clearance])
 
-    def active(going: _Going) -> Array:
-        alive = (going.outcome == 0) | (going.outcome == INACCURATE)
-        return alive & (going.reached < samples)
-
     def attempt(going: _Going) -> _Going:
-        goes = active(going)
-        left = spacing - going.within
-        h = jnp.where(left <= going.step, left, jnp.where(left < 2 * going.step, left / 2, going.step))
-        new, error = step(law, going.base + law.sense * going.within, h, going.point)
-        finite = jnp.isfinite(error)
-        good, shortest = (error <= tolerance) & finite, going.step <= SHORTEST
-        taken = goes & finite & (good | shortest)
-        wish = SAFETY * (tolerance / jnp.maximum(error, 1e-30)) ** (1 / ORDER)
-        tried = h * jnp.where(finite, jnp.clip(wish, LEAST, MOST), LEAST)
-        # A step that was shortened to end at a sample says nothing against the one that was to be tried.
-        tried = jnp.where(good & (h < going.step), jnp.maximum(going.step, tried), tried)
-        tried = jnp.where(goes, jnp.clip(tried, SHORTEST, LONGEST), going.step)
-        hit = taken & (h >= left)
-        point = kept(law, taken, new, going.point)
-        trapezoid = lambda total, a, b: total + jnp.where(taken, h / 2 * (a + b), 0.0)
-        peaks = tuple(jnp.where(taken, jnp.maximum(p, w), p) for p, w in zip(going.peaks, new.watched, strict=True))
-        code = jnp.where(goes & shortest & ~good, jnp.where(finite, INACCURATE, NOT_FINITE), 0)
-        lost = (jnp.abs(point.y.bodies[4]) < slowest) | (point.watched[3] > FAR)
-        code = jnp.where(goes & lost, OUTSIDE, code)
-        code = jnp.where(goes & (going.attempts + 1 >= most) & ~hit, TOO_MANY, code)
-        worse = (going.outcome == 0) | ((code != 0) & (code != INACCURATE))
-        return _Going(
-            point=point,
-            base=jnp.where(hit, going.base + law.sense * spacing, going.base),
-            within=jnp.where(hit, 0.0, jnp.where(taken, going.within + h, going.within)),
-            reached=going.reached + hit.astype(jnp.int32),
-            step=tried,
-            outcome=jnp.where(worse, code, going.outcome).astype(jnp.int32),
-            integrals=tuple(map(trapezoid, going.integrals, going.point.integrand, new.integrand)),
-            peaks=peaks,
-            steps=going.steps + taken.astype(jnp.int32),
-            place=going.place.at[jnp.where(hit, going.reached, going.place.shape[0]), :, number].set(
-                place(point).T, mode="drop"
-            ),
-            attempts=going.attempts + 1,
-        )
+        course, old = going.course, going.point
+        h, angle = lanewise(lambda _, lane: _to_try(*lane), 2, (), (course.base, course.within, course.step, sense))
+        new, error = step(law, angle, h, old)
+        limits = _Limits(tolerance, samples.astype(float), (going.attempts + 1 >= most).astype(float))
+        leaves, tree = jax.tree.flatten(course)
+        own = (error, h, new.y.bodies[4], slowest, sense, *old.integrand, *new.integrand, *new.watched)
 
-    zero, none = jnp.zeros((count,)), jnp.zeros((count,), jnp.int32)
-    begun = _Going(
-        point=point,
+        def judge(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> list[Any]:
+            course, own = jax.tree.unflatten(tree, lane[: len(leaves)]), lane[len(leaves) :]
+            after, taken, hit = _judged(_Limits(*shared), course, own)
+            return [*jax.tree.leaves(after), taken, hit]
+
+        *after, taken, hit = lanewise(judge, len(leaves) + 2, tuple(limits), (*leaves, *own))
+        point = kept(law, taken, new, old)
+        here = (number == course.reached[None, None]) & (hit > 0)[None, None]
+        places = jnp.where(here, place(point)[None], going.place)
+        return _Going(point, jax.tree.unflatten(tree, after), places, going.attempts + 1)
+
+    zero = jnp.zeros((count,))
+    course = _Course(
         base=lanes.angle,
         within=zero,
-        reached=none,
+        reached=zero,
         step=lanes.step,
-        outcome=lanes.outcome,
+        outcome=lanes.outcome.astype(float),
+        steps=zero,
         integrals=(zero,) * (1 + len(INTEGRATED)),
         peaks=point.watched,
-        steps=none,
-        place=jnp.full((LONGEST_BLOCK * SAMPLES, 2, count), jnp.nan),
-        attempts=jnp.zeros((), jnp.int32),
     )
-    going = jax.lax.while_loop(lambda going: jnp.any(active(going)), attempt, begun)
-    after = BearingLanes(going.point, going.base, going.step, going.outcome)
+    nowhere = jnp.full((LONGEST_BLOCK * SAMPLES, 2, count), jnp.nan)
+    begun = _Going(point, course, nowhere, jnp.zeros((), jnp.int32))
+    going = jax.lax.while_loop(lambda going: jnp.any(_active(going.course, samples)), attempt, begun)
+    done = going.course
+    after = BearingLanes(going.point, done.base, done.step, done.outcome.astype(jnp.int32))
     growth = jnp.log(_length(units, going.point.tangent, at.n_rollers))
-    return after, BearingBlock(growth, jnp.stack(going.integrals), jnp.stack(going.peaks), going.steps, going.place)
+    return after, BearingBlock(growth, jnp.stack(done.integrals), jnp.stack(done.peaks), done.steps, going.place)
+
+
+def _active(course: _Course, samples: Any) -> Any:
+    """Lanes that still have to go on and can."""
+    alive = (course.outcome == 0) | (course.outcome == INACCURATE)
+    return alive & (course.reached < samples)
+
+
+def _to_try(base: Any, within: Any, step: Any, sense: Any) -> tuple[Any, Any]:
+    """The step to try, which ends at the next sample or before it, and the angle where it begins."""
+    left = SPACING - within
+    h = jnp.where(left <= step, left, jnp.where(left < 2 * step, left / 2, step))
+    return h, base + sense * within
+
+
+def _judged(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_Course, Any, Any]:
+    """Take the step of a lane or refuse it, and choose the next one."""
+    error, h, cage_speed, slowest, sense, *rest = own
+    size = len(course.integrals)
+    before, after, watched = rest[:size], rest[size : 2 * size], rest[2 * size :]
+    goes, left = _active(course, limits.samples), SPACING - course.within
+    finite, shortest = jnp.isfinite(error), course.step <= SHORTEST
+    good = (error <= limits.tolerance) & finite
+    taken = goes & finite & (good | shortest)
+    hit = taken & (h >= left)
+    root = jnp.sqrt(jnp.sqrt(limits.tolerance / jnp.maximum(error, 1e-30)))  # the estimate is of fourth order
+    tried = h * jnp.where(finite, jnp.clip(SAFETY * root, LEAST, MOST), LEAST)
+    # A step that was shortened to end at a sample says nothing against the one that was to be tried.
+    tried = jnp.where(good & (h < course.step), jnp.maximum(course.step, tried), tried)
+    tried = jnp.where(goes, jnp.clip(tried, SHORTEST, LONGEST), course.step)
+    code = jnp.where(goes & shortest & ~good, jnp.where(finite, 1.0 * INACCURATE, 1.0 * NOT_FINITE), 0.0)
+    lost = taken & ((jnp.abs(cage_speed) < slowest) | (watched[-1] > FAR))
+    code = jnp.where(lost, 1.0 * OUTSIDE, code)
+    code = jnp.where(goes & (limits.last_attempt > 0) & ~hit, 1.0 * TOO_MANY, code)
+    worse = (course.outcome == 0) | ((code != 0) & (code != INACCURATE))
+    add = lambda total, a, b: total + jnp.where(taken, h / 2 * (a + b), 0.0)
+    follow = lambda p, w: jnp.where(taken, jnp.maximum(p, w), p)
+    new = _Course(
+        base=jnp.where(hit, course.base + sense * SPACING, course.base),
+        within=jnp.where(hit, 0.0, jnp.where(taken, course.within + h, course.within)),
+        reached=jnp.where(hit, course.reached + 1, course.reached),
+        step=tried,
+        outcome=jnp.where(worse, code, course.outcome),
+        steps=jnp.where(taken, course.steps + 1, course.steps),
+        integrals=tuple(map(add, course.integrals, before, after)),
+        peaks=tuple(map(follow, course.peaks, watched)),
+    )
+    return new, jnp.where(taken, 1.0, 0.0), jnp.where(hit, 1.0, 0.0)
 
 
 @compiled
@@ -221,7 +262,7 @@ def lanes_apart(scale: BearingState, a: Point, b: Point) -> Float[Array, " lanes
     """How far two points are apart, in units of the state's scale: the largest of all its parts."""
     units = _inverse(scale)
     count = units.bodies[0].shape[0]
-    rollers = [jnp.abs(x - y).reshape(-1, count) * u for x, y, u in zip(a.y.rollers, b.y.rollers, units.rollers)]
+    rollers = [jnp.abs(x - y).reshape(-1, count) * u[None] for x, y, u in zip(a.y.rollers, b.y.rollers, units.rollers)]
     bodies = [jnp.abs(x - y) * u for x, y, u in zip(a.y.bodies, b.y.bodies, units.bodies)]
     return jnp.max(jnp.stack([*(jnp.max(x, axis=0) for x in rollers), *bodies]), axis=0)
 

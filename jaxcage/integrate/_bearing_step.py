@@ -128,7 +128,7 @@ def _with_tangents(go: Callable[..., Any], values: Sequence[Row], tangents: Sequ
 
 def _rollers_kernel(
     law: Law,
-    angle: Array,
+    phase: Row,
     h: Array,
     values: Sequence[Row],
     tangents: Sequence[Row],
@@ -146,7 +146,7 @@ def _rollers_kernel(
     and ring. Then, at the end: the rest of what is passed on, slip, and the estimated error.
     """
     layout, ends = law.layout, last is not None
-    own = [law.places_cos, law.places_sin, *map(layout.over, (*_phase(angle), h))]
+    own = [law.places_cos, law.places_sin, *map(layout.over, (*phase, h))]
     sizes = (OF_ROLLER, OF_ROLLER, OF_ROLLER, OF_BODIES)
     spread = lambda rows: [*rows[0], *rows[1], *rows[2], *map(layout.over, rows[3])]
     pushed = bool(tangents[0])
@@ -183,7 +183,7 @@ def _rollers_kernel(
 
 
 def _bodies_kernel(
-    law: Law, angle: Array, h: Array, values: Sequence[Row], tangents: Sequence[Row], weight: Any, rest: Row, last: Row
+    law: Law, phase: Row, h: Array, values: Sequence[Row], tangents: Sequence[Row], weight: Any, rest: Row, last: Row
 ) -> list[Row]:
     """Cage and inner ring under what all rollers pass on.
 
@@ -220,7 +220,7 @@ def _bodies_kernel(
 
     units = law.units.bodies if ends else ()
     flat = lambda rows: [x for row in rows for x in row]
-    given = [*_phase(angle), h, *flat(values), *flat(tangents), *rest, *last, *units]
+    given = [*phase, h, *flat(values), *flat(tangents), *rest, *last, *units]
     seen = (1 + len(INTEGRATED) + 3) * ends
     out = law.kernel(f, 2 * OF_BODIES * (1 + pushed) + seen, (weight,), given, rollers=False)
     parts = (OF_BODIES, OF_BODIES)
@@ -241,33 +241,46 @@ def _error(h: Any, before: Row, results: Sequence[Any], units: Row) -> Any:
     return h / 6 * worst
 
 
-def _phase(angle: Array) -> Row:
-    """Cosine and sine of an angle in every lane."""
-    return lanewise(lambda _, lane: cos_sin(lane[0]), 2, (), (angle,))
+def _ahead(
+    angle: Array, h: Array, share: Any, of_sum: Any, values: Sequence[Row], tangents: Sequence[Row]
+) -> tuple[Row, Row, Row]:
+    """Cage and inner ring on their way through a step, and cosine and sine of an angle.
 
+    **Arguments:** angle; step; of values and tangents: where the step begins, slopes, and sums of slopes, which count
+    `share` and `of_sum` times.
+    """
+    rows = [row for row in (tuple(values), tuple(tangents)) if row[0]]
 
-def _on(y: Row, h: Array, way: Sequence[Array]) -> Row:
-    return tuple(a + h * b for a, b in zip(y, way, strict=True))
+    def f(shared: Row, lane: Row) -> Sequence[Any]:
+        (angle, h), lane = lane[:2], lane[2:]
+        share, of_sum = shared
+        out = [*cos_sin(angle)]
+        for part in _taken(lane, *[3 * OF_BODIES] * len(rows)):
+            y, slope, total = _taken(part, *[OF_BODIES] * 3)
+            out += [a + h * (share * k + of_sum * t) for a, k, t in zip(y, slope, total, strict=True)]
+        return out
 
-
-def _sixth(total: Row) -> list[Array]:
-    return [x / 6 for x in total]
+    shared = jnp.asarray(share, dtype=float), jnp.asarray(of_sum, dtype=float)
+    lanes = [angle, h, *(x for row in rows for part in row for x in part)]
+    phase, *moved = _taken(lanewise(f, 2 + OF_BODIES * len(rows), shared, lanes), 2, *[OF_BODIES] * len(rows))
+    return phase, moved[0], moved[1] if len(rows) > 1 else ()
 
 
 def _end(
     law: Law, angle: Array, h: Array, y: Moving, total: Moving, t: Moving, t_total: Moving, last: Moving
 ) -> tuple[Point, Array]:
     """The point at the end of a step, by the weighted sums of its slopes, and the error."""
-    bodies, t_bodies = _on(y.bodies, h, _sixth(total.bodies)), _on(t.bodies, h, _sixth(t_total.bodies))
+    sums = (y.bodies, last.bodies, total.bodies), (t.bodies, t.bodies, t_total.bodies)
+    phase, bodies, t_bodies = _ahead(angle, h, 0.0, 1 / 6, *sums)
     values = (y.rollers, last.rollers, total.rollers, bodies)
     tangents = (t.rollers, t.rollers, t_total.rollers, t_bodies)
-    got = _rollers_kernel(law, angle, h, values, tangents, 0.0, 0.0, last.rollers)
+    got = _rollers_kernel(law, phase, h, values, tangents, 0.0, 0.0, last.rollers)
     slope, rollers, moving, t_slope, t_rollers, t_moving, seen = got
     sums = law.layout.reduce(jnp.sum, [*moving, *t_moving, *seen[:-2]])
     moving, t_moving, rest = _taken(sums, len(moving), len(t_moving), len(seen) - 2)
     normal, slip, error = law.layout.reduce(jnp.max, [seen[Passed._fields.index("normal") - MOVING], *seen[-2:]])
     values, tangents = (bodies, bodies, moving), (t_bodies, t_bodies, t_moving)
-    got = _bodies_kernel(law, angle, h, values, tangents, 0.0, rest, last.bodies)
+    got = _bodies_kernel(law, phase, h, values, tangents, 0.0, rest, last.bodies)
     b_slope, _, t_b_slope, _, seen = got
     *integrand, land_force, eps, b_error = seen
     point = Point(
@@ -296,15 +309,15 @@ def step(law: Law, angle: Array, h: Float[Array, " lanes"], at: Point) -> tuple[
         slope, total, t_slope, t_total = carry
         share, weight = shares[i], weights[i]
         here = angle + law.sense * share * h
-        on = lambda y, slope: _on(y, h, [share * x for x in slope])
-        bodies, t_bodies = on(at.y.bodies, slope.bodies), on(at.tangent.bodies, t_slope.bodies)
+        rows = (at.y.bodies, slope.bodies, total.bodies), (at.tangent.bodies, t_slope.bodies, t_total.bodies)
+        phase, bodies, t_bodies = _ahead(here, h, share, 0.0, *rows)
         values = (at.y.rollers, slope.rollers, total.rollers, bodies)
         tangents = (at.tangent.rollers, t_slope.rollers, t_total.rollers, t_bodies)
-        got = _rollers_kernel(law, here, h, values, tangents, share, weight, None)
+        got = _rollers_kernel(law, phase, h, values, tangents, share, weight, None)
         k, sums, moving, t_k, t_sums, t_moving, _ = got
         moving, t_moving = _taken(law.layout.reduce(jnp.sum, [*moving, *t_moving]), len(moving), len(t_moving))
         values, tangents = (bodies, total.bodies, moving), (t_bodies, t_total.bodies, t_moving)
-        k_b, sums_b, t_k_b, t_sums_b, _ = _bodies_kernel(law, here, h, values, tangents, weight, (), ())
+        k_b, sums_b, t_k_b, t_sums_b, _ = _bodies_kernel(law, phase, h, values, tangents, weight, (), ())
         return Moving(k, k_b), Moving(sums, sums_b), Moving(t_k, t_k_b), Moving(t_sums, t_sums_b)
 
     begun = (at.slope, at.slope, at.tangent_slope, at.tangent_slope)
@@ -313,14 +326,14 @@ def step(law: Law, angle: Array, h: Float[Array, " lanes"], at: Point) -> tuple[
 
 
 def kept(law: Law, taken: Array, new: Point, old: Point) -> Point:
-    """The new point of the lanes whose step was taken, the old one of the others."""
+    """The new point of the lanes whose step was `taken` (1, else 0), the old one of the others."""
 
     def choose(taken: Array, new: Any, old: Any) -> Any:
         a, tree = jax.tree.flatten(new)
         pick = lambda _, lane: [
             jnp.where(lane[0] > 0, x, y) for x, y in zip(lane[1 : 1 + len(a)], lane[1 + len(a) :], strict=True)
         ]
-        got = lanewise(pick, len(a), (), [taken.astype(float), *a, *jax.tree.leaves(old)])
+        got = lanewise(pick, len(a), (), [taken, *a, *jax.tree.leaves(old)])
         return jax.tree.unflatten(tree, got)
 
     parts = lambda p: (
@@ -328,7 +341,7 @@ def kept(law: Law, taken: Array, new: Point, old: Point) -> Point:
         (p.y.bodies, p.slope.bodies, p.tangent.bodies, p.tangent_slope.bodies, p.integrand, p.watched),
     )
     of_rollers, of_lanes = zip(parts(new), parts(old), strict=True)
-    rollers = choose(law.layout.over(taken.astype(float)), *of_rollers)
+    rollers = choose(law.layout.over(taken), *of_rollers)
     bodies = choose(taken, *of_lanes)
-    moving = [Moving(r, b) for r, b in zip(rollers, bodies[:4], strict=True)]
-    return Point(*moving, *bodies[4:])
+    y, slope, tangent, t_slope = (Moving(r, b) for r, b in zip(rollers, bodies[:4], strict=True))
+    return Point(y, slope, tangent, t_slope, bodies[4], bodies[5])

@@ -66,7 +66,7 @@ def sweep_bearing(
     - `blocks`: of the observed revolutions, from whose scatter standard errors come.
     - `exponents`: 1 for the largest Lyapunov exponent, 0 for none.
     - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
-    - `allowed`: largest measured error. Once in each block a stretch of 1/32 of a revolution is run a second time with
+    - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution is run a second time with
         about half the steps; a lane in which that moves the state by more is `inaccurate`.
     - `progress`: called with lanes done and lanes in all.
 

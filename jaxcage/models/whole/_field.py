@@ -279,7 +279,8 @@ class BearingAtSpeed(eqx.Module):
         x = -jnp.sum(out * g.cos - across * g.sin) - self.mounting_damping * ring.ring_vx
         y = -jnp.sum(out * g.sin + across * g.cos) - self.mounting_damping * ring.ring_vy
         if self.inner_guided:
-            x, y = x - f.land.x, y - f.land.y
+            land = self.on_land(ring)
+            x, y = x - land.x, y - land.y
         return jnp.stack([x, y - self.load - self.ring_mass * self.gravity])
 
     def __call__(self, state: BearingState) -> Rates:
