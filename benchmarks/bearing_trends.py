@@ -42,13 +42,17 @@ class Seen:
 
     @property
     def error(self) -> float:
-        """Standard error, from the scatter of blocks of all starts."""
+        """Standard error, from the scatter of blocks of all starts; NaN of a single number."""
+        if self.blocks.size < 2:
+            return float("nan")
         return float(np.std(self.blocks, ddof=1) / np.sqrt(self.blocks.size))
 
     @property
     def drifts(self) -> bool:
         """Whether the two halves of the run differ by more than twice the error of their difference."""
         half = self.blocks.shape[1] // 2
+        if half < 2:
+            return False
         first, second = self.blocks[:, :half], self.blocks[:, half:]
         apart = np.hypot(*(np.std(x, ddof=1) / np.sqrt(x.size) for x in (first, second)))
         return abs(np.mean(second) - np.mean(first)) > 2 * apart
@@ -69,8 +73,8 @@ def scatter_of_slip(found: jc.BearingSweep) -> np.ndarray:
 
 
 def one_of_each_start(name: str) -> Indicator:
-    """A quantity that is known of the whole run only."""
-    return lambda found: np.repeat(getattr(found, name)[0][:, None], 2, axis=1)
+    """A quantity that is known of a whole run only: its error is from the scatter of the starts."""
+    return lambda found: getattr(found, name)[0][:, None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,6 +126,8 @@ def verdict(first: Seen, last: Seen, sign: int) -> str:
     change, error = sign * (last.mean - first.mean), np.hypot(first.error, last.error)
     if not np.isfinite(change):
         return "failed"
+    if not np.isfinite(error):
+        return "undecided, one start"
     said = "yes" if change > 2 * error else "no" if change < -2 * error else "undecided"
     return said + (", drifts" if first.drifts or last.drifts else "")
 
@@ -220,7 +226,7 @@ def crossing(slips: np.ndarray, level: float) -> str:
 
 def shown(x: Seen) -> str:
     """A mean with its error."""
-    return f"{x.mean:.3g} ± {x.error:.1g}"
+    return f"{x.mean:.3g}" + (f" ± {x.error:.1g}" if np.isfinite(x.error) else "")
 
 
 def table(rows: Sequence[Sequence[str]]) -> None:
