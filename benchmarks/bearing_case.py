@@ -88,6 +88,9 @@ def statistics(found: jc.BearingSweep, load: float) -> list[dict[str, Any]]:
         for name in MEANS:
             blocks = found.block_means[name][i]
             error = np.std(blocks, ddof=1) / np.sqrt(blocks.size)
+            if not error > 0:  # a tangent vector that is no number any more grows by nothing: not known
+                row[name] = None
+                continue
             row[name] = {"mean": float(f"{blocks.mean():.5g}"), "standard_error": float(f"{error:.2g}")}
         row |= {
             "pocket_force_max_N": float(f"{np.max(found.pocket_force_max_N[i]):.4g}"),

@@ -84,6 +84,7 @@ def test_arcs_by_another_tolerance():
 
 def test_statistics_have_errors_and_states():
     for row in CASE["statistics"]["at"]:
-        assert 0 < row["cage_slip"]["standard_error"] < 0.02 and row["exponent"]["mean"] > 0
+        assert 0 < row["cage_slip"]["standard_error"] < 0.02
+        assert row["exponent"] is None or row["exponent"]["mean"] > 3 * row["exponent"]["standard_error"] > 0
         assert set(row["state"]) <= {"circular", "locally_periodic", "disordered"}
         assert set(row["outcome"]) <= {"successful", "inaccurate"}
