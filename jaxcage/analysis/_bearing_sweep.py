@@ -127,7 +127,8 @@ def summed_up(
     losses = LEDGER[1:]
     parts = {name: mean(name) for name in losses}
     squares = mean("eccentricity_squared") - mean("eccentricity") ** 2
-    growth = record.growth / block if exponents else np.full(record.growth.shape, np.nan)
+    # A tangent vector that is no number any more grows by nothing at all: that is no exponent of zero.
+    growth = np.where((record.growth != 0) & exponents, record.growth / block, np.nan)
     means = {
         "cage_slip": shaped(1 - 2 * np.pi * block / time / rolling[:, None]),
         "pocket_force_mean_sum_N": of_blocks("pocket_force"),
