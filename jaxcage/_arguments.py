@@ -142,7 +142,8 @@ def _wrong_one(name: str, kind: Any, value: Any) -> str:
         return f"a mapping to what is {next(filter(None, said))}" if any(said) else ""
     if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray | jax.Array):
         return "a row of things"
-    if np.ndim(value) == 0 and isinstance(value, _ARRAYS):
+    of_things = is_plain_class(inside[0]) and inside[0] not in (int, float, str)
+    if isinstance(value, _ARRAYS) and (of_things or np.ndim(value) == 0):
         return "a row of things"
     each = inside[:1] * len(value) if issubclass(origin, tuple) is False or inside[-1] is ... else inside
     if len(each) != len(value):

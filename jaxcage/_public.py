@@ -14,6 +14,7 @@ from . import (
 from ._checks import enable_x64 as enable_x64
 from ._parameters import parameter_info as parameter_info, parameters as parameters, replace as replace
 from .analysis import (
+    BearingSweep as BearingSweep,
     Sweep as Sweep,
     Zones as Zones,
     bearing_measures as bearing_measures,
@@ -56,4 +57,11 @@ from .orbits import (
     synchronous_orbits as synchronous_orbits,
 )
 from .studies import label_map as label_map, open_study as open_study, study as study
-from .sweeps import rpm as rpm, run_up_down as run_up_down, sweep as sweep, sweep_designs as sweep_designs
+from .sweeps import (
+    rpm as rpm,
+    run_up_down as run_up_down,
+    sweep as sweep,
+    sweep_bearing as sweep_bearing,
+    sweep_bearings as sweep_bearings,
+    sweep_designs as sweep_designs,
+)

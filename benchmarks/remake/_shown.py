@@ -61,6 +61,7 @@ README, EDGES, DESIGNS, STUDIES, REPRODUCTION = (
     "README.md",
     *(f"docs/{name}.md" for name in ("edges", "design", "studies", "reproduction")),
 )
+WHOLE, TRENDS = "docs/whole-bearing.md", "python -m benchmarks.bearing_trends"
 CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
 SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
 SPEED = "python -m benchmarks"
@@ -91,6 +92,8 @@ SHOWN = (
     Shown("readings", REPRODUCTION, ["jaxcage reproduce --quick"], ex.readings),
     Shown("lasting", REPRODUCTION, [f"jaxcage sweep {c}{o}" for c in CASES for o in (" --horizon 0", "")], ex.lasting),
     Shown("identify", REPRODUCTION, ["python -m benchmarks.identify"], ex.lines("+-")),
+    Shown("bearing-threshold", WHOLE, [f"{TRENDS} threshold --discard 100 --revolutions 50"], ex.printed),
+    Shown("bearing-trends", WHOLE, [f"{TRENDS} trends --starts 1 --discard 10 --revolutions 10"], ex.printed),
     Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
     _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),
     _whole("solvers-page", "benchmarks/solvers.md", "python -m benchmarks.solvers", "solvers.md"),

@@ -12,15 +12,34 @@
 | `_hazard`       | the rate of escapes as it depends on speed and design                                |
 | `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
+| `_bearing_history` | forces and slips of every roller of it, around its circumference; its spectra     |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
+| `_bearing_sweep` | the result of a sweep of the whole bearing                                         |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
 from .._arguments import check_layer
+from ._bearing_history import (
+    Around as Around,
+    BearingHistory as BearingHistory,
+    NamedLine as NamedLine,
+    around as around,
+    bearing_history as bearing_history,
+    bearing_orders as bearing_orders,
+    bearing_spectra as bearing_spectra,
+    named_lines as named_lines,
+    pocket_force_distribution as pocket_force_distribution,
+)
 from ._bearing_measures import (
     BearingMeasures as BearingMeasures,
     bearing_measures as bearing_measures,
     cage_state as cage_state,
+    synchronous_force as synchronous_force,
+)
+from ._bearing_sweep import (
+    BearingRecord as BearingRecord,
+    BearingSweep as BearingSweep,
+    summed_up as summed_up,
 )
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
@@ -78,6 +97,7 @@ from ._spectra import (
     Waterfall as Waterfall,
     dominant_orders as dominant_orders,
     order_spectrum as order_spectrum,
+    spectrum_of as spectrum_of,
     waterfall as waterfall,
     whirl_spectrum as whirl_spectrum,
 )

@@ -98,11 +98,18 @@ def order_spectrum(trajectory: Trajectory, component: int = 0, *, window: Window
 
     **Raises:** `ValueError` for a trajectory that is too short, or an unknown window.
     """
-    signal = _whole_revolutions(trajectory)[:, component]
+    return spectrum_of(_whole_revolutions(trajectory)[:, component], trajectory.samples, window)
+
+
+def spectrum_of(signal: Float[np.ndarray, " n"], samples: int, window: Window = "hann") -> OrderSpectrum:
+    """One-sided amplitude spectrum of a quantity at evenly spaced angles.
+
+    **Arguments:** values over whole revolutions; samples per revolution; window as in `order_spectrum`.
+    """
     n = len(signal)
     amplitude = np.abs(_transform(signal, window)[: n // 2 + 1])
     amplitude[1 : (n + 1) // 2] *= 2  # the other half of a real line is at the negative order
-    return OrderSpectrum(np.fft.rfftfreq(n, 1 / trajectory.samples), amplitude, window)
+    return OrderSpectrum(np.fft.rfftfreq(n, 1 / samples), amplitude, window)
 
 
 def whirl_spectrum(

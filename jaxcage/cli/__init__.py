@@ -12,6 +12,7 @@
 | `_bearing`  | `init`, `statics`, `impact`                                                 |
 | `_one_speed` | `simulate`, `poincare`                                                     |
 | `_whole`     | `simulate` of a whole bearing                                              |
+| `_whole_sweep` | `sweep` of a whole bearing                                              |
 | `_sweep`    | `sweep`, `zones`                                                            |
 | `_orbits`   | `bifurcations`, `gradient`                                                  |
 | `_lasting`  | `gradient --lasting`                                                        |

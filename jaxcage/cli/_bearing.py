@@ -10,16 +10,20 @@ from ..io import write_template
 from ..plotting import impact_forces, load_bars
 from ..report import Table, chosen, displacements, impact_document, impact_table, statics_table
 from ..sweeps import rpm
-from ._job import Job
+from ._job import WHOLE_COMMANDS, Job
 from ._options import ImpactOptions, InitOptions, StaticsOptions
 from ._show import Report
 
 
 def init(job: Job[InitOptions]) -> Report:
     """`jaxcage init`: a commented description of a bearing to fill in."""
-    path = write_template(job.options.path)
-    goes_on = [f"  jaxcage {command} {path}" for command in ("statics", "sweep", "zones", "report")]
-    told = "It describes the NU2310 of case 1a: change the values and go on with"
+    subject = job.options.model
+    path = write_template(job.options.path, subject)
+    commands = ("statics", "sweep", "zones", "report") if subject == "cage" else WHOLE_COMMANDS
+    speed = {"simulate": ' --speed "10000 rpm shaft"'} if subject == "bearing" else {}
+    goes_on = [f"  jaxcage {command} {path}{speed.get(command, '')}" for command in commands]
+    described = "the NU2310 of case 1a" if subject == "cage" else "the NU2310 with its rollers"
+    told = f"It describes {described}: change the values and go on with"
     return Report({"file": str(path)}, notes=[f"Written: {path}", told, *goes_on])
 
 

@@ -17,7 +17,18 @@ from matplotlib.figure import Figure
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
-from ..io import BearingFile, Unknown, Whose, cage_rpm, check_writable, read_bearing, replacing, write_columns
+from ..io import (
+    BearingFile,
+    Unknown,
+    Whose,
+    cage_rpm,
+    check_writable,
+    read_bearing,
+    read_whole_bearing,
+    replacing,
+    subject_of,
+    write_columns,
+)
 from ..models import FASTEST, BearingModel, CageModel, case, fastest_speed, whole_bearing
 from ..models.whole import WHOLE_BEARINGS
 from ..plotting import Style, add_shaft_axes, new_figure, restyle
@@ -28,6 +39,8 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
+WHOLE_COMMANDS = ("simulate", "sweep")
+"""What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
 
@@ -48,8 +61,8 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            if options.case.lower() in WHOLE_BEARINGS:
-                self.name, self.whole = options.case.lower(), _whole_bearing(options.case, command)
+            if _is_whole(options.case):
+                self.name, self.whole, self.file = _whole_subject(options.case, command)
             else:
                 self.name, self.model, self.published, self.file = read_subject(options.case)
                 self.options = self._of_the_cage(options)
@@ -64,7 +77,9 @@ class Job(Generic[Given]):
     @property
     def speeds(self) -> Whose:
         """Whose speeds bare numbers are."""
-        return "cage" if self.file is None else self.file.speeds
+        if self.file is not None:
+            return self.file.speeds
+        return "cage" if self.whole is None else "shaft"
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -178,6 +193,13 @@ class Job(Generic[Given]):
             temporary.write_text(text, encoding="utf-8")
         self.listed(key, path)
 
+    @contextlib.contextmanager
+    def written(self, key: str, path: Path) -> Iterator[Path]:
+        """A temporary place to write a file to; it becomes `path` at the end, and is listed under `key`."""
+        with replacing(path) as temporary:
+            yield temporary
+        self.listed(key, path)
+
     def listed(self, key: str, path: Path) -> None:
         """Show a file at the end."""
         self.files[key] = str(path)
@@ -190,10 +212,31 @@ def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     return path
 
 
-def _whole_bearing(name: str, command: str) -> BearingModel:
-    if command != "simulate":
-        raise InputError(f"Case '{name}' is a whole bearing, of which only `jaxcage simulate` knows so far.")
-    return whole_bearing(name)
+def _is_whole(given: str) -> bool:
+    """Whether a case is a whole bearing, by its name or by what its file says."""
+    return subject_of(given) == "bearing" if _is_file(given) else given.lower() in WHOLE_BEARINGS
+
+
+def _is_file(given: str) -> bool:
+    return given not in PUBLISHED_CASES and (Path(given).suffix.lower() == ".toml" or os.path.exists(given))
+
+
+def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, BearingFile | None]:
+    """Name and model of a whole bearing by its name or from its file.
+
+    **Raises:** `InputError` for a command that takes none yet.
+    """
+    if command not in WHOLE_COMMANDS:
+        known = " and ".join(f"`jaxcage {name}`" for name in WHOLE_COMMANDS)
+        verb = "knows" if len(WHOLE_COMMANDS) == 1 else "know"
+        raise InputError(
+            f"Case '{given}' is a whole bearing, of which only {known} {verb} so far: `jaxcage {command}` takes a cage."
+        )
+    if not _is_file(given):
+        return given.lower(), whole_bearing(given), None
+    file = read_whole_bearing(given)
+    _say_broken_rule(file.model)
+    return _shown_name(given), file.model, file
 
 
 class Subject(NamedTuple):
@@ -213,18 +256,24 @@ def read_subject(given: str) -> Subject:
     file = None
     if given in PUBLISHED_CASES:
         name, model, published = given, case(given), PUBLISHED_CASES[given]
-    elif Path(given).suffix.lower() == ".toml" or os.path.exists(given):
-        stem = Path(given).stem
-        name = "".join(c if c.isprintable() and c != "$" else "_" for c in stem)  # as matplotlib shows it
-        file = read_bearing(given)
+    elif _is_file(given):
+        name, file = _shown_name(given), read_bearing(given)
         model, published = file.model, None
     else:
         known = ", ".join(PUBLISHED_CASES)
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
-    broken = design_rule_violations(model.bearing, model.guidance_gap)
-    if broken:
-        say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
+    _say_broken_rule(model)
     return Subject(name, model, published, file)
+
+
+def _shown_name(path: str) -> str:
+    """Name of a file without its ending, as matplotlib shows it."""
+    return "".join(c if c.isprintable() and c != "$" else "_" for c in Path(path).stem)
+
+
+def _say_broken_rule(model: CageModel | BearingModel) -> None:
+    if broken := design_rule_violations(model.bearing, model.guidance_gap):
+        say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
 
 
 def _method(options: IntegrationOptions) -> AbstractMethod | None:

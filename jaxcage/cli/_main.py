@@ -123,12 +123,15 @@ def _complete(job: "Job[Any]", report: "Report") -> "Report":
 
 def _readings(job: "Job[Any]", found: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """How the model reads what the paper leaves open, and its speeds, for programs and for people."""
-    if not job.name or job.whole is not None:
+    if not job.name:
         return {}, []
-    from ..report import readings_document, readings_words
+    document: dict[str, Any] = {}
+    notes: list[str] = []
+    if job.whole is None:
+        from ..report import readings_document, readings_words
 
-    document: dict[str, Any] = {"readings": readings_document(job.model), "cage_speed_ratio": job.ratio}
-    notes = [f"Readings: {readings_words(job.model)}"]
+        document = {"readings": readings_document(job.model), "cage_speed_ratio": job.ratio}
+        notes = [f"Readings: {readings_words(job.model)}"]
     if job.file is not None:
         document["left_as_in_template"] = job.file.left
     if job.file is not None and job.file.left:

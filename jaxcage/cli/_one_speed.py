@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._errors import NoResult
+from .._errors import InputError, NoResult
 from ..analysis import OrbitMeasures, Sweep, cage_forces, orbit_measures
 from ..integrate import OUTCOMES, simulate
 from ..io import strobe_columns, write_trajectory
@@ -24,6 +24,9 @@ def simulate_at(job: Job[SimulateOptions]) -> Report:
     if job.whole is not None:
         return bearing_at(job, job.whole)
     options, model = job.options, job.model
+    for name, given in (("--load", options.load is not None), ("--animate", options.animate)):
+        if given:
+            raise InputError(f"Option {name} goes with a whole bearing, but {job.name} is a cage.")
     with job.computing():
         samples = samples_per_revolution(job.method, 128)
         length = job.given("revolutions discard")

@@ -63,7 +63,7 @@ class CommonOptions(AnyOptions):
 @dataclasses.dataclass(frozen=True)
 class _Case:
     case: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CASE")]
-    """A published case (1a, 1b, 2a, 2b, 3a, 3b) or the path of a TOML file."""
+    """A published case (1a, 1b, 2a, 2b, 3a, 3b), a whole bearing (nu2310), or the path of a TOML file."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,10 +109,12 @@ class _Length(Options):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SweepOptions(_Length, _Range, IntegrationOptions):
-    """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones."""
+    """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
+    bearing, whose speeds are the shaft's."""
 
     count: Annotated[int | None, whole(1)] = None
-    """Number of speeds, 251 if left out, 40 where ranges are drawn from; with one, only the first speed is run."""
+    """Number of speeds; if left out 251, of a whole bearing 13, and 40 where ranges are drawn from. With one, only the
+    first speed is run."""
     draws: FromTwo = 64
     """Draws from what the file knows within ranges only, each run once at every speed, 100 revolutions after 100."""
     seed: FromZero = 0
@@ -380,6 +382,10 @@ class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Revolutions recorded."""
     discard: FromZero = 0
     """Revolutions left out at the beginning."""
+    load: Annotated[float | None, number("be from 0 to 1e7 N", lambda x: x >= 0, "N", "own")] = None
+    """Shaft load [N] of a whole bearing, or with a unit, e.g. "4.45 kN"; its own if left out."""
+    animate: bool = False
+    """Of a whole bearing: an animation of one revolution of the cage as well, a GIF."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -507,6 +513,8 @@ class InitOptions(AnyOptions):
 
     path: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FILE")]
     """Where to write it, e.g. my_bearing.toml; an existing file is left alone."""
+    model: Literal["cage", "bearing"] = "cage"
+    """What it describes: the cage under prescribed forces, or the whole bearing with its rollers."""
 
 
 COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {

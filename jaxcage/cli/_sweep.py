@@ -19,6 +19,7 @@ from ._console import say, warn_of_short
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import SweepOptions, ZonesOptions
 from ._show import Report
+from ._whole_sweep import bearing_over_speed
 
 
 ENDS = ("onset", "exit")
@@ -44,6 +45,8 @@ def _swept(job: Job[SweepOptions]) -> Sweep:
 
 def sweep_over_speed(job: Job[SweepOptions]) -> Report:
     """`jaxcage sweep`: orbit diagram, exponents and zones of a case over speed."""
+    if job.whole is not None:
+        return bearing_over_speed(job, job.whole)
     if job.unknowns and not job.options.nominal:
         return chances(job)
     found = _swept(job)

@@ -1,23 +1,44 @@
-"""What a whole bearing does at one shaft speed: slips, forces, losses, the cage's motion."""
+"""What a whole bearing does at one shaft speed: slips, forces, losses, wear, the cage's motion."""
 
 import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
 
 from .._errors import InputError, NoResult
-from ..analysis import BearingMeasures, bearing_measures
+from .._parameters import replace
+from ..analysis import (
+    Around,
+    BearingHistory,
+    BearingMeasures,
+    OrderSpectrum,
+    around,
+    bearing_history,
+    bearing_measures,
+    bearing_orders,
+    bearing_spectra,
+    named_lines,
+    pocket_force_distribution,
+)
 from ..integrate import simulate_bearing
-from ..io import SpeedOf, cage_rpm
-from ..models import BearingModel
-from ..report import Table, chosen
+from ..io import SpeedOf, Whose
+from ..models import FASTEST, BearingModel
+from ..plotting import bearing_animation, bearing_figure
+from ..report import Table, chosen, number
 from ..sweeps import rpm
 from ._job import Job
+from ._limits import Demand
 from ._options import SimulateOptions
 from ._show import Report
 
 
-SAMPLES = 32
-"""Of a revolution of the cage."""
+SAMPLES = 128
+"""Of a revolution of the cage: some twenty in the contact of a roller with its pocket."""
 TOLERANCE = 1e-5
 """Of a step, in units of the state's scale."""
+RATE = 0.5
+"""Revolutions a second, about."""
 
 
 def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
@@ -25,28 +46,129 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     options = job.options
     if options.solver is not None or options.steps is not None:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
-    shaft_rpm = cage_rpm(options.speed, "shaft", 1.0)
-    if isinstance(options.speed, SpeedOf) and options.speed.whose == "cage":
-        shaft_rpm /= float(model.rolling_cage_speed(1.0))
+    if options.load is not None:
+        model = replace(model, load=options.load)
+    shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
     speed = float(rpm(shaft_rpm))
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
-    run = simulate_bearing(model, speed, **job.given("revolutions discard"), samples=SAMPLES, tolerance=tolerance)
-    if run.outcome not in ("successful", "inaccurate"):
-        raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
-    measures = bearing_measures(model, run, speed)
+    numbers = (5 * model.bearing.n_rollers + 40) * SAMPLES * (options.revolutions + options.discard)
+    job.require(Demand(1, options.revolutions + options.discard, 40.0 * numbers, 20.0 * numbers, RATE))
+    with job.computing():
+        length = job.given("revolutions discard")
+        run = simulate_bearing(model, speed, **length, samples=SAMPLES, tolerance=tolerance)
+        if run.outcome not in ("successful", "inaccurate"):
+            raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
+        history = bearing_history(model, run, speed)
+    measures, orders = bearing_measures(model, run, speed), bearing_orders(model, run, speed)
+    spectra = bearing_spectra(history) if options.revolutions > 1 else {}
+    circumference = around(history)
+    at = f"_{shaft_rpm:g}rpm_shaft"
+    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N"
+    figure = bearing_figure(model, run, history, circumference, spectra, orders, title)
+    job.listed("figure", job.saved(figure, job.path(f"{at}.png")))
+    job.columns(_columns(history), detail=at)
+    if options.animate:
+        with job.written("animation", job.path(f"{at}.gif")) as path:
+            bearing_animation(model, run, history, path)
     document = {
         "shaft_speed_rpm": shaft_rpm,
+        "load_N": float(model.load),
         **chosen(options, "revolutions discard"),
         **chosen(run, "outcome error estimate steps"),
         **dataclasses.asdict(measures),
+        "pocket_force_distribution_N": pocket_force_distribution(history),
+        "around": {"angle_deg": np.degrees(circumference.angle), **_without_angle(circumference)},
+        "orders": orders,
+        "spectra": _lines(spectra, orders),
     }
-    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {options.revolutions} revolutions of the cage"
+    length = f"{options.revolutions} revolutions of the cage"
+    tables = [
+        Table(f"{title}, {length}", ("measure", "value", "unit"), _rows(measures)),
+        _circumference_table(circumference),
+        *_line_tables(spectra, orders),
+    ]
     said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
-    return Report(document, [Table(title, ("measure", "value", "unit"), _rows(measures))], [said])
+    return Report(document, tables, [said])
+
+
+def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str = "--speed") -> float:
+    """The shaft's speed [rpm] that a speed means.
+
+    **Raises:** `InputError` for one at which no cage runs.
+    """
+    whose = given.whose if isinstance(given, SpeedOf) else unsaid
+    at_rest = float(model.rolling_cage_speed(0.0)) * 30 / np.pi  # where the outer ring turns
+    ratio = float(model.rolling_cage_speed(1.0) - model.rolling_cage_speed(0.0))
+    shaft = float(given) if whose == "shaft" else (float(given) - at_rest) / ratio
+    land = abs(float(model.rolling_cage_speed(rpm(shaft)) * model.land_radius))
+    if land > FASTEST:
+        raise InputError(
+            f"Option {option} must leave the cage at most {FASTEST:g} m/s at its land, but {shaft:g} rpm of the shaft "
+            f"make {land:.0f} m/s."
+        )
+    return shaft
+
+
+def _columns(history: BearingHistory) -> dict[str, np.ndarray]:
+    """Time history for a file: cage, land, and each roller."""
+    found = {
+        "time [s]": history.time,
+        "cage angle [rad]": history.angle,
+        "cage place x over clearance": history.place[:, 0],
+        "cage place y over clearance": history.place[:, 1],
+    }
+    for name in ("pocket_on_cage", "land_on_cage"):
+        found |= {f"{name}_{axis} [N]": getattr(history, name)[:, i] for i, axis in enumerate("xy")}
+    of_rollers = {"pocket_force": "N", "inner_load": "N", "roller_slip": "1"}
+    for name, unit in of_rollers.items():
+        values = getattr(history, name)
+        found |= {f"{name}_{j + 1} [{unit}]": values[:, j] for j in range(values.shape[1])}
+    return found
+
+
+def _without_angle(circumference: Around) -> dict[str, np.ndarray]:
+    values = {field.name: getattr(circumference, field.name) for field in dataclasses.fields(circumference)}
+    del values["angle"]
+    return values
+
+
+def _lines(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> dict[str, list[dict[str, Any]]]:
+    return {name: [vars(line) for line in named_lines(found, orders)] for name, found in spectra.items()}
+
+
+def _line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
+    titles = {"cage_place": "Cage's vertical place over the clearance", "pocket_force": "Pockets on cage, vertical [N]"}
+    return [
+        Table(
+            f"Spectrum, {titles[name]}",
+            ("order of the cage's speed", "amplitude", "at the frequency of"),
+            [(f"{x.order:.3f}", f"{x.amplitude:.3g}", x.name or "-") for x in named_lines(found, orders)],
+        )
+        for name, found in spectra.items()
+    ]
+
+
+def _circumference_table(found: Around) -> Table:
+    """An eighth of the circumference to a row."""
+    eighths = [np.flatnonzero(np.floor(found.angle / (2 * np.pi) * 8).astype(int) == i) for i in range(8)]
+    mean = lambda x, i: float(np.nanmean(x[i])) if np.isfinite(x[i]).any() else float("nan")
+    rows = [
+        (
+            f"{45 * i} to {45 * (i + 1)}°",
+            number(100 * mean(found.roller_slip, part), 2),
+            number(mean(found.inner_load, part), 0),
+            number(mean(found.driving_force, part), 2),
+            number(mean(found.braking_force, part), 2),
+            number(float(np.nanmax(found.largest_force[part])), 0),
+        )
+        for i, part in enumerate(eighths)
+    ]
+    heads = ("place, load at 270°", "slip [%]", "inner load [N]", "driving [N]", "braking [N]", "largest [N]")
+    return Table("Rollers around the bearing: slip, load, pocket force", heads, rows)
 
 
 def _rows(measures: BearingMeasures) -> list[tuple[str, str, str]]:
-    """Measures with their own words; the parts of the power one by one."""
+    """Measures with their own words; parts one by one."""
     rows = []
     for field in dataclasses.fields(measures):
         value, unit = getattr(measures, field.name), field.metadata["unit"]

@@ -25,6 +25,17 @@ from ._bearing import (
     bearing_over_time as bearing_over_time,
     simulate_bearing as simulate_bearing,
 )
+from ._bearing_blocks import (
+    LONGEST_BLOCK as LONGEST_BLOCK,
+    SAMPLES as SAMPLES,
+    BearingBlock as BearingBlock,
+    BearingLanes as BearingLanes,
+    bearing_states as bearing_states,
+    begin_lanes as begin_lanes,
+    lanes_apart as lanes_apart,
+    run_block as run_block,
+)
+from ._bearing_step import FOLLOWED as FOLLOWED, INTEGRATED as INTEGRATED
 from ._controlled import (
     DEFAULT_ERROR as DEFAULT_ERROR,
     ControlledSteps as ControlledSteps,

@@ -337,7 +337,7 @@ def _in_order() -> bool:
     """Whether the backend reduces a window of one element as body(init, element): a reduction leaves the order free."""
     with jax.ensure_compile_time_eval():
         first, second = np.array([5.0, 7.0]), np.array([1.0, 2.0])
-        program = jax.jit(lambda s, *x: _lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), 2, (s,), x))
+        program = jax.jit(lambda s, *x: lanewise(lambda s, x: (s[0] - 3 * x[0], s[0] * x[1]), 2, (s,), x))
         got = [np.asarray(x) for x in program(np.array(2.0), first, second)]
         return bool(np.all(got[0] == 2 - 3 * first) and np.all(got[1] == 2 * second))
 
@@ -355,7 +355,7 @@ def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numb
     return jax.lax.fori_loop(0, count, body, (moved, tuple(jax.lax.stop_gradient(x) for x in watched)))
 
 
-def _lanewise(
+def lanewise(
     f: Callable[[Numbers, Numbers], Sequence[Any]], results: int, shared: Sequence[Array], lanes: Sequence[Array]
 ) -> tuple[Array, ...]:
     """The results of f(shared, lane) in every lane by one reduction: shared scalars, arrays of one axis."""
@@ -406,7 +406,7 @@ def _piece(part: Any, consts: Sequence[Any], given: Sequence[Array], like: Array
         x = [known[i].astype(v.aval.dtype) for i, v in enumerate(part.invars)]
         return [y.astype(float) for y in eval_jaxpr(part, consts, *x)]
 
-    return _lanewise(kernel, len(part.outvars), [given[i] for i in alike], [given[i] for i in own] or [like])
+    return lanewise(kernel, len(part.outvars), [given[i] for i in alike], [given[i] for i in own] or [like])
 
 
 def _kernel_on_gpu(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:

@@ -1,4 +1,5 @@
-"""TOML -> `CageModel`: tables mirror the modules, every value is checked against its declaration.
+"""TOML -> `CageModel` or `BearingModel`: tables mirror the modules, every value is checked against its declaration.
+A whole bearing says `model = "bearing"`, or starts from one, `base = "nu2310"`. Of a cage:
 
 base = "1a"                  # optional: start from a published case and change what is listed
 guidance_gap = "0.5 mm"      # numbers are SI, texts carry their unit
@@ -20,7 +21,7 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import equinox as eqx
 
@@ -28,12 +29,13 @@ from .._checks import require_x64
 from .._parameters import must_be_given, parameter_paths
 from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
-from ..models import CageModel, case
+from ..models import BearingModel, CageModel, case, whole_bearing
+from ..models.whole import WHOLE_BEARINGS
 from ._files import read_bytes
 from ._ranges import Range
 from ._schema import KINDS, ConfigError, Known, read_value, submodules, values
 from ._speeds import WHOSE, Whose
-from ._template import left_as_written
+from ._template import Subject, left_as_written
 from ._units import printable, shown
 
 
@@ -43,6 +45,10 @@ _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
 }
 """Keys by which a table starts from a ready-made module."""
 
+
+SUBJECTS: dict[str, Subject] = {"cage": "cage", "bearing": "bearing"}
+"""What key `model` may be: the cage in its land, or the whole bearing."""
+M = TypeVar("M", CageModel, BearingModel)
 
 Ranges = dict[tuple[str, ...], tuple[Range, tuple[str, ...]]]
 """Where a range is given -> the range, and the fields of that table that it sets."""
@@ -64,12 +70,13 @@ class Unknown:
 
 
 @dataclasses.dataclass(frozen=True)
-class BearingFile:
+class BearingFile(Generic[M]):
     """What a TOML file says: a model, and how its speeds are meant."""
 
-    model: CageModel
+    model: M
     speeds: Whose
-    """Whose speeds bare numbers of the commands are: key `speeds`, the cage's if left out."""
+    """Whose speeds bare numbers of the commands are: key `speeds`; if left out the cage's, of a whole bearing the
+    shaft's."""
     unknowns: tuple[Unknown, ...]
     """Values of which the file knows a range only."""
     left: tuple[str, ...]
@@ -86,25 +93,67 @@ def load_model(path: str | Path) -> CageModel:
     return read_bearing(path).model
 
 
-def read_bearing(path: str | Path) -> BearingFile:
-    """All that the TOML file at `path` says.
+def load_whole_bearing(path: str | Path) -> BearingModel:
+    """The whole bearing that the TOML file at `path` describes.
+
+    **Raises:** as `read_whole_bearing`.
+    """
+    return read_whole_bearing(path).model
+
+
+def read_bearing(path: str | Path) -> BearingFile[CageModel]:
+    """All that the TOML file at `path` says of a cage.
 
     **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the
     key, what was given and what is allowed; `RuntimeError` without double precision.
     """
+    return _read(path, model_from)
+
+
+def read_whole_bearing(path: str | Path) -> BearingFile[BearingModel]:
+    """All that the TOML file at `path` says of a whole bearing.
+
+    **Raises:** as `read_bearing`.
+    """
+    return _read(path, whole_bearing_from)
+
+
+def _read(path: str | Path, make: Callable[[Mapping[str, Any], list[Unknown]], M]) -> BearingFile[M]:
+    table, unknowns = _table_of(path), []
     try:
-        table = tomllib.loads(read_bytes(path).decode())
+        model = make(table, unknowns)
+        subject = subject_of(table)
+        return BearingFile(model, _whose(table, subject), tuple(unknowns), left_as_written(table, subject), table)
+    except ConfigError as error:
+        raise ConfigError(f"File '{path}': {error}") from error
+
+
+def _table_of(path: str | Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_bytes(path).decode())
     except OSError as error:
         raise ConfigError(f"File '{path}' must be a readable TOML file, but: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits; nested too deep
         reason = printable(str(error).rstrip("."))
         raise ConfigError(f"File '{path}' must be valid TOML, but is not: {reason}.") from error
-    try:
-        unknowns: list[Unknown] = []
-        model = model_from(table, unknowns)
-        return BearingFile(model, _whose(table), tuple(unknowns), left_as_written(table), table)
-    except ConfigError as error:
-        raise ConfigError(f"File '{path}': {error}") from error
+
+
+def subject_of(source: str | Path | Mapping[str, Any]) -> Subject:
+    """Whether a file, or a nested mapping as read from one, is about a cage or a whole bearing.
+
+    **Raises:** `ConfigError` for what is neither, or no TOML file.
+    """
+    if not isinstance(source, Mapping):
+        table = _table_of(source)
+        try:
+            return subject_of(table)
+        except ConfigError as error:
+            raise ConfigError(f"File '{source}': {error}") from error
+    base = source.get("base")
+    given = source.get("model", "bearing" if isinstance(base, str) and base in WHOLE_BEARINGS else "cage")
+    if not isinstance(given, str) or given not in SUBJECTS:
+        raise ConfigError(f"`model` must be one of {', '.join(SUBJECTS)}, but is {shown(given)}.")
+    return SUBJECTS[given]
 
 
 def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> CageModel:
@@ -115,32 +164,61 @@ def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) 
     **Raises:** `ConfigError`.
     """
     require_x64()
-    rest = dict(table)
-    start, _ = None, _whose(rest)
-    rest.pop("speeds", None)
+    if subject_of(table) != "cage":
+        raise ConfigError('`model` must be "cage" here, but a whole bearing is described.')
+    model = _made(CageModel, table, tuple(PUBLISHED_CASES), case, unknowns)
+    check_together(model)
+    return model
+
+
+def whole_bearing_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> BearingModel:
+    """The whole bearing that a nested mapping describes; of a range its best guess.
+
+    **Arguments:** as `model_from`.
+
+    **Raises:** `ConfigError`.
+    """
+    require_x64()
+    if subject_of(table) != "bearing":
+        raise ConfigError('`model` must be "bearing" here, but is "cage".')
+    model = _made(BearingModel, table, tuple(WHOLE_BEARINGS), whole_bearing, unknowns)
+    check_together(model)
+    return model
+
+
+def _made(
+    kind: type[M],
+    table: Mapping[str, Any],
+    bases: tuple[str, ...],
+    base: Callable[[str], M],
+    unknowns: list[Unknown] | None,
+) -> M:
+    """A model of `kind`, from nothing or from one of `bases`."""
+    rest, start, _ = dict(table), None, _whose(table)
+    for key in ("speeds", "model"):
+        rest.pop(key, None)
     if "base" in rest:
         name = rest.pop("base")
-        if not isinstance(name, str) or name not in PUBLISHED_CASES:
-            raise ConfigError(f"`base` must be one of {', '.join(PUBLISHED_CASES)}, but is {shown(name)}.")
-        start = case(name)
+        if not isinstance(name, str) or name not in bases:
+            raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(name)}.")
+        start = base(name)
     ranges: Ranges = {}
-    model = _build(CageModel, rest, start, (), ranges)
-    assert isinstance(model, CageModel)
-    check_together(model)
+    model = _build(kind, rest, start, (), ranges)
+    assert isinstance(model, kind)
     if unknowns is not None:
         unknowns += _named(model, ranges)
     return model
 
 
-def _named(model: CageModel, ranges: Ranges) -> list[Unknown]:
+def _named(model: eqx.Module, ranges: Ranges) -> list[Unknown]:
     """Ranges by the names that `jaxcage.replace` knows; a key that sets several parameters is one unknown."""
     short = {path: name for name, path in parameter_paths(model).items()}
     each = lambda path, names: tuple(short[(*path[:-1], name)] for name in names)
     return [Unknown(".".join(path), each(path, names), found) for path, (found, names) in ranges.items()]
 
 
-def _whose(table: Mapping[str, Any]) -> Whose:
-    given = table.get("speeds", "cage")
+def _whose(table: Mapping[str, Any], subject: Subject = "cage") -> Whose:
+    given = table.get("speeds", "shaft" if subject == "bearing" else "cage")
     if given not in WHOSE:
         raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(given)}.")
     return given
@@ -211,7 +289,8 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
     required = [f.name for f in dataclasses.fields(kind) if _has_no_default(f)]
     missing = [_dotted(path, name) for name in required if name not in arguments]
     if missing:
-        hint = "" if path else ', unless `base = "1a"` or the like gives the rest'
+        example = "nu2310" if kind is BearingModel else "1a"
+        hint = "" if path else f', unless `base = "{example}"` or the like gives the rest'
         raise ConfigError(f"`{'`, `'.join(missing)}` must be given{hint}.")
     if readings := [f for f in values(kind) if "readings" in f.metadata and f.name not in arguments]:
         said = ", and ".join(f"`{_dotted(path, f.name)}` {must_be_given(f.metadata['readings'])}" for f in readings)
@@ -234,7 +313,7 @@ def _dotted(path: tuple[str, ...], name: str = "") -> str:
 def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple[str, ...]) -> None:
     extra = [key for (where, key) in _READY_MADE if (where,) == path]
     keys = [*keys, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
-    allowed = [*([] if path else ["base", "speeds"]), *extra, *keys, *(f"[{name}]" for name in tables)]
+    allowed = [*([] if path else ["base", "model", "speeds"]), *extra, *keys, *(f"[{name}]" for name in tables)]
     for key in table:
         if key not in keys and key not in tables:
             where = f" in [{_dotted(path)}]" if path else " at the top level"
@@ -264,8 +343,11 @@ def _grade(given: Any) -> float:
     return float(given)
 
 
-def check_together(model: CageModel) -> None:
-    """What ranges of single values cannot see."""
+def check_together(model: CageModel | BearingModel) -> None:
+    """What ranges of single values cannot see.
+
+    **Raises:** `ConfigError`.
+    """
     gap, eccentricity = 1e3 * float(model.guidance_gap), 1e3 * float(model.eccentricity)
     if eccentricity >= gap:
         raise ConfigError(
@@ -274,6 +356,13 @@ def check_together(model: CageModel) -> None:
     rib = 1e3 * float(model.bearing.rib_diameter)
     if gap >= rib:
         raise ConfigError(f"`guidance_gap` must leave room for the cage, but is {gap:g} mm in a rib of {rib:g} mm.")
+    if isinstance(model, BearingModel) and model.guidance == "inner":
+        land = 1e3 * float(model.inner_land_diameter)
+        if land + gap >= rib:
+            raise ConfigError(
+                f"`inner_land_diameter` and `guidance_gap` must leave room for the cage within the outer ring's ribs, "
+                f"{rib:g} mm, but are {land:g} and {gap:g} mm."
+            )
     if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
         raise ConfigError(
             "`lubricant` must have a viscosity at its temperature, but by ASTM D341 its two points, reference and "

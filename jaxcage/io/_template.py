@@ -6,28 +6,38 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, Literal
 
 from .._errors import InputError
 from ..forces import SynchronousImpact
-from ..models import case
+from ..models import case, whole_bearing
 
 
-CHOSEN = ("speeds", "clearance_reading", "unbalance", "kind")
-"""What the template holds that is no number of the NU2310."""
+Subject = Literal["cage", "bearing"]
+"""What a file is about: the cage in its land, or the whole bearing."""
+CHOSEN = ("model", "speeds", "clearance_reading", "unbalance", "kind")
+"""What the templates hold that is no number of the NU2310."""
 
 
 @functools.cache
-def template() -> str:
-    """The commented TOML text that `jaxcage init` writes; `load_model` accepts it as it is.
+def template(subject: Subject = "cage") -> str:
+    """The commented TOML text that `jaxcage init` writes; `load_model`, or `load_whole_bearing`, accepts it as it is.
 
-    Dimensions stand in the text; what the paper does not print is filled in from the constants of its cases.
+    Dimensions stand in the text; what the paper does not print is filled in from the constants of its cases, and what
+    is worked out for the whole bearing from that.
     """
-    text = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
+    file, numbers = ("template.toml", _of_the_cage()) if subject == "cage" else ("whole_template.toml", _of_the_whole())
+    text = Path(__file__).with_name(file).read_text(encoding="utf-8")
+    words = {name: f"{float(value):.4g}" for name, value in numbers.items()}
+    filled = Template(text).substitute(words)
+    return "\n".join(map(_aligned, filled.splitlines())) + "\n"
+
+
+def _of_the_cage() -> dict[str, Any]:
     model = case("1a")
     support, contact, impact = model.support, model.contact, model.impact
     assert isinstance(impact, SynchronousImpact)
-    numbers = {
+    return {
         "cage_mass": model.cage_mass,
         "land_width": 1e3 * model.film.land_width,
         "contact": contact.stiffness,
@@ -41,14 +51,16 @@ def template() -> str:
         "amplitude": impact.amplitude,
         "exponent": impact.exponent,
     }
-    words = {name: f"{float(value):.4g}" for name, value in numbers.items()}
-    filled = Template(text).substitute(words)
-    return "\n".join(map(_aligned, filled.splitlines())) + "\n"
 
 
-def left_as_written(table: Mapping[str, Any]) -> tuple[str, ...]:
+def _of_the_whole() -> dict[str, Any]:
+    model = whole_bearing("nu2310")
+    return {"inertia": model.cage_inertia, "bar": model.pockets.pocket_stiffness}
+
+
+def left_as_written(table: Mapping[str, Any], subject: Subject = "cage") -> tuple[str, ...]:
     """Values of a nested mapping that are those of the template, by dotted name: they are the NU2310's."""
-    return tuple(_alike(table, tomllib.loads(template()), ()))
+    return tuple(_alike(table, tomllib.loads(template(subject)), ()))
 
 
 def _alike(given: Mapping[str, Any], written: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
@@ -66,13 +78,13 @@ def _aligned(line: str) -> str:
     return f"{(line[:2] + value).rstrip():<34} # {comment}" if sign else line
 
 
-def write_template(path: str | Path) -> Path:
-    """Write the template to a new file.
+def write_template(path: str | Path, subject: Subject = "cage") -> Path:
+    """Write the template of a cage, or of a whole bearing, to a new file.
 
     **Raises:** `ValueError`, one sentence, if the name does not end in `.toml`, if the file is there already, or if it
     cannot be written.
     """
-    target, text = Path(path), template()
+    target, text = Path(path), template(subject)
     if target.suffix.lower() != ".toml":
         raise InputError(f"File '{path}' must end in .toml, so that the commands take it for a description.")
     try:

@@ -1,22 +1,24 @@
-"""`CageModel` -> nested mapping or TOML text that `load_model` reads back to the same numbers."""
+"""`CageModel` or `BearingModel` -> nested mapping or TOML text that `load_model` reads back to the same numbers."""
 
 from pathlib import Path
 from typing import Any
 
 import equinox as eqx
 
-from ..models import CageModel
+from ..models import BearingModel, CageModel
 from ._config import kind_name
 from ._files import replacing
 from ._schema import ConfigError, submodules, values
 
 
-def configuration(model: CageModel) -> dict[str, Any]:
+def configuration(model: CageModel | BearingModel) -> dict[str, Any]:
     """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML
     file.
 
     **Raises:** `ConfigError` for a model with forces of its user's own, which no table can hold.
     """
+    if isinstance(model, BearingModel):
+        return {"model": "bearing"} | _table(model)
     if model.extra:
         names = ", ".join(type(law).__name__ for law in model.extra)
         raise ConfigError(f"Argument `model` must have no forces of your own to be put into a file, but has {names}.")
@@ -49,9 +51,9 @@ def _literal(value: float | int | str) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-def save_model(path: str | Path, model: CageModel) -> Path:
-    """Write `model` as a TOML file that `load_model` reads; an earlier file stays whole if that
-    fails.
+def save_model(path: str | Path, model: CageModel | BearingModel) -> Path:
+    """Write `model` as a TOML file that `load_model`, or `load_whole_bearing`, reads; an earlier file stays whole if
+    that fails.
     """
     with replacing(path) as temporary:
         temporary.write_text(toml_text(configuration(model)) + "\n", encoding="utf-8")

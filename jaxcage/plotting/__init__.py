@@ -8,6 +8,7 @@
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
+| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
 | `_impact`        | impact of a roller on a cage bar                                        |
 | `_statics`       | load of every roller                                                    |
 | `_waterfall`     | spectra over speed                                                      |
@@ -23,6 +24,18 @@
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
 """
 
+from ._bearing import (
+    bearing_animation as bearing_animation,
+    bearing_drawing as bearing_drawing,
+    bearing_figure as bearing_figure,
+    bearing_sweep_figure as bearing_sweep_figure,
+    cage_orbit as cage_orbit,
+    force_over_time as force_over_time,
+    marked_spectrum as marked_spectrum,
+    over_shaft_speed as over_shaft_speed,
+    pocket_force_around as pocket_force_around,
+    slip_around as slip_around,
+)
 from ._branches import (
     MARKS as MARKS,
     PERIOD_COLOURS as PERIOD_COLOURS,

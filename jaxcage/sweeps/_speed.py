@@ -289,10 +289,11 @@ def _own_starts(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) ->
 
 
 @functools.cache
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of what a sweep is computed with."""
     return {f"version_{p}": version(p) for p in ("jaxcage", "jax", "diffrax", "equinox", "numpy")}
 
 
 def settings_of(method: AbstractMethod) -> dict[str, str]:
     """How a sweep was computed: method and versions."""
-    return {"method": str(method).replace("\n", " "), **_versions()}
+    return {"method": str(method).replace("\n", " "), **versions()}

@@ -9,6 +9,7 @@
 | `_drag`       | drag and churning                                                           |
 | `_contacts`   | every contact of the rollers, one set of numbers for both bodies            |
 | `_guide`      | film and contact of the guiding land, on cage and ring                      |
+| `_wear`       | Archard's law for the cage                                                  |
 | `_state`      | state, what is integrated beside it                                         |
 | `_field`      | equations of motion at one shaft speed                                      |
 | `_energy`     | energy, angular momentum                                                    |
@@ -23,11 +24,11 @@ from ._energy import (
     kinetic_energy as kinetic_energy,
     potential_energy as potential_energy,
 )
-from ._field import BearingAtSpeed as BearingAtSpeed
+from ._field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
 from ._model import BearingModel as BearingModel, InnerRing as InnerRing
 from ._pockets import Pockets as Pockets, bar_stiffness as bar_stiffness
 from ._raceway import Raceways as Raceways
-from ._starts import rolling_start as rolling_start, state_scale as state_scale
+from ._starts import CAGE_STARTS as CAGE_STARTS, rolling_start as rolling_start, state_scale as state_scale
 from ._state import (
     LEDGER as LEDGER,
     MEANS as MEANS,
@@ -38,3 +39,4 @@ from ._state import (
     Rollers as Rollers,
 )
 from ._traction import Traction as Traction, TractionCurve as TractionCurve
+from ._wear import Wear as Wear

@@ -34,6 +34,8 @@ class RacewayForces(NamedTuple):
     """Power of the traction [W]."""
     lost_in_damping: OfRoller
     """Power of Q beyond its elastic part [W]."""
+    sliding: OfRoller
+    """Speed of the raceway beyond that of the roller's surface, where they meet or would meet [m/s]."""
 
 
 class RacewayConstants(NamedTuple):
@@ -61,7 +63,7 @@ def outer_contact(
     race_arm = radius + arm
     sliding = at.speed * race_arm - (radius * orbit + spin * arm)
     traction = at.curve(sliding) * load
-    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (load - elastic) * radial)
+    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (load - elastic) * radial, sliding)
 
 
 def inner_contact(
@@ -78,7 +80,7 @@ def inner_contact(
     race_arm = distance - arm
     sliding = at.speed * race_arm - (across - spin * arm)
     traction = at.curve(sliding) * load
-    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (elastic - load) * away)
+    return RacewayForces(load, traction, arm, race_arm, traction * sliding, (elastic - load) * away, sliding)
 
 
 class PocketForces(NamedTuple):
@@ -96,6 +98,8 @@ class PocketForces(NamedTuple):
     """N [N]."""
     lost_in_sliding: OfRoller
     lost_in_damping: OfRoller
+    rubbing: OfRoller
+    """N times the sliding speed [W]."""
 
 
 class PocketConstants(NamedTuple):
@@ -138,4 +142,5 @@ def pocket_contact(
         normal=normal,
         lost_in_sliding=-friction * sliding,
         lost_in_damping=(normal - elastic) * rate,
+        rubbing=normal * jnp.abs(sliding),
     )

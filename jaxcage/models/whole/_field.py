@@ -9,8 +9,7 @@ too) and the moment tau_C of the contacts about C:
     M C'' = F_C + M e (omega^2 n - omega' t),   J_G omega' = tau_C - e M g cos theta - e t.F_C.
 """
 
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -37,15 +36,11 @@ from ._raceway import hunt_crossley
 from ._state import BearingState, Bodies, Rates, Rollers
 
 
-Many = Float[Array, " rollers"]
+Many = Float[Array, "*rollers"] | float | int
+"""Of all rollers, or of one."""
 
 NEWTON_STEPS, LONGEST_STEP = 5, 1e-3
 """For the place of a quasi-static ring, and how far each goes at most, over the roller's radius."""
-
-
-def _of_each(law: Any) -> Any:
-    """A law of one roller, with constants first, for all of them."""
-    return lambda constants, *rollers: jax.vmap(partial(law, constants))(*rollers)
 
 
 class Geometry(NamedTuple):
@@ -66,17 +61,49 @@ class Geometry(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """All contacts of the bearing at one moment."""
+    """All contacts of the bearing at one moment; of one roller, `land` is left out."""
 
     geometry: Geometry
     outer: RacewayForces
     inner: RacewayForces
     pocket: PocketForces
-    land: LandForces
     drag_out: Many
     drag_across: Many
     churning: Many
     drag_power: Many
+    land: LandForces | None = None
+
+
+class Passed(NamedTuple):
+    """What a roller passes on to cage and rings, and to the ledger; of all of them, the sums."""
+
+    x: Many
+    """Force of the cage on the roller [N]."""
+    y: Many
+    cage_moment: Many
+    """On the cage about its centre [N m]."""
+    inner_x: Many
+    """Force of the inner ring on the roller [N]."""
+    inner_y: Many
+    inner_moment: Many
+    """Of the traction about the ring's centre [N m]."""
+    outer_moment: Many
+    traction: Many
+    """Powers that are lost [W], to `drag`."""
+    raceway_damping: Many
+    pocket_friction: Many
+    pocket_damping: Many
+    drag: Many
+    normal: Many
+    """Pocket force [N]."""
+    spin: Many
+    """Over the number of rollers [rad/s]."""
+    rubbing: Many
+    """Pocket force times sliding speed [W]."""
+
+
+MOVING = 7
+"""So many of them, the first, move cage and rings."""
 
 
 class BearingAtSpeed(eqx.Module):
@@ -163,44 +190,59 @@ class BearingAtSpeed(eqx.Module):
     def forces(self, state: BearingState) -> Forces:
         """Every contact at a state."""
         rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
-        g = self._geometry(rollers, cage, state.clock[0])
+        each = jax.vmap(self.on_roller, in_axes=(0, None, 0, 0))
+        return each(rollers, cage, *self.pockets(state.clock[0]))._replace(land=self.on_land(cage))
+
+    def pockets(self, angle: Scalar) -> tuple[Array, Array]:
+        """Cosine and sine of the pockets' angles at an angle of the cage."""
+        cos, sin = cos_sin(angle)
+        table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
+        return cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
+
+    def on_roller(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Forces:
+        """Every contact of one roller, of whom alone `rollers` are, by elementary operations."""
+        g = self._geometry(rollers, cage, pocket_cos, pocket_sin)
         across = rollers.radius * rollers.orbit
         ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
         ring_across = cage.ring_vy * g.cos - cage.ring_vx * g.sin
         dv_out, dv_across = rollers.radial - ring_out, across - ring_across
-        inner = _of_each(inner_contact)(
+        inner = inner_contact(
             self.inner_race,
             g.distance,
             g.inner_out * dv_out + g.inner_across * dv_across,
             g.inner_out * dv_across - g.inner_across * dv_out,
             rollers.spin,
         )
-        outer = _of_each(outer_contact)(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
-        turning = partial(pocket_contact, cage_speed=cage.cage_speed)
-        pocket = _of_each(turning)(
+        outer = outer_contact(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
+        pocket = pocket_contact(
             self.pocket,
             rollers.radius * g.lag_cos - (cage.x * g.pocket_cos + cage.y * g.pocket_sin),
             rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin),
             rollers.radial * g.lag_cos - across * g.lag_sin - (cage.vx * g.pocket_cos + cage.vy * g.pocket_sin),
             rollers.radial * g.lag_sin + across * g.lag_cos - (cage.vy * g.pocket_cos - cage.vx * g.pocket_sin),
             rollers.spin,
+            cage.cage_speed,
         )
-        if self.inner_guided:
-            from_land = cage.x - cage.ring_x, cage.y - cage.ring_y, cage.vx - cage.ring_vx, cage.vy - cage.ring_vy
-            land = land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
-        else:
-            land = land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
         fast = magnitude(rollers.radial, across)
         drag_out, drag_across = quadratic(rollers.radial, fast, self.drag), quadratic(across, fast, self.drag)
         churning = quadratic(rollers.spin, jnp.abs(rollers.spin), self.churning)
         power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
-        return Forces(g, outer, inner, pocket, land, drag_out, drag_across, churning, power)
+        return Forces(g, outer, inner, pocket, drag_out, drag_across, churning, power)
 
-    def _geometry(self, rollers: Rollers, cage: Bodies, angle: Scalar) -> Geometry:
-        cos, sin = cos_sin(angle)
-        table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
-        pocket_cos, pocket_sin = cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
-        lag_cos, lag_sin = map(jnp.asarray, jax.vmap(cos_sin)(rollers.lag))
+    def on_land(self, cage: Bodies) -> LandForces:
+        """The guiding land."""
+        if self.inner_guided:
+            from_land = cage.x - cage.ring_x, cage.y - cage.ring_y, cage.vx - cage.ring_vx, cage.vy - cage.ring_vy
+            return land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
+        return land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
+
+    def geometry(self, state: BearingState) -> Geometry:
+        """Where all rollers are."""
+        each = jax.vmap(self._geometry, in_axes=(0, None, 0, 0))
+        return each(Rollers(*state.rollers), Bodies(*state.bodies), *self.pockets(state.clock[0]))
+
+    def _geometry(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Geometry:
+        lag_cos, lag_sin = cos_sin(rollers.lag)
         c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
         out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
         across = cage.ring_x * s - cage.ring_y * c
@@ -237,7 +279,8 @@ class BearingAtSpeed(eqx.Module):
         x = -jnp.sum(out * g.cos - across * g.sin) - self.mounting_damping * ring.ring_vx
         y = -jnp.sum(out * g.sin + across * g.cos) - self.mounting_damping * ring.ring_vy
         if self.inner_guided:
-            x, y = x - f.land.x, y - f.land.y
+            land = self.on_land(ring)
+            x, y = x - land.x, y - land.y
         return jnp.stack([x, y - self.load - self.ring_mass * self.gravity])
 
     def __call__(self, state: BearingState) -> Rates:
@@ -247,7 +290,25 @@ class BearingAtSpeed(eqx.Module):
     def rates(self, state: BearingState, f: Forces) -> Rates:
         """Rates over time at a state with these forces."""
         rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
-        g, inner, outer, pocket, land = f.geometry, f.inner, f.outer, f.pocket, f.land
+        assert f.land is not None
+        alone = f._replace(land=None)
+        roller_rates, passed = jax.vmap(self.roller_rates, in_axes=(0, None, 0))(rollers, cage, alone)
+        sums = Passed(*jnp.sum(jnp.stack(passed), axis=1))
+        body_rates, integrals, imbalance = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
+        slip = jnp.max(jax.vmap(self.slip)(rollers.spin))
+        peaks = jnp.stack([jnp.max(f.pocket.normal), f.land.size, slip, imbalance, f.land.eps])
+        clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
+        moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), clock)
+        return Rates(moved, jnp.stack(integrals), peaks)
+
+    def slip(self, spin: Scalar) -> Array:
+        """Of a roller's spin against pure rolling."""
+        turns = self.rolling_spin != 0
+        return jnp.where(turns, 1 - spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
+
+    def roller_rates(self, rollers: Rollers, cage: Bodies, f: Forces) -> tuple[tuple[Array, ...], Passed]:
+        """Rates of one roller under its forces, and what it passes on."""
+        g, inner, outer, pocket = f.geometry, f.inner, f.outer, f.pocket
         inner_out = inner.load * g.inner_out - inner.traction * g.inner_across
         inner_across = inner.load * g.inner_across + inner.traction * g.inner_out
         out = inner_out - outer.load + pocket.out * g.lag_cos + pocket.along * g.lag_sin + f.drag_out
@@ -256,51 +317,44 @@ class BearingAtSpeed(eqx.Module):
         across = across - self.roller_mass * self.gravity * g.cos
         moment = outer.arm * outer.traction - inner.arm * inner.traction + pocket.roller_moment + f.churning
         per_mass = 1 / self.roller_mass
-        roller_rates = jnp.stack(
-            [
-                rollers.orbit - cage.cage_speed,
-                moment / self.roller_inertia,
-                rollers.radial,
-                out * per_mass + rollers.radius * rollers.orbit * rollers.orbit,
-                (across * per_mass - 2 * rollers.radial * rollers.orbit) / rollers.radius,
-            ]
+        rates = (
+            rollers.orbit - cage.cage_speed,
+            moment / self.roller_inertia,
+            rollers.radial,
+            out * per_mass + rollers.radius * rollers.orbit * rollers.orbit,
+            (across * per_mass - 2 * rollers.radial * rollers.orbit) / rollers.radius,
         )
-        turns = self.rolling_spin != 0
-        slip = jnp.where(turns, 1 - rollers.spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
-        sums = jnp.sum(
-            jnp.stack(
-                [
-                    pocket.out * g.pocket_cos - pocket.along * g.pocket_sin,
-                    pocket.out * g.pocket_sin + pocket.along * g.pocket_cos,
-                    pocket.cage_moment,
-                    inner_out * g.cos - inner_across * g.sin,
-                    inner_out * g.sin + inner_across * g.cos,
-                    inner.traction * inner.race_arm,
-                    outer.traction * outer.race_arm,
-                    inner.lost_in_sliding + outer.lost_in_sliding,
-                    inner.lost_in_damping + outer.lost_in_damping,
-                    pocket.lost_in_sliding,
-                    pocket.lost_in_damping,
-                    f.drag_power,
-                    pocket.normal,
-                    rollers.spin / self.n_rollers,
-                ]
-            ),
-            axis=1,
+        passed = Passed(
+            x=pocket.out * g.pocket_cos - pocket.along * g.pocket_sin,
+            y=pocket.out * g.pocket_sin + pocket.along * g.pocket_cos,
+            cage_moment=pocket.cage_moment,
+            inner_x=inner_out * g.cos - inner_across * g.sin,
+            inner_y=inner_out * g.sin + inner_across * g.cos,
+            inner_moment=inner.traction * inner.race_arm,
+            outer_moment=outer.traction * outer.race_arm,
+            traction=inner.lost_in_sliding + outer.lost_in_sliding,
+            raceway_damping=inner.lost_in_damping + outer.lost_in_damping,
+            pocket_friction=pocket.lost_in_sliding,
+            pocket_damping=pocket.lost_in_damping,
+            drag=f.drag_power,
+            normal=pocket.normal,
+            spin=rollers.spin / self.n_rollers,
+            rubbing=pocket.rubbing,
         )
-        peaks = jnp.stack([jnp.max(pocket.normal), land.size, jnp.max(slip), jnp.zeros_like(land.eps), land.eps])
-        return self._bodies(state, cage, roller_rates, sums, land, peaks)
+        return tuple(map(jnp.asarray, rates)), passed
 
-    def _bodies(
-        self, state: BearingState, cage: Bodies, roller_rates: Array, sums: Array, land: LandForces, peaks: Array
-    ) -> Rates:
-        """Cage and inner ring, under the sums over all rollers; the ledger."""
-        (on_rollers_x, on_rollers_y, pocket_moment, inner_x, inner_y, inner_moment, outer_moment) = sums[:7]
-        (traction, raceway, friction, pocket_damping, drag, pocket_sum, spin) = sums[7:]
+    def body_rates(
+        self, cage: Bodies, phase: tuple[Scalar, Scalar], sums: Passed, land: LandForces
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
+        """Rates of cage and inner ring under the sums over all rollers; what is integrated, as in `LEDGER` and `MEANS`;
+        the force by which a quasi-static ring is out of balance.
+
+        **Arguments:** cosine and sine of the cage's angle; else as they are called.
+        """
         mass, e, g = self.cage_mass, self.eccentricity, self.gravity
-        cos, sin = cos_sin(state.clock[0])
-        contact_x, contact_y = land.x - on_rollers_x, land.y - on_rollers_y
-        moment = pocket_moment + land.moment
+        cos, sin = phase
+        contact_x, contact_y = land.x - sums.x, land.y - sums.y
+        moment = sums.cage_moment + land.moment
         down = contact_y - mass * g
         drive = moment - e * mass * g * cos - e * (cos * down - sin * contact_x)
         if self.held:
@@ -312,47 +366,42 @@ class BearingAtSpeed(eqx.Module):
         cage_y = down / mass + swing * sin - e * turning * cos
 
         from_land = self.inner_guided
-        ring_x = -inner_x - self.mounting_damping * cage.ring_vx - (land.x if from_land else 0.0)
-        ring_y = -inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
+        ring_x = -sums.inner_x - self.mounting_damping * cage.ring_vx - (land.x if from_land else 0.0)
+        ring_y = -sums.inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
         ring_y = ring_y - self.load - self.ring_mass * g
         ring_rates = cage.ring_vx, cage.ring_vy, ring_x / self.ring_mass, ring_y / self.ring_mass
+        imbalance = jnp.zeros_like(ring_x)
         if self.settles:
-            peaks = peaks.at[-2].set(jnp.sqrt(ring_x * ring_x + ring_y * ring_y))
+            imbalance = jnp.sqrt(ring_x * ring_x + ring_y * ring_y)
             ring_rates = (jnp.zeros_like(ring_x),) * 4
-        body_rates = jnp.stack(
-            [
-                cage.vx,
-                cage.vy,
-                cage_x,
-                cage_y,
-                turning,
-                *ring_rates,
-            ]
-        )
-        on_inner = -inner_moment + (land.land_moment if from_land else 0.0)
-        on_outer = -outer_moment + (0.0 if from_land else land.land_moment)
-        mounting = self.mounting_damping * (cage.ring_vx**2 + cage.ring_vy**2)
+        on_inner = -sums.inner_moment + (land.land_moment if from_land else 0.0)
+        on_outer = -sums.outer_moment + (0.0 if from_land else land.land_moment)
+        mounting = self.mounting_damping * (cage.ring_vx * cage.ring_vx + cage.ring_vy * cage.ring_vy)
         paid = -on_inner * self.speed - on_outer * self.outer_speed + hold * cage.cage_speed
         about_origin = moment + cage.x * contact_y - cage.y * contact_x - mass * g * (cage.x + e * cos) + hold
-        integrals = jnp.stack(
-            [
-                paid,
-                traction,
-                raceway,
-                friction,
-                pocket_damping,
-                land.lost_in_film,
-                land.lost_in_contact,
-                drag,
-                mounting,
-                about_origin,
-                pocket_sum,
-                land.eps,
-                land.whirl,
-                cage.cage_speed,
-                spin,
-                hold,
-            ]
+        integrals = (
+            paid,
+            sums.traction,
+            sums.raceway_damping,
+            sums.pocket_friction,
+            sums.pocket_damping,
+            land.lost_in_film,
+            land.lost_in_contact,
+            sums.drag,
+            mounting,
+            about_origin,
+            sums.normal,
+            land.eps,
+            land.whirl,
+            cage.cage_speed,
+            sums.spin,
+            hold,
+            sums.rubbing,
+            land.rubbing,
+            -sums.x * cos,
+            -sums.x * sin,
+            -sums.y * cos,
+            -sums.y * sin,
         )
-        clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
-        return Rates(BearingState(roller_rates, body_rates, clock), integrals, peaks)
+        rates = cage.vx, cage.vy, cage_x, cage_y, turning, *ring_rates
+        return tuple(map(jnp.asarray, rates)), tuple(map(jnp.asarray, integrals)), imbalance

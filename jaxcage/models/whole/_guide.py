@@ -26,6 +26,8 @@ class LandForces(NamedTuple):
     """On the land about its centre [N m]."""
     lost_in_film: Scalar
     lost_in_contact: Scalar
+    rubbing: Scalar
+    """Normal force of the contact times its sliding speed [W]."""
     size: Scalar
     """Whole force [N]."""
     eps: Scalar
@@ -79,6 +81,7 @@ def land_forces(
         land_moment=on_land - land_arm * rub,
         lost_in_film=film_loss,
         lost_in_contact=damped - rub * sliding,
+        rubbing=normal * jnp.abs(sliding),
         size=jnp.sqrt(force_x * force_x + force_y * force_y + 1e-12),
         eps=place.eps,
         whirl=(x * vy - y * vx) / (c * place.eps) ** 2,

@@ -14,6 +14,7 @@ from ._drag import RollerDrag
 from ._pockets import Pockets
 from ._raceway import Raceways
 from ._traction import Traction
+from ._wear import Wear
 
 
 Guided = Literal["outer", "inner"]
@@ -53,6 +54,7 @@ class BearingModel(eqx.Module):
     raceways: Raceways = eqx.field(default_factory=Raceways)
     drag: RollerDrag = eqx.field(default_factory=RollerDrag)
     ring: InnerRing = eqx.field(default_factory=InnerRing)
+    wear: Wear = eqx.field(default_factory=Wear)
     land_friction: Scalar = parameter("1", 0.0, 1.0, "friction coefficient of cage on land in contact", default=0.1)
     inner_land_diameter: Scalar = parameter(
         "m", 1e-3, 4.0, "diameter of the inner ring's land, where it guides the cage", default=69e-3

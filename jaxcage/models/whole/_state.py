@@ -68,10 +68,26 @@ LEDGER = (
 )
 """Powers that are integrated: what the shaft (or whoever turns the outer ring or holds the cage) puts in [W], and what
 each kind of contact takes out."""
-MEANS = ("cage_moment", "pocket_force", "eccentricity", "whirl", "cage_speed", "roller_spin", "hold_torque")
+MEANS = (
+    "cage_moment",
+    "pocket_force",
+    "eccentricity",
+    "whirl",
+    "cage_speed",
+    "roller_spin",
+    "hold_torque",
+    "pocket_rubbing",
+    "land_rubbing",
+    "pocket_x_cos",
+    "pocket_x_sin",
+    "pocket_y_cos",
+    "pocket_y_sin",
+)
 """Other quantities that are integrated over time: moment of all outer forces on the cage about the outer ring's centre
 [N m], sum of the pocket forces [N], eccentricity ratio, angular speed of the cage's centre about the land's [rad/s],
-cage speed [rad/s], mean spin of the rollers [rad/s], torque that holds the cage's speed [N m]."""
+cage speed [rad/s], mean spin of the rollers [rad/s], torque that holds the cage's speed [N m]; load times sliding speed
+of all pockets and of the land [W], which is what wears them; and the force of all rollers on the cage times cosine and
+sine of the cage's angle [N], for its first harmonic."""
 PEAKS = ("pocket_force", "land_force", "roller_slip", "ring_imbalance", "eccentricity")
 """Largest values that are followed: of a pocket force [N], of the land's whole force on the cage [N], of the slip of a
 roller's spin against pure rolling, of the force by which a quasi-static ring is out of balance [N], and of the

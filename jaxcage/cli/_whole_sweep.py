@@ -1,0 +1,124 @@
+"""What a whole bearing does over the shaft's speed: slips, forces, losses, exponent, state of the cage's motion."""
+
+import collections
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .._errors import InputError, NoResult
+from ..analysis import BearingSweep
+from ..io import save_bearing_sweep
+from ..models import BearingModel
+from ..plotting import bearing_sweep_figure
+from ..report import Table, chosen
+from ..sweeps import rpm, sweep_bearing
+from ._job import Job, blocks_of
+from ._limits import Demand
+from ._options import SweepOptions
+from ._readers import flag
+from ._show import Report
+from ._whole import shaft_rpm_of
+
+
+SPEEDS, STARTS = 13, 3
+NOT_YET = "solver steps waterfall horizon confirm draws seed nominal"
+"""Options of sweeps of a cage that say nothing here."""
+RATE = 15.0
+"""Revolutions of lanes that a core makes in a second, about, exponents with them."""
+COLUMNS = (
+    "cage_slip roller_slip_max pocket_force_mean_sum_N pocket_force_max_N land_force_max_N friction_power_W "
+    "input_power_W eccentricity_mean eccentricity_std eccentricity_max whirl_ratio synchronous_force_x_N "
+    "synchronous_force_error_N exponent exponent_error state outcome error steps"
+)
+
+
+def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
+    """`jaxcage sweep` of a whole bearing."""
+    options = job.options
+    speeds = _speeds(job, model)
+    lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
+    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, RATE))
+    given: dict[str, Any] = job.given("discard revolutions exponents")
+    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
+    with job.computing("sweep") as say:
+        found = sweep_bearing(
+            model,
+            speeds,
+            starts=STARTS,
+            blocks=blocks_of(options.revolutions),
+            progress=partial(say, ""),
+            **given,
+        )
+    if found.failed.all():
+        raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
+    title = f"{job.name}, {float(model.load):g} N, {options.discard} + {options.revolutions} revolutions of the cage"
+    job.listed("figure", job.saved(bearing_sweep_figure(found, title), job.path(".png")))
+    job.listed("data", save_bearing_sweep(job.folder / f"sweep_{job.name}.zarr", found, model))
+    outcomes = dict(sorted(collections.Counter(found.outcome.ravel().tolist()).items()))
+    document = {
+        "load_N": float(model.load),
+        "speeds": speeds.size,
+        "starts": STARTS,
+        **chosen(options, "discard revolutions"),
+        "shaft_speed_rpm": found.rpm,
+        **chosen(found, COLUMNS),
+        "standard_errors": {name: found.standard_error(name) for name in found.block_means},
+        "power_parts_W": found.power_parts_W,
+        "outcomes": outcomes,
+    }
+    said = ", ".join(f"{n} {name}" for name, n in outcomes.items())
+    return Report(document, [_table(title, found)], [f"Lanes: {said}"])
+
+
+def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
+    """Shaft speeds [rad/s].
+
+    **Raises:** `InputError` for options that a whole bearing does not take, and speeds that it cannot have.
+    """
+    options = job.options
+    for name in NOT_YET.split():
+        if getattr(options, name) != getattr(SweepOptions, name):
+            raise InputError(f"Option {flag(name)} does not go with a whole bearing.")
+    if options.exponents > 1:
+        raise InputError(f"Option --exponents must be 1 for a whole bearing, but {options.exponents} was given.")
+    first, last = (shaft_rpm_of(model, getattr(options, n), job.speeds, flag(n)) for n in ("first", "last"))
+    count = options.count or SPEEDS
+    if count == 1:
+        return np.array([rpm(first)])
+    if last <= first:
+        raise InputError(f"Option --last must be above --first, but the range is {first:g} to {last:g} rpm.")
+    return np.asarray(rpm(first, last, count))
+
+
+def _table(title: str, found: BearingSweep) -> Table:
+    """One row for each speed, means over the starts that did not fail."""
+    heads = ("shaft [rpm]", "slip [%]", "pockets, mean [N]", "largest [N]", "lost [W]", "eccentricity", "whirl ratio")
+    rows = []
+    for i, shaft in enumerate(found.rpm):
+        well = ~found.failed[i]
+        if not well.any():
+            rows.append((f"{shaft:.0f}", *["-"] * (len(heads) - 1), "-", "failed"))
+            continue
+        mean = lambda name, i=i, well=well: float(np.mean(getattr(found, name)[i, well]))
+        error = lambda name, i=i, well=well: _error(found, name, i, well)
+        rows.append(
+            (
+                f"{shaft:.0f}",
+                f"{100 * mean('cage_slip'):.2f} ± {100 * error('cage_slip'):.2f}",
+                f"{mean('pocket_force_mean_sum_N'):.1f} ± {error('pocket_force_mean_sum_N'):.1f}",
+                f"{np.max(found.pocket_force_max_N[i, well]):.0f}",
+                f"{mean('friction_power_W'):.1f}",
+                f"{mean('eccentricity_mean'):.3f}",
+                f"{mean('whirl_ratio'):.3f}",
+                f"{mean('exponent'):.2f} ± {error('exponent'):.2f}",
+                ", ".join(sorted(set(found.state[i, well].tolist()))),
+            )
+        )
+    return Table(title, (*heads, "exponent", "state"), rows)
+
+
+def _error(found: BearingSweep, name: str, i: int, well: np.ndarray) -> float:
+    """Standard error of the mean over starts, from blocks of all of them."""
+    blocks: Any = found.block_means[name][i][well]
+    return float(np.std(blocks, ddof=1) / np.sqrt(blocks.size))

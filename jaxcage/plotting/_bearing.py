@@ -1,0 +1,298 @@
+"""The whole bearing: drawn to scale with pocket forces, slips around it, whirl of the cage, spectra, an animation."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Annulus, Circle, FancyArrowPatch, Polygon
+
+from ..analysis import Around, BearingHistory, BearingSweep, OrderSpectrum
+from ..integrate import BearingRun
+from ..models import BearingModel
+from ._style import BLACK, BLUE, GREEN, GREY, GRID, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, dress, new_figure
+
+
+MM = 1e3
+LONGEST_ARROW = 0.14
+"""Of the outside diameter, for the largest pocket force of the run."""
+MARK_COLOURS = (BLUE, SKY, GREEN, PURPLE, VERMILION, ORANGE)
+
+
+def bearing_drawing(
+    model: BearingModel, run: BearingRun, history: BearingHistory, sample: int, ax: Axes | None = None
+) -> Axes:
+    """Rings, rollers and cage at one sample, to scale; arrows are the forces of the rollers on the cage's bars.
+
+    The cage's displacement and clearances are drawn as they are: a few tenths of a millimetre. The longest arrow is the
+    largest pocket force of the whole run.
+    """
+    ax = axes_or_new(ax, 6.0, 6.0)
+    ax.grid(False)
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+    ax.set(xticks=[], yticks=[], aspect="equal")
+    for artist in _rings(model) + _moving(model, run, history, sample):
+        ax.add_artist(artist)
+    half = 0.53 * MM * float(model.bearing.outside_diameter)
+    ax.set(xlim=(-half, half), ylim=(-half, half))
+    now = np.abs(history.pocket_force[sample])
+    most = np.abs(history.pocket_force).max()
+    ax.set_title(
+        f"{1e3 * (history.time[sample] - history.time[0]):.2f} ms: largest pocket force {now.max():.0f} N"
+        f" (of {most:.0f} N in the run)",
+        fontsize=9,
+    )
+    return ax
+
+
+def _rings(model: BearingModel) -> list[Artist]:
+    outside, raceway = MM * float(model.bearing.outside_diameter) / 2, MM * float(model.outer_radius)
+    return [Annulus((0, 0), outside, outside - raceway, facecolor=GRID, edgecolor=GREY, linewidth=0.8)]
+
+
+def _moving(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
+    bore, raceway = MM * float(model.bearing.bore) / 2, MM * float(model.inner_radius)
+    ring = MM * run.bodies[sample, 5:7]
+    found: list[Artist] = [
+        Annulus((ring[0], ring[1]), raceway, raceway - bore, facecolor=GRID, edgecolor=GREY, linewidth=0.8)
+    ]
+    found += _rollers(model, run, history, sample)
+    found += _bars(model, run, sample)
+    return found + _arrows(model, run, history, sample)
+
+
+def _rollers(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
+    radius = MM * run.rollers[sample, 2]
+    angle, half = history.roller_angle[sample], MM * float(model.bearing.roller_diameter) / 2
+    heaviest = max(float(history.inner_load.max()), 1e-9)
+    found: list[Artist] = []
+    for r, psi, load in zip(radius, angle, history.inner_load[sample], strict=True):
+        found.append(
+            Circle(
+                (r * np.cos(psi), r * np.sin(psi)),
+                half,
+                facecolor=(*_rgb(BLUE), 0.08 + 0.6 * load / heaviest),
+                edgecolor=BLACK,
+                linewidth=0.7,
+            )
+        )
+    return found
+
+
+def _rgb(colour: str) -> tuple[float, float, float]:
+    r, g, b = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return r, g, b
+
+
+def _bars(model: BearingModel, run: BearingRun, sample: int) -> list[Artist]:
+    """The bars between the pockets, in the height that the guiding surface and the rollers' centres leave them."""
+    centre, theta = MM * run.bodies[sample, 0:2], run.angle[sample]
+    n, free = model.bearing.n_rollers, float(model.bearing.roller_diameter + model.bearing.pocket_clearance) / 2
+    pitch = float(model.outer_radius - model.bearing.roller_diameter / 2)
+    inner, outer = _bar_ends(model, pitch)
+    found: list[Artist] = []
+    for j in range(n):
+        left, right = theta + 2 * np.pi * j / n, theta + 2 * np.pi * (j + 1) / n
+        corners = []
+        for r, side in ((inner, 1), (outer, 1), (outer, -1), (inner, -1)):
+            at = left if side > 0 else right
+            t, out = np.array([-np.sin(at), np.cos(at)]), np.array([np.cos(at), np.sin(at)])
+            corners.append(centre + MM * (np.sqrt(r * r - free * free) * out + side * free * t))
+        found.append(Polygon(corners, facecolor=ORANGE, edgecolor=BLACK, linewidth=0.5, alpha=0.55))
+    return found
+
+
+def _bar_ends(model: BearingModel, pitch: float) -> tuple[float, float]:
+    land = float(model.land_radius)
+    return (pitch - abs(land - pitch) * 0.6, land) if land > pitch else (land, pitch + abs(land - pitch) * 0.6)
+
+
+def _arrows(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
+    force = history.pocket_force[sample]
+    longest = LONGEST_ARROW * MM * float(model.bearing.outside_diameter)
+    scale = longest / max(float(np.abs(history.pocket_force).max()), 1e-9)
+    radius, half = MM * run.rollers[sample, 2], MM * float(model.bearing.roller_diameter) / 2
+    found: list[Artist] = []
+    for r, psi, f in zip(radius, history.roller_angle[sample], force, strict=True):
+        if abs(f) * scale < 0.01 * longest:
+            continue
+        t, out = np.array([-np.sin(psi), np.cos(psi)]), np.array([np.cos(psi), np.sin(psi)])
+        begin = r * out + np.sign(f) * half * t
+        found.append(
+            FancyArrowPatch(
+                tuple(begin),
+                tuple(begin + scale * f * t),
+                arrowstyle="-|>",
+                mutation_scale=8,
+                shrinkA=0,
+                shrinkB=0,
+                color=VERMILION,
+                linewidth=1.4,
+                zorder=5,
+            )
+        )
+    return found
+
+
+def slip_around(found: Around, ax: Axes | None = None) -> Axes:
+    """Mean slip of the rollers, and how fast they slide on the inner ring, over the circumference."""
+    ax = axes_or_new(ax, 7.0, 3.2)
+    degrees = np.degrees(found.angle)
+    ax.step(degrees, 100 * found.roller_slip, where="mid", color=BLUE, linewidth=1.2)
+    _around_axis(ax, "Slip of the rollers [%]")
+    other = ax.twinx()
+    other.spines[["top", "left"]].set_visible(False)
+    other.step(degrees, found.inner_sliding, where="mid", color=VERMILION, linewidth=1.0)
+    other.set_ylabel("Sliding on the inner ring [m/s]", color=VERMILION)
+    other.tick_params(labelsize=9, colors=VERMILION)
+    ax.yaxis.label.set_color(BLUE)
+    ax.tick_params(axis="y", colors=BLUE)
+    return ax
+
+
+def pocket_force_around(found: Around, ax: Axes | None = None) -> Axes:
+    """Mean pocket force at each place of the circumference: of rollers that drive the cage or hold it back."""
+    ax = axes_or_new(ax, 7.0, 3.2)
+    degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
+    ax.bar(degrees, found.driving_force, width, color=GREEN, label="rollers drive the cage")
+    ax.bar(degrees, -found.braking_force, width, color=VERMILION, label="they hold it back")
+    ax.axhline(0, color=GREY, linewidth=0.8)
+    _around_axis(ax, "Mean pocket force [N]")
+    ax.legend(frameon=False, fontsize=8, loc="upper left")
+    return ax
+
+
+def _around_axis(ax: Axes, ylabel: str) -> None:
+    ax.axvline(270, color=GREY, linewidth=0.8, linestyle="--")
+    ax.set(
+        xlim=(0, 360), xticks=range(0, 361, 90), xlabel="Place on the circumference [°], load at 270°", ylabel=ylabel
+    )
+
+
+def cage_orbit(history: BearingHistory, ax: Axes | None = None) -> Axes:
+    """Path of the cage's centre in the clearance circle, a dot at each revolution."""
+    ax = axes_or_new(ax, 5.0, 5.0)
+    ax.add_patch(Circle((0, 0), 1.0, fill=False, color=GREY, linewidth=1.0, linestyle="--"))
+    x, y = history.place.T
+    ax.plot(x, y, color=BLUE, linewidth=0.7, alpha=0.8)
+    ax.plot(x[:: history.samples], y[:: history.samples], ".", color=BLACK, markersize=4)
+    ax.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal")
+    ax.set(xlabel="Cage centre, horizontal / clearance", ylabel="Cage centre, vertical / clearance")
+    return ax
+
+
+def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel: str, ax: Axes | None = None) -> Axes:
+    """Amplitudes by order of the cage's speed, with the frequencies of the bearing marked."""
+    ax = axes_or_new(ax, 7.0, 3.0)
+    keep = (spectrum.order > 0) & (spectrum.order <= 1.15 * max(orders.values()))
+    ax.semilogy(spectrum.order[keep], np.maximum(spectrum.amplitude[keep], 1e-12), color=BLACK, linewidth=0.8)
+    for colour, (name, order) in zip(MARK_COLOURS, orders.items(), strict=False):
+        ax.axvline(order, color=colour, linewidth=1.1, linestyle="--", label=f"{name} {order:.3g}")
+    shown = spectrum.amplitude[keep]
+    ax.set(
+        ylim=(0.5 * max(shown.min(), 1e-6 * shown.max()), 2 * shown.max()),
+        xlabel="Order of the cage's speed",
+        ylabel=ylabel,
+    )
+    ax.legend(frameon=False, fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return ax
+
+
+def bearing_figure(
+    model: BearingModel,
+    run: BearingRun,
+    history: BearingHistory,
+    circumference: Around,
+    spectra: Mapping[str, OrderSpectrum],
+    orders: Mapping[str, float],
+    title: str = "",
+) -> Figure:
+    """The bearing at its largest pocket force, the cage's orbit, slips and forces around it, and spectra if there are
+    any.
+    """
+    figure = new_figure(12.0, 11.0 if spectra else 8.0)
+    grid = figure.add_gridspec(4 if spectra else 3, 2, height_ratios=(2.4, 1, 1, 1)[: 4 if spectra else 3])
+    worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
+    bearing_drawing(model, run, history, worst, dress(figure.add_subplot(grid[0, 0])))
+    cage_orbit(history, dress(figure.add_subplot(grid[0, 1])))
+    slip_around(circumference, dress(figure.add_subplot(grid[1, 0])))
+    pocket_force_around(circumference, dress(figure.add_subplot(grid[1, 1])))
+    force_over_time(history, dress(figure.add_subplot(grid[2, :])))
+    labels = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
+    for i, (name, spectrum) in enumerate(spectra.items()):
+        ax = marked_spectrum(spectrum, orders, labels.get(name, name), dress(figure.add_subplot(grid[3, i])))
+        if i == 0 and (legend := ax.get_legend()) is not None:
+            legend.remove()
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def force_over_time(history: BearingHistory, ax: Axes | None = None) -> Axes:
+    """Largest pocket force, and the land's force on the cage, over the revolutions of the cage."""
+    ax = axes_or_new(ax, 7.0, 3.0)
+    turns = np.abs(history.angle - history.angle[0]) / (2 * np.pi)
+    ax.plot(turns, np.abs(history.pocket_force).max(axis=1), color=VERMILION, linewidth=0.6, label="largest pocket")
+    ax.plot(turns, np.hypot(*history.land_on_cage.T), color=BLUE, linewidth=0.8, label="land")
+    ax.set(xlim=(0, turns[-1]), xlabel="Revolutions of the cage", ylabel="Force [N]")
+    ax.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return ax
+
+
+def bearing_sweep_figure(found: BearingSweep, title: str = "") -> Figure:
+    """Slip, pocket forces, power lost, whirl, largest exponent and equivalent synchronous force over the shaft's speed,
+    a line for each start, with standard errors where they are known.
+    """
+    figure = new_figure(11.5, 8.5)
+    axes = figure.subplots(3, 2, sharex=True)
+    over_shaft_speed(found, 100 * found.cage_slip, "Cage slip [%]", axes[0, 0], 100 * found.standard_error("cage_slip"))
+    force = found.standard_error("pocket_force_mean_sum_N")
+    over_shaft_speed(found, found.pocket_force_mean_sum_N, "Sum of pocket forces, mean [N]", axes[0, 1], force)
+    over_shaft_speed(found, found.pocket_force_max_N, "Largest pocket force [N]", axes[1, 0])
+    lost = found.standard_error("friction_power_W")
+    over_shaft_speed(found, found.friction_power_W, "Power lost [W]", axes[1, 1], lost)
+    over_shaft_speed(found, found.exponent, "Largest exponent per revolution", axes[2, 0], found.exponent_error)
+    synchronous, error = found.synchronous_force_x_N, found.synchronous_force_error_N
+    over_shaft_speed(found, synchronous, "Equivalent synchronous force [N]", axes[2, 1], error)
+    for ax in axes[2]:
+        ax.set_xlabel("Shaft speed [rpm]")
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def over_shaft_speed(
+    found: BearingSweep,
+    values: Float[np.ndarray, "speeds starts"],
+    label: str,
+    ax: Axes | None = None,
+    errors: Float[np.ndarray, "speeds starts"] | None = None,
+) -> Axes:
+    """A quantity of a sweep over the shaft's speed, a line for each start, with bars of one standard error."""
+    ax = axes_or_new(ax, 6.0, 3.2) if ax is None else dress(ax)
+    for i, colour in zip(range(values.shape[1]), MARK_COLOURS, strict=False):
+        bars = None if errors is None else np.where(np.isfinite(errors[:, i]), errors[:, i], 0.0)
+        style: Any = dict(color=colour, linewidth=0.9, marker=".", markersize=5, elinewidth=0.7, label=f"start {i + 1}")
+        ax.errorbar(found.rpm, values[:, i], bars, **style)
+    ax.set_ylabel(label)
+    return ax
+
+
+def bearing_animation(model: BearingModel, run: BearingRun, history: BearingHistory, path: Any, fps: int = 16) -> None:
+    """Write the last revolution of a run as an animated GIF: the drawing at every sample of it, at most 96 of them."""
+    from matplotlib.animation import FuncAnimation, PillowWriter
+
+    last = np.arange(len(history.time))[-history.samples - 1 :]
+    frames = last[:: max(1, -(-len(last) // 96))]
+    figure = Figure(figsize=(5.0, 5.2), layout="constrained", dpi=100)
+    ax = dress(figure.subplots())
+
+    def draw(sample: int) -> list[Artist]:
+        ax.clear()
+        bearing_drawing(model, run, history, int(sample), ax)
+        return []
+
+    FuncAnimation(figure, draw, frames=[int(i) for i in frames], blit=False).save(path, PillowWriter(fps=fps))

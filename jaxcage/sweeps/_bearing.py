@@ -1,0 +1,347 @@
+"""Sweeps of the whole bearing over shaft speeds, from several starts and for several designs."""
+
+import concurrent.futures
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._checks import require_x64
+from .._errors import ArgumentError
+from ..analysis import BearingRecord, BearingSweep, summed_up
+from ..integrate import (
+    FOLLOWED,
+    INTEGRATED,
+    LONGEST_BLOCK,
+    OUTCOMES,
+    SAMPLES,
+    BearingLanes,
+    bearing_states,
+    begin_lanes,
+    lanes_apart,
+    run_block,
+)
+from ..models import BearingModel, BearingState, rolling_start
+from ..models.whole import CAGE_STARTS, BearingAtSpeed, state_scale
+from ._engine import Progress, cores
+from ._speed import checked_speeds, versions
+
+
+CHUNKS = (8, 16, 32, 48, 64, 96)
+"""Lanes per call: few sizes, as each is compiled."""
+CALL = 12
+"""What a call costs beside its lanes, in lanes."""
+LEAD = 10
+"""Revolutions before those observed in which a tangent vector turns to the direction of fastest growth."""
+COARSER = 16.0
+"""A tolerance so many times larger makes steps of fourth order about twice as long."""
+
+
+def sweep_bearing(
+    model: BearingModel,
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    *,
+    starts: int | Sequence[BearingState] = 3,
+    discard: int = 100,
+    revolutions: int = 200,
+    blocks: int = 20,
+    exponents: int = 1,
+    tolerance: float = 1e-4,
+    allowed: float = 5e-2,
+    progress: Progress | None = None,
+) -> BearingSweep:
+    """Run the whole bearing over shaft speeds from several starts: slips, forces, losses, whirl, largest exponent.
+
+    **Arguments:**
+
+    - `model`: bearing, with an inner ring that is `dynamic`.
+    - `speeds`: ascending shaft speeds [rad/s].
+    - `starts`: how many of the model's own starts (`rolling_start`), or states with which every speed begins.
+    - `discard`, `revolutions`: revolutions of the cage left out at the beginning, and observed after that.
+    - `blocks`: of the observed revolutions, from whose scatter standard errors come.
+    - `exponents`: 1 for the largest Lyapunov exponent, 0 for none.
+    - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
+    - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution is run a second time with
+        about half the steps; a lane in which that moves the state by more is `inaccurate`.
+    - `progress`: called with lanes done and lanes in all.
+
+    **Returns:** `BearingSweep`. A lane that fails is NaN with an outcome, and its neighbours go on: `outside` if the
+    cage comes nearly to rest (below 5 % of the speed of pure rolling) or leaves its land, `max_steps_reached` if it
+    needs more than 20,000 steps a revolution.
+
+    **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, impossible counts, a quasi-static
+    ring or a film of finite length; `RuntimeError` without double precision.
+    """
+    options: dict[str, Any] = dict(
+        starts=starts, discard=discard, revolutions=revolutions, blocks=blocks, exponents=exponents
+    )
+    return sweep_bearings([model], speeds, **options, tolerance=tolerance, allowed=allowed, progress=progress)[0]
+
+
+def sweep_bearings(
+    models: Sequence[BearingModel],
+    speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
+    *,
+    starts: int | Sequence[BearingState] = 3,
+    discard: int = 100,
+    revolutions: int = 200,
+    blocks: int = 20,
+    exponents: int = 1,
+    tolerance: float = 1e-4,
+    allowed: float = 5e-2,
+    progress: Progress | None = None,
+) -> list[BearingSweep]:
+    """`sweep_bearing` for several designs at once, all lanes in one batch.
+
+    **Arguments:** bearings that differ in their numbers only; the rest as for `sweep_bearing`.
+
+    **Returns:** a `BearingSweep` for each.
+    """
+    require_x64()
+    speed = checked_speeds(speeds)
+    models = list(models)
+    _require(models, starts, discard, revolutions, blocks, exponents)
+    table = _Table.of(models, speed, starts)
+    lanes, block = table.which.size, revolutions // blocks
+    size = min(CHUNKS, key=lambda size: (-(-lanes // (size * cores())) * (size + CALL), size))
+    chunks = [
+        np.arange(lanes)[np.argsort(table.lane_speed, kind="stable")][i : i + size] for i in range(0, lanes, size)
+    ]
+    counted = _Counted(progress, lanes, discard + revolutions)
+
+    def run(chunk: np.ndarray) -> dict[str, Any]:
+        padded = np.concatenate([chunk, np.repeat(chunk[-1:], size - chunk.size)])
+        found = _followed(*table.taken(padded), discard, [block] * blocks, exponents, tolerance, counted.of(chunk.size))
+        return jax.tree.map(lambda x: x[: chunk.size], found)
+
+    with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
+        futures = [pool.submit(run, chunk) for chunk in chunks]
+        try:
+            parts = [future.result() for future in futures]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    back = np.argsort(np.concatenate(chunks))
+    found = jax.tree.map(lambda *x: np.concatenate(x)[back], *parts)
+    found["outcome"] = np.where(
+        (found["outcome"] == 0) & ~(found["error"] <= allowed), OUTCOMES.index("inaccurate"), found["outcome"]
+    )
+    settings = {"tolerance": str(tolerance), "allowed": str(allowed), **versions()}
+    each = lanes // len(models)
+    sweeps = []
+    for i in range(len(models)):
+        mine = jax.tree.map(lambda x: x[i * each : (i + 1) * each], found)
+        sweeps.append(
+            summed_up(
+                speed,
+                table.rolling[i * each : (i + 1) * each],
+                BearingRecord(**mine),
+                block=block,
+                samples=SAMPLES,
+                exponents=exponents > 0,
+                discard=discard,
+                settings=settings,
+            )
+        )
+    return sweeps
+
+
+def _require(
+    models: list[BearingModel], starts: Any, discard: int, revolutions: int, blocks: int, exponents: int
+) -> None:
+    """**Raises:** `ValueError` for what cannot be swept."""
+    if not models:
+        raise ArgumentError("models", said="must hold at least one bearing, but it is empty.")
+    for model in models:
+        if model.ring.ring_motion != "dynamic":
+            raise ArgumentError("model", said="must have a dynamic inner ring, but its `ring_motion` is quasi_static.")
+        if model.film.model == "finite_length":
+            raise ArgumentError("model", said="must have a short film, but its film is of finite_length.")
+    if discard < 0 or revolutions < 1:
+        raise ArgumentError(
+            "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
+        )
+    if blocks < 1 or revolutions % blocks:
+        raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
+    if exponents not in (0, 1):
+        raise ArgumentError("exponents", said=f"must be 0 or 1, but {exponents} was given.")
+    if isinstance(starts, int) and not 1 <= starts <= len(CAGE_STARTS):
+        raise ArgumentError(
+            "starts", said=f"must be 1 to {len(CAGE_STARTS)}, as many as a bearing has, but {starts} was given."
+        )
+
+
+class _Counted:
+    """Revolutions done, told as lanes."""
+
+    def __init__(self, progress: Progress | None, lanes: int, revolutions: int):
+        self.progress, self.lanes, self.whole = progress, lanes, lanes * revolutions
+        self.done, self.lock = 0, threading.Lock()
+
+    def of(self, lanes: int) -> Callable[[int], None]:
+        """To be called with revolutions done of so many lanes."""
+
+        def add(revolutions: int) -> None:
+            with self.lock:
+                self.done += lanes * revolutions
+                if self.progress is not None:
+                    self.progress(self.lanes * self.done // self.whole, self.lanes)
+
+        return add
+
+
+@eqx.filter_jit
+def _laws(model: BearingModel, speeds: Float[Array, " speeds"]) -> tuple[BearingAtSpeed, BearingState]:
+    def scale(speed: Array) -> BearingState:
+        whole = state_scale(model, speed)
+        return whole._replace(rollers=whole.rollers[:, 0])
+
+    return jax.vmap(model.at_speed)(speeds), jax.vmap(scale)(speeds)
+
+
+@eqx.filter_jit
+def _starts(model: BearingModel, speeds: Float[Array, " speeds"], cage: int) -> BearingState:
+    return jax.vmap(lambda speed: rolling_start(model, speed, cage))(speeds)
+
+
+class _Table:
+    """Laws, magnitudes and initial states of all lanes: designs, then speeds, then starts."""
+
+    def __init__(self, at: Any, own: list[bool], scale: BearingState, begin: BearingState, speed: np.ndarray):
+        designs, starts = len(at), begin.bodies.shape[0] // (len(at) * speed.size)
+        self.which = np.repeat(np.arange(designs), speed.size * starts)
+        self.at_speed = np.tile(np.repeat(np.arange(speed.size), starts), designs)
+        self.lane_speed = speed[self.at_speed]
+        self.at, self.own, self.scale, self.begin = at, own, scale, begin
+        self.rolling = np.array(
+            [at[d].rolling_cage_speed[s] for d, s in zip(self.which, self.at_speed, strict=True)], dtype=float
+        )
+
+    @classmethod
+    def of(cls, models: list[BearingModel], speed: np.ndarray, starts: int | Sequence[BearingState]) -> "_Table":
+        """**Raises:** `ValueError` for designs that differ in more than their numbers, and states of other bearings."""
+        arrays = [
+            jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, model)
+            for model in models
+        ]
+        rests = [eqx.partition(model, eqx.is_array)[1] for model in arrays]
+        if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
+            raise ArgumentError("models", said="must hold bearings that differ in their numbers only.")
+        several = jnp.asarray(np.append(speed, 1.1 * speed[0]))  # the last one shows what depends on speed
+        laws, scales = zip(*(_laws(model, several) for model in arrays), strict=True)
+        to_numpy = lambda tree: jax.tree.map(np.asarray, tree)
+        at = [to_numpy(law) for law in laws]
+        own = [len(models) > 1 or bool(x[0] != x[-1]) for x in jax.tree.leaves(at[0])]
+        many = np.asarray(speed)
+        if isinstance(starts, int):
+            states = [[to_numpy(_starts(model, jnp.asarray(many), k)) for k in range(starts)] for model in arrays]
+        else:
+            n = models[0].bearing.n_rollers
+            if not starts or any(np.shape(s.rollers) != (5, n) or np.shape(s.bodies) != (9,) for s in starts):
+                raise ArgumentError("starts", said=f"must hold states of a bearing with {n} rollers.")
+            at_all = lambda x: np.broadcast_to(np.asarray(x), (many.size, *np.shape(x)))
+            states = [[jax.tree.map(at_all, s) for s in starts] for _ in models]
+        rows = lambda *x: np.stack(x, axis=1).reshape(-1, *x[0].shape[1:])  # speeds, then starts
+        begin = jax.tree.map(lambda *x: np.concatenate(x), *(jax.tree.map(rows, *of_model) for of_model in states))
+        scale = jax.tree.map(lambda *x: np.stack(x), *(to_numpy(s) for s in scales))
+        return cls(at, own, scale, begin, speed)
+
+    def taken(self, lanes: np.ndarray) -> tuple[BearingAtSpeed, BearingState, BearingState]:
+        """Of some lanes, lanes last."""
+        which, at_speed = self.which[lanes], self.at_speed[lanes]
+        of_designs, tree = [jax.tree.leaves(at) for at in self.at], jax.tree.structure(self.at[0])
+        leaves = [
+            np.stack([row[i] for row in of_designs])[which, at_speed] if mine else of_designs[0][i][0]
+            for i, mine in enumerate(self.own)
+        ]
+        last = lambda x: jnp.asarray(np.moveaxis(x, 0, -1))
+        scale = jax.tree.map(lambda x: last(x[which, at_speed]), self.scale)
+        begin = jax.tree.map(lambda x: last(x[lanes]), self.begin)
+        return jax.tree.unflatten(tree, [jnp.asarray(x, dtype=float) for x in leaves]), scale, begin
+
+
+def _direction(begin: BearingState) -> BearingState:
+    """A tangent vector in no special direction, the same in every lane."""
+    numbers = np.random.default_rng(0)
+    each = lambda x: jnp.asarray(np.broadcast_to(numbers.normal(size=x.shape[:-1])[..., None], x.shape).copy())
+    return jax.tree.map(each, begin)
+
+
+def _in_parts(revolutions: int) -> list[int]:
+    """Stretches of at most `LONGEST_BLOCK` revolutions."""
+    whole, rest = divmod(revolutions, LONGEST_BLOCK)
+    return [LONGEST_BLOCK] * whole + [rest] * (rest > 0)
+
+
+def _followed(
+    at: BearingAtSpeed,
+    scale: BearingState,
+    begin: BearingState,
+    discard: int,
+    blocks: list[int],
+    exponents: int,
+    tolerance: float,
+    done: Callable[[int], None],
+) -> dict[str, Any]:
+    """Lanes from their beginning to the end, as the fields of a `BearingRecord` with lanes first."""
+    tight, loose = jnp.asarray(tolerance), jnp.asarray(COARSER * tolerance)
+    direction = _direction(begin) if exponents else None
+    lead = min(discard, LEAD) if exponents else 0
+    go = lambda lanes, samples: run_block(at, scale, lanes, jnp.asarray(samples), tight)
+    lanes = begin_lanes(at, scale, begin, None if lead < discard else direction)
+    for part in _in_parts(discard - lead):
+        lanes, _ = go(lanes, part * SAMPLES)
+        done(part)
+    if exponents and lead < discard:
+        lanes = _with_direction(at, scale, lanes, direction)
+    for part in _in_parts(lead):
+        lanes, _ = go(lanes, part * SAMPLES)
+        done(part)
+
+    integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
+    for block in blocks:
+        trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose)
+        samples, gathered = [1, *(part * SAMPLES for part in _in_parts(block))], []
+        samples[-1] -= 1
+        for k, count in enumerate(samples):
+            lanes, found = go(lanes, count)
+            if k == 0:
+                errors.append(np.asarray(lanes_apart(scale, trial.point, lanes.point)))
+            gathered.append(jax.tree.map(np.asarray, found))
+            places.append(gathered[-1].place[:count])
+        integrals.append(sum(part.integrals for part in gathered))
+        growths.append(sum(part.growth for part in gathered))
+        peaks.append(np.max([part.peaks for part in gathered], axis=0))
+        steps.append(sum(part.steps for part in gathered))
+        done(block)
+    rollers, bodies = bearing_states(lanes)
+    total = np.stack(integrals, axis=-1)  # quantities, lanes, blocks
+    highest = np.max(peaks, axis=0)
+    return {
+        "integrals": dict(zip(("time", *INTEGRATED), total, strict=True)),
+        "peaks": dict(zip(FOLLOWED, highest, strict=True)),
+        "growth": np.stack(growths, axis=-1),
+        "place": np.moveaxis(np.concatenate(places), -1, 0),
+        "error": np.max(errors, axis=0),
+        "steps": np.sum(steps, axis=0) / sum(blocks),
+        "outcome": np.asarray(lanes.outcome),
+        "rollers": rollers,
+        "bodies": bodies,
+        "angle": np.asarray(lanes.angle),
+    }
+
+
+def _with_direction(
+    at: BearingAtSpeed, scale: BearingState, lanes: BearingLanes, direction: BearingState | None
+) -> BearingLanes:
+    """The same lanes with tangent vectors."""
+    rollers, bodies = bearing_states(lanes)
+    last = lambda x: jnp.asarray(np.moveaxis(x, 0, -1))
+    clock = jnp.stack([lanes.angle, jnp.zeros_like(lanes.angle)])
+    again = begin_lanes(at, scale, BearingState(last(rollers), last(bodies), clock), direction)
+    return again._replace(step=lanes.step, outcome=lanes.outcome)

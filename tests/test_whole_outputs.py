@@ -1,0 +1,151 @@
+"""What is reported of a run of the whole bearing: forces and slips of each roller, around the bearing; spectra."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from reference import WholeBearing
+from test_whole_motion import SPEED, bearing
+
+import jaxcage as jc
+from jaxcage.analysis import (
+    OrderSpectrum,
+    around,
+    bearing_history,
+    bearing_orders,
+    bearing_spectra,
+    named_lines,
+    pocket_force_distribution,
+    synchronous_force,
+)
+from jaxcage.models.whole import LEDGER, MEANS, rolling_start
+
+
+pytestmark = pytest.mark.wide
+SAMPLES = 32
+
+
+@pytest.fixture(scope="module")
+def run():
+    """Two revolutions from inside the clearance."""
+    model = bearing()
+    start = rolling_start(model, SPEED, cage=1)
+    ran = jc.simulate_bearing(model, SPEED, revolutions=2, samples=SAMPLES, start=start)
+    return model, ran, bearing_history(model, ran, SPEED)
+
+
+def test_pocket_forces_are_those_of_the_second_implementation(run):
+    """Force of all pockets on the cage, and of the land: together they move its mass centre."""
+    model, ran, history = run
+    theirs = WholeBearing(model, SPEED)
+    e, weight = float(model.eccentricity), float(model.cage_mass * model.gravity)
+    for i in (5, 17, 40, 63):
+        _, bodies = theirs.rates(float(ran.angle[i]), ran.rollers[i], ran.bodies[i])
+        out = np.exp(1j * ran.angle[i])
+        pull = complex(bodies[2], bodies[3]) + (1j * bodies[4] - ran.bodies[i, 4] ** 2) * e * out
+        expected = float(model.cage_mass) * pull + 1j * weight
+        found = complex(*(history.pocket_on_cage[i] + history.land_on_cage[i]))
+        assert found == pytest.approx(expected, rel=1e-8)
+    assert np.abs(history.pocket_force).max() > 10
+
+
+def test_loads_carry_the_shaft(run):
+    """In the mean the inner raceway bears load and weight of the ring, and rollers in the upper half bear nothing."""
+    model, ran, history = run
+    upward = -(history.inner_load * np.sin(history.roller_angle)).sum(axis=1)
+    heavy = float(model.load + model.ring.ring_mass * model.gravity)
+    assert upward[SAMPLES:].mean() == pytest.approx(heavy, rel=0.02)
+    found = around(history, 12)
+    assert np.all(found.inner_load[1:5] == 0) and found.inner_load[8:10].min() > 1000
+    assert found.inner_sliding[8] < 0.1 * found.inner_sliding[2]
+    with pytest.raises(ValueError, match="bins"):
+        around(history, 1)
+
+
+def test_around_and_distribution_are_of_all_rollers(run):
+    """Weighted with their times, bins make up the whole; quantiles ascend to the largest."""
+    _, _, history = run
+    found = around(history, 9)
+    weight = np.broadcast_to(np.gradient(history.time)[:, None], history.pocket_force.shape)
+    where = np.floor(np.mod(history.roller_angle, 2 * np.pi) * 9 / (2 * np.pi)).astype(int)
+    time = np.array([weight[where == k].sum() for k in range(9)])
+    total = ((found.driving_force + found.braking_force) * time).sum()
+    assert total == pytest.approx((weight * np.abs(history.pocket_force)).sum(), rel=1e-12)
+    shares = pocket_force_distribution(history)
+    quantiles = [v for k, v in shares.items() if k.startswith("q")]
+    assert 0.01 < shares["contact_share"] < 0.9
+    assert quantiles == sorted(quantiles) and quantiles[-1] <= np.abs(history.pocket_force).max()
+
+
+def test_impulse_wear_and_torque_are_integrals(run):
+    model, ran, _ = run
+    found = jc.bearing_measures(model, ran, SPEED)
+    spent = ran.time[-1] - ran.time[0]
+    assert found.pocket_impulse_N_s == pytest.approx(found.pocket_force_mean_sum_N * spent / 2, rel=1e-12)
+    rubbed = ran.total("pocket_friction") / float(model.pockets.pocket_friction)  # mu N v: the sliding is fast
+    assert ran.total("pocket_rubbing") == pytest.approx(rubbed, rel=1e-4)
+    wear = 6e-4 * rubbed / spent / 0.93e9 * 1e9 * 3600
+    assert found.pocket_wear_mm3_per_h == pytest.approx(wear, rel=1e-4)
+    assert found.land_wear_mm3_per_h == pytest.approx(0.0, abs=1e-9) and found.eccentricity_max < 0.97
+    assert found.friction_torque_parts_N_m["film"] * SPEED == pytest.approx(found.power_parts_W["film"], rel=1e-12)
+
+
+def test_the_land_wears_where_it_is_touched():
+    """A cage pressed on its land, which damps nothing, sliding at some 18 m/s: friction over its coefficient rubs."""
+    model = bearing(**{"lubricant.density": 0.0, "restitution": 1.0})
+    start = rolling_start(model, SPEED, cage=1)
+    start = start._replace(bodies=start.bodies.at[0:2].set(jnp.array([0.0, -0.999 * float(model.clearance)])))
+    ran = jc.bearing_over_time(model, SPEED, np.array([0.0, 1e-4]), start=start)
+    assert ran.total("land_rubbing") > 1e-3
+    friction = float(model.land_friction) * ran.total("land_rubbing")
+    assert ran.total("land_contact") == pytest.approx(friction, rel=1e-5)
+
+
+def test_the_synchronous_force_of_a_known_one(run):
+    """Of a run whose pocket force is 7 cos(theta - 0.3) + 2 horizontally and 3 sin(2 theta) vertically."""
+    _, ran, _ = run
+    theta = ran.angle - ran.angle[0]
+    time = theta / 400.0
+    fx, fy = 7 * np.cos(theta - 0.3) + 2, 3 * np.sin(2 * theta)
+    integrals = np.zeros_like(ran.integrals)
+    running = lambda f: np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(time))])
+    for name, f in (("x", fx), ("y", fy)):
+        for part, wave in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
+            integrals[:, (*LEDGER, *MEANS).index(f"pocket_{name}_{part}")] = running(f * wave)
+    x, y, error = synchronous_force(dataclasses.replace(ran, time=time, integrals=integrals))
+    assert (x, y) == (pytest.approx(7.0, rel=1e-9), pytest.approx(0.0, abs=1e-9))
+    assert error == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_synchronous_force_of_a_run(run):
+    """The quadrature against the samples, which are coarse."""
+    _, ran, history = run
+    x, y, error = synchronous_force(ran)
+    rough = 2 * np.abs((history.pocket_on_cage[1:] * np.exp(-1j * history.angle[1:, None])).mean(axis=0))
+    assert error > 0 and np.all(np.abs(rough - [x, y]) < 15)
+    assert np.isnan(synchronous_force(beginning(ran, SAMPLES + 1))[2])
+
+
+def beginning(found, n):
+    """The first samples of a run, or of a history."""
+    each = {f.name: getattr(found, f.name) for f in dataclasses.fields(found)}
+    return dataclasses.replace(found, **{k: x[:n] for k, x in each.items() if isinstance(x, np.ndarray)})
+
+
+def test_orders_of_rolling_and_names_of_lines(run):
+    model, ran, history = run
+    orders = bearing_orders(model, ran, SPEED)
+    rolling = 1 / 0.401037
+    assert orders["inner ring"] == pytest.approx(rolling, rel=0.03)
+    assert orders["roller pass, outer ring"] == 13
+    assert orders["roller pass, inner ring"] == pytest.approx(13 * (rolling - 1), rel=0.05)
+    assert orders["roller spin"] == pytest.approx(81.04 / 16, rel=0.02)
+    assert set(bearing_spectra(history)) == {"cage_place", "pocket_force"}
+    order = np.arange(0, 30, 0.1)
+    lines = OrderSpectrum(
+        order, np.exp(-(((order - 13) / 0.15) ** 2)) + 0.5 * np.exp(-(((order - 8) / 0.15) ** 2)), "hann"
+    )
+    assert [line.name for line in named_lines(lines, orders)] == ["roller pass, outer ring", None]
+    with pytest.raises(ValueError, match="2 revolutions"):
+        bearing_spectra(beginning(history, 40))

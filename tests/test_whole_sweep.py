@@ -1,0 +1,212 @@
+"""Sweeps of the whole bearing: lanes against single runs, exponents against two runs, failures, symmetry, cost."""
+
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_whole_motion import SPEED, bearing
+
+import jaxcage as jc
+from jaxcage.integrate import OUTCOMES, SAMPLES, BearingLanes, begin_lanes, run_block
+from jaxcage.models.whole import BearingState, rolling_start, state_scale
+
+
+SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
+
+
+def lanes_of(model, states, direction=None):
+    """Laws, magnitudes and lanes of one bearing from several states at one speed."""
+    count = len(states)
+    last = lambda *x: jnp.stack([jnp.asarray(y) for y in x], axis=-1)
+    scale = state_scale(model, jnp.asarray(SPEED))
+    scale = jax.tree.map(lambda x: jnp.stack([x] * count, axis=-1), scale._replace(rollers=scale.rollers[:, 0]))
+    at = jax.tree.map(lambda x: jnp.asarray(x, dtype=float), model.at_speed(jnp.asarray(SPEED)))
+    if direction is not None:
+        direction = jax.tree.map(lambda x: jnp.stack([x] * count, axis=-1), direction)
+    return at, scale, begin_lanes(at, scale, jax.tree.map(last, *states), direction)
+
+
+def in_units(model, state):
+    """A state over its magnitudes, in one row."""
+    unit = state_scale(model, jnp.asarray(SPEED))
+    return np.concatenate([np.ravel(state.rollers / unit.rollers), state.bodies / unit.bodies])
+
+
+def end_of(lanes: BearingLanes, which: int, rollers: int) -> BearingState:
+    of = [x.reshape(rollers, -1)[:, which] for x in lanes.point.y.rollers]
+    return BearingState(jnp.stack(of), jnp.stack([x[which] for x in lanes.point.y.bodies]), jnp.zeros(2))
+
+
+@pytest.fixture(scope="module")
+def start():
+    """A state with contacts of all kinds: a revolution on from the cage near its lowest place."""
+    return jc.simulate_bearing(bearing(), SPEED, revolutions=1, samples=32).last
+
+
+def along():
+    """A direction of tangent vectors, in units of the state."""
+    numbers = np.random.default_rng(1)
+    return BearingState(jnp.asarray(numbers.normal(size=(5, 13))), jnp.asarray(numbers.normal(size=9)), jnp.zeros(2))
+
+
+def test_a_lane_is_a_simulation(start):
+    """From one state over an eighth of a revolution, both by tight steps."""
+    model = bearing()
+    at, scale, lanes = lanes_of(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)], along())
+    after, block = run_block(at, scale, lanes, jnp.asarray(2), jnp.asarray(1e-7))
+    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-7)
+    k = 2 * 32 // SAMPLES
+    expected = BearingState(jnp.asarray(run.rollers[k]), jnp.asarray(run.bodies[k]), jnp.zeros(2))
+    assert np.all(np.asarray(after.outcome) == 0) and run.outcome == "successful"
+    moved = np.abs(in_units(model, expected) - in_units(model, start)).max()
+    apart = np.abs(in_units(model, end_of(after, 0, 13)) - in_units(model, expected)).max()
+    assert apart < 1e-5 < 1e-2 < moved
+    assert float(after.angle[0]) == pytest.approx(float(run.angle[k]), abs=1e-12)
+    gathered = np.asarray(block.integrals)[:, 0]
+    assert gathered[0] == pytest.approx(run.time[k] - run.time[0], rel=1e-8)
+    np.testing.assert_allclose(gathered[1:-1], run.integrals[k] - run.integrals[0], rtol=2e-3, atol=1e-9)
+    np.testing.assert_allclose(np.asarray(block.peaks)[0, 0], run.peaks[:k, 0].max(), rtol=1e-3)
+    place = np.asarray(block.place)[:2, :, 0]
+    np.testing.assert_allclose(place, run.bodies[k // 2 : k + 1 : k // 2, :2] / float(model.clearance), atol=1e-6)
+
+
+def test_growth_is_that_of_the_distance_of_two_runs(start):
+    """Over an eighth of a revolution, the logarithm of the tangent's length against runs a little apart."""
+    model, direction = bearing(), along()
+    unit, little = state_scale(model, jnp.asarray(SPEED)), 1e-7
+    aside = lambda k: jax.tree.map(lambda x, d, u: jnp.asarray(x) + k * little * d * u, start, direction, unit)
+    at, scale, lanes = lanes_of(model, [start, aside(1), aside(-1)], direction)
+    after, block = run_block(at, scale, lanes, jnp.asarray(2), jnp.asarray(1e-9))
+    rows = [in_units(model, end_of(after, k, 13)) for k in (1, 2)]
+    whole = np.concatenate([np.ravel(direction.rollers), direction.bodies])
+    expected = np.log(np.linalg.norm(rows[0] - rows[1]) / (2 * little * np.linalg.norm(whole)))
+    assert abs(expected) > 0.1
+    assert float(block.growth[0]) == pytest.approx(expected, abs=2e-3)
+
+
+def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
+    """Beside a cage that hardly turns, and one that starts with no number, a lane is bit for bit what it is alone."""
+    model = bearing()
+    stalled = rolling_start(model, SPEED, turning=0.01)
+    broken = start._replace(rollers=start.rollers.at[1, 4].set(jnp.nan))
+    found = []
+    for others in ((stalled, broken), (start, start)):
+        at, scale, lanes = lanes_of(model, [start, *others], along())
+        found.append(run_block(at, scale, lanes, jnp.asarray(1), jnp.asarray(1e-5)))
+    (after, block), (alone, block_alone) = found
+    assert [OUTCOMES[k] for k in np.asarray(after.outcome)] == ["successful", "outside", "not_finite"]
+    np.testing.assert_array_equal(in_units(model, end_of(after, 0, 13)), in_units(model, end_of(alone, 0, 13)))
+    assert float(block.growth[0]) == float(block_alone.growth[0]) and np.isfinite(float(block.growth[0]))
+
+
+def test_rollers_have_no_names():
+    """With a balanced cage, a start with its rollers and its angle moved on by one pocket is the same motion."""
+    model = bearing(eccentricity=0.0)
+    start, turn = rolling_start(model, SPEED, 1), 2 * np.pi / 13
+    renamed = lambda state: state._replace(rollers=jnp.roll(state.rollers, -1, axis=1))
+    rolled = renamed(start)._replace(clock=start.clock + jnp.asarray([turn, 0.0]))
+    at, scale, lanes = lanes_of(model, [start, rolled, start], along())
+    after, block = run_block(at, scale, lanes, jnp.asarray(1), jnp.asarray(1e-6))
+    one, other = end_of(after, 0, 13), end_of(after, 1, 13)
+    assert np.abs(in_units(model, renamed(one)) - in_units(model, other)).max() < 1e-8
+    assert np.abs(in_units(model, one) - in_units(model, other)).max() > 1e-3
+    np.testing.assert_allclose(np.asarray(block.peaks)[:, 0], np.asarray(block.peaks)[:, 1], rtol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def swept():
+    """A lane that fails, since its cage hardly turns, beside one that does not."""
+    model = bearing(eccentricity=0.0)
+    starts = [rolling_start(model, SPEED, 1), rolling_start(model, SPEED, turning=0.01)]
+    return model, starts, jc.sweep_bearing(model, SPEED, starts=starts, **SHORT)
+
+
+@pytest.mark.wide
+def test_a_lane_that_fails_spoils_no_other(swept):
+    model, starts, both = swept
+    assert list(both.outcome[0]) == ["successful", "outside"] and both.state[0, 1] == "failed"
+    alone = jc.sweep_bearing(model, SPEED, starts=starts[:1], **SHORT)
+    for name in (
+        "cage_slip",
+        "pocket_force_max_N",
+        "friction_power_W",
+        "whirl_ratio",
+        "exponent",
+        "error",
+        "last_bodies",
+    ):
+        good, bad = getattr(both, name)[0]
+        np.testing.assert_array_equal(good, getattr(alone, name)[0, 0])
+        assert np.all(np.isnan(bad)) and np.all(np.isfinite(good))
+
+
+@pytest.mark.wide
+def test_measures_of_a_sweep_are_those_of_a_run(swept):
+    """Over a revolution from the same state; two runs drift apart in it, but their means do not."""
+    model, starts, both = swept
+    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=SAMPLES, start=starts[0])
+    expected = jc.bearing_measures(model, run, SPEED)
+    assert both.cage_slip[0, 0] == pytest.approx(expected.cage_slip, abs=2e-4)
+    assert both.eccentricity_mean[0, 0] == pytest.approx(expected.eccentricity_mean, rel=1e-2)
+    assert both.power_parts_W["film"][0, 0] == pytest.approx(expected.power_parts_W["film"], rel=1e-2)
+    assert both.friction_power_W[0, 0] == pytest.approx(expected.friction_power_W, rel=1e-2)
+    assert both.eccentricity_std[0, 0] == pytest.approx(expected.eccentricity_std, rel=0.1)
+
+
+def test_what_cannot_be_swept():
+    for changed, said in (
+        ({"ring.ring_motion": "quasi_static"}, "dynamic"),
+        ({"film.model": "finite_length"}, "short"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            jc.sweep_bearing(bearing(**changed), SPEED)
+    model = bearing()
+    for options in ({"starts": 4}, {"blocks": 3}, {"exponents": 2}, {"discard": -1}):
+        with pytest.raises(ValueError, match=next(iter(options))):
+            jc.sweep_bearing(model, SPEED, **options)
+    with pytest.raises(ValueError, match="ascending"):
+        jc.sweep_bearing(model, np.array([SPEED, SPEED]))
+    few = rolling_start(bearing(**{"bearing.n_rollers": 12}), SPEED)
+    with pytest.raises(ValueError, match="with 13 rollers"):
+        jc.sweep_bearing(model, SPEED, starts=[few])
+
+
+@pytest.mark.wide
+def test_designs_in_one_batch_are_those_one_by_one():
+    """Two loads over a short window: as each alone, but for rounding that chaos makes large."""
+    models = [bearing(load=load) for load in (4450.0, 2000.0)]
+    options = dict(SHORT, starts=[rolling_start(models[0], SPEED, 1)], tolerance=1e-6)
+    both = jc.sweep_bearings(models, SPEED, **options)
+    for model, found in zip(models, both, strict=True):
+        alone = jc.sweep_bearing(model, SPEED, **options)
+        assert found.cage_slip[0, 0] == pytest.approx(alone.cage_slip[0, 0], abs=1e-4)
+        assert found.friction_power_W[0, 0] == pytest.approx(alone.friction_power_W[0, 0], rel=1e-2)
+    assert abs(both[0].friction_power_W[0, 0] / both[1].friction_power_W[0, 0] - 1) > 1e-3
+
+
+@pytest.mark.wide
+def test_cost_of_twice_as_many_rollers():
+    """At most 2.2 times per step, and compiled within 30 s: 13 and 26 rollers, with tangent vectors."""
+    spent = {}
+    for rollers in (13, 26):
+        model = jc.replace(bearing(roller_diameter=8e-3), **{"bearing.n_rollers": rollers})
+        states = [rolling_start(model, SPEED, 1)] * 32
+        numbers = np.random.default_rng(1)
+        direction = jax.tree.map(lambda x: jnp.asarray(numbers.normal(size=np.shape(x))), states[0])
+        at, scale, lanes = lanes_of(model, states, direction)
+        once = lambda samples: jax.block_until_ready(
+            run_block(at, scale, lanes, jnp.asarray(samples), jnp.asarray(1e-4))
+        )
+        begun = time.process_time()
+        once(1)
+        compiling = time.process_time() - begun
+        per_step = []
+        for _ in range(5):
+            begun = time.process_time()
+            _, block = once(2)
+            per_step.append((time.process_time() - begun) / float(block.steps[0]))
+        spent[rollers] = min(per_step)
+        assert compiling < 30
+    assert spent[26] < 2.2 * spent[13]
