@@ -110,7 +110,8 @@ def wrong(name: str, annotation: Any, value: Any) -> str:
         if isinstance(value, _ARRAYS) and any(np.ndim(value) for _ in arrays):
             return ""
         others = [m for m in members if m is not int and not is_array_type(m)]
-        fits = _is_count(name, value) or any(not _wrong_one(name, m, value) for m in others)
+        rows = others if not isinstance(value, _ARRAYS) else []  # an array is no row of things
+        fits = _is_count(name, value) or any(not _wrong_one(name, m, value) for m in rows)
         return "" if fits else _count_words(name, value)
     if float in members:
         return _wrong_number(name, members, bool([m for m in arrays if not _is_scalar(m)]), value)

@@ -78,6 +78,8 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "whole_bearing": lambda m: jc.whole_bearing("nu2310"),
     "simulate_bearing": lambda m: jc.simulate_bearing(WHOLE, 1000.0, revolutions=1),
     "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=START),
+    "sweep_bearing": lambda m: jc.sweep_bearing(WHOLE, 1000.0),
+    "sweep_bearings": lambda m: jc.sweep_bearings([WHOLE], 1000.0),
     "waterfall": lambda m: jc.analysis.waterfall(OSCILLATOR, SPEEDS),
 }
 """Every public function that computes in JAX, or makes a model to compute with."""

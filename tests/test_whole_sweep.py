@@ -192,7 +192,7 @@ def test_cost_of_twice_as_many_rollers():
     spent = {}
     for rollers in (13, 26):
         model = jc.replace(bearing(roller_diameter=8e-3), **{"bearing.n_rollers": rollers})
-        states = [rolling_start(model, SPEED, 1)] * 32
+        states = [rolling_start(model, SPEED, 1)] * 16
         numbers = np.random.default_rng(1)
         direction = jax.tree.map(lambda x: jnp.asarray(numbers.normal(size=np.shape(x))), states[0])
         at, scale, lanes = lanes_of(model, states, direction)
@@ -203,7 +203,7 @@ def test_cost_of_twice_as_many_rollers():
         once(1)
         compiling = time.process_time() - begun
         per_step = []
-        for _ in range(5):
+        for _ in range(4):
             begun = time.process_time()
             _, block = once(2)
             per_step.append((time.process_time() - begun) / float(block.steps[0]))

@@ -129,10 +129,9 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     if not tangent.bodies:
         return jnp.ones_like(units.bodies[0])
     parts = [jnp.square(x * u) for x, u in zip(tangent.bodies, units.bodies, strict=True)]
-    squares = [
-        jnp.square(x.reshape(rollers, -1) * u[None]) for x, u in zip(tangent.rollers, units.rollers, strict=True)
-    ]
-    length = jnp.sqrt(sum(parts) + sum(jnp.sum(x, axis=0) for x in squares))
+    over = lambda x, u: jnp.sum(jnp.square(x.reshape(rollers, -1) * u[None]), axis=0)
+    squares = map(over, tangent.rollers, units.rollers)
+    length = jnp.sqrt(sum(parts) + sum(squares))
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
 

@@ -170,10 +170,15 @@ def _require(
         raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
     if exponents not in (0, 1):
         raise ArgumentError("exponents", said=f"must be 0 or 1, but {exponents} was given.")
-    if isinstance(starts, int) and not 1 <= starts <= len(CAGE_STARTS):
-        raise ArgumentError(
-            "starts", said=f"must be 1 to {len(CAGE_STARTS)}, as many as a bearing has, but {starts} was given."
-        )
+    if isinstance(starts, int):
+        if not 1 <= starts <= len(CAGE_STARTS):
+            raise ArgumentError(
+                "starts", said=f"must be 1 to {len(CAGE_STARTS)}, as many as a bearing has, but {starts} was given."
+            )
+        return
+    n = models[0].bearing.n_rollers
+    if not starts or any(np.shape(s.rollers) != (5, n) or np.shape(s.bodies) != (9,) for s in starts):
+        raise ArgumentError("starts", said=f"must hold states of a bearing with {n} rollers.")
 
 
 class _Counted:
@@ -224,7 +229,7 @@ class _Table:
 
     @classmethod
     def of(cls, models: list[BearingModel], speed: np.ndarray, starts: int | Sequence[BearingState]) -> "_Table":
-        """**Raises:** `ValueError` for designs that differ in more than their numbers, and states of other bearings."""
+        """**Raises:** `ValueError` for designs that differ in more than their numbers."""
         arrays = [
             jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, model)
             for model in models
@@ -241,9 +246,6 @@ class _Table:
         if isinstance(starts, int):
             states = [[to_numpy(_starts(model, jnp.asarray(many), k)) for k in range(starts)] for model in arrays]
         else:
-            n = models[0].bearing.n_rollers
-            if not starts or any(np.shape(s.rollers) != (5, n) or np.shape(s.bodies) != (9,) for s in starts):
-                raise ArgumentError("starts", said=f"must hold states of a bearing with {n} rollers.")
             at_all = lambda x: np.broadcast_to(np.asarray(x), (many.size, *np.shape(x)))
             states = [[jax.tree.map(at_all, s) for s in starts] for _ in models]
         rows = lambda *x: np.stack(x, axis=1).reshape(-1, *x[0].shape[1:])  # speeds, then starts
