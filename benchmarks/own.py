@@ -37,11 +37,11 @@ def coverage(draws: int, truths: int, speeds: int) -> None:
         planted = ensemble(design, unknowns, rpm, draws=truths, seed=1000 + i)
         for j, verdict in enumerate(stated.verdict):
             k, n = (int(x[j]) for x in planted.counts)
-            p = float(stated.chance[j])
-            expected, seen, counted = expected + n * p, seen + k, counted + n
-            variance += n * p * (1 - p) * (1 + n / max(int(stated.counts[1][j]), 1))
+            expected, seen, counted = expected + n * float(stated.chance[j]), seen + k, counted + n
             decided += n * (verdict in ("calm", "chaotic"))
             wrong += {"calm": k, "chaotic": n - k}.get(verdict, 0)
+        total = np.sum(stated.chaotic & ~stated.failed, axis=1)  # speeds of one bearing are not independent
+        variance += truths * float(np.var(total, ddof=1)) * (1 + truths / draws)
         print(f"design {i + 1}: {_line(stated)}", flush=True)
         print(f"  planted: {_line(planted)}", flush=True)
     print(
