@@ -456,6 +456,7 @@ TEXTS: dict[str, Sequence[str]] = {
     "vary": VARIED,
     "scatter": ["guidance_gap=10%", "eccentricity=rayleigh", "guidance_gap=nan%", "x=1%", "guidance_gap=0.1", "=", "x"],
     "topics": ["film", "statics, contact", "film,film", ",", "film;oil", "exponents bifurcations"],
+    "table": ["t.csv", "a/t.xlsx", "t.ods", "../t.csv", "t", ".csv", "/t.csv"],
     "at": ["8500", "8500, 12000", "900 rad/s", "21000 rpm shaft", ",", "nan", "5-4", "0", "...", "1e400"],
     "operating": [
         "8500",
@@ -784,7 +785,11 @@ def check_called(options: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) ->
     ]
     for name in ("first", "last", "speed"):
         rpm = getattr(options, name, None)
-        if rpm is None or isinstance(options, _options.StudyOptions) or (name == "last" and options.count == 1):
+        if (
+            rpm is None
+            or isinstance(options, _options.StudyOptions)
+            or (name == "last" and getattr(options, "count", 0) == 1)
+        ):
             continue
         if not numbers or not any(math.isclose(x, rpm * math.pi / 30, rel_tol=1e-9) for x in numbers):
             if isinstance(options, _options.MapOptions) and options.points is not None:

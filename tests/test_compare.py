@@ -12,6 +12,7 @@ from report_example import swept
 import jaxcage as jc
 from jaxcage.analysis import orbit_measures
 from jaxcage.cli import main
+from jaxcage.orbits import Sensitivity
 from jaxcage.plotting import over_speed, sweeps_beside
 from jaxcage.report import (
     Compared,
@@ -21,6 +22,7 @@ from jaxcage.report import (
     differences,
     differences_table,
     overall_table,
+    to_be_turned,
 )
 from jaxcage.sweeps import Motion, motions
 
@@ -88,6 +90,15 @@ def test_figures_show_both_on_the_scale_that_holds_both(pair: list[Compared]):
     lines = over_speed([p.name for p in pair], [p.rpm for p in pair], curves).axes[0]
     assert [line.get_label() for line in lines.get_lines()] == ["first", "second"]
     assert lines.get_ylim()[1] > 0.3 and lines.get_legend() is not None
+
+
+def test_bars_show_what_a_designer_can_turn():
+    model = jc.case("1a")
+    every = dict.fromkeys(jc.parameters(model), 0.1)
+    one = Sensitivity("zone 1 onset", "fold", 9000.0, every, every, {}, 0.1, "converged")
+    (found,) = to_be_turned(model, [one])
+    assert {"guidance_gap", "eccentricity", "cage_mass"} <= set(found.elasticity) < set(every)
+    assert not {"stiffness_x", "cubic_stiffness", "amplitude", "onset", "gravity"} & set(found.elasticity)
 
 
 def test_speeds_outside_and_unknown_cases_are_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path):

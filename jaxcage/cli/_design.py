@@ -225,7 +225,8 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
     job.files["figure"] = None
     if edges:
         title, size = f"{job.name}: elasticities of the synchronous-loss edges", (9.0, 2.2 + 1.2 * len(edges))
-        job.draw(lambda ax: elasticity_bars(list(edges.values()), ax), size, title)
+        turned = report.to_be_turned(job.model, edges.values())
+        job.draw(lambda ax: elasticity_bars(turned, ax), size, title)
     document = {
         "vary": vary,
         "sobol": report.chosen(shares, "first total first_interval total_interval samples_wanted")

@@ -113,11 +113,15 @@ def _complete(job: "Job[Any]", report: "Report") -> "Report":
     read, named = _readings(job, report.document)
     time = {"seconds": round(job.seconds, 2)} if job.options.timed else {}
     said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
+    tables = [with_shaft(table, job.ratio) if job.name and job.whole is None else table for table in report.tables]
+    if (wanted := getattr(job.options, "table", None)) is not None and tables:
+        from ..io import write_tables
+
+        job.listed("table", write_tables(job.folder / wanted, [(t.title, [t.columns, *t.rows]) for t in tables]))
     files = [
         f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in job.files.items() if path is not None
     ]
     document = {**case, **report.document, **read, **time, **job.files}
-    tables = [with_shaft(table, job.ratio) if job.name and job.whole is None else table for table in report.tables]
     return dataclasses.replace(report, document=document, tables=tables, notes=[*report.notes, *named, *said, *files])
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 import tyro
 
 from .._errors import InputError
-from ._readers import is_within, number, text, two, whole
+from ._readers import is_table, is_within, number, text, two, whole
 
 
 SIDE = range(2, 10_001)
@@ -58,6 +58,8 @@ class CommonOptions(AnyOptions):
     """Style of the figures: for white pages, dark screens, or black-and-white paper."""
     no_cache: bool = False
     """Compile everything anew instead of using programs kept from earlier runs."""
+    table: Annotated[str | None, text("name a .csv or .xlsx file within --out", is_table)] = None
+    """Write the tables that are printed to this file within the output folder too: .csv, or .xlsx with a sheet each."""
 
 
 @dataclasses.dataclass(frozen=True)

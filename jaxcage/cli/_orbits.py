@@ -85,7 +85,7 @@ def gradient(job: Job[GradientOptions]) -> Report:
     wide = width(onset, leaves, "zone 1 width") if onset and leaves else None
     shown = [*([wide] if wide else []), *trusted.values()]
     title, size = f"{job.name}: elasticities of the synchronous-loss edges", (9.0, 2.2 + 1.2 * len(shown))
-    job.draw(lambda ax: elasticity_bars(shown, ax), size, title)
+    job.draw(lambda ax: elasticity_bars(report.to_be_turned(job.model, shown), ax), size, title)
     document = report.gradient_document(edges, wide)
     tables = [report.gradient_table(job.name, job.model, s) for s in shown]
     return Report(document, tables, [*report.missing_notes(edges), *report.homogeneity_notes(document)])

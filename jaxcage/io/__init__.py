@@ -9,6 +9,7 @@
 | `_ranges`       | values that are known within a range only                                 |
 | `_measurements` | what was measured on a machine, from CSV                                  |
 | `_narrow`       | a TOML file with other ranges                                             |
+| `_tables`       | tables as CSV or Excel                                                    |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
 | `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
@@ -58,6 +59,7 @@ from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
 from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner
+from ._tables import write_tables as write_tables
 from ._template import Subject as Subject, template as template, write_template as write_template
 from ._units import to_si as to_si
 from ._write_config import (

@@ -49,6 +49,8 @@ MARKS = {
 """Every figure of bifurcations uses these."""
 PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
 _LABEL_SIZE = 7.5
+_AWAY = 2.0
+"""Widths of a label by which one is moved at most."""
 
 
 def mark_of(kind: str) -> Mark:
@@ -206,8 +208,8 @@ def _mark_points(ax: Axes, points: Sequence[Point], component: int, factor: floa
 def _write_above(ax: Axes, points: Iterable[Point]) -> None:
     """Kind and speed of points in a row above the frame, moved apart, with lines to where they belong.
 
-    Points that are written alike, as on branches that share a part, are written once; where there is no room for all,
-    those with the nearest neighbours are left out.
+    Points that are written alike, as on branches that share a part, are written once; where there is no room for all
+    near to where they belong, those with the nearest neighbours are left out.
     """
     texts = {f"{mark_of(p.kind).short} {p.speed_rpm:.0f}": p for p in points}
     row = sorted(texts.items(), key=lambda item: item[1].speed_rpm)
@@ -215,7 +217,8 @@ def _write_above(ax: Axes, points: Iterable[Point]) -> None:
     width = ax.get_window_extent().width * 72 / ax.figure.dpi
     wide, gap = 5.0 * _LABEL_SIZE / width, 1.3 * _LABEL_SIZE / width
     place = lambda: np.array([(p.speed_rpm - low) / (high - low) for _, p in row])
-    while (len(row) - 1) * gap > 1.0:
+    moved = lambda at: float(np.max(np.abs(move_apart(at, gap, 0.0, 1.0) - at), initial=0.0))
+    while (len(row) - 1) * gap > 1.0 or moved(place()) > _AWAY * gap:
         apart = np.diff(place())
         k = int(np.argmin(apart))
         row.pop(k if 0 < k and apart[k - 1] < apart[min(k + 1, apart.size - 1)] else k + 1)

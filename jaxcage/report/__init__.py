@@ -120,6 +120,7 @@ from ._slopes import (
     slopes_document as slopes_document,
     source_document as source_document,
     source_notes as source_notes,
+    to_be_turned as to_be_turned,
 )
 from ._sources import parameter_rows as parameter_rows
 from ._statics import (

@@ -32,6 +32,7 @@ from ..studies import Ensemble
 from ._findings import MAP_PARAMETER, Findings
 from ._operating import Operating
 from ._page_tables import with_full_names
+from ._slopes import to_be_turned
 
 
 RASTER_DPI = 150
@@ -120,16 +121,15 @@ def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
         )
     if findings.map is not None:
         yield picture("map", _map(findings, spans), *_map_words(findings))
-    trusted = [
-        with_full_names(findings, s) for n, s in findings.slopes.items() if s.trusted and n in findings.loss.edges
-    ]
+    edges = [s for n, s in findings.slopes.items() if s.trusted and n in findings.loss.edges]
+    trusted = [with_full_names(findings, s) for s in to_be_turned(findings.model, edges)]
     if trusted:
         yield picture(
             "elasticities",
             _alone(9.5, 2.2 + 0.95 * len(trusted), lambda ax: _bars(trusted, ax)),
             "Bars: elasticities of the synchronous-loss edges with respect to the parameters that move them most.",
-            "How much the synchronous-loss edges move: per cent of speed for one per cent of the parameter. The axis "
-            "is logarithmic beyond ±0.1.",
+            "How much the synchronous-loss edges move: per cent of speed for one per cent of a parameter that a "
+            "designer can turn. The axis is logarithmic beyond ±0.1.",
         )
     if findings.statics is not None:
         shared = findings.statics

@@ -1,9 +1,10 @@
 """How every exact edge answers to the design, as documents and as tables."""
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from .._parameters import parameter_info, parameters
+from .._parameters import EXTRA, parameter_info, parameters
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
@@ -23,6 +24,20 @@ def at_fixed_rho(elasticity: Mapping[str, float]) -> float:
     that of clearance, film and land. With the physical one it does not.
     """
     return elasticity["guidance_gap"] + elasticity["eccentricity"]
+
+
+TURNED = ("drawing", "catalogue", "oil", "operating")
+"""Kinds of parameters that a designer or a user chooses."""
+
+
+def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
+    """Sensitivities with the parameters that a designer can turn: neither those that nobody knows nor constants of
+    nature and of the numerics; laws of one's own stay. Tables and documents keep all."""
+    info = parameter_info(model)
+    kept = lambda name: info[name].kind in TURNED or name.startswith(EXTRA)
+    return [
+        dataclasses.replace(s, elasticity={n: value for n, value in s.elasticity.items() if kept(n)}) for s in slopes
+    ]
 
 
 ONSET, EXIT = "zone 1 onset", "zone 1 exit"
