@@ -38,6 +38,8 @@ POSITIVE = frozenset(
     "viscosity viscosity_1 viscosity_2 width".split()
 )
 """Names of other numbers that are above 0 and finite in every formula."""
+MAY_BE_NAN = frozenset({"starts", "tau"})
+"""A lane that starts nowhere fails alone; a law that is asked with no phase shows whether it wants one."""
 FASTEST = 1e9
 """Of speeds [rad/s]: beyond, nothing that is computed means anything."""
 _REAL = "biuf"
@@ -149,7 +151,8 @@ def _wrong_one(name: str, kind: Any, value: Any) -> str:
     each = inside[:1] * len(value) if issubclass(origin, tuple) is False or inside[-1] is ... else inside
     if len(each) != len(value):
         return f"a row of {len(each)}"
-    said = [wrong("", kind, x) for kind, x in zip(each, value, strict=True)]
+    inner = name if name in MAY_BE_NAN else ""
+    said = [wrong(inner, kind, x) for kind, x in zip(each, value, strict=True)]
     return f"a row of things, each {next(filter(None, said))}" if any(said) else ""
 
 
@@ -219,7 +222,7 @@ def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: An
         return f"positive and finite, at most {FASTEST:g} rad/s"
     if name in POSITIVE and not 0 < number < math.inf:
         return "positive and finite"
-    return "a number" if math.isnan(number) else ""
+    return "a number" if math.isnan(number) and name not in MAY_BE_NAN else ""
 
 
 def shown(value: Any) -> str:

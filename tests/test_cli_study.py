@@ -116,7 +116,7 @@ SPEED = "--vary speed=9000:12000:3"
         (f"{SPEED} --vary oil=1", "oil must stay from 2 to 10000"),
         ("--vary speed=-3", "speed must stay above 0 rad/s"),
         ("--vary speed=140Hz", 'is in Hz, where "rpm" or "rad/s" is wanted'),
-        ("--vary speed=nan", "speed must stay above 0"),
+        ("--vary speed=nan", "speed must be a finite number"),
         (f"{SPEED} --shard 0/4", "--shard must be I/N with I from 1 to N, e.g. 1/4, but '0/4'"),
         (f"{SPEED} --shard 5/4", "but '5/4'"),
         (f"{SPEED} --shard half", "but 'half'"),

@@ -3,16 +3,18 @@
 import dataclasses
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..analysis import BearingSweep
 from ..models import BearingModel
 from ._files import replacing
 from ._write_config import configuration
 
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LANES = ("speed", "start")
 _CODES = ("state", "outcome")
@@ -22,7 +24,7 @@ _LAST: dict[str, tuple[str, ...]] = {
 }
 
 
-def bearing_dataset(sweep: BearingSweep, model: BearingModel | None = None) -> xr.Dataset:
+def bearing_dataset(sweep: BearingSweep, model: BearingModel | None = None) -> "xr.Dataset":
     """A sweep of the whole bearing as a labelled data set.
 
     **Arguments:** the sweep; the model it was made with, whose every parameter then goes along.
@@ -46,6 +48,8 @@ def bearing_dataset(sweep: BearingSweep, model: BearingModel | None = None) -> x
         elif isinstance(value, np.ndarray) and field.name != "speed":
             variables[field.name] = (_LAST.get(field.name, LANES), value, about)
     configured = {} if model is None else {"configuration": json.dumps(configuration(model))}
+    import xarray as xr
+
     return xr.Dataset(
         variables,
         coords={
