@@ -28,6 +28,7 @@ import hypothesis.strategies as st
 import numpy as np
 
 import jaxcage as jc
+from jaxcage._arguments import CHECKED
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.cli import (
     _bearing,
@@ -804,7 +805,7 @@ FUNCTIONS = {
     f"{layer.__name__}.{name}": f
     for layer in LAYERS
     for name, f in sorted(vars(layer).items())
-    if inspect.isfunction(f) and f is not inspect.unwrap(f) and not name.startswith("_")
+    if inspect.isfunction(f) and name in CHECKED
 }
 """Public functions that look at their arguments before they do anything."""
 

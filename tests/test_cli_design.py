@@ -91,6 +91,7 @@ def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixtur
     assert Path(said["figure"]).parent == tmp_path and Path(said["figure"]).stat().st_size > 10_000
 
 
+@pytest.mark.slow
 @pytest.mark.wide
 def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     scatter = ["--scatter", "guidance_gap=10%", "--scatter", "eccentricity=rayleigh", "--worst", "0.5"]

@@ -86,7 +86,7 @@ def other(bench: faults.Bench):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the other process makes children")
-@pytest.mark.parametrize("lives, steps", [(3, 8), pytest.param(30, 20, marks=pytest.mark.wide)])
+@pytest.mark.parametrize("lives, steps", [(3, 8), pytest.param(12, 20, marks=pytest.mark.wide)])
 def test_any_life_of_a_store(bench: faults.Bench, other: Other, tmp_path: Path, lives: int, steps: int):
     """Started, killed, damaged, resumed, read, by two processes, in any order."""
     few = settings(

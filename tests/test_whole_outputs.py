@@ -15,9 +15,9 @@ from jaxcage.analysis import (
     bearing_history,
     bearing_orders,
     bearing_spectra,
+    equivalent_synchronous_force,
     named_lines,
     pocket_force_distribution,
-    synchronous_force,
 )
 from jaxcage.models.whole import LEDGER, MEANS, rolling_start
 
@@ -113,7 +113,7 @@ def test_the_synchronous_force_of_a_known_one(run):
     for name, f in (("x", fx), ("y", fy)):
         for part, wave in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
             integrals[:, (*LEDGER, *MEANS).index(f"pocket_{name}_{part}")] = running(f * wave)
-    x, y, error = synchronous_force(dataclasses.replace(ran, time=time, integrals=integrals))
+    x, y, error = equivalent_synchronous_force(dataclasses.replace(ran, time=time, integrals=integrals))
     assert (x, y) == (pytest.approx(7.0, rel=1e-9), pytest.approx(0.0, abs=1e-9))
     assert error == pytest.approx(0.0, abs=1e-9)
 
@@ -121,10 +121,10 @@ def test_the_synchronous_force_of_a_known_one(run):
 def test_the_synchronous_force_of_a_run(run):
     """The quadrature against the samples, which are coarse."""
     _, ran, history = run
-    x, y, error = synchronous_force(ran)
+    x, y, error = equivalent_synchronous_force(ran)
     rough = 2 * np.abs((history.pocket_on_cage[1:] * np.exp(-1j * history.angle[1:, None])).mean(axis=0))
     assert error > 0 and np.all(np.abs(rough - [x, y]) < 15)
-    assert np.isnan(synchronous_force(beginning(ran, SAMPLES + 1))[2])
+    assert np.isnan(equivalent_synchronous_force(beginning(ran, SAMPLES + 1))[2])
 
 
 def beginning(found, n):

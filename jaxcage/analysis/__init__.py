@@ -34,7 +34,7 @@ from ._bearing_measures import (
     BearingMeasures as BearingMeasures,
     bearing_measures as bearing_measures,
     cage_state as cage_state,
-    synchronous_force as synchronous_force,
+    equivalent_synchronous_force as equivalent_synchronous_force,
 )
 from ._bearing_sweep import (
     BearingRecord as BearingRecord,
@@ -117,6 +117,6 @@ from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zo
 
 check_layer(
     globals(),
-    "cage_forces cage_moments equilibrium film_coefficients film_whirl_speed orbit_measures "
-    "order_spectrum stability_chart survival waterfall zero_one zones",
+    "around bearing_history bearing_measures cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
+    "orbit_measures order_spectrum stability_chart survival waterfall zero_one zones",
 )

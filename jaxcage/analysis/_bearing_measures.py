@@ -64,7 +64,7 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
     eps = np.hypot(*from_land(model, run).T) / float(model.clearance)
     whirl = mean("whirl") / mean("cage_speed")
     revolutions = abs(run.angle[-1] - run.angle[0]) / (2 * np.pi)
-    force_x, force_y, error = synchronous_force(run)
+    force_x, force_y, error = equivalent_synchronous_force(run)
     worn = lambda name: float(1e9 * 3600 * model.wear.volume(mean(name)))
     return BearingMeasures(
         cage_slip=float(slip(slice(None))),
@@ -92,7 +92,7 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
     )
 
 
-def synchronous_force(run: BearingRun) -> tuple[float, float, float]:
+def equivalent_synchronous_force(run: BearingRun) -> tuple[float, float, float]:
     """First harmonic, over the cage's angle, of the force of all rollers on the cage: what a cage model that prescribes
     one force at cage frequency has in its place.
 
