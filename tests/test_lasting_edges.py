@@ -143,6 +143,13 @@ def test_a_parameter_that_is_zero_or_unknown_is_refused():
         lasting_edge(CASE, 12000.0, 100.0, names=("gap",))
 
 
+def test_a_window_and_a_horizon_that_are_none_are_refused():
+    with pytest.raises(ValueError, match="`within_rpm` must be positive, but 0.0"):
+        lasting_edge(CASE, 12000.0, 0.0)
+    with pytest.raises(ValueError, match="`horizon` must be above 400 revolutions, but 300"):
+        lasting_edge(CASE, 12000.0, 100.0, horizon=300)
+
+
 def test_an_open_zone_has_one_edge_and_a_closed_one_a_width(planted):
     planted(3)
     leaves = Edge(EDGE, 100.0, "chaotic")

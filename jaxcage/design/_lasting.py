@@ -144,8 +144,13 @@ def lasting_edge(
 
     **Returns:** `LastingEdge`; its `status` says where the numbers should not be used.
 
-    **Raises:** `ValueError` for parameters that are unknown or 0, and where too few lanes escape to tell anything.
+    **Raises:** `ValueError` for parameters that are unknown or 0, a window that is none, a horizon that is not beyond
+    what every lane runs, and where too few lanes escape to tell anything.
     """
+    if not within_rpm > 0:
+        raise ArgumentError("within_rpm", said=f"must be positive, but {within_rpm} was given.")
+    if horizon <= DISCARD + OBSERVED:
+        raise ArgumentError("horizon", said=f"must be above {DISCARD + OBSERVED} revolutions, but {horizon} was given.")
     values = parameters(model)
     for name in names:
         if name not in values or not float(values[name]):
@@ -223,10 +228,9 @@ def _fitted(
     scale = np.maximum(np.std(change, axis=0), 1e-12)
     u = (rpm - edge) / window
     of = lambda *x: hazard(times, horizon, np.column_stack([*x, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
-    fit, order = of(u), 1
-    bent = of(u, u**2)
-    if _steep(bent, _root(bent, horizon)):
-        fit, order = bent, 2
+    fit, order = of(u, u**2), 2
+    if not _steep(fit, _root(fit, horizon)):
+        fit, order = of(u), 1
     beta, n = fit.coefficients, len(names)
     at = _root(fit, horizon) if order == 2 else -(beta[0] + math.log(horizon)) / beta[1]
     powers = at ** np.arange(order + 1.0)  # log rate = sum of beta u^k + ..., and its slope by u:

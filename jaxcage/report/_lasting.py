@@ -8,7 +8,7 @@ from ._slopes import FIRST, FIXED_RHO
 from ._table import Table, chosen
 
 
-def lasting_rows(edges: Mapping[str, LastingEdge]) -> dict[str, dict[str, tuple[float, float]]]:
+def _lasting_rows(edges: Mapping[str, LastingEdge]) -> dict[str, dict[str, tuple[float, float]]]:
     """Elasticities of each edge by parameter, and by gap and eccentricity together, each with its standard error."""
     found = {}
     for name, edge in edges.items():
@@ -21,7 +21,7 @@ def lasting_rows(edges: Mapping[str, LastingEdge]) -> dict[str, dict[str, tuple[
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> Table:
     """Edges of lasting chaos, and their elasticities."""
-    rows = lasting_rows(edges)
+    rows = _lasting_rows(edges)
     columns = {
         "edge": lambda item: item[0],
         "speed [rpm]": lambda item: f"{item[1].speed_rpm:.0f} ± {item[1].standard_error_rpm:.0f}",
@@ -33,7 +33,7 @@ def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> 
     return Table.of(title, columns, edges.items(), ("speed [rpm]",))
 
 
-def lasting_widths(edges: Mapping[str, LastingEdge]) -> dict[str, LastingWidth]:
+def _lasting_widths(edges: Mapping[str, LastingEdge]) -> dict[str, LastingWidth]:
     """Widths of the zones that have both edges."""
     zones = dict.fromkeys(name.rpartition(" ")[0] for name in edges)
     ends = {zone: [edges.get(f"{zone} {end}") for end in ("onset", "exit")] for zone in zones}
@@ -50,7 +50,7 @@ def _by_1_percent(width: LastingWidth) -> dict[str, tuple[float, float]]:
 
 def lasting_width_table(name: str, edges: Mapping[str, LastingEdge]) -> Table | None:
     """Widths of the zones that have both edges; None if there are none."""
-    widths = lasting_widths(edges)
+    widths = _lasting_widths(edges)
     if not widths:
         return None
     changes = {zone: _by_1_percent(width) for zone, width in widths.items()}
@@ -67,7 +67,7 @@ def lasting_width_table(name: str, edges: Mapping[str, LastingEdge]) -> Table | 
 
 def lasting_document(edges: Mapping[str, LastingEdge]) -> dict[str, Any]:
     """Edges and widths for programs."""
-    rows = lasting_rows(edges)
+    rows = _lasting_rows(edges)
     pairs = lambda found: {n: {"value": v, "error": e} for n, (v, e) in found.items()}
     return {
         "edges": [
@@ -78,7 +78,7 @@ def lasting_document(edges: Mapping[str, LastingEdge]) -> dict[str, Any]:
         "widths": [
             {"name": name, "rpm_by_1_percent": pairs(_by_1_percent(width))}
             | chosen(width, "width_rpm standard_error_rpm")
-            for name, width in lasting_widths(edges).items()
+            for name, width in _lasting_widths(edges).items()
         ],
     }
 
