@@ -376,6 +376,9 @@ def test_columns_are_numbers(tmp_path: Path, text: str):
 )
 def test_a_configuration_cannot_run_code(tmp_path: Path, value: str):
     path = tmp_path / "design.toml"
+    path.write_text('base = "1a"\nguidance_gap = "0.4 no_such_unit(1)"')
+    with pytest.raises(ConfigError):
+        load_model(path)  # what pint loads when it first reads such words
     path.write_text(f'base = "1a"\nguidance_gap = "{value}"')
     with hostile.watching() as seen, pytest.raises(ConfigError, match="`guidance_gap` must be a number"):
         load_model(path)
