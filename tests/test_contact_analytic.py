@@ -179,6 +179,7 @@ def test_slope_of_smooth_plus_is_its_derivative():
 def test_power_is_exact_with_finite_derivatives_at_touch():
     p = np.geomspace(1e-12, 1.0, 25)
     np.testing.assert_allclose(jax.vmap(power_10_9)(jnp.asarray(p)), p ** (10 / 9), rtol=1e-14)
+    np.testing.assert_allclose(power_10_9(jnp.asarray(3, jnp.float32)), 3 ** (10 / 9), rtol=1e-14)
     for order, f in enumerate(derivatives(power_10_9, 3)):
         assert float(f(0.0)) == 0.0, order
         assert float(f(-1.0)) == 0.0, order

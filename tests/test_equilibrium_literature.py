@@ -196,6 +196,12 @@ def test_eigenvalues_cross_the_axis_at_rouths_threshold(eps):
             assert np.sign(worst.real) == sign and abs(worst.real) > 1e-6
 
 
+@pytest.mark.parametrize("ratios", [[0.5, 1.0], [0.0], []])
+def test_a_chart_wants_a_row_of_ratios(ratios):
+    with pytest.raises(ValueError, match="`eccentricity_ratios` must be"):
+        stability_chart(np.array(ratios))
+
+
 def test_default_chart_holds_together():
     chart = stability_chart()
     assert np.all(np.diff(chart.load_number) > 0) and np.all(np.diff(chart.attitude_angle) < 0)

@@ -173,12 +173,18 @@ def stability_chart(
     """The chart of threshold speed against load number.
 
     **Arguments:** eccentricity ratios, by default 0.005 to 0.95 in 190 steps; film model.
+
+    **Raises:** `ValueError` for ratios that are not between 0 and 1, or no row.
     """
     require_x64()
-    eps = np.linspace(0.005, 0.95, 190) if eccentricity_ratios is None else eccentricity_ratios
-    coefficients, threshold = _chart(jnp.asarray(eps, dtype=float), film)
+    eps = np.asarray(np.linspace(0.005, 0.95, 190) if eccentricity_ratios is None else eccentricity_ratios, dtype=float)
+    if eps.ndim != 1 or eps.size == 0 or not np.all((eps > 0) & (eps < 1)):
+        raise ArgumentError(
+            "eccentricity_ratios", said=f"must be a row of numbers above 0 and below 1, but {eps} was given."
+        )
+    coefficients, threshold = _chart(jnp.asarray(eps), film)
     columns = (coefficients.load_number, coefficients.attitude_angle, *threshold)
-    return StabilityChart(np.asarray(eps, dtype=float), *(np.asarray(a) for a in columns))
+    return StabilityChart(eps, *(np.asarray(a) for a in columns))
 
 
 @eqx.filter_jit

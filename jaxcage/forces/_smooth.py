@@ -61,6 +61,7 @@ def _inverse_ninth_root_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tu
 
 def root_9(p: Scalar) -> Array:
     """p^(1/9) for p >= 0, with finite derivatives of every order at p = 0 (where they are taken as zero)."""
+    p = jnp.asarray(p, dtype=float)
     touching = p > 0
     safe = jnp.where(touching, p, 1.0)
     root = _inverse_ninth_root(safe)
@@ -71,4 +72,5 @@ def root_9(p: Scalar) -> Array:
 
 def power_10_9(p: Scalar) -> Array:
     """p^(10/9) for p >= 0, in the same sense."""
+    p = jnp.asarray(p, dtype=float)
     return p * root_9(p)
