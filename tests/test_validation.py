@@ -41,8 +41,8 @@ def test_page():
     assert text.index("## Film") < text.index("## Cage")
 
 
-@pytest.mark.parametrize("topic", wide_but(["statics", "contact"], "contact"))
-def test_quick_topics_pass(topic: str):
+@pytest.mark.parametrize("topic", wide_but(["statics", "contact", "cage"], "contact"))
+def test_topics_pass(topic: str):
     found = TOPICS[topic]()
     assert len(found) >= 8
     assert [c.what for c in found if not c.passed] == []
