@@ -27,7 +27,7 @@ from ._results import INACCURATE, result_of
 
 DEFAULT_ERROR = 3e-3
 """Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
-DEFAULT_LADDER = (*(("rk4", 64 << i) for i in range(8)), *(("rodas4", 512 << i) for i in range(6)))
+DEFAULT_LADDER = (*(("rk4", 16 << i) for i in range(10)), *(("rodas4", 512 << i) for i in range(6)))
 TURN = 0.5
 """Largest difference that half as many steps may make to the leading tangent vector, relative to its length, at the
 default error."""

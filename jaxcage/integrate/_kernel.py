@@ -60,7 +60,7 @@ class Structure:
         return eqx.combine(jax.tree.unflatten(self.numbers, list(numbers)), rest)
 
 
-NEARNESS = 0.05
+NEARNESS = 0.2
 """Time to a place of abrupt change [rad], at the pace of the moment, at which steps are half as long."""
 FAR = 0.5
 """Time [rad] from which on they are not shortened."""

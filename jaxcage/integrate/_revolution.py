@@ -24,8 +24,8 @@ from ._results import outcome_code
 from ._strobe import StrobeMap
 
 
-BLOCK = 16
-"""Lanes packed together on a CPU: smaller blocks cost more calls, larger ones run more lanes for nothing."""
+BLOCK = 8
+"""Lanes packed together on a CPU, as many as an instruction takes: larger blocks run more lanes for nothing."""
 BLOCK_ON_GPU = 1 << 14
 
 LaneState = tuple[Float[Array, " lanes"], ...]

@@ -34,6 +34,8 @@ from ._system import AbstractForcedSystem
 
 ClearanceReading = Literal["as_printed", "radial"]
 
+TINY = 1e-30
+"""Square of a speed [m^2/s^2] that keeps a division from being by zero."""
 ONSET_WIDTH = 4.0
 """Distance from the onset of land contact, in smoothing lengths, within which steps are not shortened any more."""
 SMOOTHEST = 0.1
@@ -151,10 +153,24 @@ class CageModel(AbstractForcedSystem):
         return smooth_norm(x, dy, self.film.smoothing) / self.clearance
 
     def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar]:
-        """The onset of land contact, whose force sets in within a smoothing length."""
+        """The onset of land contact, whose force sets in within a smoothing length.
+
+        The speed is that with which the cage comes to the onset: where it turns round, at the deepest of a contact, it
+        is at rest, and the force of the contact throws it out all the same.
+        """
         eps, growth = jax.jvp(lambda *y: jnp.asarray(self.excursion(y)), y, rate)
+        gap = eps - self.contact.onset
         width = ONSET_WIDTH * self.contact.smoothing / self.clearance
-        return smooth_norm(eps - self.contact.onset, 0.0, width), jnp.abs(growth)
+        gained = jnp.maximum(-2 * gap * self._radial_acceleration(y, rate), 0.0)
+        return smooth_norm(gap, 0.0, width), jnp.sqrt(growth**2 + gained)
+
+    def _radial_acceleration(self, y: State, rate: State) -> Scalar:
+        """That of the eccentricity ratio along the line of centres [1/rad^2]."""
+        n = self.dimension // 2
+        v = y[n:]
+        per_speed = sum(a * b for a, b in zip(v, rate, strict=False)) / (sum(a * a for a in v) + TINY)  # q' = v/omega
+        pushed = (*(per_speed * a for a in rate[n:]), *(jnp.zeros_like(a) for a in v))
+        return jax.jvp(lambda *y: jnp.asarray(self.excursion(y)), y, pushed)[1]
 
 
 PARTS: dict[str, tuple[type, ...]] = {

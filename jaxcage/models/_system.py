@@ -41,8 +41,8 @@ class AbstractForcedSystem(eqx.Module):
 
     def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar] | None:
         """Where the law changes abruptly: how far a state is from there, not below the width of the change, and how
-        fast that changes [1/rad] where the state does by `rate`. Steps are shortened in proportion to their ratio.
-        None, as here, where the law has no such place.
+        fast it comes there [1/rad] where it changes by `rate`. Steps are shortened in proportion to their ratio. None,
+        as here, where the law has no such place.
         """
         return None
 

@@ -94,9 +94,9 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
-def _padded(x: np.ndarray, size: int) -> np.ndarray:
-    """Repeat the last lane up to `size` lanes."""
-    return np.concatenate([x, np.repeat(x[-1:], size - x.shape[0], axis=0)])
+def _padded(lanes: np.ndarray, size: int) -> np.ndarray:
+    """`size` lanes: -1 stands for one that is not run."""
+    return np.pad(lanes, (0, size - lanes.size), constant_values=-1)
 
 
 def _in_chunks(
@@ -104,10 +104,10 @@ def _in_chunks(
 ) -> tuple[np.ndarray, ...]:
     """`work` on `lanes`, chunk by chunk on all cores; results in the order of their numbers.
 
-    Lanes are dealt out to the chunks like cards: neighbours need about as many steps, and so every chunk takes as long.
+    Neighbours stay together: they need about as many steps, and so the few that need the most share the blocks in which
+    these are run. The dearest come first.
     """
-    chunks = -(-lanes.size // size)
-    parts = [lanes[i::chunks] for i in range(chunks)]
+    parts = [lanes[i : i + size] for i in range(0, lanes.size, size)]
     with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
         futures = [pool.submit(lambda p: [np.asarray(x) for x in work(_padded(p, size))], part) for part in parts]
         try:
@@ -137,15 +137,18 @@ def run_parts(
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
-    return Part(jnp.asarray(speed[lane]), jnp.asarray(which[lane]), tuple(map(jnp.asarray, y[lane].T)))
+    state = np.where(lane[:, None] < 0, np.nan, y[lane])
+    return Part(jnp.asarray(speed[lane]), jnp.asarray(which[lane]), tuple(map(jnp.asarray, state.T)))
 
 
 def _chunk_size(lanes: int) -> int:
-    """The size with which all cores are done first, each taking one chunk after the other."""
+    """The size with which all cores are done first, each taking one chunk after the other, two of them at least: one
+    whose lanes need many steps takes longer than the others."""
     if jax.default_backend() != "cpu":
         return lanes
     rounds = lambda size: -(-lanes // (size * cores()))
-    return min(CHUNKS, key=lambda size: (rounds(size) * (size + CALL), size))
+    several = [size for size in CHUNKS if rounds(size) > 1] or CHUNKS[:1]
+    return min(several, key=lambda size: (rounds(size) * (size + CALL), size))
 
 
 def _room(count: int) -> int:
@@ -167,8 +170,7 @@ def run_lanes(
 
     Lanes that go `onward`, from where another run left them, may be as far out as lanes come on their way.
 
-    Lanes are dealt out to the chunks, first by their place and after the discarded revolutions by the number of steps
-    that they need, so that all chunks take about as long.
+    Lanes are in chunks with their neighbours, and after the discarded revolutions with those that need as many steps.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
@@ -202,7 +204,7 @@ def run_lanes(
     settled = np.stack(y, axis=-1).reshape(lanes, dim)
 
     def follow(lane: np.ndarray) -> Observation:
-        rest = [jnp.asarray(x[lane]) for x in (outcome, level, error)]
+        rest = [jnp.asarray(x) for x in (np.where(lane < 0, 1, outcome[lane]), level[lane], error[lane])]
         return _observe_chunk(designs, method, lengths, room, _part(speed, which, settled, lane), *rest)
 
     seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))
