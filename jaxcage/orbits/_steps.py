@@ -1,8 +1,8 @@
 """How many steps a revolution of an orbit takes: doubled until the orbit by half as many is the same.
 
 The map of equal steps is as smooth as the field, so that roots and derivatives are exact for it; how far it is from
-the true one is seen by solving again with twice the steps, from the orbit known. An orbit takes
-256 to 2048 steps as a rule, whether it touches the land or not: steps are shortened through a contact.
+the true one is seen by solving again with twice the steps, from the orbit known. An orbit takes 256 to 2048 steps as a
+rule, whether it touches the land or not: they are shortened through a contact.
 """
 
 from collections.abc import Callable
