@@ -16,7 +16,7 @@ import numpy as np
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.reproduction import compare_edges, zones_in_range
+from jaxcage.reproduction import LASTING, compare_edges, zones_in_range
 
 
 jc.enable_x64()
@@ -59,7 +59,7 @@ def check(cases: list[str], values: dict[str, float]) -> None:
     models = [jc.replace(jc.case(name), **chosen) for name in cases]
     for name, swept in zip(cases, jc.sweep_designs(models, jc.rpm(2500, 27500, 251)), strict=True):
         found = jc.zones(swept).zones
-        rows = compare_edges(PUBLISHED_CASES[name], found, "chaotic")
+        rows = compare_edges(PUBLISHED_CASES[name], found, LASTING)
         errors = [f"{r.edge} " + ("none" if r.ours_rpm is None else f"{r.error_percent:+.1f} %") for r in rows]
         print(f"{name}: {', '.join(errors)}; {len(zones_in_range(found))} zones", flush=True)
 

@@ -13,10 +13,14 @@ from jaxcage.forces import cubic_stiffness
 from jaxcage.plotting import paper_figures
 from jaxcage.reproduction import (
     READINGS,
+    Observer,
     compare_edges,
     conclusions,
+    marks,
+    observed_zones,
     run_all,
     try_readings,
+    wide_zones,
     zones_in_range,
 )
 
@@ -27,7 +31,7 @@ def zone(onset, leaves):
 
 
 def ours(zones, case="1a"):
-    return [row.ours_rpm for row in compare_edges(PUBLISHED_CASES[case], zones, "chaotic")]
+    return [row.ours_rpm for row in compare_edges(PUBLISHED_CASES[case], zones, "lasting")]
 
 
 def test_edges_of_the_zones_that_overlap_most():
@@ -46,21 +50,43 @@ def test_a_zone_far_from_the_published_ones_is_none_of_them():
 
 
 def test_errors_are_relative_to_what_was_published():
-    rows = compare_edges(PUBLISHED_CASES["1a"], [zone(9100 * 1.1, 12000 * 0.95)], "chaotic")
+    rows = compare_edges(PUBLISHED_CASES["1a"], [zone(9100 * 1.1, 12000 * 0.95)], "lasting")
     assert rows[0].error_percent == pytest.approx(10.0)
     assert rows[1].error_percent == pytest.approx(-5.0)
     assert rows[2].error_percent is None
-    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("crisis", 100.0, "chaotic")
+    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("crisis", 100.0, "lasting")
 
 
 def test_zones_below_the_range_do_not_count():
     assert len(zones_in_range([zone(2500, 3900), zone(3900, 4100), zone(9000, 12000), zone(27400, None)])) == 3
 
 
+def test_wide_zones_are_those_that_a_diagram_shows():
+    assert len(wide_zones([zone(5000, 5400), zone(9000, 12000), zone(27400, None), zone(2500, 3900)])) == 2
+
+
+def test_marks_cover_points_on_a_line():
+    """A periodic motion takes one for each of its points, a band as many as it is wide."""
+    three = np.tile([0.0, 1.0, 5.0], 50) + 1e-3 * np.sin(np.arange(150))
+    assert marks(three, 0.01) == 3
+    assert marks(np.random.default_rng(0).permutation(np.linspace(0, 1, 1001)), 0.01) == pytest.approx(100, abs=10)
+
+
+@pytest.mark.wide
+def test_an_observer_reads_zones_off_a_diagram():
+    """Where the motion is chaotic it fills a band, where it is periodic it does not, whatever is in between."""
+    model = jc.case("1a")
+    speeds = np.concatenate([jc.rpm(10400, 10800, 3), jc.rpm(16000, 16400, 3)])
+    seen = jc.sweep(model, speeds, starts=1, horizon=0)
+    assert list(np.char.startswith(seen.label[:, 0], "periodic")) == [False] * 3 + [True] * 3
+    ((found,),) = observed_zones([model], speeds, Observer("late", steps=128, discard=300, drawn=200))
+    assert found.onset is None and found.exit is not None and found.exit.speed_rpm == pytest.approx(13400)
+
+
 @pytest.fixture(scope="module")
 def runs():
     models = {name: jc.case(name, "preliminary") for name in PUBLISHED_CASES}
-    return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False)
+    return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False, observers=())
 
 
 @pytest.mark.wide

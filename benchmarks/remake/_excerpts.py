@@ -62,21 +62,22 @@ def _ours(edge: dict, apart: str) -> str:
 
 
 def against_paper(runs: Sequence[Run]) -> str:
-    """The chaotic edges of `jaxcage reproduce`, a case to a row."""
+    """The edges of lasting chaos of `jaxcage reproduce`, a case to a row."""
     cases: dict[str, list[str]] = {}
-    for edge in (e for e in runs[0].document["edges"] if e["kind"] == "chaotic"):
+    for edge in (e for e in runs[0].document["edges"] if e["kind"] == "lasting"):
         cases.setdefault(edge["case"], []).append(f"{edge['published_rpm']:.0f} / {_ours(edge, ' ({:+.1f} %)')}")
     return markdown(("case", "zone 1 from", "to", "zone 2 from"), [(name, *row) for name, row in cases.items()])
 
 
-def both_kinds(runs: Sequence[Run]) -> str:
-    """The chaotic and the synchronous-loss edges of `jaxcage reproduce`."""
-    rows: dict[tuple[str, str], list[str]] = {}
+def every_kind(runs: Sequence[Run]) -> str:
+    """The edges of every kind of `jaxcage reproduce`."""
+    kinds = list(runs[0].document["summary"])
+    rows: dict[tuple[str, str, str], dict[str, str]] = {}
     for edge in runs[0].document["edges"]:
-        begin = [f"{edge['published_rpm']:.0f}"]
-        rows.setdefault((edge["case"], edge["edge"]), begin).append(_ours(edge, " {:+.1f} %"))
-    body = [(*key, *row, *(["none"] * (3 - len(row)))) for key, row in rows.items()]
-    return aligned([("case", "edge", "published", "chaotic", "synchronous loss"), *body])
+        key = (edge["case"], edge["edge"], f"{edge['published_rpm']:.0f}")
+        rows.setdefault(key, {})[edge["kind"]] = _ours(edge, " {:+.1f} %")
+    body = [(*key, *(found.get(kind, "none") for kind in kinds)) for key, found in rows.items()]
+    return aligned([("case", "edge", "published", *kinds), *body])
 
 
 def readings(runs: Sequence[Run]) -> str:

@@ -86,7 +86,7 @@ SHOWN = (
     Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
     Shown("studies-text", STUDIES, ["python -m benchmarks.study"]),
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
-    Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.both_kinds),
+    Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
     Shown("case-fits", REPRODUCTION, [FIT.format(c) for c in CASES], ex.case_fits),
     _figure("reproduction-figure", REPRODUCTION, REPRODUCE, "reproduce_7a.png"),
     Shown("readings", REPRODUCTION, ["jaxcage reproduce --quick"], ex.readings),

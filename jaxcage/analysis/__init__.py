@@ -112,7 +112,14 @@ from ._transients import (
     when_t0_doubles as when_t0_doubles,
 )
 from ._zero_one import mean_square_displacement as mean_square_displacement, zero_one as zero_one
-from ._zones import CLOSE_BELOW_RPM as CLOSE_BELOW_RPM, Edge as Edge, Zone as Zone, Zones as Zones, zones as zones
+from ._zones import (
+    CLOSE_BELOW_RPM as CLOSE_BELOW_RPM,
+    Edge as Edge,
+    Zone as Zone,
+    Zones as Zones,
+    close_windows as close_windows,
+    zones as zones,
+)
 
 
 check_layer(

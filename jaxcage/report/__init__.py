@@ -102,6 +102,7 @@ from ._paper_tables import (
     compared_table as compared_table,
     ranges_table as ranges_table,
     readings_table as readings_table,
+    two_zones_table as two_zones_table,
 )
 from ._readings import (
     readings_document as readings_document,

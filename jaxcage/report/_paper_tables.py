@@ -7,19 +7,23 @@ from ..reproduction import ComparedEdge, ReadingResult
 from ._table import Table, number
 
 
+def two_zones_table(zones: Mapping[str, Mapping[str, int]]) -> Table:
+    """How many wide zones each case has, by case and kind, where two were published."""
+    kinds = tuple(next(iter(zones.values())))
+    rows = [(case, "2", *(str(found[kind]) for kind in kinds)) for case, found in zones.items()]
+    return Table("Zones of 500 rpm and more, 4000 to 27500 rpm", ("case", "published", *kinds), rows)
+
+
 def compared_table(edges: Sequence[ComparedEdge], resolution: float) -> Table:
-    """The published edges beside ours, from sweeps at a resolution [rpm]."""
-    plus = lambda e: "" if e.uncertainty_rpm is None else f" ± {e.uncertainty_rpm:.3g}"
-    columns = {
-        "case": "{.case}",
-        "edge": "{.edge}",
-        "published": lambda e: number(e.published_rpm),
-        "kind": "{.kind}",
-        "ours": lambda e: number(e.ours_rpm, nothing="none") + plus(e),
-        "error": lambda e: "-" if e.error_percent is None else f"{e.error_percent:+.1f} %",
-        "mechanism": lambda e: e.mechanism or "-",
-    }
-    return Table.of(f"Published edges and ours [rpm], sweeps at {resolution:.0f} rpm", columns, edges)
+    """The published edges beside ours of every kind, from sweeps at a resolution [rpm]."""
+    kinds = tuple(dict.fromkeys(e.kind for e in edges))
+    rows: dict[tuple[str, str, str], dict[str, str]] = {}
+    for e in edges:
+        found = "none" if e.ours_rpm is None else f"{e.ours_rpm:.0f} ({e.error_percent:+.1f} %)"
+        rows.setdefault((e.case, e.edge, number(e.published_rpm)), {})[e.kind] = found
+    body = [(*key, *(found.get(kind, "-") for kind in kinds)) for key, found in rows.items()]
+    title = f"Published edges and ours [rpm], sweeps at {resolution:.0f} rpm"
+    return Table(title, ("case", "edge", "published", *kinds), body)
 
 
 def ranges_table(ranges: Sequence[Mapping[str, Any]]) -> Table:

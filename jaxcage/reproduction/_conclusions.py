@@ -15,7 +15,7 @@ from ..bearing import PUBLISHED_CASES, load_distribution, static_cage_displaceme
 from ..forces import PocketImpact, approach_speed, impact_history
 from ..models import CageModel
 from ..sweeps import rpm, sweep
-from ._edges import compare_edges, zones_in_range
+from ._edges import LASTING, compare_edges, zones_in_range
 from ._runs import SECTION_RPM, Runs
 
 
@@ -43,7 +43,7 @@ def _verdict(*checks: bool) -> str:
 
 def _edge(runs: Runs, case: str, name: str) -> float:
     """Our chaotic edge [rpm]; NaN if there is none."""
-    rows = compare_edges(PUBLISHED_CASES[case], runs.zones[case].zones, "chaotic")
+    rows = compare_edges(PUBLISHED_CASES[case], runs.zones[case].zones, LASTING)
     found = next(row.ours_rpm for row in rows if row.edge == name)
     return float("nan") if found is None else found
 

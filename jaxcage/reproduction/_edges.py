@@ -1,4 +1,8 @@
-"""The published edges beside those found, kind by kind."""
+"""The published edges beside those found, kind by kind.
+
+Kinds never stand in for each other: chaos that lasts, chaos seen at first, the loss of the synchronous orbit, and what
+an observer reads off a diagram (`_observer`).
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -13,6 +17,10 @@ from ..design import MeasuredEdge, matched
 
 ZONE_RANGE_RPM = (4000.0, 27500.0)
 """Speeds between which a case should have exactly two zones."""
+LASTING, AT_FIRST, LOSS = "lasting", "at first", "synchronous-loss"
+"""Chaos that lasts beyond the horizon; chaos while observed, lasting or not; loss of the synchronous orbit."""
+WIDE_RPM = 500.0
+"""Zones at least so wide are those that a diagram over 25000 rpm shows."""
 READING = 0.02
 """Relative uncertainty of an edge read off a diagram."""
 
@@ -26,7 +34,7 @@ class ComparedEdge:
     """`zone 1 onset`, `zone 1 exit` or `zone 2 onset`."""
     published_rpm: float
     kind: str
-    """`chaotic` or `synchronous-loss`."""
+    """`lasting`, `at first`, `synchronous-loss`, or the name of an observer."""
     ours_rpm: float | None
     uncertainty_rpm: float | None
     mechanism: str | None
@@ -44,6 +52,11 @@ def zones_in_range(zones: Sequence[Zone]) -> list[Zone]:
     return [z for z, (a, b) in zip(zones, ends, strict=True) if b > low and a < high]
 
 
+def wide_zones(zones: Sequence[Zone]) -> list[Zone]:
+    """Of those the ones that are wide, or run past the swept range."""
+    return [z for z in zones_in_range(zones) if z.width_rpm is None or z.width_rpm >= WIDE_RPM]
+
+
 def compare_edges(published: PublishedCase, zones: Sequence[Zone], kind: str) -> list[ComparedEdge]:
     """The three published edges of a case beside those of the zones found in the range in which they were published."""
     rows = (
@@ -51,7 +64,8 @@ def compare_edges(published: PublishedCase, zones: Sequence[Zone], kind: str) ->
         ("zone 1 exit", published.zone_1_exit_rpm),
         ("zone 2 onset", published.zone_2_onset_rpm),
     )
-    measured = [MeasuredEdge(published.name, name, rpm, READING * rpm, kind) for name, rpm in rows]
+    of_edge = LOSS if kind == LOSS else "chaotic"
+    measured = [MeasuredEdge(published.name, name, rpm, READING * rpm, of_edge) for name, rpm in rows]
     found = matched(measured, zones_in_range(zones), ZONE_RANGE_RPM[1])
     return [
         ComparedEdge(

@@ -13,7 +13,7 @@ from ..forces import ElasticRib, PocketImpact, RollerPassImpact
 from ..integrate import AbstractMethod, method
 from ..models import CageModel
 from ..sweeps import rpm, sweep
-from ._edges import ZONE_RANGE_RPM, ComparedEdge, compare_edges, zones_in_range
+from ._edges import AT_FIRST, LASTING, ZONE_RANGE_RPM, ComparedEdge, compare_edges, zones_in_range
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,7 +143,11 @@ def try_readings(
                 found,
                 float(np.mean(np.any(found.label == "chaotic", axis=1))),
                 len(zones_in_range(chaotic.zones)),
-                tuple(compare_edges(PUBLISHED_CASES[reading.case], chaotic.zones, "chaotic")),
+                tuple(
+                    compare_edges(
+                        PUBLISHED_CASES[reading.case], chaotic.zones, LASTING if reading.persist else AT_FIRST
+                    )
+                ),
                 int(np.sum(found.failed)),
             )
         )

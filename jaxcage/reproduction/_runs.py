@@ -1,17 +1,18 @@
 """The runs behind the reproduction: every case over speed, and the strobe sections of fig. 9."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..analysis import Sweep, Zones, zones
+from ..analysis import Sweep, Zone, Zones, zones
 from ..bearing import FIGURE_AXES, PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, synchronous_orbits
 from ..sweeps import rpm, sweep_designs
-from ._edges import ComparedEdge, compare_edges
+from ._edges import AT_FIRST, LASTING, LOSS, ComparedEdge, compare_edges
+from ._observer import OBSERVERS, Observer, observed_zones
 
 
 SECTION_RPM = 8500.0
@@ -31,6 +32,15 @@ class Runs:
     """Empty where the orbits were left out."""
     sections: Mapping[str, Sweep]
     """At the speed of fig. 9, from the paper's start, with its transient."""
+    diagrams: Mapping[str, Mapping[str, tuple[Zone, ...]]] = dataclasses.field(default_factory=dict)
+    """Zones that each observer reads off a diagram, by the observer's name and the case."""
+
+    def zones_by_kind(self, name: str) -> dict[str, Sequence[Zone]]:
+        """The zones of a case of every kind."""
+        at_first = zones(dataclasses.replace(self.sweeps[name], escape=None)).zones
+        kinds: dict[str, Sequence[Zone]] = {LASTING: self.zones[name].zones, AT_FIRST: at_first}
+        kinds |= {observer: found[name] for observer, found in self.diagrams.items()}
+        return kinds | ({LOSS: self.loss[name].zones} if name in self.loss else {})
 
 
 def run_all(
@@ -41,9 +51,11 @@ def run_all(
     revolutions: int = 300,
     section_revolutions: int = SECTION_REVOLUTIONS[1],
     orbits: bool = True,
+    observers: Sequence[Observer] = OBSERVERS,
     report: Report | None = None,
 ) -> Runs:
-    """Sweep every case over the published range from three starts, find its synchronous orbits, and run fig. 9."""
+    """Sweep every case over the published range from three starts, find its synchronous orbits, read its diagrams as
+    the paper may have done, and run fig. 9."""
     say = report or (lambda what, done, total: None)
     grid = rpm(*PUBLISHED_SPEED_RANGE_RPM, speeds)
     swept = dict(
@@ -64,6 +76,10 @@ def run_all(
         say(f"orbits of {name}", i, len(models))
         found = synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name])
         loss[name] = loss_zones(found)
+    diagrams = {}
+    for i, observer in enumerate(observers):
+        say(f"diagrams, {observer.name}", i, len(observers))
+        diagrams[observer.name] = dict(zip(models, observed_zones(list(models.values()), grid, observer), strict=True))
     say("strobe sections", 0, 1)
     observed = section_revolutions - SECTION_REVOLUTIONS[0]
     blocks = max(n for n in range(1, 21) if observed % n == 0)
@@ -81,16 +97,13 @@ def run_all(
         )[0]
         for (name, model), start in zip(models.items(), first, strict=True)
     }
-    return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections)
+    return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections, diagrams)
 
 
 def edges_of(runs: Runs, name: str) -> list[ComparedEdge]:
-    """The published edges of a case beside those of both kinds."""
+    """The published edges of a case beside those of each kind."""
     published = PUBLISHED_CASES[name]
-    found = compare_edges(published, runs.zones[name].zones, "chaotic")
-    if name in runs.loss:
-        found += compare_edges(published, runs.loss[name].zones, "synchronous-loss")
-    return found
+    return [row for kind, found in runs.zones_by_kind(name).items() for row in compare_edges(published, found, kind)]
 
 
 def ranges_of(runs: Runs) -> list[dict[str, Any]]:
