@@ -7,7 +7,7 @@ What is declared here once is used by the configuration reader (units, ranges, u
 import dataclasses
 import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any, Literal, TypeVar
 
@@ -277,6 +277,13 @@ def _with_static(module: Any, path: tuple[str, ...], value: Any) -> Any:
     return dataclasses.replace(module, **{name: inner})
 
 
+def with_values(module: M, values: Mapping[str, PyTree]) -> M:
+    """A copy of `module` with parameters by name, whatever their ranges: limits in which a formula is known."""
+    paths = parameter_paths(module)
+    at = lambda m: [get(m, paths[name]) for name in values]
+    return eqx.tree_at(at, module, [jax.tree.map(_as_leaf, value) for value in values.values()])
+
+
 def replace(module: M, **values: PyTree) -> M:
     """A copy of `module` with named parts replaced.
 
@@ -305,8 +312,7 @@ def replace(module: M, **values: PyTree) -> M:
         module = _with_parts(module, exchanged)
     changed = [name for name in leaves if name in values and name not in parts]
     if changed:
-        at = lambda m: [get(m, leaves[name]) for name in changed]
-        module = eqx.tree_at(at, module, [jax.tree.map(_as_leaf, values[name]) for name in changed])
+        module = with_values(module, {name: values[name] for name in changed})
     # Last, and those of the module itself at once: what is checked is what was asked for, and not a half of it.
     own = {name: values[name] for name, path in choices.items() if name in values and len(path) == 1}
     module = dataclasses.replace(module, **own) if own else _checked(module)

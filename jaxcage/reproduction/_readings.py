@@ -3,10 +3,9 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
-import equinox as eqx
 import numpy as np
 
-from .._parameters import get, parameter_paths, replace
+from .._parameters import get, parameter_paths, replace, with_values
 from ..analysis import Sweep, zones
 from ..bearing import PUBLISHED_CASES
 from ..forces import ElasticRib, PocketImpact, RollerPassImpact
@@ -58,11 +57,7 @@ def _roller_pass(model: CageModel) -> CageModel:
 def _scaled(name: str, factor: float) -> Callable[[CageModel], CageModel]:
     """A parameter scaled; next to nothing of it too, which is beyond the range that users may give."""
 
-    def scaled(model: CageModel) -> CageModel:
-        at = lambda m: get(m, parameter_paths(m)[name])
-        return eqx.tree_at(at, model, factor * at(model))
-
-    return scaled
+    return lambda model: with_values(model, {name: factor * get(model, parameter_paths(model)[name])})
 
 
 def _chosen(**values: str) -> Callable[[CageModel], CageModel]:

@@ -2,12 +2,11 @@
 
 import math
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .._parameters import parameters, replace
+from .._parameters import replace, with_values
 from ..analysis import equilibrium, film_whirl_speed
 from ..bearing import PUBLISHED_CASES
 from ..forces import cubic_stiffness
@@ -31,17 +30,10 @@ def cage_comparisons() -> list[Comparison]:
     return [*_unbalance(), *_divergence(), *_whirl(), *_another_integration()]
 
 
-def _limit(model: CageModel, **values: float) -> CageModel:
-    """The model with values that no cage has, where a closed form is that limit."""
-    now = parameters(model)
-    new = {id(now[name]): jnp.asarray(value) for name, value in values.items()}
-    return jax.tree.map(lambda leaf: new.get(id(leaf), leaf), model)
-
-
 def _bare(**changes: float) -> CageModel:
     """A cage on linear springs without film, weight and impacts."""
     none = dict.fromkeys(("gravity", "amplitude", "cubic_stiffness", "cubic_ratio", "cross_stiffness"), 0.0)
-    return _limit(replace(case("1a"), unbalance="physical", **(none | changes)), land_width=1e-7)
+    return with_values(replace(case("1a"), unbalance="physical", **(none | changes)), {"land_width": 1e-7})
 
 
 def _unbalance() -> list[Comparison]:
@@ -60,7 +52,7 @@ def _unbalance() -> list[Comparison]:
 
 
 def _divergence() -> list[Comparison]:
-    model, speed = _limit(replace(case("1a"), restitution=1.0), land_width=1e-7), 15000 * RPM
+    model, speed = with_values(replace(case("1a"), restitution=1.0), {"land_width": 1e-7}), 15000 * RPM
     options = dict(exponents=4, blocks=10, keep=1, method=method(steps=2048))
     found = sweep(model, np.array([speed]), discard=20, revolutions=50, **options)  # pyright: ignore
     theirs = -2 * float(model.support.damping / model.cage_mass) * 2 * math.pi / speed
@@ -85,13 +77,13 @@ def _in_film(**changes: float) -> CageModel:
 def _whirl() -> list[Comparison]:
     rows = []
     for gap in (0.45e-3, 0.60e-3):
-        light = _limit(_in_film(guidance_gap=gap), cage_mass=1e-6)
+        light = with_values(_in_film(guidance_gap=gap), {"cage_mass": 1e-6})
         theirs = math.sqrt(24 / math.pi * 9.81 / gap) / RPM
         ours = float(film_whirl_speed(light)) / RPM
         rows.append(
             within_share(f"whirl threshold of a light cage, gap {1e3 * gap:g} mm [rpm]", ROUTH, theirs, ours, 1e-4)
         )
-    model = _limit(_in_film(), cage_mass=1e-5)
+    model = with_values(_in_film(), {"cage_mass": 1e-5})
     speed = float(film_whirl_speed(model)) * 1.01
     at = equilibrium(model, speed)
     start = (*(float(c) for c in at.coordinates), 1e-3 * float(model.clearance) * speed, 0.0)
