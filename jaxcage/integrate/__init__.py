@@ -56,7 +56,7 @@ from ._method import (
 from ._moved import Moved as Moved
 from ._newmark import NewmarkBeta as NewmarkBeta
 from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
-from ._revolution import pushed as pushed, revolution as revolution
+from ._revolution import BLOCK as BLOCK, pushed as pushed, revolution as revolution
 from ._rosenbrock import (
     RODAS3 as RODAS3,
     RODAS4 as RODAS4,

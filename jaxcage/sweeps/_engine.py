@@ -19,7 +19,7 @@ from jaxtyping import Array, Float, Int
 from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
-from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
+from ..integrate import BLOCK, AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
 
 
@@ -104,10 +104,12 @@ def _in_chunks(
 ) -> tuple[np.ndarray, ...]:
     """`work` on `lanes`, chunk by chunk on all cores; results in the order of their numbers.
 
-    Neighbours stay together: they need about as many steps, and so the few that need the most share the blocks in which
-    these are run. The dearest come first.
+    Neighbours need about as many steps. They are dealt out to the chunks as many at a time as are run together: so the
+    few lanes that need the most share their blocks, and every chunk takes as long.
     """
-    parts = [lanes[i : i + size] for i in range(0, lanes.size, size)]
+    chunks = -(-lanes.size // size)
+    blocks = np.split(lanes, range(BLOCK, lanes.size, BLOCK))
+    parts = [np.concatenate(blocks[i::chunks]) for i in range(chunks)]
     with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
         futures = [pool.submit(lambda p: [np.asarray(x) for x in work(_padded(p, size))], part) for part in parts]
         try:
@@ -142,13 +144,11 @@ def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray)
 
 
 def _chunk_size(lanes: int) -> int:
-    """The size with which all cores are done first, each taking one chunk after the other, two of them at least: one
-    whose lanes need many steps takes longer than the others."""
+    """The size with which all cores are done first, each taking one chunk after the other."""
     if jax.default_backend() != "cpu":
         return lanes
     rounds = lambda size: -(-lanes // (size * cores()))
-    several = [size for size in CHUNKS if rounds(size) > 1] or CHUNKS[:1]
-    return min(several, key=lambda size: (rounds(size) * (size + CALL), size))
+    return min(CHUNKS, key=lambda size: (rounds(size) * (size + CALL), size))
 
 
 def _room(count: int) -> int:
@@ -170,7 +170,7 @@ def run_lanes(
 
     Lanes that go `onward`, from where another run left them, may be as far out as lanes come on their way.
 
-    Lanes are in chunks with their neighbours, and after the discarded revolutions with those that need as many steps.
+    Lanes run beside their neighbours, and after the discarded revolutions beside those that need as many steps.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
