@@ -1,5 +1,6 @@
 """Ranges in a file, what is drawn from them, and the chances that come of it."""
 
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -11,9 +12,19 @@ from report_example import findings
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.io import ConfigError, Range, Unknown, model_from, read_bearing, read_range, template, write_template
+from jaxcage.io import (
+    ConfigError,
+    Measurement,
+    Range,
+    Unknown,
+    model_from,
+    read_bearing,
+    read_range,
+    template,
+    write_template,
+)
 from jaxcage.report import chances_notes, chances_table, operating_chances, page, read_operating
-from jaxcage.studies import Band, Ensemble, binomial_interval, draw, ensemble, sobol, verdict_of
+from jaxcage.studies import Band, Ensemble, binomial_interval, draw, ensemble, identify, sobol, verdict_of
 
 
 STIFF = Unknown("support.stiffness", ("stiffness_x", "stiffness_y"), Range(1e4, 1e6))
@@ -161,6 +172,32 @@ def test_commands_answer_a_file_with_ranges_by_chances(
     assert (
         "not decided by what is known" in text and "As the template has them, of another bearing: guidance_gap" in text
     )
+
+
+class Asked(Exception):
+    """What a sweep was asked for, instead of one."""
+
+
+@pytest.mark.parametrize("place", ["_ensemble", "_identify"])
+def test_every_draw_starts_on_its_own_rib(monkeypatch: pytest.MonkeyPatch, place: str):
+    """Where contact begins earlier, the resting place of another draw lies inside the rib: a stiff one shoots the cage
+    off at speeds that no steps follow."""
+
+    def refuse(models: Any, speeds: Any, *, starts: Any, **options: Any) -> None:
+        raise Asked(models, speeds, starts)
+
+    monkeypatch.setattr(f"jaxcage.studies.{place}.sweep_designs", refuse)
+    model = dataclasses.replace(jc.case("1a"), clearance_reading="radial")
+    onset, speeds = Unknown("contact.onset", ("onset",), Range(0.85, 0.99)), jc.rpm(3000, 4000, 2)
+    with pytest.raises(Asked) as asked:
+        if place == "_ensemble":
+            ensemble(model, [onset], speeds, draws=8)
+        else:
+            identify(model, [onset], [Measurement("calm", 4000.0, 0.0, 0.0)], draws=16)
+    models, speeds, starts = asked.value.args
+    places = [jc.sweeps.initial_states(m, np.atleast_1d(speeds), starts)[0] for m in models]
+    rest = [float(m.excursion(tuple(each[0]))) for m, each in zip(models, places, strict=True)]
+    assert len(models) >= 8 and rest == pytest.approx([float(m.contact.onset) for m in models], rel=1e-6)
 
 
 @pytest.mark.wide

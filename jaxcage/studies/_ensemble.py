@@ -213,12 +213,12 @@ def _run(
     method: AbstractMethod | None,
     progress: Any,
 ) -> list[Sweep]:
-    """Every design once at every speed, from the conventional start."""
-    start = tuple(float(c) for c in models[0].starts(float(speeds[0]))[0])
+    """Every design once at every speed, from its own conventional start: where the cage of one rests on its rib, that
+    of another with an earlier contact would be pressed into it, and be shot off."""
     return sweep_designs(
         models,
         speeds,
-        starts=[start],
+        starts=1,
         discard=discard,
         revolutions=revolutions,
         confirm=False,

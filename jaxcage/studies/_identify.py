@@ -163,11 +163,10 @@ def misses(
     right (0) or wrong (as far as anything counts)."""
     models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
-    start = tuple(float(c) for c in models[0].starts(float(rpm[0] * np.pi / 30))[0])
     found = sweep_designs(
         models,
         rpm * np.pi / 30,
-        starts=[start],
+        starts=1,
         discard=REVOLUTIONS,
         revolutions=REVOLUTIONS,
         confirm=False,
