@@ -141,13 +141,35 @@ def test_a_measured_stiffness_decides():
 
 def test_verdicts_and_lanes_that_failed():
     assert [verdict_of(k, 64, 64) for k in (3, 4, 60, 61)] == ["calm", "not decided", "not decided", "chaotic"]
-    assert [verdict_of(0, n, 64) for n in (61, 60)] == ["calm", "not decided"]  # those that failed may be chaotic
+    assert [verdict_of(0, n, 64) for n in (61, 60)] == ["calm", "calm as computed"]  # those that failed may be chaotic
+    assert [verdict_of(k, 60, 64) for k in (3, 4, 56, 57, 60)] == [
+        "calm as computed",
+        *2 * ["not decided"],
+        *2 * ["chaotic as computed"],
+    ]
     assert verdict_of(0, 28, 28) == "too few draws" and binomial_interval(0, 29)[1] < 0.12
     found = by_stiffness()
     lost = np.zeros((64, 4), dtype=bool)
     lost[:, 3] = True
     failed = Ensemble(*(lost if name == "failed" else value for name, value in vars(found).items()))
     assert failed.verdict[3] == "too few draws" and np.isnan(failed.chance[3])
+    assert [bound[3] for bound in failed.interval] == [0.0, 1.0]
+
+
+def test_what_failed_widens_the_bars_and_is_said():
+    """4 of 64 draws fail: 0 of 64 to 4 of 64 are chaotic, 0 to 15.2 % with 95 % confidence (Clopper and Pearson)."""
+    found = by_stiffness()
+    lost = np.zeros((64, 4), dtype=bool)
+    lost[:4, 3] = True
+    some = dataclasses.replace(found, failed=lost)
+    assert some.interval[0][3] == 0.0 and some.interval[1][3] == pytest.approx(0.1524, abs=1e-3)
+    assert some.verdict[3] == "calm as computed" and some.chance[3] == 0.0
+    table = chances_table("mine", some)
+    assert table.rows[-1][2:] == ("calm where computed", "0 %", "0 to 15 %", "4")
+    notes = " ".join(chances_notes(some))
+    assert "4 of 256 simulations failed" in notes and "At 1 of 4 speeds the verdict is that of the draws" in notes
+    calm = dataclasses.replace(some, chaotic=np.zeros((64, 4), dtype=bool))
+    assert chances_notes(calm)[0].endswith("at every speed, as far as the draws could be computed.")
 
 
 def test_commands_answer_a_file_with_ranges_by_chances(

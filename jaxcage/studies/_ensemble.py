@@ -6,7 +6,7 @@ the draws are independent, so that their chaotic share has the error bar of a bi
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -32,6 +32,9 @@ FEWEST = 29
 CONFIDENCE = 0.95
 BINS = 4
 """Parts of a range whose chances are compared, to tell what an unknown has to say."""
+
+
+Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,12 +95,14 @@ class Ensemble:
 
     @property
     def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """Between which bounds the chance lies with 95 % confidence, by Clopper and Pearson."""
-        return binomial_interval(*self.counts)
+        """Between which bounds the chance lies with 95 % confidence, by Clopper and Pearson: the lower one as if all
+        that failed were calm, the upper one as if all were chaotic."""
+        (chaotic, of), draws = self.counts, len(self.place)
+        return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
 
     @property
-    def verdict(self) -> list[str]:
-        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided`, or `too few draws` at each speed."""
+    def verdict(self) -> list[Verdict]:
+        """What the chance means at each speed, see `verdict_of`."""
         return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
 
     @property
@@ -122,14 +127,23 @@ class Ensemble:
         return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
 
 
-def verdict_of(chaotic: int, finished: int, draws: int) -> str:
-    """What it means that `chaotic` of `finished` of `draws` draws are. Draws that failed are often those that hit the
-    land hardest: a speed is decided only if it would be whatever they do."""
+def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
+    """What it means that `chaotic` of `finished` of `draws` draws are.
+
+    `calm` and `chaotic` hold whatever those that failed would do: at most 5 %, or at least 95 %, of all draws are
+    chaotic then. `calm as computed` and `chaotic as computed` say that of those that finished; those that failed are
+    often the ones that hit the land hardest, and others drawn in their place would not be like them. `not decided` is
+    in between.
+    """
     if finished < FEWEST:
         return "too few draws"
     if chaotic + draws - finished <= RARE * draws:
         return "calm"
-    return "chaotic" if chaotic >= (1 - RARE) * draws else "not decided"
+    if chaotic >= (1 - RARE) * draws:
+        return "chaotic"
+    if chaotic <= RARE * finished:
+        return "calm as computed"
+    return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
 
 
 def binomial_interval(hits: Any, of: Any) -> tuple[np.ndarray, np.ndarray]:
