@@ -23,6 +23,8 @@ from ..sweeps import sweep_designs
 DRAWS, ENSEMBLE_SPEEDS = 64, 40
 REVOLUTIONS = 100
 """Left out, and observed: what one lane shows is an example of a chance, and need not be known to three digits."""
+SETTLED = 64
+"""A draw that is periodic by then is left where it is: as it is at the end of what is left out: three in five are."""
 ERROR = 1e-2
 """Of a revolution [clearances]: with fewer rungs than the default method has, a quarter of the draws fail."""
 RARE = 0.05
@@ -239,6 +241,7 @@ def _run(
         horizon=0,
         blocks=blocks,
         keep=32,
+        settled=SETTLED if discard >= SETTLED else 0,
         method=controlled(ERROR) if method is None else method,
         progress=progress,
     )

@@ -20,7 +20,7 @@ from ..integrate import AbstractMethod, controlled
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
 from ..sweeps import motions, sweep_designs
-from ._ensemble import ERROR, REVOLUTIONS, draw, sobol
+from ._ensemble import ERROR, REVOLUTIONS, SETTLED, draw, sobol
 
 
 DRAWS = 128
@@ -173,6 +173,7 @@ def misses(
         horizon=0,
         blocks=20,
         keep=32,
+        settled=SETTLED,
         method=controlled(ERROR) if method is None else method,
         progress=progress,
     )
