@@ -101,7 +101,7 @@ def test_the_template_declares_support_impact_and_contact_unknown(tmp_path: Path
     info = jc.parameter_info(file.model)
     assert all((u.range.lower, u.range.upper) == info[n].within for u in file.unknowns for n in u.names)
     assert "cage_mass" in file.left and "support.stiffness" in file.left and "unbalance" not in file.left
-    text = template().replace('cage_mass = "', 'cage_mass = "1')
+    text = template().replace('cage_mass = "0', 'cage_mass = "1')
     (tmp_path / "other.toml").write_text(text)
     assert "cage_mass" not in read_bearing(tmp_path / "other.toml").left
     assert tomllib.loads(text)["speeds"] == "shaft"

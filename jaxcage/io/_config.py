@@ -364,6 +364,16 @@ def _grade(given: Any) -> float:
     return float(given)
 
 
+HEAVIEST = 8900.0
+"""Density of bronze [kg/m^3]."""
+
+
+def _volume(model: CageModel) -> float:
+    """Of the space between shaft and housing [m^3]."""
+    b = model.bearing
+    return math.pi / 4 * float((b.outside_diameter**2 - b.bore**2) * b.width)
+
+
 def check_together(model: CageModel | BearingModel) -> None:
     """What ranges of single values cannot see.
 
@@ -383,6 +393,13 @@ def check_together(model: CageModel | BearingModel) -> None:
             raise ConfigError(
                 f"`inner_land_diameter` and `guidance_gap` must leave room for the cage within the outer ring's ribs, "
                 f"{rib:g} mm, but are {land:g} and {gap:g} mm."
+            )
+    if isinstance(model, CageModel):
+        mass, most = float(model.cage_mass), HEAVIEST * _volume(model)
+        if mass > most:
+            raise ConfigError(
+                f"`cage_mass` must be at most {most:.3g} kg, as of a bearing full of bronze, but is {mass:g} kg: "
+                'are these grams ("60 g")?'
             )
     if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
         raise ConfigError(

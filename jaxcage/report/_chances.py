@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..design import SobolIndices
-from ..io import Unknown
+from ..io import Range
 from ..studies import Band, Ensemble, verdict_of
 from ._operating import Operating
 from ._table import Table, number
@@ -89,14 +89,21 @@ def bands_table(name: str, bands: Sequence[Band]) -> Table:
     )
 
 
-def unknowns_table(unknowns: Sequence[Unknown], shares: Mapping[str, float], sources: Mapping[str, str]) -> Table:
+def unknowns_table(found: Ensemble) -> Table:
     """What is unknown, how much of the verdict hangs on it, and what to measure; the most telling first."""
-    order = sorted(unknowns, key=lambda u: -shares.get(u.label, 0.0))
+    shares = {c.label: c.share for c in found.clues()}
+    each = list(zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True))
     rows = [
-        (u.label, f"{u.range.lower:.4g} to {u.range.upper:.4g}", _share(shares.get(u.label)), sources[u.label])
-        for u in order
+        (u.label, range_words(u.range, unit), _share(shares.get(u.label)), source)
+        for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
     ]
-    return Table("What is not known [SI units]", ("value", "range", "of the verdict", "measure"), rows)
+    return Table("What is not known", ("value", "range", "of the verdict", "measure"), rows)
+
+
+def range_words(found: Range, unit: str) -> str:
+    """The ends of a range with their unit."""
+    low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
+    return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
 
 
 def _share(value: float | None) -> str:
@@ -105,12 +112,10 @@ def _share(value: float | None) -> str:
 
 def chances_tables(name: str, found: Ensemble) -> list[Table]:
     """All that is said of an ensemble."""
-    sources = {u.label: s for u, s in zip(found.unknowns, found.sources, strict=True)}
-    shares = {c.label: c.share for c in found.clues()}
     return [
         chances_table(name, found),
         bands_table(name, found.bands),
-        unknowns_table(found.unknowns, shares, sources),
+        unknowns_table(found),
     ]
 
 

@@ -1,10 +1,11 @@
 """What measurements leave of the ranges of a file, as documents and tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..io import Measurement
 from ..studies import Narrowed
+from ._chances import range_words
 from ._table import Table
 
 
@@ -32,11 +33,11 @@ def measured_table(found: Narrowed, measured: Sequence[Measurement]) -> Table:
     return Table("Measurements, and how far the nearest draw is off [tolerances]", ("measured", "off"), rows)
 
 
-def narrowed_table(found: Narrowed) -> Table:
-    """Each range before and after."""
-    ends = lambda r: f"{r.lower:.4g} to {r.upper:.4g}"
+def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
+    """Each range before and after, with the unit of each value by its label."""
+    ends = lambda label, r: range_words(r, units[label])
     rows = [
-        (u.label, ends(u.range), ends(r) if worth else "as it was", f"{share:.0%}")
+        (u.label, ends(u.label, u.range), ends(u.label, r) if worth else "as it was", f"{share:.0%}")
         for u, r, share, worth in zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True)
     ]
-    return Table("Ranges [SI units]", ("value", "before", "after", "left of it"), rows)
+    return Table("Ranges", ("value", "before", "after", "left of it"), rows)

@@ -78,6 +78,8 @@ class Ensemble:
     bands: tuple[Band, ...]
     discard: int
     revolutions: int
+    units: tuple[str, ...] = ()
+    """Of the unknowns, by name of the SI unit."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " speeds"]:
@@ -217,6 +219,7 @@ def ensemble(
         tuple(_bands(found)),
         discard,
         revolutions,
+        tuple(info[u.names[0]].unit for u in unknowns),
     )
 
 
