@@ -48,7 +48,7 @@ def coverage(draws: int, truths: int, speeds: int) -> None:
         total = np.sum(stated.chaotic & ~stated.failed, axis=1)  # speeds of one bearing are not independent
         variance += truths * float(np.var(total, ddof=1)) * (1 + truths / draws)
         print(f"design {i + 1}: {_line(stated)}", flush=True)
-        print(f"  planted: {_line(planted)}", flush=True)
+        print(f"  planted: {_line(planted, of_verdicts=False)}", flush=True)
     print(
         f"{counted} verdicts of {truths * len(DESIGNS)} planted bearings: {seen} chaotic, {expected:.1f} stated, "
         f"standard deviation {np.sqrt(variance):.1f}"
@@ -80,10 +80,10 @@ def _template() -> tuple[jc.CageModel, tuple[Unknown, ...]]:
     return file.model, file.unknowns
 
 
-def _line(found: Ensemble) -> str:
+def _line(found: Ensemble, of_verdicts: bool = True) -> str:
     chaotic, of = found.counts
     cells = zip(found.rpm, chaotic, of, found.verdict, strict=True)
-    return ", ".join(f"{r:.0f} rpm {k}/{n} {v}" for r, k, n, v in cells)
+    return ", ".join(f"{r:.0f} rpm {k}/{n} {v if of_verdicts else ''}".rstrip() for r, k, n, v in cells)
 
 
 def main() -> None:

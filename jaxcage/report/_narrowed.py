@@ -6,7 +6,7 @@ from typing import Any
 from ..io import Measurement
 from ..studies import Narrowed
 from ._chances import range_words
-from ._table import Table
+from ._table import Table, number
 
 
 def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[str, Any]:
@@ -29,8 +29,12 @@ def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[
 
 def measured_table(found: Narrowed, measured: Sequence[Measurement]) -> Table:
     """How near the best draw comes to each measurement."""
-    rows = [(str(m), f"{off:.2g}") for m, off in zip(measured, found.nearest, strict=True)]
-    return Table("Measurements, and how far the nearest draw is off [tolerances]", ("measured", "off"), rows)
+    rows = [
+        (m.quantity, number(m.cage_rpm), m.words or "-", f"{off:.2g}")
+        for m, off in zip(measured, found.nearest, strict=True)
+    ]
+    columns = ("measured", "cage [rpm]", "value", "off")
+    return Table("Measurements, and how far the nearest draw is off [tolerances]", columns, rows, ("cage [rpm]",))
 
 
 def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
