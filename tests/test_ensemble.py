@@ -1,5 +1,6 @@
 """Ranges in a file, what is drawn from them, and the chances that come of it."""
 
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -11,9 +12,19 @@ from report_example import findings
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.io import ConfigError, Range, Unknown, model_from, read_bearing, read_range, template, write_template
+from jaxcage.io import (
+    ConfigError,
+    Measurement,
+    Range,
+    Unknown,
+    model_from,
+    read_bearing,
+    read_range,
+    template,
+    write_template,
+)
 from jaxcage.report import chances_notes, chances_table, operating_chances, page, read_operating
-from jaxcage.studies import Band, Ensemble, binomial_interval, draw, ensemble, sobol, verdict_of
+from jaxcage.studies import Band, Ensemble, binomial_interval, draw, ensemble, identify, sobol, verdict_of
 
 
 STIFF = Unknown("support.stiffness", ("stiffness_x", "stiffness_y"), Range(1e4, 1e6))
@@ -90,7 +101,7 @@ def test_the_template_declares_support_impact_and_contact_unknown(tmp_path: Path
     info = jc.parameter_info(file.model)
     assert all((u.range.lower, u.range.upper) == info[n].within for u in file.unknowns for n in u.names)
     assert "cage_mass" in file.left and "support.stiffness" in file.left and "unbalance" not in file.left
-    text = template().replace('cage_mass = "', 'cage_mass = "1')
+    text = template().replace('cage_mass = "0', 'cage_mass = "1')
     (tmp_path / "other.toml").write_text(text)
     assert "cage_mass" not in read_bearing(tmp_path / "other.toml").left
     assert tomllib.loads(text)["speeds"] == "shaft"
@@ -130,13 +141,35 @@ def test_a_measured_stiffness_decides():
 
 def test_verdicts_and_lanes_that_failed():
     assert [verdict_of(k, 64, 64) for k in (3, 4, 60, 61)] == ["calm", "not decided", "not decided", "chaotic"]
-    assert [verdict_of(0, n, 64) for n in (61, 60)] == ["calm", "not decided"]  # those that failed may be chaotic
+    assert [verdict_of(0, n, 64) for n in (61, 60)] == ["calm", "calm as computed"]  # those that failed may be chaotic
+    assert [verdict_of(k, 60, 64) for k in (3, 4, 56, 57, 60)] == [
+        "calm as computed",
+        *2 * ["not decided"],
+        *2 * ["chaotic as computed"],
+    ]
     assert verdict_of(0, 28, 28) == "too few draws" and binomial_interval(0, 29)[1] < 0.12
     found = by_stiffness()
     lost = np.zeros((64, 4), dtype=bool)
     lost[:, 3] = True
     failed = Ensemble(*(lost if name == "failed" else value for name, value in vars(found).items()))
     assert failed.verdict[3] == "too few draws" and np.isnan(failed.chance[3])
+    assert [bound[3] for bound in failed.interval] == [0.0, 1.0]
+
+
+def test_what_failed_widens_the_bars_and_is_said():
+    """4 of 64 draws fail: 0 of 64 to 4 of 64 are chaotic, 0 to 15.2 % with 95 % confidence (Clopper and Pearson)."""
+    found = by_stiffness()
+    lost = np.zeros((64, 4), dtype=bool)
+    lost[:4, 3] = True
+    some = dataclasses.replace(found, failed=lost)
+    assert some.interval[0][3] == 0.0 and some.interval[1][3] == pytest.approx(0.1524, abs=1e-3)
+    assert some.verdict[3] == "calm as computed" and some.chance[3] == 0.0
+    table = chances_table("mine", some)
+    assert table.rows[-1][2:] == ("calm where computed", "0 %", "0 to 15 %", "4")
+    notes = " ".join(chances_notes(some))
+    assert "4 of 256 simulations failed" in notes and "At 1 of 4 speeds the verdict is that of the draws" in notes
+    calm = dataclasses.replace(some, chaotic=np.zeros((64, 4), dtype=bool))
+    assert chances_notes(calm)[0].endswith("at every speed, as far as the draws could be computed.")
 
 
 def test_commands_answer_a_file_with_ranges_by_chances(
@@ -161,6 +194,32 @@ def test_commands_answer_a_file_with_ranges_by_chances(
     assert (
         "not decided by what is known" in text and "As the template has them, of another bearing: guidance_gap" in text
     )
+
+
+class Asked(Exception):
+    """What a sweep was asked for, instead of one."""
+
+
+@pytest.mark.parametrize("place", ["_ensemble", "_identify"])
+def test_every_draw_starts_on_its_own_rib(monkeypatch: pytest.MonkeyPatch, place: str):
+    """Where contact begins earlier, the resting place of another draw lies inside the rib: a stiff one shoots the cage
+    off at speeds that no steps follow."""
+
+    def refuse(models: Any, speeds: Any, *, starts: Any, **options: Any) -> None:
+        raise Asked(models, speeds, starts)
+
+    monkeypatch.setattr(f"jaxcage.studies.{place}.sweep_designs", refuse)
+    model = dataclasses.replace(jc.case("1a"), clearance_reading="radial")
+    onset, speeds = Unknown("contact.onset", ("onset",), Range(0.85, 0.99)), jc.rpm(3000, 4000, 2)
+    with pytest.raises(Asked) as asked:
+        if place == "_ensemble":
+            ensemble(model, [onset], speeds, draws=8)
+        else:
+            identify(model, [onset], [Measurement("calm", 4000.0, 0.0, 0.0)], draws=16)
+    models, speeds, starts = asked.value.args
+    places = [jc.sweeps.initial_states(m, np.atleast_1d(speeds), starts)[0] for m in models]
+    rest = [float(m.excursion(tuple(each[0]))) for m, each in zip(models, places, strict=True)]
+    assert len(models) >= 8 and rest == pytest.approx([float(m.contact.onset) for m in models], rel=1e-6)
 
 
 @pytest.mark.wide

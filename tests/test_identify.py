@@ -155,3 +155,10 @@ def test_a_cage_meets_its_own_measurements():
     own = [Measurement("orbit size", 12000.0, size, 1e-6), Measurement("whirl frequency", 12000.0, whirl, 1.0)]
     again = misses(model, (STIFF, HIT), own, place)
     assert np.all(again[0] <= 1e-6) and again[1, 0] > 1
+
+
+def test_a_tight_tolerance_closes_a_range_as_a_wide_one_does():
+    """What counted no more than 5 tolerances left all draws alike where three in four were further off."""
+    tight = narrow([STIFF, HIT], lambda place: np.abs(place[:, :1] - 0.3) / 1e-3, draws=64)
+    assert tight.lower[0] < 0.3 < tight.upper[0] and tight.share[0] < 0.05
+    assert tight.share[1] > 0.7

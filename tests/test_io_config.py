@@ -52,6 +52,11 @@ def test_units(text: str, unit: str, value: float):
         ("", "m", "not a number with a unit"),
         ("1 2 mm", "m", "unknown unit"),
         ("0.45 furlongs_per", "m", "unknown unit"),
+        ("60 C", "K", 'has the unit "C", where a unit like "degC" is wanted'),
+        ("0,45 mm", "m", 'is "0,45 mm", but numbers are written with a point and without commas'),
+        ("1,450 N", "N", "with a point and without commas"),
+        ("1e4 - 1e6 N/m", "N/m", 'but a range is written with two points, such as "1e4 .. 1e6 N/m"'),
+        ("0.2 mm to 0.3 mm", "m", "a range is written with two points"),
         ("0.45 kg", "m", 'has the unit "kg", where a unit like "m" is wanted'),
         ("0.45 m", "1", 'has the unit "m", where no unit is wanted'),
         ("50 Hz", "rad/s", "is in Hz"),
@@ -177,3 +182,15 @@ def test_example_in_the_documentation_is_valid(tmp_path: Path):
     assert float(model.guidance_gap) == pytest.approx(0.5e-3)
     assert isinstance(model.impact, jc.forces.RollerPassImpact)
     assert float(model.impact.oscillator.bar_mass) == pytest.approx(4e-3)
+
+
+@pytest.mark.parametrize("text, value", [("1e-4 m", 1e-4), ("5 m^-1 m^2", 5.0), ("-2E-3 m", -2e-3)])
+def test_signs_within_a_number_or_a_unit_are_no_range(text: str, value: float):
+    assert to_si(text, "m") == pytest.approx(value, rel=1e-12)
+
+
+def test_a_cage_heavier_than_its_bearing_is_refused():
+    """The NU2310 has 2.68 kg of bronze between shaft and housing: pi/4 (0.11^2 - 0.05^2) 0.04 m^3 of 8900 kg/m^3."""
+    with pytest.raises(ConfigError, match=r"`cage_mass` must be at most 2.68 kg, .* but is 60 kg: are these grams"):
+        model_from({"base": "1a", "cage_mass": 60})
+    assert float(model_from({"base": "1a", "cage_mass": "2.6 kg"}).cage_mass) == 2.6

@@ -108,7 +108,7 @@ def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):
         ('model = "ball"', "`model` must be one of cage, bearing, but is 'ball'"),
         ('model = "bearing"\nbase = "1a"', "`base` must be one of nu2310, but is '1a'"),
         ('base = "nu2310"\nload = "3 kg"', '`load` must be a number from 0 to 1e+07 N, but has the unit "kg"'),
-        ('base = "nu2310"\nlaod = 3', "Key `laod` at the top level must be one of base, model, speeds, cage_mass"),
+        ('base = "nu2310"\nlaod = 3', "Key `laod` at the top level must be one of base, model, speeds, units, cage_mass"),
         ('base = "nu2310"\n[pockets]\nfriction = 3', "Key `friction` in [pockets] must be one of pocket_stiffness"),
         ('base = "nu2310"\n[traction]\npeak = 0.01', "`peak` must be above `rest` and `limit`, but is 0.01"),
         ('base = "nu2310"\nguidance = "roller"', "`guidance` must be one of outer, inner, but is 'roller'"),

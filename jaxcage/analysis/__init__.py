@@ -68,6 +68,7 @@ from ._hazard import Hazard as Hazard, hazard as hazard
 from ._labels import (
     CHAOS_THRESHOLD as CHAOS_THRESHOLD,
     CLOSING_TOLERANCE as CLOSING_TOLERANCE,
+    LONGEST_PERIOD as LONGEST_PERIOD,
     closing_period as closing_period,
     label_lanes as label_lanes,
     too_few_revolutions as too_few_revolutions,

@@ -43,14 +43,15 @@ def identify_from(job: Job[IdentifyOptions]) -> Report:
     if not found.met:
         why = f"None of {found.draws} draws does what was measured in all rows: the nearest is {_off(document)}"
         return Report(document | {"file": None}, tables, failure=why)
-    changed = {u.label: (r, info[u.names[0]].unit) for u, r in _changed(found)}
+    units = {u.label: info[u.names[0]].unit for u in job.unknowns}
+    changed = {u.label: (r, units[u.label]) for u, r in _changed(found)}
     path = job.path(".toml")
     job.text(with_ranges(read_bytes(options.case).decode(), changed), path, "file")
     notes = [
         f"{found.accepted} of {found.draws} draws of the last of {found.stages} stages do what was measured.",
         f"What it decides: jaxcage sweep {path}",
     ]
-    return Report(document, [*tables, report.narrowed_table(found)], notes)
+    return Report(document, [*tables, report.narrowed_table(found, units)], notes)
 
 
 def _changed(found: Narrowed) -> list[tuple[Unknown, Range]]:

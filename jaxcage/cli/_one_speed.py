@@ -9,7 +9,7 @@ import numpy as np
 from .._errors import InputError, NoResult
 from ..analysis import OrbitMeasures, Sweep, cage_forces, orbit_measures
 from ..integrate import OUTCOMES, simulate
-from ..io import strobe_columns, write_trajectory
+from ..io import strobe_columns, trajectory_columns
 from ..plotting import simulation_figure, strobe_section
 from ..report import Table, chosen, number, require_some
 from ..sweeps import rpm, sweep
@@ -36,7 +36,7 @@ def simulate_at(job: Job[SimulateOptions]) -> Report:
     forces, measures = cage_forces(model, trajectory), orbit_measures(model, trajectory)
     at, title = f"_{options.speed:g}rpm", f"{job.name}, {job.at_speed}, {options.revolutions} revolutions"
     job.figure(simulation_figure(trajectory, forces, float(model.clearance), title), detail=at)
-    job.listed("data", write_trajectory(job.path(f"{at}.csv"), trajectory, forces))
+    job.columns(trajectory_columns(trajectory, forces), detail=at)
     document = {
         "speed_rpm": options.speed,
         "shaft_speed_rpm": options.speed / job.ratio,

@@ -39,7 +39,9 @@ def report_on(job: Job[ReportOptions]) -> Report:
         )
         drawn = drawn_chances(job, options.draws, say) if job.unknowns and options.draws else None
     table, left = (None, ()) if job.file is None else (job.file.table, job.file.left)
-    html = report.page(findings, operating, table=table, command=_command(options), chances=drawn, left=left)
+    html = report.page(
+        findings, operating, table=table, command=_command(options), chances=drawn, left=left, units=job.units
+    )
     job.text(html, job.path(".html"), "report")
     judged = report.judge(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())

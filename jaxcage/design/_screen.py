@@ -119,8 +119,7 @@ def screen(
     - `best`: how many candidates to return.
     - `by`: what is held against the measured edges: `motion`, chaotic or not at each speed, smoothly, which works far
       from the answer; or the `edges` of the zones found, which is what counts near it.
-    - `starts`: initial states, by default the first of the first system's own, for all cases; a speed is chaotic if
-      any of them is.
+    - `starts`: initial states, by default the first of each design's own; a speed is chaotic if any of them is.
     - `discard`, `revolutions`: revolutions left out and observed, at each speed.
     - `report`: called with the designs tried so far and the best candidate.
 
@@ -143,11 +142,10 @@ def screen(
         new: list[Candidate] = []
         for part in np.array_split(places, -(-len(places) // TOGETHER)):
             models = [m for place in part for m in with_values(systems, unknowns, place).values()]
-            first = starts or [tuple(float(c) for c in models[0].starts(float(speeds[len(speeds) // 2]))[0])]
             swept = sweep_designs(
                 models,
                 speeds,
-                starts=first,
+                starts=1 if starts is None else starts,
                 discard=discard,
                 revolutions=revolutions,
                 exponents=1,

@@ -3,6 +3,7 @@
 | module          | responsibility                                                            |
 |-----------------|---------------------------------------------------------------------------|
 | `_units`        | texts with a unit to SI numbers                                           |
+| `_shown_units`  | tables, figures and files in the units that are asked for                 |
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
 | `_config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
 | `_write_config` | a model to nested mapping or TOML                                         |
@@ -58,6 +59,7 @@ from ._measurements import Measurement as Measurement, read_measurements as read
 from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
+from ._shown_units import UNIT as UNIT, ShownUnits as ShownUnits
 from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner
 from ._tables import write_tables as write_tables
 from ._template import Subject as Subject, template as template, write_template as write_template

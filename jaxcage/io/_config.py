@@ -34,6 +34,7 @@ from ..models.whole import WHOLE_BEARINGS
 from ._files import read_bytes
 from ._ranges import Range
 from ._schema import KINDS, ConfigError, Known, read_value, submodules, values
+from ._shown_units import ShownUnits
 from ._speeds import WHOSE, Whose
 from ._template import Subject, left_as_written
 from ._units import printable, shown
@@ -83,6 +84,8 @@ class BearingFile(Generic[M]):
     """Values that are still those of the template that `jaxcage init` writes, by dotted name."""
     table: Mapping[str, Any]
     """As it was read."""
+    units: ShownUnits = ShownUnits()
+    """Units of tables and figures: key `units`."""
 
 
 def load_model(path: str | Path) -> CageModel:
@@ -123,7 +126,8 @@ def _read(path: str | Path, make: Callable[[Mapping[str, Any], list[Unknown]], M
     try:
         model = make(table, unknowns)
         subject = subject_of(table)
-        return BearingFile(model, _whose(table, subject), tuple(unknowns), left_as_written(table, subject), table)
+        left = left_as_written(table, subject)
+        return BearingFile(model, _whose(table, subject), tuple(unknowns), left, table, _units(table))
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
 
@@ -194,8 +198,8 @@ def _made(
     unknowns: list[Unknown] | None,
 ) -> M:
     """A model of `kind`, from nothing or from one of `bases`."""
-    rest, start, _ = dict(table), None, _whose(table)
-    for key in ("speeds", "model"):
+    rest, start, _ = dict(table), None, (_whose(table), _units(table))
+    for key in ("speeds", "model", "units"):
         rest.pop(key, None)
     if "base" in rest:
         name = rest.pop("base")
@@ -222,6 +226,18 @@ def _whose(table: Mapping[str, Any], subject: Subject = "cage") -> Whose:
     if given not in WHOSE:
         raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(given)}.")
     return given
+
+
+def _units(table: Mapping[str, Any]) -> ShownUnits:
+    given = table.get("units")
+    if given is None:
+        return ShownUnits()
+    if not isinstance(given, str):
+        raise ConfigError(f"`units` must be a text, but is {shown(given)}.")
+    try:
+        return ShownUnits.read(given)
+    except ValueError as error:
+        raise ConfigError(f"`units` {error}.") from error
 
 
 def _build(
@@ -313,7 +329,12 @@ def _dotted(path: tuple[str, ...], name: str = "") -> str:
 def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple[str, ...]) -> None:
     extra = [key for (where, key) in _READY_MADE if (where,) == path]
     keys = [*keys, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
-    allowed = [*([] if path else ["base", "model", "speeds"]), *extra, *keys, *(f"[{name}]" for name in tables)]
+    allowed = [
+        *([] if path else ["base", "model", "speeds", "units"]),
+        *extra,
+        *keys,
+        *(f"[{name}]" for name in tables),
+    ]
     for key in table:
         if key not in keys and key not in tables:
             where = f" in [{_dotted(path)}]" if path else " at the top level"
@@ -343,6 +364,16 @@ def _grade(given: Any) -> float:
     return float(given)
 
 
+HEAVIEST = 8900.0
+"""Density of bronze [kg/m^3]."""
+
+
+def _volume(model: CageModel) -> float:
+    """Of the space between shaft and housing [m^3]."""
+    b = model.bearing
+    return math.pi / 4 * float((b.outside_diameter**2 - b.bore**2) * b.width)
+
+
 def check_together(model: CageModel | BearingModel) -> None:
     """What ranges of single values cannot see.
 
@@ -362,6 +393,13 @@ def check_together(model: CageModel | BearingModel) -> None:
             raise ConfigError(
                 f"`inner_land_diameter` and `guidance_gap` must leave room for the cage within the outer ring's ribs, "
                 f"{rib:g} mm, but are {land:g} and {gap:g} mm."
+            )
+    if isinstance(model, CageModel):
+        mass, most = float(model.cage_mass), HEAVIEST * _volume(model)
+        if mass > most:
+            raise ConfigError(
+                f"`cage_mass` must be at most {most:.3g} kg, as of a bearing full of bronze, but is {mass:g} kg: "
+                'are these grams ("60 g")?'
             )
     if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
         raise ConfigError(

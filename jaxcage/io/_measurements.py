@@ -44,10 +44,15 @@ class Measurement:
 
     def __str__(self) -> str:
         at = f"{self.quantity} at {self.cage_rpm:.0f} rpm of the cage"
+        return f"{at}: {self.words}" if self.words else at
+
+    @property
+    def words(self) -> str:
+        """The value with its tolerance and unit; nothing where something is seen or not."""
         if not UNITS[self.quantity]:
-            return at
+            return ""
         unit, factor = ("mm", 1e3) if UNITS[self.quantity] == "m" else (UNITS[self.quantity], 1.0)
-        return f"{at}: {factor * self.value:.4g} ± {factor * self.tolerance:.2g} {unit}"
+        return f"{factor * self.value:.4g} ± {factor * self.tolerance:.2g} {unit}"
 
 
 def read_measurements(path: str | Path, speeds: Whose = "cage", cage_speed_ratio: float = 1.0) -> list[Measurement]:

@@ -8,7 +8,6 @@ from ._schema import ConfigError
 
 
 _TABLE = re.compile(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?")
-_NUMBER = "{:.4g}"
 
 
 def with_ranges(text: str, ranges: Mapping[str, tuple[Range, str]]) -> str:
@@ -37,5 +36,5 @@ def with_ranges(text: str, ranges: Mapping[str, tuple[Range, str]]) -> str:
 
 def range_text(found: Range, unit: str) -> str:
     """A range as `read_range` reads it."""
-    ends = f"({_NUMBER.format(found.lower)} .. {_NUMBER.format(found.upper)})"
-    return f"{_NUMBER.format(found.best)} {ends}" + ("" if unit == "1" else f" {unit}")
+    best, low, high = (re.sub(r"e\+?(-?)0*", r"e\1", f"{x:.4g}") for x in (found.best, found.lower, found.upper))
+    return f"{best} ({low} .. {high})" + ("" if unit == "1" else f" {unit}")

@@ -11,11 +11,17 @@ if TYPE_CHECKING:
     import pint
 
 
+_SIZE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 _UNIT = re.compile(r"[\w°µΩ%*/^().·⁻ +-]{1,60}")
 """What a unit is written with; pint takes a comment, a colon or a line end for nothing."""
+_COMMA = re.compile(r"\s*[-+]?\d*,\d")
+_DASH = re.compile(rf"\s*{_SIZE}(?:\s+[^\s\d]+)?\s+(?:-|–|to)\s+{_SIZE}")
+"""Two numbers with a dash between them."""
 _TOWER = re.compile(r"[\d)]\s*(?:\^|\*\*)|\d{3}")
 """A power of a number, or a large number: pint would work out 9**9**9 to its last digit."""
+_LIKE = {"K": "degC"}
+"""What people write; "C" alone is a coulomb."""
 LONGEST = 100
 """Characters of a value that a message shows."""
 
@@ -38,6 +44,10 @@ def to_si(text: str, unit: str) -> float:
     unit, for a unit nobody knows, and for one of another dimension, where a radian counts as one: 3000 1/min may be
     revolutions.
     """
+    if _COMMA.match(text):
+        raise ValueError(f'is "{printable(text)}", but numbers are written with a point and without commas')
+    if _DASH.match(text):
+        raise ValueError(f'is "{printable(text)}", but a range is written with two points, such as "1e4 .. 1e6 N/m"')
     match = _NUMBER_AND_UNIT.fullmatch(text)
     if match is None:
         raise ValueError(f'is "{printable(text)}", which is not a number with a unit')
@@ -57,7 +67,7 @@ def _convert(number: float, given: str, unit: str) -> float:
     except Exception as error:  # pint's parser leaks errors of many kinds
         raise ValueError(unknown) from error
     target = registry.parse_units(unit)
-    wanted = f'a unit like "{unit}"' if unit else "no unit"
+    wanted = f'a unit like "{_LIKE.get(unit, unit)}"' if unit else "no unit"
     speeds = '"rpm" or "rad/s"'
     if unit in ("rad/s", "rpm") and any(name.endswith("hertz") for name in source._units):
         raise ValueError(f"is in Hz, where {speeds} is wanted")
@@ -69,6 +79,22 @@ def _convert(number: float, given: str, unit: str) -> float:
     if not same:
         raise ValueError(f'has the unit "{given}", where {speeds if unit in ("rad/s", "rpm") else wanted} is wanted')
     return found
+
+
+@functools.cache
+def known_unit(text: str) -> str | None:
+    """What a unit measures, such as `meter` or `kilogram * meter / second ** 2`, without a factor; None for no unit."""
+    if not text or _UNIT.fullmatch(text) is None or _TOWER.search(text):
+        return None
+    try:
+        return str(_registry().Quantity(1.0, text).to_base_units().units).replace("radian / second", "1/second")
+    except Exception:  # pint's parser leaks errors of many kinds
+        return None
+
+
+def times(unit: str, other: str) -> float:
+    """How many of `other` make one of `unit`."""
+    return float(_registry().Quantity(1.0, unit).to(other).magnitude)
 
 
 def _base_units(unit: Any) -> set[str]:

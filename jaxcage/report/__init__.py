@@ -133,6 +133,7 @@ from ._statics import (
 from ._table import (
     Table as Table,
     chosen as chosen,
+    in_units as in_units,
     number as number,
     shares_table as shares_table,
     shown_unit as shown_unit,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..design import SobolIndices
-from ..io import Unknown
+from ..io import Range
 from ..studies import Band, Ensemble, verdict_of
 from ._operating import Operating
 from ._table import Table, number
@@ -39,17 +39,35 @@ def chances_table(name: str, found: Ensemble) -> Table:
     """Stretches of speeds with one verdict, and the chances within them."""
     low, high = found.interval
     verdict, rows, first = found.verdict, [], 0
+    lost = len(found.place) - found.counts[1]
     for i in range(1, len(verdict) + 1):
         if i == len(verdict) or verdict[i] != verdict[first]:
             part = slice(first, i)
             p = found.chance[part]
-            said = "not decided by what is known" if verdict[first] == "not decided" else verdict[first]
             chance = _span(p[np.isfinite(p)])
             bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
-            rows.append((number(float(found.rpm[first])), number(float(found.rpm[i - 1])), said, chance, bar))
+            ends = number(float(found.rpm[first])), number(float(found.rpm[i - 1]))
+            rows.append((*ends, verdict_words(verdict[first]), chance, bar, _counts(lost[part])))
             first = i
     title = f"Chance of chaos of {name}, {found.place.shape[0]} draws from {len(found.unknowns)} ranges [rpm]"
-    return Table(title, ("from", "to", "verdict", "chance", "95 % bars"), rows, ("from", "to"))
+    return Table(title, ("from", "to", "verdict", "chance", "95 % bars", "draws that failed"), rows, ("from", "to"))
+
+
+_WORDS = {
+    "not decided": "not decided by what is known",
+    "calm as computed": "calm where computed",
+    "chaotic as computed": "chaotic where computed",
+}
+
+
+def verdict_words(verdict: str) -> str:
+    """A verdict for people."""
+    return _WORDS.get(verdict, verdict)
+
+
+def _counts(lost: np.ndarray) -> str:
+    low, high = int(lost.min()), int(lost.max())
+    return f"{low}" if low == high else f"{low} to {high}"
 
 
 def _span(p: np.ndarray) -> str:
@@ -71,14 +89,21 @@ def bands_table(name: str, bands: Sequence[Band]) -> Table:
     )
 
 
-def unknowns_table(unknowns: Sequence[Unknown], shares: Mapping[str, float], sources: Mapping[str, str]) -> Table:
+def unknowns_table(found: Ensemble) -> Table:
     """What is unknown, how much of the verdict hangs on it, and what to measure; the most telling first."""
-    order = sorted(unknowns, key=lambda u: -shares.get(u.label, 0.0))
+    shares = {c.label: c.share for c in found.clues()}
+    each = list(zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True))
     rows = [
-        (u.label, f"{u.range.lower:.4g} to {u.range.upper:.4g}", _share(shares.get(u.label)), sources[u.label])
-        for u in order
+        (u.label, range_words(u.range, unit), _share(shares.get(u.label)), source)
+        for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
     ]
-    return Table("What is not known [SI units]", ("value", "range", "of the verdict", "measure"), rows)
+    return Table("What is not known", ("value", "range", "of the verdict", "measure"), rows)
+
+
+def range_words(found: Range, unit: str) -> str:
+    """The ends of a range with their unit."""
+    low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
+    return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
 
 
 def _share(value: float | None) -> str:
@@ -87,12 +112,10 @@ def _share(value: float | None) -> str:
 
 def chances_tables(name: str, found: Ensemble) -> list[Table]:
     """All that is said of an ensemble."""
-    sources = {u.label: s for u, s in zip(found.unknowns, found.sources, strict=True)}
-    shares = {c.label: c.share for c in found.clues()}
     return [
         chances_table(name, found),
         bands_table(name, found.bands),
-        unknowns_table(found.unknowns, shares, sources),
+        unknowns_table(found),
     ]
 
 
@@ -104,13 +127,24 @@ def chances_notes(found: Ensemble) -> list[str]:
     ]
     if np.any(found.failed):
         lost = f"{int(np.sum(found.failed))} of {found.failed.size}"
-        notes.append(f"{lost} simulations failed: they are in no chance, and a verdict holds whatever they would do.")
+        notes.append(
+            f"{lost} simulations failed: they are in no chance; bars and the verdicts calm and chaotic hold whatever "
+            "they would do."
+        )
+    partly = [v for v in found.verdict if v.endswith("as computed")]
+    if partly:
+        notes.append(
+            f"At {len(partly)} of {found.rpm.size} speeds the verdict is that of the draws that could be computed. "
+            "The rest are not like them, and more draws do not replace these: other steps may (--solver, --steps)."
+        )
     clues = found.clues()
     open_ = found.rpm[found.undecided]
     if open_.size:
         notes.insert(0, f"Not decided by what is known at {open_.size} of {found.rpm.size} speeds. {measures(clues)}")
     elif "too few draws" in found.verdict:
         notes.insert(0, "Too few draws finished to call a speed calm or chaotic: take more --draws.")
+    elif partly:
+        notes.insert(0, "What is known decides at every speed, as far as the draws could be computed.")
     else:
         notes.insert(0, "What is known decides at every speed.")
     return notes
@@ -134,7 +168,7 @@ def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: fl
         hits, of = int(np.sum(np.any(found.chaotic[done][:, which], axis=1))), int(np.sum(done))
         chance = hits / of if of else float("nan")
         verdict = verdict_of(hits, of, len(done))
-        said = "not decided by what is known" if verdict == "not decided" else verdict
+        said = verdict_words(verdict)
         measure = measures(found.clues(which)) if verdict == "not decided" else "-"
         rows.append((str(at), str(at.of_shaft(ratio)), f"{100 * chance:.0f} %", said, measure))
     return Table(

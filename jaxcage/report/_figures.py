@@ -12,12 +12,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
+from ..io import ShownUnits
 from ..orbits import Sensitivity
 from ..plotting import (
     Style,
     add_shaft_axes,
     chance_of_chaos,
     elasticity_bars,
+    in_units,
     load_bars,
     mark_operating,
     multiplier_circle,
@@ -55,18 +57,23 @@ class Picture:
     """Size [px at 96 per inch]."""
 
 
-def pictures(findings: Findings, operating: list[Operating], chances: Ensemble | None = None) -> dict[str, Picture]:
+def pictures(
+    findings: Findings, operating: list[Operating], chances: Ensemble | None, units: ShownUnits
+) -> dict[str, Picture]:
     """All figures that the findings allow, by name."""
-    drawn = {picture.key: picture for picture in _draw(findings, operating)}
-    return drawn if chances is None else drawn | {"chance": _chance(findings, operating, chances)}
+    picture = functools.partial(_picture, float(findings.model.bearing.cage_speed_ratio), units)
+    drawn = {each.key: each for each in _draw(findings, operating, picture)}
+    return drawn if chances is None else drawn | {"chance": _chance(findings, operating, chances, picture)}
 
 
-def _chance(findings: Findings, operating: list[Operating], found: Ensemble) -> Picture:
+Painter = Callable[..., Picture]
+
+
+def _chance(findings: Findings, operating: list[Operating], found: Ensemble, picture: Painter) -> Picture:
     bands = [(b.name, b.rpm) for b in found.bands]
     figure = _alone(9.5, 4.6, lambda ax: chance_of_chaos(found.rpm, found.chance, found.interval, bands, ax))
     mark_operating(figure.axes[0], [(at.low_rpm, at.high_rpm) for at in operating])
-    return _picture(
-        float(findings.model.bearing.cage_speed_ratio),
+    return picture(
         "chance",
         figure,
         f"Chance of chaos of {findings.name} over cage speed with 95 % bars, and bands of the edges beneath.",
@@ -75,9 +82,8 @@ def _chance(findings: Findings, operating: list[Operating], found: Ensemble) -> 
     )
 
 
-def _draw(findings: Findings, operating: list[Operating]) -> Iterator[Picture]:
+def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> Iterator[Picture]:
     swept, found, name = findings.sweep, findings.found, findings.name
-    picture = functools.partial(_picture, float(findings.model.bearing.cage_speed_ratio))
     spans = [(at.low_rpm, at.high_rpm) for at in operating]
     limits = float(swept.rpm[0]), float(swept.rpm[-1])
     strip = _alone(
@@ -195,8 +201,8 @@ def _map_words(findings: Findings) -> tuple[str, str]:
     )
 
 
-def _picture(cage_speed_ratio: float, key: str, figure: Figure, alt: str, caption: str) -> Picture:
-    add_shaft_axes(figure, cage_speed_ratio)
+def _picture(cage_speed_ratio: float, units: ShownUnits, key: str, figure: Figure, alt: str, caption: str) -> Picture:
+    in_units(add_shaft_axes(figure, cage_speed_ratio), units)
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (96 * float(x) for x in figure.get_size_inches())

@@ -1,11 +1,12 @@
 """What measurements leave of the ranges of a file, as documents and tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..io import Measurement
 from ..studies import Narrowed
-from ._table import Table
+from ._chances import range_words
+from ._table import Table, number
 
 
 def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[str, Any]:
@@ -28,15 +29,19 @@ def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[
 
 def measured_table(found: Narrowed, measured: Sequence[Measurement]) -> Table:
     """How near the best draw comes to each measurement."""
-    rows = [(str(m), f"{off:.2g}") for m, off in zip(measured, found.nearest, strict=True)]
-    return Table("Measurements, and how far the nearest draw is off [tolerances]", ("measured", "off"), rows)
-
-
-def narrowed_table(found: Narrowed) -> Table:
-    """Each range before and after."""
-    ends = lambda r: f"{r.lower:.4g} to {r.upper:.4g}"
     rows = [
-        (u.label, ends(u.range), ends(r) if worth else "as it was", f"{share:.0%}")
+        (m.quantity, number(m.cage_rpm), m.words or "-", f"{off:.2g}")
+        for m, off in zip(measured, found.nearest, strict=True)
+    ]
+    columns = ("measured", "cage [rpm]", "value", "off")
+    return Table("Measurements, and how far the nearest draw is off [tolerances]", columns, rows, ("cage [rpm]",))
+
+
+def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
+    """Each range before and after, with the unit of each value by its label."""
+    ends = lambda label, r: range_words(r, units[label])
+    rows = [
+        (u.label, ends(u.label, u.range), ends(u.label, r) if worth else "as it was", f"{share:.0%}")
         for u, r, share, worth in zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True)
     ]
-    return Table("Ranges [SI units]", ("value", "before", "after", "left of it"), rows)
+    return Table("Ranges", ("value", "before", "after", "left of it"), rows)

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from ..io import ShownUnits
+
 
 @dataclasses.dataclass(frozen=True)
 class Table:
@@ -51,6 +53,14 @@ def with_shaft(table: Table, cage_speed_ratio: float) -> Table:
     )
     rows = [each(row, lambda cell: _NUMBER.sub(times, cell)) for row in table.rows]
     return Table(table.title, heads, rows)
+
+
+def in_units(table: Table, units: ShownUnits) -> Table:
+    """The table in the units that are asked for."""
+    if not units.names:
+        return table
+    columns, rows = units.in_rows(table.columns, table.rows)
+    return Table(units.in_text(table.title), columns, rows, table.speeds)
 
 
 def chosen(found: Any, names: str) -> dict[str, Any]:

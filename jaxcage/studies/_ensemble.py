@@ -6,7 +6,7 @@ the draws are independent, so that their chaotic share has the error bar of a bi
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -23,6 +23,8 @@ from ..sweeps import sweep_designs
 DRAWS, ENSEMBLE_SPEEDS = 64, 40
 REVOLUTIONS = 100
 """Left out, and observed: what one lane shows is an example of a chance, and need not be known to three digits."""
+SETTLED = 64
+"""A draw that is periodic by then is left where it is: as it is at the end of what is left out: three in five are."""
 ERROR = 1e-2
 """Of a revolution [clearances]: with fewer rungs than the default method has, a quarter of the draws fail."""
 RARE = 0.05
@@ -32,6 +34,9 @@ FEWEST = 29
 CONFIDENCE = 0.95
 BINS = 4
 """Parts of a range whose chances are compared, to tell what an unknown has to say."""
+
+
+Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,6 +78,8 @@ class Ensemble:
     bands: tuple[Band, ...]
     discard: int
     revolutions: int
+    units: tuple[str, ...] = ()
+    """Of the unknowns, by name of the SI unit."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " speeds"]:
@@ -92,12 +99,14 @@ class Ensemble:
 
     @property
     def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """Between which bounds the chance lies with 95 % confidence, by Clopper and Pearson."""
-        return binomial_interval(*self.counts)
+        """Between which bounds the chance lies with 95 % confidence, by Clopper and Pearson: the lower one as if all
+        that failed were calm, the upper one as if all were chaotic."""
+        (chaotic, of), draws = self.counts, len(self.place)
+        return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
 
     @property
-    def verdict(self) -> list[str]:
-        """`calm` (chance at most 5 %), `chaotic` (at least 95 %), `not decided`, or `too few draws` at each speed."""
+    def verdict(self) -> list[Verdict]:
+        """What the chance means at each speed, see `verdict_of`."""
         return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
 
     @property
@@ -122,14 +131,23 @@ class Ensemble:
         return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
 
 
-def verdict_of(chaotic: int, finished: int, draws: int) -> str:
-    """What it means that `chaotic` of `finished` of `draws` draws are. Draws that failed are often those that hit the
-    land hardest: a speed is decided only if it would be whatever they do."""
+def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
+    """What it means that `chaotic` of `finished` of `draws` draws are.
+
+    `calm` and `chaotic` hold whatever those that failed would do: at most 5 %, or at least 95 %, of all draws are
+    chaotic then. `calm as computed` and `chaotic as computed` say that of those that finished; those that failed are
+    often the ones that hit the land hardest, and others drawn in their place would not be like them. `not decided` is
+    in between.
+    """
     if finished < FEWEST:
         return "too few draws"
     if chaotic + draws - finished <= RARE * draws:
         return "calm"
-    return "chaotic" if chaotic >= (1 - RARE) * draws else "not decided"
+    if chaotic >= (1 - RARE) * draws:
+        return "chaotic"
+    if chaotic <= RARE * finished:
+        return "calm as computed"
+    return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
 
 
 def binomial_interval(hits: Any, of: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -201,6 +219,7 @@ def ensemble(
         tuple(_bands(found)),
         discard,
         revolutions,
+        tuple(info[u.names[0]].unit for u in unknowns),
     )
 
 
@@ -213,18 +232,19 @@ def _run(
     method: AbstractMethod | None,
     progress: Any,
 ) -> list[Sweep]:
-    """Every design once at every speed, from the conventional start."""
-    start = tuple(float(c) for c in models[0].starts(float(speeds[0]))[0])
+    """Every design once at every speed, from its own conventional start: where the cage of one rests on its rib, that
+    of another with an earlier contact would be pressed into it, and be shot off."""
     return sweep_designs(
         models,
         speeds,
-        starts=[start],
+        starts=1,
         discard=discard,
         revolutions=revolutions,
         confirm=False,
         horizon=0,
         blocks=blocks,
         keep=32,
+        settled=SETTLED if discard >= SETTLED else 0,
         method=controlled(ERROR) if method is None else method,
         progress=progress,
     )

@@ -20,7 +20,7 @@ from ..integrate import AbstractMethod, controlled
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
 from ..sweeps import motions, sweep_designs
-from ._ensemble import ERROR, REVOLUTIONS, draw, sobol
+from ._ensemble import ERROR, REVOLUTIONS, SETTLED, draw, sobol
 
 
 DRAWS = 128
@@ -28,7 +28,8 @@ STAGES = 4
 KEPT = 0.25
 """Of the draws of a stage, around which the ranges close; with as many accepted it is the last."""
 FAR = 5.0
-"""In tolerances: a miss counts no more, and as much as what rattles and should not."""
+"""In tolerances: no miss counts more, and what rattles and should not is as far off; of two misses the larger counts
+more, however large, or a tight tolerance could not tell near draws from far ones."""
 FEW = 8
 """Accepted draws without which even the last stage closes around the best ones, met or not."""
 WHOLE = 0.9
@@ -105,7 +106,7 @@ def narrow(
         place = lower + (upper - lower) * sobol(len(unknowns), draws, seed + stage)
         missed = np.where(np.isnan(far := misses(place)), math.inf, far)
         met = np.all(missed <= 1.0, axis=1)
-        far_off = np.mean(np.minimum(missed, FAR), axis=1)
+        far_off = np.mean(_counted(missed), axis=1)
         enough = met.sum() >= KEPT * draws
         last = enough or stage == stages
         chosen = met if last and (enough or met.sum() >= FEW) else far_off <= np.sort(far_off)[_quarter(draws)]
@@ -114,6 +115,11 @@ def narrow(
             best = missed[np.argmin(far_off)]
             middle = np.median(place[chosen], axis=0)
             return Narrowed(tuple(unknowns), lower, upper, middle, int(met.sum()), draws, stage, best)
+
+
+def _counted(missed: np.ndarray) -> np.ndarray:
+    """How much a miss counts: itself where it is small, and never more than `FAR`."""
+    return FAR * (1 - 1 / (1 + missed / FAR))
 
 
 def _quarter(draws: int) -> int:
@@ -163,17 +169,17 @@ def misses(
     right (0) or wrong (as far as anything counts)."""
     models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
-    start = tuple(float(c) for c in models[0].starts(float(rpm[0] * np.pi / 30))[0])
     found = sweep_designs(
         models,
         rpm * np.pi / 30,
-        starts=[start],
+        starts=1,
         discard=REVOLUTIONS,
         revolutions=REVOLUTIONS,
         confirm=False,
         horizon=0,
         blocks=20,
         keep=32,
+        settled=SETTLED,
         method=controlled(ERROR) if method is None else method,
         progress=progress,
     )

@@ -98,7 +98,12 @@ def motions(
     count, speeds, starts, dim = last.shape
     speed = np.concatenate([np.repeat(swept.speed, starts) for swept in found])
     which = np.repeat(np.arange(count), speeds * starts)
-    state = samples(models, speed, last.reshape(-1, dim), which, revolutions, error)
+    label = np.concatenate([swept.observed_label.ravel() for swept in found])
+    state = np.empty((label.size, revolutions * SAMPLES, dim))
+    for lanes, read in ((label == "periodic-1", 1), (label != "periodic-1", revolutions)):
+        if np.any(lanes):  # of what repeats itself every revolution one tells all
+            seen = samples(models, speed[lanes], last.reshape(-1, dim)[lanes], which[lanes], read, error)
+            state[lanes] = np.tile(seen, (1, revolutions // read, 1))
     q = state[..., :2] if dim == 4 else state[..., :2] - state[..., 2:4]
     across = np.ptp(q, axis=1)
     order = np.array([_order(x + 1j * y, revolutions) for x, y in np.moveaxis(q, 2, 1)])

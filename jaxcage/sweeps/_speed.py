@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -17,7 +17,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._recent import jitted
 from .._types import State
-from ..analysis import Confirmation, Observation, Plan, Sweep
+from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
 from ..integrate import AbstractMethod, controlled, finer
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._confirm import Judged, confirm as confirm_lanes, doubtful
@@ -142,13 +142,15 @@ def sweep_designs(
     exponents: int = 1,
     blocks: int = 20,
     keep: int = 64,
+    settled: int = 0,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> list[Sweep]:
     """`sweep` for several designs or cases at once, all lanes in one batch: one program, full chunks.
 
-    **Arguments:** systems that differ in their numbers only; speeds of all of them, or a row for each; the rest as for
-    `sweep`.
+    **Arguments:** systems that differ in their numbers only; speeds of all of them, or a row for each; `settled`,
+    revolutions after which a lane whose kept strobe states close is left where it is, periodic, its exponents NaN (0
+    runs all lanes to the end); the rest as for `sweep`.
 
     **Returns:** a `Sweep` for each system, the same as one by one to rounding (which chaos makes large).
     """
@@ -161,6 +163,7 @@ def sweep_designs(
     chosen = controlled() if method is None else method
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
+    _require_settled(settled, discard, confirm, horizon)
     y0 = np.stack([initial_states(*each, starts) for each in zip(systems, speed, strict=True)])  # ..., starts, dim
     shape = y0.shape[1:3]
     each = shape[0] * shape[1]
@@ -177,7 +180,11 @@ def sweep_designs(
         parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
         return [assemble(s, v, how, plan, part, shape) for s, v, part in zip(systems, speed, parts, strict=True)]
 
-    seen = run(plan, np.arange(which.size))
+    if settled:
+        scale = np.concatenate([np.asarray(_scales(s, jnp.asarray(v))) for s, v in zip(systems, speed, strict=True)])
+        seen = run_unsettled(run, plan, settled, np.repeat(scale, shape[1], axis=0))
+    else:
+        seen = run(plan, np.arange(which.size))
     found = each_system(seen)
     if exponents < 1 or blocks < 2:  # without an error of the exponent nothing is called chaotic
         return found
@@ -202,6 +209,49 @@ def sweep_designs(
         dataclasses.replace(s, escape=e.reshape(shape), horizon=lasting.horizon, confirmed=rounds)
         for s, e in zip(each_system(seen), escapes, strict=True)
     ]
+
+
+def _require_settled(settled: int, discard: int, confirm: bool, horizon: int) -> None:
+    """**Raises:** `ValueError`."""
+    if settled and not 2 * LONGEST_PERIOD <= settled <= discard:
+        allowed = f"{2 * LONGEST_PERIOD} to the {discard} revolutions discarded"
+        raise ArgumentError("settled", said=f"must be 0, or {allowed}, but is {settled}.")
+    if settled and (confirm or horizon):
+        raise ArgumentError("settled", said="goes with `confirm=False` and `horizon=0`, but one of them was given.")
+
+
+def run_unsettled(
+    run: Callable[..., Observation], plan: Plan, settled: int, scale: Float[np.ndarray, "lanes dim"]
+) -> Observation:
+    """What lanes do, of which those that are periodic after `settled` revolutions, or after all that are discarded, are
+    not run any further, nor with tangent vectors."""
+    lanes, seen, done = np.arange(len(scale)), None, 0
+    for until in sorted({settled, plan.discard}):
+        short = min(plan.keep, until - done)
+        new = run(Plan(until - done - short, short, 1, short, 0), lanes, y=None if seen is None else _last(seen)[lanes])
+        strobe = np.full((plan.keep, *new.strobe.shape[1:]), np.nan)
+        strobe[plan.keep - short :] = new.strobe
+        growth = np.full((plan.blocks, plan.exponents, lanes.size), np.nan)
+        new = new._replace(strobe=strobe, growth=growth, doubt=growth[0])
+        seen = new if seen is None else _after(seen, lanes, new)
+        closed = closing_period(np.moveaxis(strobe[plan.keep - short :], -1, 0), scale[lanes]) > 0
+        lanes, done = lanes[~closed & (np.asarray(new.outcome) == 0)], until
+    assert seen is not None
+    if lanes.size:
+        seen = _after(seen, lanes, run(plan._replace(discard=plan.align), lanes, y=_last(seen)[lanes]))
+    return seen
+
+
+def _last(seen: Observation) -> np.ndarray:
+    return np.asarray(seen.last).T
+
+
+def _after(seen: Observation, lanes: np.ndarray, new: Observation) -> Observation:
+    """What was seen of all, and of some of them later."""
+    error = np.array(seen.error)
+    error[lanes] = np.fmax(error[lanes], new.error)
+    _put(seen, lanes, new)
+    return seen._replace(error=error)
 
 
 def _speeds_of_each(speeds: Any, systems: int) -> Float[np.ndarray, "systems speeds"]:
