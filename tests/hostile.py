@@ -48,6 +48,9 @@ from jaxcage.cli import (
     _sweep,
     _unknowns,
     _validate,
+    _whole,
+    _whole_gradient,
+    _whole_sweep,
     main,
 )
 from jaxcage.io import ConfigError, configuration, load_model, template
@@ -604,6 +607,9 @@ HEAVY = (
     (_identify, "identify"),
     (_runup, "ramp_up_down"),
     (_study, "run_study"),
+    (_whole, "simulate_bearing"),
+    (_whole_gradient, "bearing_gradient"),
+    (_whole_sweep, "sweep_bearing"),
     (_page.report, "examine"),
     (_reproduce, "run_all"),
     (_bearing, "impact_history"),

@@ -141,9 +141,8 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["init", str(path), "--model", "bearing"]) == 0
     assert f'jaxcage simulate {path} --speed "10000 rpm shaft"' in capsys.readouterr().out
     assert subject_of(path) == "bearing"
-    for command in ("zones", "statics", "report"):
+    for command in ("bifurcations", "statics", "sensitivity"):
         assert main([command, str(path)]) == 2
         said = capsys.readouterr().err
-        assert "is a whole bearing, of which only `jaxcage simulate` and `jaxcage sweep` know" in said
-        assert f"`jaxcage {command}` takes a cage" in said
+        assert f"is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with simulate" in said
         assert said.count("\n") == 1

@@ -37,6 +37,7 @@ from ._bearing_measures import (
     equivalent_synchronous_force as equivalent_synchronous_force,
 )
 from ._bearing_sweep import (
+    AVERAGED as AVERAGED,
     BearingRecord as BearingRecord,
     BearingSweep as BearingSweep,
     summed_up as summed_up,

@@ -39,7 +39,7 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep")
+WHOLE_COMMANDS = ("simulate", "sweep", "gradient")
 """What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
@@ -61,11 +61,14 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            if _is_whole(options.case):
+            whole = _is_whole(options.case)
+            if whole:
                 self.name, self.whole, self.file = _whole_subject(options.case, command)
             else:
                 self.name, self.model, self.published, self.file = read_subject(options.case)
-                self.options = self._of_the_cage(options)
+            self.options = filled = _filled(options, whole)
+            if not whole:
+                self.options = self._of_the_cage(filled)
 
     whole: BearingModel | None = None
     """The whole bearing, if the case is one; there is no `model` then."""
@@ -205,6 +208,20 @@ class Job(Generic[Given]):
         self.files[key] = str(path)
 
 
+def _filled(options: Any, whole: bool) -> Any:
+    """Options with what those that were left out usually are.
+
+    **Raises:** `InputError` for one that says nothing of such a case.
+    """
+    for name in options.of_cage if whole else options.of_whole:
+        field = type(options).__dataclass_fields__[name]
+        if getattr(options, name) != field.default:
+            about = "does not go with a whole bearing" if whole else "goes with a whole bearing, such as nu2310"
+            raise InputError(f"Option {flag(name)} {about}.")
+    usual = {name: pair[whole] for name, pair in options.usual.items() if getattr(options, name) in (None, ())}
+    return dataclasses.replace(options, **usual)
+
+
 def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     """Write a figure, whole or not at all."""
     with replacing(path) as temporary:
@@ -227,10 +244,9 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     **Raises:** `InputError` for a command that takes none yet.
     """
     if command not in WHOLE_COMMANDS:
-        known = " and ".join(f"`jaxcage {name}`" for name in WHOLE_COMMANDS)
-        verb = "knows" if len(WHOLE_COMMANDS) == 1 else "know"
         raise InputError(
-            f"Case '{given}' is a whole bearing, of which only {known} {verb} so far: `jaxcage {command}` takes a cage."
+            f"Case '{given}' is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with "
+            f"{', '.join(WHOLE_COMMANDS)}."
         )
     if not _is_file(given):
         return given.lower(), whole_bearing(given), None

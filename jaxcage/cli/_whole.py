@@ -39,6 +39,8 @@ TOLERANCE = 1e-5
 """Of a step, in units of the state's scale."""
 RATE = 0.5
 """Revolutions a second, about."""
+SWEEPING = 15.0
+"""Revolutions of lanes that a core makes in a second in a sweep, about, exponents with them."""
 
 
 def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
@@ -46,8 +48,7 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     options = job.options
     if options.solver is not None or options.steps is not None:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
-    if options.load is not None:
-        model = replace(model, load=options.load)
+    model = loaded(model, options.load)
     shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
     speed = float(rpm(shaft_rpm))
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
@@ -89,6 +90,11 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     ]
     said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
     return Report(document, tables, [said])
+
+
+def loaded(model: BearingModel, load: float | None) -> BearingModel:
+    """The bearing under the load of an option [N]."""
+    return model if load is None else replace(model, load=load)
 
 
 def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str = "--speed") -> float:

@@ -18,18 +18,17 @@ from ._limits import Demand
 from ._options import SweepOptions
 from ._readers import flag
 from ._show import Report
-from ._whole import shaft_rpm_of
+from ._whole import SWEEPING, shaft_rpm_of
 
 
 SPEEDS, STARTS = 13, 3
 NOT_YET = "solver steps waterfall horizon confirm draws seed nominal"
 """Options of sweeps of a cage that say nothing here."""
-RATE = 15.0
-"""Revolutions of lanes that a core makes in a second, about, exponents with them."""
 COLUMNS = (
-    "cage_slip roller_slip_max pocket_force_mean_sum_N pocket_force_max_N land_force_max_N friction_power_W "
-    "input_power_W eccentricity_mean eccentricity_std eccentricity_max whirl_ratio synchronous_force_x_N "
-    "synchronous_force_error_N exponent exponent_error state outcome error steps"
+    "cage_slip roller_slip_max pocket_force_mean_sum_N pocket_force_max_N pocket_impulse_N_s land_force_max_N "
+    "land_impulse_N_s pocket_wear_mm3_per_h land_wear_mm3_per_h friction_power_W input_power_W eccentricity_mean "
+    "eccentricity_std eccentricity_max whirl_ratio synchronous_force_x_N synchronous_force_error_N exponent "
+    "exponent_error state outcome error steps"
 )
 
 
@@ -38,7 +37,7 @@ def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
     options = job.options
     speeds = _speeds(job, model)
     lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
-    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, RATE))
+    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
     given: dict[str, Any] = job.given("discard revolutions exponents")
     given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
     with job.computing("sweep") as say:

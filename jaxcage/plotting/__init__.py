@@ -9,6 +9,7 @@
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
 | `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
+| `_bearing_gradient` | elasticities of the whole bearing's statistics with their errors      |
 | `_impact`        | impact of a roller on a cage bar                                        |
 | `_statics`       | load of every roller                                                    |
 | `_waterfall`     | spectra over speed                                                      |
@@ -36,6 +37,7 @@ from ._bearing import (
     pocket_force_around as pocket_force_around,
     slip_around as slip_around,
 )
+from ._bearing_gradient import statistic_bars as statistic_bars
 from ._branches import (
     MARKS as MARKS,
     PERIOD_COLOURS as PERIOD_COLOURS,
