@@ -50,6 +50,8 @@ from jaxcage.cli import (
     _validate,
     _whole,
     _whole_gradient,
+    _whole_map,
+    _whole_runup,
     _whole_sweep,
     main,
 )
@@ -609,6 +611,8 @@ HEAVY = (
     (_study, "run_study"),
     (_whole, "simulate_bearing"),
     (_whole_gradient, "bearing_gradient"),
+    (_whole_map, "sweep_bearings"),
+    (_whole_runup, "bearing_up_down"),
     (_whole_sweep, "sweep_bearing"),
     (_page.report, "examine"),
     (_reproduce, "run_all"),

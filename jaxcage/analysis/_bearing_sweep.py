@@ -58,7 +58,10 @@ class BearingSweep:
     synchronous_force_x_N: OfLanes = measure(
         "N", "equivalent synchronous force: first harmonic of the pocket forces on the cage, horizontal amplitude"
     )
-    synchronous_force_error_N: OfLanes = measure("N", "its standard error, from the scatter of the blocks")
+    synchronous_force_y_N: OfLanes = measure("N", "the same, vertical amplitude")
+    synchronous_force_error_N: OfLanes = measure(
+        "N", "standard error of the larger of both, from the scatter of the blocks"
+    )
     exponent: OfLanes = measure("1", "largest Lyapunov exponent per revolution of the cage; NaN if not asked for")
     exponent_error: OfLanes = measure("1", "its standard error, from the scatter of the blocks")
     state: Shaped[np.ndarray, "speeds starts"] = measure("", "what the cage's centre does, as in `cage_state`")
@@ -166,7 +169,8 @@ def summed_up(
         cage_state(place, samples) if not bad else "failed" for place, bad in zip(record.place, lost, strict=True)
     ]
     peak = lambda name: shaped(record.peaks[name])
-    harmonic = np.stack([of_blocks(f"pocket_x_{part}") for part in ("cos", "sin")])
+    harmonic = np.stack([[of_blocks(f"pocket_{axis}_{part}") for part in ("cos", "sin")] for axis in "xy"])
+    force_x, force_y = 2 * np.hypot(*np.moveaxis(harmonic.mean(axis=-1), 1, 0))
     return BearingSweep(
         speed=speed,
         cage_slip=shaped(1 - 2 * np.pi * block * blocks / time.sum(axis=1) / rolling),
@@ -185,8 +189,9 @@ def summed_up(
         eccentricity_std=np.sqrt(np.maximum(squares, 0.0)),
         eccentricity_max=peak("eccentricity"),
         whirl_ratio=shaped(whole("whirl") / whole("cage_speed")),
-        synchronous_force_x_N=2 * np.hypot(*harmonic.mean(axis=-1)),
-        synchronous_force_error_N=2 * scatter(harmonic).max(axis=0),
+        synchronous_force_x_N=force_x,
+        synchronous_force_y_N=force_y,
+        synchronous_force_error_N=2 * scatter(harmonic).max(axis=(0, 1)),
         exponent=shaped(growth.mean(axis=1)),
         exponent_error=shaped(scatter(growth)),
         state=np.array(states).reshape(speed.size, -1),

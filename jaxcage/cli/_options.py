@@ -128,6 +128,8 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
     bearing, whose speeds are the shaft's."""
 
+    of_whole: ClassVar[tuple[str, ...]] = ("load",)
+
     count: Annotated[int | None, whole(1)] = None
     """Number of speeds; if left out 251, of a whole bearing 13, and 40 where ranges are drawn from. With one, only the
     first speed is run."""
@@ -145,6 +147,8 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Number of Lyapunov exponents."""
     waterfall: FromZero = 0
     """Speeds of a waterfall of spectra of the vertical motion; none by default."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
     def check(self) -> None:
         if self.count != 1:
@@ -153,7 +157,10 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ZonesOptions(SweepOptions):
-    """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones."""
+    """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones; of a
+    whole bearing, stretches of speed in which its cage does the same, by the sweep."""
+
+    of_cage: ClassVar[tuple[str, ...]] = ("quick",)
 
     quick: bool = False
     """Leave out the gradients of the edges, which take about a minute to compile."""
@@ -254,7 +261,8 @@ class MapOptions(SearchOptions):
     y: OptionalText = None
     """Parameter upwards, any of the model; guidance_gap if left out, of a whole bearing its load."""
     lower: OptionalText = None
-    """Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out."""
+    """Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out, a twentieth of
+    a whole bearing's load."""
     upper: OptionalText = None
     """Highest value of y; 1.25 of its value if left out."""
     rows: Annotated[int | None, whole(0)] = None
@@ -545,16 +553,23 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunUpOptions(_Range, IntegrationOptions):
-    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs."""
+    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs; of
+    a whole bearing its slip, eccentricity and power, whose speeds are the shaft's."""
 
-    called: ClassVar[Mapping[str, str]] = {"settle": "discard"}
+    called: ClassVar[Mapping[str, str]] = {"settle": "discard", "steps": "windows"}
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"discard": (100, 10), "windows": (100, 24)}
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps")
+    of_whole: ClassVar[tuple[str, ...]] = ("load",)
 
     rate: Annotated[float, number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0
     """Speed gained per second [rpm/s], in the mean over the ramp; the cage's, or the shaft's if the file says so."""
-    windows: FromTwo = 100
-    """Parts into which each ramp is cut, in each of which the orbit's size is read."""
-    discard: FromZero = 100
-    """Revolutions at the first speed before the ramp begins."""
+    windows: Annotated[int | None, whole(2)] = None
+    """Parts into which each ramp is cut, in each of which the orbit's size is read; 100 if left out. Of a whole bearing
+    steps of the speed, 24 if left out."""
+    discard: Annotated[int | None, whole(0)] = None
+    """Revolutions at the first speed before the ramp begins; 100 if left out, 10 of a whole bearing."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

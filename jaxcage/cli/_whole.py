@@ -30,6 +30,7 @@ from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
 from ._options import SimulateOptions
+from ._readers import flag
 from ._show import Report
 
 
@@ -113,6 +114,19 @@ def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str =
             f"make {land:.0f} m/s."
         )
     return shaft
+
+
+def shaft_speeds(job: Job[Any], model: BearingModel, count: int) -> np.ndarray:
+    """Shaft speeds [rad/s] from --first to --last.
+
+    **Raises:** `InputError` for a range that is none, or in which no cage runs.
+    """
+    first, last = (shaft_rpm_of(model, getattr(job.options, n), job.speeds, flag(n)) for n in ("first", "last"))
+    if count == 1:
+        return np.array([rpm(first)])
+    if last <= first:
+        raise InputError(f"Option --last must be above --first, but the range is {first:g} to {last:g} rpm.")
+    return np.asarray(rpm(first, last, count))
 
 
 def _columns(history: BearingHistory) -> dict[str, np.ndarray]:

@@ -29,6 +29,8 @@ from ._bearing import (
     bearing_animation as bearing_animation,
     bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
+    bearing_map_figure as bearing_map_figure,
+    bearing_ramp_figure as bearing_ramp_figure,
     bearing_sweep_figure as bearing_sweep_figure,
     cage_orbit as cage_orbit,
     force_over_time as force_over_time,
