@@ -3,14 +3,14 @@
 from typing import Any
 
 from ..design import BearingGradient, StatisticGradient
-from ._table import Table, chosen
+from ._table import Table, chosen, number
 
 
 def bearing_gradient_table(title: str, found: BearingGradient) -> Table:
     """A row for each statistic: its mean, and its elasticities."""
     first = next(iter(found.statistics.values()))
     rows = [
-        (each.name, f"{each.value:.4g} ± {each.value_error:.1g}", *_cells(each), f"{100 * each.explained:.0f} %")
+        (each.name, f"{each.value:.4g} ± {each.value_error:.1g}", *_cells(each), f"{number(100 * each.explained)} %")
         for each in found.statistics.values()
     ]
     names = [name.replace("_", " ").replace("+", ", ") for name in first.directions]
