@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import pathlib
+import re
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
 from jaxcage.analysis import bearing_zones
-from jaxcage.cli import main
+from jaxcage.cli import _whole, _whole_page, main
 from jaxcage.sweeps import BearingRamp, BearingUpDown, bearing_up_down
 
 
@@ -122,6 +123,8 @@ def test_commands(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
         (["map", "nu2310", "--y", "speed"], "Option --y must be one of bore"),
         (["map", "nu2310", "--rows", "0"], "Option --rows must be at least 2 for a whole bearing, but 0 was given."),
         (["map", "nu2310", "--lower", "3 kg"], "Option --lower"),
+        (["report", "nu2310", "--operating", "fast"], "Option --operating must be speeds and ranges"),
+        (["report", "nu2310", "--draws", "3"], "Option --draws does not go with a whole bearing."),
         (["runup", "nu2310", "--solver", "rk4"], "Option --solver does not go with a whole bearing."),
         (["runup", "nu2310", "--last", "200000"], "must leave the cage at most 300 m/s"),
     ],
@@ -129,3 +132,22 @@ def test_commands(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 def test_refusals(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
     assert said in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.wide
+def test_the_report(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
+    """A page that needs nothing from outside, with what sweep and simulate say."""
+    monkeypatch.setattr(_whole_page, "REVOLUTIONS", 2)
+    monkeypatch.setattr(_whole_page, "DISCARD", 0)
+    monkeypatch.setattr(_whole, "SAMPLES", 32)
+    asked = ["report", "nu2310", "--first", "8000", "--last", "10000", "--count", "2", "--quick", "--discard", "0"]
+    asked += ["--revolutions", "10", "--operating", "9000 rpm shaft", "--json", "--out", str(tmp_path)]
+    assert main(asked) == 0
+    found = json.loads(capsys.readouterr().out)
+    text = pathlib.Path(found["report"]).read_text()
+    assert found["operating_shaft_rpm"] == pytest.approx([9000]) and found["gradient"] is None
+    assert f"{100 * found['measures']['cage_slip']:.2f} %" in text and "At 9000 rpm of the shaft" in text
+    assert text.count("data:image/svg+xml;base64,") == 4 and "http" not in text.replace("http-equiv", "")
+    assert "Spectrum, Cage" in text and "guidance gap C_r between cage and land" in text
+    ids = re.findall('id="([^"]+)"', text)
+    assert len(ids) == len(set(ids)) and set(re.findall('href="#([^"]+)"', text)) <= set(ids)

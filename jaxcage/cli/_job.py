@@ -39,7 +39,7 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient")
+WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "report")
 """What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 

@@ -504,12 +504,15 @@ class ValidateOptions(CommonOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReportOptions(_Length, _Range, IntegrationOptions):
-    """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is."""
+    """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is; of a
+    whole bearing its drawing, slips, forces, wear, spectra, sweep and gradients."""
+
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "draws", "seed")
 
     operating: str = ""
     """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
     count: Annotated[int | None, whole(2)] = None
-    """Number of speeds; 251, or 126 with --quick."""
+    """Number of speeds; if left out 251, or 126 with --quick; of a whole bearing 13, or 5."""
     draws: Annotated[int, whole(0)] = 64
     """Draws from what the file knows within ranges only; 0 takes the best guesses alone."""
     seed: FromZero = 0

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from .._errors import InputError, NoResult
 from .._parameters import replace
@@ -21,7 +22,7 @@ from ..analysis import (
     named_lines,
     pocket_force_distribution,
 )
-from ..integrate import simulate_bearing
+from ..integrate import BearingRun, simulate_bearing
 from ..io import SpeedOf, Whose
 from ..models import FASTEST, BearingModel
 from ..plotting import bearing_animation, bearing_figure
@@ -51,23 +52,13 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
     model = loaded(model, options.load)
     shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
-    speed = float(rpm(shaft_rpm))
-    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     numbers = (5 * model.bearing.n_rollers + 40) * SAMPLES * (options.revolutions + options.discard)
     job.require(Demand(1, options.revolutions + options.discard, 40.0 * numbers, 20.0 * numbers, RATE))
     with job.computing():
-        length = job.given("revolutions discard")
-        run = simulate_bearing(model, speed, **length, samples=SAMPLES, tolerance=tolerance)
-        if run.outcome not in ("successful", "inaccurate"):
-            raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
-        history = bearing_history(model, run, speed)
-    measures, orders = bearing_measures(model, run, speed), bearing_orders(model, run, speed)
-    spectra = bearing_spectra(history) if options.revolutions > 1 else {}
-    circumference = around(history)
+        found = examined(job.name, model, shaft_rpm, options.revolutions, options.discard, options.tolerance)
+    run, history = found.run, found.history
     at = f"_{shaft_rpm:g}rpm_shaft"
-    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N"
-    figure = bearing_figure(model, run, history, circumference, spectra, orders, title)
-    job.listed("figure", job.saved(figure, job.path(f"{at}.png")))
+    job.listed("figure", job.saved(found.figure, job.path(f"{at}.png")))
     job.columns(_columns(history), detail=at)
     if options.animate:
         with job.written("animation", job.path(f"{at}.gif")) as path:
@@ -77,20 +68,78 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
         "load_N": float(model.load),
         **chosen(options, "revolutions discard"),
         **chosen(run, "outcome error estimate steps"),
-        **dataclasses.asdict(measures),
+        **dataclasses.asdict(found.measures),
         "pocket_force_distribution_N": pocket_force_distribution(history),
-        "around": {"angle_deg": np.degrees(circumference.angle), **_without_angle(circumference)},
-        "orders": orders,
-        "spectra": _lines(spectra, orders),
+        "around": {"angle_deg": np.degrees(found.circumference.angle), **_without_angle(found.circumference)},
+        "orders": found.orders,
+        "spectra": _lines(found.spectra, found.orders),
     }
-    length = f"{options.revolutions} revolutions of the cage"
-    tables = [
-        Table(f"{title}, {length}", ("measure", "value", "unit"), _rows(measures)),
-        _circumference_table(circumference),
-        *_line_tables(spectra, orders),
-    ]
     said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
-    return Report(document, tables, [said])
+    return Report(document, found.tables, [said])
+
+
+@dataclasses.dataclass(frozen=True)
+class Examined:
+    """A whole bearing at one shaft speed."""
+
+    title: str
+    model: BearingModel
+    revolutions: int
+    run: BearingRun
+    history: BearingHistory
+    measures: BearingMeasures
+    orders: Mapping[str, float]
+    spectra: Mapping[str, OrderSpectrum]
+    circumference: Around
+
+    @property
+    def figure(self) -> Figure:
+        """Drawing, orbit, slips and forces around the bearing, forces over time, spectra."""
+        return bearing_figure(
+            self.model, self.run, self.history, self.circumference, self.spectra, self.orders, self.title
+        )
+
+    @property
+    def tables(self) -> list[Table]:
+        """Measures, rollers around the bearing, lines of the spectra."""
+        title = f"{self.title}, {self.revolutions} revolutions of the cage"
+        return [
+            Table(title, ("measure", "value", "unit"), _rows(self.measures)),
+            _circumference_table(self.circumference),
+            *_line_tables(self.spectra, self.orders),
+        ]
+
+
+def examined(
+    name: str, model: BearingModel, shaft_rpm: float, revolutions: int, discard: int, tolerance: float | None
+) -> Examined:
+    """Run a whole bearing at one speed, and all that is read off that run.
+
+    **Raises:** `NoResult` if the run fails.
+    """
+    speed = float(rpm(shaft_rpm))
+    run = simulate_bearing(
+        model,
+        speed,
+        revolutions=revolutions,
+        discard=discard,
+        samples=SAMPLES,
+        tolerance=TOLERANCE if tolerance is None else tolerance,
+    )
+    if run.outcome not in ("successful", "inaccurate"):
+        raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
+    history = bearing_history(model, run, speed)
+    return Examined(
+        f"{name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N",
+        model,
+        revolutions,
+        run,
+        history,
+        bearing_measures(model, run, speed),
+        bearing_orders(model, run, speed),
+        bearing_spectra(history) if revolutions > 1 else {},
+        around(history),
+    )
 
 
 def loaded(model: BearingModel, load: float | None) -> BearingModel:

@@ -37,21 +37,7 @@ def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
     """`jaxcage sweep` of a whole bearing, and `jaxcage zones`."""
     options, model = job.options, loaded(model, job.options.load)
     speeds = _speeds(job, model)
-    lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
-    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
-    given: dict[str, Any] = job.given("discard revolutions exponents")
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
-    with job.computing("sweep") as say:
-        found = sweep_bearing(
-            model,
-            speeds,
-            starts=STARTS,
-            blocks=blocks_of(options.revolutions),
-            progress=partial(say, ""),
-            **given,
-        )
-    if found.failed.all():
-        raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
+    found = swept(job, model, speeds)
     title = f"{job.name}, {float(model.load):g} N, {options.discard} + {options.revolutions} revolutions of the cage"
     found_zones = bearing_zones(found)
     job.listed("figure", job.saved(bearing_sweep_figure(found, title, found_zones), job.path(".png")))
@@ -70,8 +56,33 @@ def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
         "zones": [dataclasses.asdict(zone) for zone in found_zones],
     }
     said = ", ".join(f"{n} {name}" for name, n in outcomes.items())
-    tables = [_zones_table(job.name, found_zones), _table(title, found)]
+    tables = [zones_table(job.name, found_zones), sweep_table(title, found)]
     return Report(document, tables, [f"Lanes: {said}"])
+
+
+def swept(job: Job[Any], model: BearingModel, speeds: np.ndarray) -> BearingSweep:
+    """The sweep that the options describe.
+
+    **Raises:** `NoResult` if every lane fails.
+    """
+    options = job.options
+    lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
+    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
+    given: dict[str, Any] = job.given("discard revolutions")
+    given |= {"exponents": getattr(options, "exponents", 1)}
+    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
+    with job.computing("sweep") as say:
+        found = sweep_bearing(
+            model,
+            speeds,
+            starts=STARTS,
+            blocks=blocks_of(options.revolutions),
+            progress=partial(say, ""),
+            **given,
+        )
+    if found.failed.all():
+        raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
+    return found
 
 
 def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
@@ -88,7 +99,7 @@ def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
     return shaft_speeds(job, model, options.count or SPEEDS)
 
 
-def _zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
+def zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
     """Stretches of speed in which the cage does the same."""
     rows = [
         (
@@ -104,7 +115,7 @@ def _zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
     return Table(f"Zones of {name}, each edge halfway between two speeds of the sweep", heads, rows)
 
 
-def _table(title: str, found: BearingSweep) -> Table:
+def sweep_table(title: str, found: BearingSweep) -> Table:
     """One row for each speed, means over the starts that did not fail."""
     heads = ("shaft [rpm]", "slip [%]", "pockets, mean [N]", "largest [N]", "lost [W]", "eccentricity", "whirl ratio")
     rows = []
