@@ -1,7 +1,8 @@
 """`python -m benchmarks.bearing_paper`: what the published cage model prescribes, beside what the whole bearing gives.
 
 `force`: the first harmonic of the pocket forces on the cage over its speed, beside the force (15) with identified
-constants. `support`: least squares of those forces on place and velocity of the cage, beside the identified support.
+constants. `support`: least squares of those forces on place and velocity of the cage, beside the identified support;
+their mean, and where the cage is in the mean.
 `cases`: 1a to 3b as whole bearings, by guidance gap, unbalance and oil of each, over the cage's speed.
 """
 
@@ -65,7 +66,16 @@ def support(revolutions: int, discard: int) -> None:
     """Stiffness and damping of the pockets by least squares, errors by leaving out one revolution after the other."""
     model, paper = whole_case("1a"), jc.case("1a").support
     rows: list[tuple[str, ...]] = [
-        ("cage [rpm]", "K_x [kN/m]", "K_y [kN/m]", "K_xy [kN/m]", "damping [N s/m]", "explained")
+        (
+            "cage [rpm]",
+            "K_x [kN/m]",
+            "K_y [kN/m]",
+            "K_xy [kN/m]",
+            "damping [N s/m]",
+            "explained",
+            "mean push [N]",
+            "place",
+        )
     ]
     for rpm, speed in zip(SUPPORT_SPEEDS, shaft_speeds(model, SUPPORT_SPEEDS), strict=True):
         run = jc.simulate_bearing(model, speed, revolutions=revolutions, discard=discard, samples=SAMPLES)
@@ -79,10 +89,16 @@ def support(revolutions: int, discard: int) -> None:
         error = np.sqrt((revolutions - 1) * left_out.var(axis=0))
         scale = (1e-3, 1e-3, 1e-3, 1.0)
         cells = [f"{s * v:.0f} ± {s * e:.0f}" for s, v, e in zip(scale, every[:4], error, strict=True)]
-        rows.append((f"{rpm:.0f}", *cells, f"{100 * every[4]:.1f} %"))
+        weight = np.gradient(history.time) / np.gradient(history.time).sum()
+        push, mean_place = (
+            ", ".join(f"{v:.{n}f}" for v in weight @ x) for n, x in ((0, history.pocket_on_cage), (2, history.place))
+        )
+        rows.append((f"{rpm:.0f}", *cells, f"{100 * every[4]:.1f} %", push, mean_place))
     print(f"Pocket forces on the cage against its place and velocity, case 1a, {revolutions} revolutions")
     table(rows)
     stiffness, cross = 1e-3 * float(paper.stiffness_x), 1e-3 * float(paper.cross_stiffness)
+    print("mean push and place: to the right and upward, the place over the clearance")
+    print(f"weight of the cage: {float(model.cage_mass * model.gravity):.1f} N")
     print(f"identified: K {stiffness:.0f} kN/m, K_xy {cross:.1f} kN/m, damping {float(paper.damping):.1f} N s/m")
 
 

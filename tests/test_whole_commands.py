@@ -123,6 +123,8 @@ def test_commands(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
         (["map", "nu2310", "--y", "speed"], "Option --y must be one of bore"),
         (["map", "nu2310", "--rows", "0"], "Option --rows must be at least 2 for a whole bearing, but 0 was given."),
         (["map", "nu2310", "--lower", "3 kg"], "Option --lower"),
+        (["compare", "nu2310", "1a"], "Case '1a' must be a whole bearing, as the first one is"),
+        (["compare", "nu2310", "nu2310", "--at", "9000"], "Option --at does not go with a whole bearing."),
         (["report", "nu2310", "--operating", "fast"], "Option --operating must be speeds and ranges"),
         (["report", "nu2310", "--draws", "3"], "Option --draws does not go with a whole bearing."),
         (["runup", "nu2310", "--solver", "rk4"], "Option --solver does not go with a whole bearing."),
@@ -132,6 +134,21 @@ def test_commands(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 def test_refusals(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
     assert said in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.wide
+def test_compare(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    """Two bearings that differ in the oil only: what differs, and each as a sweep has it."""
+    path = tmp_path / "thin.toml"
+    path.write_text('base = "nu2310"\n[lubricant]\nviscosity_1 = "28 mm^2/s"')
+    asked = ["compare", "nu2310", str(path), "--first", "8000", "--last", "10000", "--count", "2", "--discard", "0"]
+    assert main([*asked, "--revolutions", "10", "--json", "--out", str(tmp_path)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["cases"] == ["nu2310", "thin"] and len(found["differences"]) == 1
+    thick, thin = (np.array(found["designs"][name]["friction_power_W"]) for name in found["cases"])
+    assert np.all(thin < 0.7 * thick) and pathlib.Path(found["figure"]).stat().st_size > 30_000
+    one = jc.sweep_bearing(jc.whole_bearing("nu2310"), jc.rpm(8000, 10000, 2), discard=0, revolutions=10, blocks=10)
+    np.testing.assert_allclose(thick, one.block_means["friction_power_W"].mean(axis=(1, 2)), rtol=1e-9)
 
 
 @pytest.mark.wide

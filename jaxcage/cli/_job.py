@@ -39,7 +39,7 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "report")
+WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report")
 """What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
@@ -253,6 +253,17 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     file = read_whole_bearing(given)
     _say_broken_rule(file.model)
     return _shown_name(given), file.model, file
+
+
+def whole_subject(given: str) -> tuple[str, BearingModel]:
+    """Name and model of another whole bearing.
+
+    **Raises:** `InputError` for a cage.
+    """
+    if not _is_whole(given):
+        raise InputError(f"Case '{given}' must be a whole bearing, as the first one is: two of a kind are compared.")
+    name, model, _ = _whole_subject(given, "compare")
+    return name, model
 
 
 class Subject(NamedTuple):

@@ -540,12 +540,16 @@ class UnknownsOptions(_Range, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CompareOptions(_Length, _Range, IntegrationOptions):
-    """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land."""
+    """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land; of two
+    whole bearings slips, impulses, wear, power and states of the cage."""
+
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"count": (126, 13)}
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "confirm", "horizon", "at")
 
     other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")]
     """The design to compare it with, a case or a TOML file. Both run at the same speeds of the shaft."""
-    count: Annotated[int, whole(2)] = 126
-    """Number of speeds."""
+    count: Annotated[int | None, whole(2)] = None
+    """Number of speeds; 126 if left out, 13 of a whole bearing."""
     at: str = ""
     """Speeds to be shown in a table, e.g. "8500, 12000" [rpm] or "20000 rpm shaft"; five of the range if left out."""
     confirm: bool = True

@@ -32,6 +32,7 @@ from ._bearing import (
     bearing_map_figure as bearing_map_figure,
     bearing_ramp_figure as bearing_ramp_figure,
     bearing_sweep_figure as bearing_sweep_figure,
+    bearings_beside as bearings_beside,
     cage_orbit as cage_orbit,
     force_over_time as force_over_time,
     marked_spectrum as marked_spectrum,

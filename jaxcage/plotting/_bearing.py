@@ -370,6 +370,34 @@ def bearing_ramp_figure(found: BearingUpDown, title: str = "") -> Figure:
     return figure
 
 
+def bearings_beside(names: Sequence[str], found: Sequence[BearingSweep]) -> Figure:
+    """Slip, impulses, wear, power and exponent of several bearings over the shaft's speed: means over starts, with
+    standard errors.
+    """
+    figure = new_figure(11.5, 8.5)
+    axes = figure.subplots(3, 2, sharex=True)
+    panels = {
+        "cage_slip": ("Cage slip [%]", 100.0),
+        "friction_power_W": ("Power lost [W]", 1.0),
+        "pocket_impulse_N_s": ("Pocket impulse [N s]", 1.0),
+        "land_impulse_N_s": ("Land impulse [N s]", 1.0),
+        "pocket_wear_mm3_per_h": ("Pocket wear [mm³/h]", 1.0),
+        "exponent": ("Largest exponent per revolution", 1.0),
+    }
+    for ax, (measure, (label, factor)) in zip(axes.ravel(), panels.items(), strict=True):
+        for name, each, colour in zip(names, found, MARK_COLOURS[::4] + MARK_COLOURS[1:4], strict=False):
+            blocks = each.block_means[measure].reshape(each.speed.size, -1)
+            count = np.maximum(np.isfinite(blocks).sum(axis=1), 1)
+            mean, bars = np.nanmean(blocks, axis=1), np.nan_to_num(np.nanstd(blocks, axis=1) / np.sqrt(count))
+            style: Any = dict(color=colour, linewidth=1.0, marker=".", elinewidth=0.8, label=name)
+            dress(ax).errorbar(each.rpm, factor * mean, factor * bars, **style)
+        ax.set_ylabel(label)
+    for ax in axes[2]:
+        ax.set_xlabel("Shaft speed [rpm]")
+    axes[0, 0].legend(frameon=False, fontsize=9)
+    return figure
+
+
 def over_shaft_speed(
     found: BearingSweep,
     values: Float[np.ndarray, "speeds starts"],
