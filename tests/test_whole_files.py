@@ -108,7 +108,10 @@ def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):
         ('model = "ball"', "`model` must be one of cage, bearing, but is 'ball'"),
         ('model = "bearing"\nbase = "1a"', "`base` must be one of nu2310, but is '1a'"),
         ('base = "nu2310"\nload = "3 kg"', '`load` must be a number from 0 to 1e+07 N, but has the unit "kg"'),
-        ('base = "nu2310"\nlaod = 3', "Key `laod` at the top level must be one of base, model, speeds, units, cage_mass"),
+        (
+            'base = "nu2310"\nlaod = 3',
+            "Key `laod` at the top level must be one of base, model, speeds, units, cage_mass",
+        ),
         ('base = "nu2310"\n[pockets]\nfriction = 3', "Key `friction` in [pockets] must be one of pocket_stiffness"),
         ('base = "nu2310"\n[traction]\npeak = 0.01', "`peak` must be above `rest` and `limit`, but is 0.01"),
         ('base = "nu2310"\nguidance = "roller"', "`guidance` must be one of outer, inner, but is 'roller'"),
@@ -141,9 +144,8 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["init", str(path), "--model", "bearing"]) == 0
     assert f'jaxcage simulate {path} --speed "10000 rpm shaft"' in capsys.readouterr().out
     assert subject_of(path) == "bearing"
-    for command in ("zones", "statics", "report"):
+    for command in ("bifurcations", "statics", "sensitivity"):
         assert main([command, str(path)]) == 2
         said = capsys.readouterr().err
-        assert "is a whole bearing, of which only `jaxcage simulate` and `jaxcage sweep` know" in said
-        assert f"`jaxcage {command}` takes a cage" in said
+        assert f"is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with simulate" in said
         assert said.count("\n") == 1

@@ -57,6 +57,12 @@ def moving(model, **parts):
     return BearingState.of(Rollers(*rollers), bodies, parts.get("angle", 0.0))
 
 
+def test_a_start_without_load_is_that_of_next_to_none():
+    none, little = (rolling_start(bearing(load=load), SPEED) for load in (0.0, 1e-2))
+    np.testing.assert_allclose(none.rollers, little.rollers, rtol=1e-6, atol=1e-9)
+    assert float(none.bodies[6]) == pytest.approx(float(little.bodies[6]), abs=1e-9)
+
+
 @pytest.fixture(scope="module")
 def run():
     """One revolution, from a cage in the middle of its clearance to its land, by tight steps."""
@@ -379,8 +385,8 @@ def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str], tmp_path: pathlib
 
 
 def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
-    assert main(["zones", "nu2310"]) == 2
-    assert "only `jaxcage simulate` and `jaxcage sweep`" in capsys.readouterr().err
+    assert main(["bifurcations", "nu2310"]) == 2
+    assert "but `jaxcage bifurcations` takes a cage" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
     assert "--solver" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "200000"]) == 2

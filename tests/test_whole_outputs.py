@@ -79,10 +79,12 @@ def test_around_and_distribution_are_of_all_rollers(run):
 
 
 def test_impulse_wear_and_torque_are_integrals(run):
-    model, ran, _ = run
+    model, ran, history = run
     found = jc.bearing_measures(model, ran, SPEED)
     spent = ran.time[-1] - ran.time[0]
     assert found.pocket_impulse_N_s == pytest.approx(found.pocket_force_mean_sum_N * spent / 2, rel=1e-12)
+    land = np.hypot(*history.land_on_cage.T)
+    assert found.land_impulse_N_s == pytest.approx(land[1:] @ np.diff(ran.time) / 2, rel=0.15)  # few samples for it
     rubbed = ran.total("pocket_friction") / float(model.pockets.pocket_friction)  # mu N v: the sliding is fast
     assert ran.total("pocket_rubbing") == pytest.approx(rubbed, rel=1e-4)
     wear = 6e-4 * rubbed / spent / 0.93e9 * 1e9 * 3600
@@ -100,6 +102,9 @@ def test_the_land_wears_where_it_is_touched():
     assert ran.total("land_rubbing") > 1e-3
     friction = float(model.land_friction) * ran.total("land_rubbing")
     assert ran.total("land_contact") == pytest.approx(friction, rel=1e-5)
+    speed = float(model.rolling_cage_speed(SPEED) * model.land_radius)
+    pressed = ran.total("land_force") / np.hypot(1, float(model.land_friction))
+    assert pressed * speed == pytest.approx(ran.total("land_rubbing"), rel=2e-2)
 
 
 def test_the_synchronous_force_of_a_known_one(run):

@@ -153,6 +153,8 @@ def test_measures_of_a_sweep_are_those_of_a_run(swept):
     assert both.power_parts_W["film"][0, 0] == pytest.approx(expected.power_parts_W["film"], rel=1e-2)
     assert both.friction_power_W[0, 0] == pytest.approx(expected.friction_power_W, rel=1e-2)
     assert both.eccentricity_std[0, 0] == pytest.approx(expected.eccentricity_std, rel=0.1)
+    for name in ("pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h"):
+        assert getattr(both, name)[0, 0] == pytest.approx(getattr(expected, name), rel=0.05)
 
 
 def test_what_cannot_be_swept():

@@ -62,6 +62,8 @@ README, EDGES, DESIGNS, STUDIES, REPRODUCTION = (
     *(f"docs/{name}.md" for name in ("edges", "design", "studies", "reproduction")),
 )
 WHOLE, TRENDS = "docs/whole-bearing.md", "python -m benchmarks.bearing_trends"
+PAPER = "python -m benchmarks.bearing_paper"
+PAPER_PARTS = (("force", ""), ("support", " --revolutions 12 --discard 8"), ("cases", ""))
 CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
 SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
 SPEED = "python -m benchmarks"
@@ -94,6 +96,8 @@ SHOWN = (
     Shown("identify", REPRODUCTION, ["python -m benchmarks.identify"], ex.lines("+-")),
     Shown("bearing-threshold", WHOLE, [f"{TRENDS} threshold --discard 100 --revolutions 50"], ex.printed),
     Shown("bearing-trends", WHOLE, [f"{TRENDS} trends --starts 1 --discard 10 --revolutions 10"], ex.printed),
+    Shown("bearing-gradients", WHOLE, ["python -m benchmarks.bearing_gradients --cases 0"], ex.printed),
+    *(Shown(f"bearing-paper-{what}", WHOLE, [f"{PAPER} {what}{more}"], ex.printed) for what, more in PAPER_PARTS),
     Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
     _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),
     _whole("solvers-page", "benchmarks/solvers.md", "python -m benchmarks.solvers", "solvers.md"),

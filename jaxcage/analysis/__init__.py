@@ -15,6 +15,7 @@
 | `_bearing_history` | forces and slips of every roller of it, around its circumference; its spectra     |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
 | `_bearing_sweep` | the result of a sweep of the whole bearing                                         |
+| `_bearing_zones` | stretches of shaft speed in which its cage does the same                           |
 | `_measures`     | whirl ratio, displacement, film, forces, impulse, drag of an orbit                   |
 """
 
@@ -37,10 +38,12 @@ from ._bearing_measures import (
     equivalent_synchronous_force as equivalent_synchronous_force,
 )
 from ._bearing_sweep import (
+    AVERAGED as AVERAGED,
     BearingRecord as BearingRecord,
     BearingSweep as BearingSweep,
     summed_up as summed_up,
 )
+from ._bearing_zones import BearingZone as BearingZone, bearing_zones as bearing_zones
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,

@@ -31,6 +31,7 @@ class BearingMeasures:
     pocket_force_mean_sum_N: float = measure("N", "mean of the sum of all pocket forces")
     pocket_impulse_N_s: float = measure("N s", "integral of all pocket forces over a revolution of the cage")
     land_force_max_N: float = measure("N", "largest force of the land on the cage")
+    land_impulse_N_s: float = measure("N s", "integral of the land's force on the cage over a revolution")
     friction_power_W: float = measure("W", "mean power lost")
     friction_torque_N_m: float = measure("N m", "power lost over shaft speed")
     friction_torque_parts_N_m: dict[str, float] = measure("N m", "parts of that torque, by kind of loss")
@@ -74,6 +75,7 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
         pocket_force_mean_sum_N=mean("pocket_force"),
         pocket_impulse_N_s=run.total("pocket_force") / revolutions,
         land_force_max_N=run.largest("land_force"),
+        land_impulse_N_s=run.total("land_force") / revolutions,
         friction_power_W=lost,
         friction_torque_N_m=lost / abs(speed),
         friction_torque_parts_N_m={name: part / abs(speed) for name, part in parts.items()},

@@ -13,6 +13,20 @@ from ._bearing_measures import cage_state, measure
 
 
 LandPower = "land_power_W"
+AVERAGED = (
+    "cage_slip",
+    "pocket_force_mean_sum_N",
+    "friction_power_W",
+    LandPower,
+    "pocket_impulse_N_s",
+    "land_impulse_N_s",
+    "pocket_wear_mm3_per_h",
+    "land_wear_mm3_per_h",
+    "eccentricity_mean",
+    "whirl_ratio",
+    "exponent",
+)
+"""What `BearingSweep.block_means` has."""
 OfLanes = Float[np.ndarray, "speeds starts"]
 
 
@@ -30,6 +44,10 @@ class BearingSweep:
     pocket_force_max_N: OfLanes = measure("N", "largest pocket force")
     pocket_force_mean_sum_N: OfLanes = measure("N", "mean of the sum of all pocket forces")
     land_force_max_N: OfLanes = measure("N", "largest force of the land on the cage")
+    pocket_impulse_N_s: OfLanes = measure("N s", "integral of all pocket forces over a revolution of the cage")
+    land_impulse_N_s: OfLanes = measure("N s", "integral of the land's force on the cage over a revolution")
+    pocket_wear_mm3_per_h: OfLanes = measure("mm^3/h", "Archard wear of all pockets, with the coefficient of `wear`")
+    land_wear_mm3_per_h: OfLanes = measure("mm^3/h", "Archard wear of the cage's guiding land")
     friction_power_W: OfLanes = measure("W", "mean power lost")
     power_parts_W: dict[str, OfLanes] = measure("W", "mean power lost by kind")
     input_power_W: OfLanes = measure("W", "mean power of the shaft")
@@ -40,7 +58,10 @@ class BearingSweep:
     synchronous_force_x_N: OfLanes = measure(
         "N", "equivalent synchronous force: first harmonic of the pocket forces on the cage, horizontal amplitude"
     )
-    synchronous_force_error_N: OfLanes = measure("N", "its standard error, from the scatter of the blocks")
+    synchronous_force_y_N: OfLanes = measure("N", "the same, vertical amplitude")
+    synchronous_force_error_N: OfLanes = measure(
+        "N", "standard error of the larger of both, from the scatter of the blocks"
+    )
     exponent: OfLanes = measure("1", "largest Lyapunov exponent per revolution of the cage; NaN if not asked for")
     exponent_error: OfLanes = measure("1", "its standard error, from the scatter of the blocks")
     state: Shaped[np.ndarray, "speeds starts"] = measure("", "what the cage's centre does, as in `cage_state`")
@@ -103,6 +124,7 @@ class BearingRecord:
 def summed_up(
     speed: Float[np.ndarray, " speeds"],
     rolling: Float[np.ndarray, " lanes"],
+    worn: float,
     record: BearingRecord,
     *,
     block: int,
@@ -113,8 +135,9 @@ def summed_up(
 ) -> BearingSweep:
     """A `BearingSweep` of lanes that are laid out as (speeds, starts).
 
-    **Arguments:** shaft speeds; speed of the cage in pure rolling [rad/s]; what was gathered; revolutions of a block;
-    samples of a revolution; whether there are exponents; revolutions left out; settings.
+    **Arguments:** shaft speeds; speed of the cage in pure rolling [rad/s]; volume worn off by 1 W that rubs [mm^3/h];
+    what was gathered; revolutions of a block; samples of a revolution; whether there are exponents; revolutions left
+    out; settings.
     """
     names = np.array(OUTCOMES)[record.outcome]
     lost = ~np.isin(names, ("successful", "inaccurate"))
@@ -134,6 +157,10 @@ def summed_up(
         "pocket_force_mean_sum_N": of_blocks("pocket_force"),
         "friction_power_W": shaped(sum(record.integrals[name] for name in losses) / time),
         LandPower: shaped((record.integrals["film"] + record.integrals["land_contact"]) / time),
+        "pocket_impulse_N_s": shaped(record.integrals["pocket_force"] / block),
+        "land_impulse_N_s": shaped(record.integrals["land_force"] / block),
+        "pocket_wear_mm3_per_h": worn * of_blocks("pocket_rubbing"),
+        "land_wear_mm3_per_h": worn * of_blocks("land_rubbing"),
         "eccentricity_mean": of_blocks("eccentricity"),
         "whirl_ratio": shaped(record.integrals["whirl"] / record.integrals["cage_speed"]),
         "exponent": shaped(growth),
@@ -142,7 +169,8 @@ def summed_up(
         cage_state(place, samples) if not bad else "failed" for place, bad in zip(record.place, lost, strict=True)
     ]
     peak = lambda name: shaped(record.peaks[name])
-    harmonic = np.stack([of_blocks(f"pocket_x_{part}") for part in ("cos", "sin")])
+    harmonic = np.stack([[of_blocks(f"pocket_{axis}_{part}") for part in ("cos", "sin")] for axis in "xy"])
+    force_x, force_y = 2 * np.hypot(*np.moveaxis(harmonic.mean(axis=-1), 1, 0))
     return BearingSweep(
         speed=speed,
         cage_slip=shaped(1 - 2 * np.pi * block * blocks / time.sum(axis=1) / rolling),
@@ -150,6 +178,10 @@ def summed_up(
         pocket_force_max_N=peak("pocket_force"),
         pocket_force_mean_sum_N=mean("pocket_force"),
         land_force_max_N=peak("land_force"),
+        pocket_impulse_N_s=means["pocket_impulse_N_s"].mean(axis=-1),
+        land_impulse_N_s=means["land_impulse_N_s"].mean(axis=-1),
+        pocket_wear_mm3_per_h=worn * mean("pocket_rubbing"),
+        land_wear_mm3_per_h=worn * mean("land_rubbing"),
         friction_power_W=sum(parts.values(), np.zeros(())),
         power_parts_W=parts,
         input_power_W=mean("input"),
@@ -157,8 +189,9 @@ def summed_up(
         eccentricity_std=np.sqrt(np.maximum(squares, 0.0)),
         eccentricity_max=peak("eccentricity"),
         whirl_ratio=shaped(whole("whirl") / whole("cage_speed")),
-        synchronous_force_x_N=2 * np.hypot(*harmonic.mean(axis=-1)),
-        synchronous_force_error_N=2 * scatter(harmonic).max(axis=0),
+        synchronous_force_x_N=force_x,
+        synchronous_force_y_N=force_y,
+        synchronous_force_error_N=2 * scatter(harmonic).max(axis=(0, 1)),
         exponent=shaped(growth.mean(axis=1)),
         exponent_error=shaped(scatter(growth)),
         state=np.array(states).reshape(speed.size, -1),

@@ -13,6 +13,7 @@ from ..sweeps import motions, rpm, sweep
 from ._job import Job, Subject, blocks_of, read_subject
 from ._options import CompareOptions
 from ._show import Report
+from ._whole_compare import bearings_compared
 
 
 CHOSEN = 5
@@ -21,12 +22,14 @@ CHOSEN = 5
 
 def compare(job: Job[CompareOptions]) -> Report:
     """Carry out `jaxcage compare`."""
+    if job.whole is not None:
+        return bearings_compared(job, job.whole)
     options, first = job.options, Subject(job.name, job.model, job.published, job.file)
     second = read_subject(options.other)
     pair = [first, second._replace(name=_told_apart(first.name, second.name))]
     first_ratio, ratio = (float(s.model.bearing.cage_speed_ratio) for s in pair)
     wanted = [at.low_rpm for at in report.read_operating(options.at, first_ratio, job.speeds)]
-    speeds, at = _speeds(rpm(options.first, options.last, options.count) * 30 / np.pi, wanted)
+    speeds, at = _speeds(rpm(options.first, options.last, options.count or 2) * 30 / np.pi, wanted)
     with job.computing() as say:
         found = [
             _swept(job, one, speeds * factor, partial(say, f"{one.name}:"))

@@ -40,7 +40,7 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep")
+WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report")
 """What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
@@ -62,11 +62,14 @@ class Job(Generic[Given]):
         if isinstance(options, IntegrationOptions):
             self.asked = _method(options)
         if isinstance(options, Options):
-            if _is_whole(options.case):
+            whole = _is_whole(options.case)
+            if whole:
                 self.name, self.whole, self.file = _whole_subject(options.case, command)
             else:
                 self.name, self.model, self.published, self.file = read_subject(options.case)
-                self.options = self._of_the_cage(options)
+            self.options = filled = _filled(options, whole)
+            if not whole:
+                self.options = self._of_the_cage(filled)
 
     whole: BearingModel | None = None
     """The whole bearing, if the case is one; there is no `model` then."""
@@ -220,6 +223,20 @@ class Job(Generic[Given]):
         self.files[key] = str(path)
 
 
+def _filled(options: Any, whole: bool) -> Any:
+    """Options with what those that were left out usually are.
+
+    **Raises:** `InputError` for one that says nothing of such a case.
+    """
+    for name in options.of_cage if whole else options.of_whole:
+        field = type(options).__dataclass_fields__[name]
+        if getattr(options, name) != field.default:
+            about = "does not go with a whole bearing" if whole else "goes with a whole bearing, such as nu2310"
+            raise InputError(f"Option {flag(name)} {about}.")
+    usual = {name: pair[whole] for name, pair in options.usual.items() if getattr(options, name) in (None, ())}
+    return dataclasses.replace(options, **usual)
+
+
 def save_figure(figure: Figure, path: Path, style: Style = "light") -> Path:
     """Write a figure, whole or not at all."""
     with replacing(path) as temporary:
@@ -242,16 +259,26 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     **Raises:** `InputError` for a command that takes none yet.
     """
     if command not in WHOLE_COMMANDS:
-        known = " and ".join(f"`jaxcage {name}`" for name in WHOLE_COMMANDS)
-        verb = "knows" if len(WHOLE_COMMANDS) == 1 else "know"
         raise InputError(
-            f"Case '{given}' is a whole bearing, of which only {known} {verb} so far: `jaxcage {command}` takes a cage."
+            f"Case '{given}' is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with "
+            f"{', '.join(WHOLE_COMMANDS)}."
         )
     if not _is_file(given):
         return given.lower(), whole_bearing(given), None
     file = read_whole_bearing(given)
     _say_broken_rule(file.model)
     return _shown_name(given), file.model, file
+
+
+def whole_subject(given: str) -> tuple[str, BearingModel]:
+    """Name and model of another whole bearing.
+
+    **Raises:** `InputError` for a cage.
+    """
+    if not _is_whole(given):
+        raise InputError(f"Case '{given}' must be a whole bearing, as the first one is: two of a kind are compared.")
+    name, model, _ = _whole_subject(given, "compare")
+    return name, model
 
 
 class Subject(NamedTuple):

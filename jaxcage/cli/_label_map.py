@@ -37,7 +37,7 @@ def label_map_of(job: Job[MapOptions], x: Axis, y: Axis, points: tuple[int, int]
             refine_by=options.refine if options.adaptive else "everything",
             **job.given("most starts"),
             **length,
-            blocks=blocks_of(options.revolutions),
+            blocks=blocks_of(length["revolutions"]),
             method=job.method,
             report=files.write,
             stage=say,

@@ -68,7 +68,7 @@ def demand_of(options: CommonOptions, model: CageModel | None) -> Demand:
     if isinstance(options, SimulateOptions):
         return Demand(1, revolutions, 5 * NUMBER * dimension * 128 * revolutions, 400.0 * 128 * revolutions, ALONE)
     if isinstance(options, MapOptions):
-        across, upward = options.points or (options.columns, options.rows)
+        across, upward = options.points or (options.columns or 0, options.rows or 0)
         lanes = max(across * upward * options.starts, options.count * own)
         return Demand(lanes, revolutions + count("persist", 0), _kept(lanes, 16, 20, 1, dimension))
     points = count("count", 0) or count("speeds", 1)

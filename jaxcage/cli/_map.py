@@ -18,10 +18,13 @@ from ._label_map import label_map_of
 from ._options import MapOptions
 from ._orbits import require_edges, searched
 from ._show import Report
+from ._whole_map import bearing_map
 
 
 def map_of(job: Job[MapOptions]) -> Report:
     """Carry out `jaxcage map`."""
+    if job.whole is not None:
+        return bearing_map(job, job.whole)
     options, (x, y) = job.options, _axes(job)
     own = len(job.model.starts(1.0))
     if options.starts > own:
@@ -36,7 +39,7 @@ def map_of(job: Job[MapOptions]) -> Report:
         if not curves:
             said = "; ".join(f"{name}: {why}" for name, why in refused.items())
             raise NoResult(f"No edge could be followed ({said}).")
-        if x.name == SPEED and options.rows > 0:
+        if x.name == SPEED and options.rows and options.columns:
             exponents = largest_exponents(
                 job.model,
                 rpm(options.first, options.last, options.columns),
@@ -56,6 +59,7 @@ def map_of(job: Job[MapOptions]) -> Report:
 def _axes(job: Job[MapOptions]) -> tuple[Axis, Axis]:
     """Both directions."""
     options, known = job.options, list(parameters(job.model))
+    assert options.y is not None
     for option, given, allowed in (("--y", options.y, known), ("--x", options.x, [SPEED, *known])):
         if given not in allowed:
             raise InputError(f"Option {option} must be one of {', '.join(allowed)}, but '{given}' was given.")

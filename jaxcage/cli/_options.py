@@ -25,6 +25,9 @@ FromOne = Annotated[int, whole(1)]
 FromTwo = Annotated[int, whole(2)]
 Tens = Annotated[int, whole(10, of=10)]
 """Revolutions that can be cut into equal blocks, for error bars."""
+OptionalSpeed = Annotated[float | None, number("be a speed above 0 rpm", lambda x: x > 0, "rpm")]
+Load = Annotated[float | None, number("be from 0 to 1e7 N", lambda x: x >= 0, "N", "own")]
+"""[N]."""
 OptionalText = Annotated[str | None, text()]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
@@ -38,6 +41,13 @@ class AnyOptions:
     called: ClassVar[Mapping[str, str]] = {}
     """Argument of the library -> option that it comes from, where their names differ."""
 
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
+    """Option that may be left out -> what it then is for a cage, and for a whole bearing."""
+    of_cage: ClassVar[tuple[str, ...]] = ()
+    """Options that say nothing of a whole bearing."""
+    of_whole: ClassVar[tuple[str, ...]] = ()
+    """Options that say nothing of a cage."""
+
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
 
@@ -46,6 +56,10 @@ class AnyOptions:
 
         **Raises:** `InputError`.
         """
+
+    def _given(self, name: str) -> bool:
+        """Whether an option is neither left out nor what it usually is."""
+        return getattr(self, name) not in (getattr(type(self), name), *self.usual.get(name, ()))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -117,6 +131,8 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
     bearing, whose speeds are the shaft's."""
 
+    of_whole: ClassVar[tuple[str, ...]] = ("load",)
+
     count: Annotated[int | None, whole(1)] = None
     """Number of speeds; if left out 251, of a whole bearing 13, and 40 where ranges are drawn from. With one, only the
     first speed is run."""
@@ -134,6 +150,8 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Number of Lyapunov exponents."""
     waterfall: FromZero = 0
     """Speeds of a waterfall of spectra of the vertical motion; none by default."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
     def check(self) -> None:
         if self.count != 1:
@@ -142,7 +160,10 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ZonesOptions(SweepOptions):
-    """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones."""
+    """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones; of a
+    whole bearing, stretches of speed in which its cage does the same, by the sweep."""
+
+    of_cage: ClassVar[tuple[str, ...]] = ("quick",)
 
     quick: bool = False
     """Leave out the gradients of the edges, which take about a minute to compile."""
@@ -152,56 +173,107 @@ class ZonesOptions(SweepOptions):
 class SearchOptions(_Range, IntegrationOptions):
     """Synchronous orbits over speed: where they are stable, how they lose it, and the zones without one."""
 
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"discard": (250, 20)}
+
     count: FromTwo = 251
     """Speeds that are simulated, from three starts each."""
-    discard: FromZero = 250
-    """Revolutions left out at the beginning."""
+    discard: Annotated[int | None, whole(0)] = None
+    """Revolutions left out at the beginning; if left out 250, 1000 for a map of a cage, 20 of a whole bearing."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class GradientOptions(SearchOptions):
-    """Derivatives of the synchronous-loss edges, and of the width of zone 1, by every parameter."""
+    """Derivatives of the synchronous-loss edges, and of the width of zone 1, by every parameter; of slip, impulses,
+    wear and power of a whole bearing (nu2310), with standard errors."""
+
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
+        **SearchOptions.usual,
+        "by": (("guidance_gap", "eccentricity"), ()),
+        "revolutions": (None, 40),
+        "spread": (None, 0.05),
+        "starts": (None, 2),
+    }
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "first", "last", "count", "lasting", "zone")
+    of_whole: ClassVar[tuple[str, ...]] = ("speed", "load", "revolutions", "spread", "starts", "chaos")
+    called: ClassVar[Mapping[str, str]] = {"directions": "by"}
 
     lasting: bool = False
     """Instead, of the edges and widths of zones of chaos that lasts, with standard errors, after a sweep (minutes)."""
     zone: FromZero = 0
     """With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all."""
-    by: tuple[str, ...] = ("guidance_gap", "eccentricity")
-    """With --lasting: parameters."""
+    by: tuple[str, ...] = ()
+    """With --lasting, or of a whole bearing: parameters, of which several joined by + change together; if left out
+    guidance_gap and eccentricity, and what a designer turns of a whole bearing."""
     designs: FromTwo = 64
-    """With --lasting: designs around this one in each of four rounds, from which an edge is estimated."""
+    """With --lasting: designs around this one in each of four rounds, from which an edge is estimated. Of a whole
+    bearing: designs around it, in pairs."""
     seed: FromZero = 0
-    """With --lasting: seed of these designs."""
+    """With --lasting, or of a whole bearing: seed of these designs."""
+    speed: OptionalSpeed = None
+    """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
+    revolutions: Annotated[int | None, whole(2, of=2)] = None
+    """Of a whole bearing: revolutions of the cage observed, an even number; 40 if left out."""
+    spread: Annotated[float | None, number("be above 0 and at most 0.3", lambda x: 0 < x <= 0.3)] = None
+    """Of a whole bearing: how far its parameters are moved, relatively; 0.05 if left out."""
+    starts: Annotated[int | None, whole(1)] = None
+    """Of a whole bearing: starts of each design; 2 if left out."""
+    chaos: bool = False
+    """Of a whole bearing: the mean slope of the largest Lyapunov exponent as well, which takes twice as long."""
 
     def check(self) -> None:
         super().check()
         names = ("zone", "by", "designs", "seed")
-        if not self.lasting and any(getattr(self, n) != getattr(GradientOptions, n) for n in names):
-            raise InputError("Options --zone, --by, --designs and --seed go with --lasting.")
-        if self.lasting and self.discard != GradientOptions.discard:
+        if not self.lasting and self.speed is None and any(self._given(n) for n in names):
+            raise InputError(
+                "Options --zone, --by, --designs and --seed go with --lasting, or with the --speed of a whole bearing."
+            )
+        if self.lasting and self._given("discard"):
             raise InputError("Option --discard does not go with --lasting, which sweeps as `jaxcage sweep` does.")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MapOptions(SearchOptions):
-    """Stability map: the edges followed in two parameters, over colours of the largest exponent."""
+    """Stability map: the edges followed in two parameters, over colours of the largest exponent; slip, power lost,
+    exponent and state of a whole bearing (nu2310) over its shaft's speed and load."""
 
-    discard: FromZero = 1000
-    """Revolutions left out at the beginning."""
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
+        "discard": (1000, 20),
+        "y": ("guidance_gap", "load"),
+        "rows": (12, 8),
+        "columns": (50, 13),
+        "revolutions": (100, 20),
+    }
+    of_cage: ClassVar[tuple[str, ...]] = (
+        "solver",
+        "steps",
+        "count",
+        "x",
+        "persist",
+        "points",
+        "adaptive",
+        "refine",
+        "most",
+        "speed",
+        "no_curves",
+    )
+
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
-    y: str = "guidance_gap"
-    """Parameter upwards, any of the model."""
+    y: OptionalText = None
+    """Parameter upwards, any of the model; guidance_gap if left out, of a whole bearing its load."""
     lower: OptionalText = None
-    """Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out."""
+    """Lowest value of y, in SI units or with a unit, e.g. "0.4 mm"; 0.8 of its value if left out, a twentieth of
+    a whole bearing's load."""
     upper: OptionalText = None
     """Highest value of y; 1.25 of its value if left out."""
-    rows: FromZero = 12
-    """Values of y at which the exponent is computed; with 0 it is left out."""
-    columns: FromTwo = 50
-    """Speeds at which the exponent is computed."""
-    revolutions: FromOne = 100
-    """Revolutions over which the exponent is computed."""
+    rows: Annotated[int | None, whole(0)] = None
+    """Values of y at which the exponent is computed; with 0 it is left out. 12 if left out, 8 of a whole bearing."""
+    columns: Annotated[int | None, whole(2)] = None
+    """Speeds at which the exponent is computed; 50 if left out, 13 of a whole bearing."""
+    revolutions: Annotated[int | None, whole(1)] = None
+    """Revolutions over which the exponent is computed; 100 if left out, 20 of a whole bearing."""
     starts: FromOne = 1
     """Starts of which the largest exponent is taken."""
     persist: FromZero = 0
@@ -214,14 +286,14 @@ class MapOptions(SearchOptions):
     """With --adaptive: follow where chaos begins and ends, or where any label changes."""
     most: Annotated[int | None, whole(4)] = None
     """With --points: points computed at most."""
-    speed: Annotated[float | None, number("be a speed above 0 rpm", lambda x: x > 0, "rpm")] = None
+    speed: OptionalSpeed = None
     """With --points and another --x than the speed: the speed of all points [rpm]."""
     no_curves: bool = False
     """With --points: do not search for the synchronous-loss edges to draw on top."""
 
     def check(self) -> None:
         super().check()
-        given = lambda *names: any(getattr(self, name) != getattr(MapOptions, name) for name in names)
+        given = lambda *names: any(self._given(name) for name in names)
         if self.points is None:
             if given("adaptive", "refine", "no_curves", "persist", "most", "speed"):
                 raise InputError(
@@ -235,10 +307,11 @@ class MapOptions(SearchOptions):
             raise InputError("Options --rows and --columns do not go with --points, which says how many there are.")
         if given("refine") and not self.adaptive:
             raise InputError("Option --refine goes with --adaptive.")
-        if self.revolutions % 10:
+        if (self.revolutions or 0) % 10:
             raise InputError(f"Option --revolutions must be a multiple of 10, but {self.revolutions} was given.")
-        if 0 < self.persist <= self.discard:
-            allowed = f"0 or above the {self.discard} of --discard"
+        discard = self.usual["discard"][0] if self.discard is None else self.discard
+        if 0 < self.persist <= discard:
+            allowed = f"0 or above the {discard} of --discard"
             raise InputError(f"Option --persist must be {allowed}, but {self.persist} was given.")
         if (self.x == "speed") != (self.speed is None):
             wrong = (
@@ -387,7 +460,7 @@ class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Revolutions recorded."""
     discard: FromZero = 0
     """Revolutions left out at the beginning."""
-    load: Annotated[float | None, number("be from 0 to 1e7 N", lambda x: x >= 0, "N", "own")] = None
+    load: Load = None
     """Shaft load [N] of a whole bearing, or with a unit, e.g. "4.45 kN"; its own if left out."""
     animate: bool = False
     """Of a whole bearing: an animation of one revolution of the cage as well, a GIF."""
@@ -434,12 +507,15 @@ class ValidateOptions(CommonOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReportOptions(_Length, _Range, IntegrationOptions):
-    """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is."""
+    """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is; of a
+    whole bearing its drawing, slips, forces, wear, spectra, sweep and gradients."""
+
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "draws", "seed")
 
     operating: str = ""
     """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
     count: Annotated[int | None, whole(2)] = None
-    """Number of speeds; 251, or 126 with --quick."""
+    """Number of speeds; if left out 251, or 126 with --quick; of a whole bearing 13, or 5."""
     draws: Annotated[int, whole(0)] = 64
     """Draws from what the file knows within ranges only; 0 takes the best guesses alone."""
     seed: FromZero = 0
@@ -467,12 +543,16 @@ class UnknownsOptions(_Range, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CompareOptions(_Length, _Range, IntegrationOptions):
-    """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land."""
+    """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land; of two
+    whole bearings slips, impulses, wear, power and states of the cage."""
+
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"count": (126, 13)}
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "confirm", "horizon", "at")
 
     other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")]
     """The design to compare it with, a case or a TOML file. Both run at the same speeds of the shaft."""
-    count: Annotated[int, whole(2)] = 126
-    """Number of speeds."""
+    count: Annotated[int | None, whole(2)] = None
+    """Number of speeds; 126 if left out, 13 of a whole bearing."""
     at: str = ""
     """Speeds to be shown in a table, e.g. "8500, 12000" [rpm] or "20000 rpm shaft"; five of the range if left out."""
     confirm: bool = True
@@ -483,16 +563,23 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunUpOptions(_Range, IntegrationOptions):
-    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs."""
+    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs; of
+    a whole bearing its slip, eccentricity and power, whose speeds are the shaft's."""
 
-    called: ClassVar[Mapping[str, str]] = {"settle": "discard"}
+    called: ClassVar[Mapping[str, str]] = {"settle": "discard", "steps": "windows"}
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"discard": (100, 10), "windows": (100, 24)}
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps")
+    of_whole: ClassVar[tuple[str, ...]] = ("load",)
 
     rate: Annotated[float, number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0
     """Speed gained per second [rpm/s], in the mean over the ramp; the cage's, or the shaft's if the file says so."""
-    windows: FromTwo = 100
-    """Parts into which each ramp is cut, in each of which the orbit's size is read."""
-    discard: FromZero = 100
-    """Revolutions at the first speed before the ramp begins."""
+    windows: Annotated[int | None, whole(2)] = None
+    """Parts into which each ramp is cut, in each of which the orbit's size is read; 100 if left out. Of a whole bearing
+    steps of the speed, 24 if left out."""
+    discard: Annotated[int | None, whole(0)] = None
+    """Revolutions at the first speed before the ramp begins; 100 if left out, 10 of a whole bearing."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -1,17 +1,15 @@
 """`jaxcage report`: one page about a design."""
 
-import shlex
-from pathlib import Path
 from typing import Any
 
 from .. import report
 from .._errors import InputError
 from ..sweeps import rpm
 from ._chances import drawn_chances
-from ._console import visible
 from ._job import Job, blocks_of
 from ._options import ReportOptions
 from ._show import Report
+from ._whole_page import bearing_report, command_line
 
 
 SPEEDS, QUICK_SPEEDS = 251, 126
@@ -20,6 +18,8 @@ SPEEDS, QUICK_SPEEDS = 251, 126
 
 def report_on(job: Job[ReportOptions]) -> Report:
     """Carry out `jaxcage report`."""
+    if job.whole is not None:
+        return bearing_report(job, job.whole)
     options = job.options
     operating = report.read_operating(options.operating, job.ratio, job.speeds)
     if options.operating and not operating:
@@ -40,7 +40,7 @@ def report_on(job: Job[ReportOptions]) -> Report:
         drawn = drawn_chances(job, options.draws, say) if job.unknowns and options.draws else None
     table, left = (None, ()) if job.file is None else (job.file.table, job.file.left)
     html = report.page(
-        findings, operating, table=table, command=_command(options), chances=drawn, left=left, units=job.units
+        findings, operating, table=table, command=command_line(options), chances=drawn, left=left, units=job.units
     )
     job.text(html, job.path(".html"), "report")
     judged = report.judge(findings, operating)
@@ -53,13 +53,6 @@ def report_on(job: Job[ReportOptions]) -> Report:
     stages = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in findings.seconds.items())
     notes = [f"Failed simulations: {failed}", f"Stages: {stages}", f"Size: {size / 1e6:.1f} MB"]
     return Report(document, [*known, *_tables(findings, judged)], notes)
-
-
-def _command(options: ReportOptions) -> str:
-    """The command line as a shell takes it, without folders."""
-    parts = ["jaxcage", "report", Path(options.case).name]
-    parts += ["--operating", options.operating] if options.operating else []
-    return visible(shlex.join([*parts, *(["--quick"] if options.quick else [])]))
 
 
 def _document(findings: report.Findings, judged: list[report.Judged]) -> dict[str, Any]:

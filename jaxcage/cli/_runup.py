@@ -10,6 +10,7 @@ from ._job import Job
 from ._limits import ALONE, NUMBER, Demand
 from ._options import RunUpOptions
 from ._show import Report
+from ._whole_runup import bearing_runup
 
 
 ROWS = 20
@@ -18,10 +19,12 @@ ROWS = 20
 
 def runup(job: Job[RunUpOptions]) -> Report:
     """Carry out `jaxcage runup`."""
-    options = job.options
+    if job.whole is not None:
+        return bearing_runup(job, job.whole)
+    options, settle = job.options, job.options.discard or 0
     rate = rpm(options.rate * (job.ratio if job.speeds == "shaft" else 1.0))
     first, last = rpm(options.first), rpm(options.last)
-    revolutions = ramp_revolutions(first, last, (last - first) / rate) + options.discard
+    revolutions = ramp_revolutions(first, last, (last - first) / rate) + settle
     job.require(Demand(1, 2 * revolutions, 10 * NUMBER * job.model.dimension * 32 * revolutions, rate=ALONE))
     with job.computing():
         found = ramp_up_down(
@@ -29,8 +32,8 @@ def runup(job: Job[RunUpOptions]) -> Report:
             first,
             last,
             rate,
-            windows=options.windows,
-            settle=options.discard,
+            windows=options.windows or 2,
+            settle=settle,
             method=job.asked,
         )
     slow, fast = found.rate_rpm_per_s

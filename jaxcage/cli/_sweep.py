@@ -128,6 +128,8 @@ def _waterfall(job: Job[SweepOptions], found: Sweep) -> None:
 
 def zones_over_speed(job: Job[ZonesOptions]) -> Report:
     """`jaxcage zones`: where the synchronous orbit is lost, with exact edges and gradients, beside where chaos is."""
+    if job.whole is not None:
+        return bearing_over_speed(job, job.whole)
     if job.unknowns and not job.options.nominal:
         return chances(job)
     swept = _swept(job)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from .._errors import InputError, NoResult
 from .._parameters import replace
@@ -21,7 +22,7 @@ from ..analysis import (
     named_lines,
     pocket_force_distribution,
 )
-from ..integrate import simulate_bearing
+from ..integrate import BearingRun, simulate_bearing
 from ..io import SpeedOf, Whose
 from ..models import FASTEST, BearingModel
 from ..plotting import bearing_animation, bearing_figure
@@ -30,6 +31,7 @@ from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
 from ._options import SimulateOptions
+from ._readers import flag
 from ._show import Report
 
 
@@ -39,6 +41,8 @@ TOLERANCE = 1e-5
 """Of a step, in units of the state's scale."""
 RATE = 0.5
 """Revolutions a second, about."""
+SWEEPING = 15.0
+"""Revolutions of lanes that a core makes in a second in a sweep, about, exponents with them."""
 
 
 def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
@@ -46,26 +50,15 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     options = job.options
     if options.solver is not None or options.steps is not None:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
-    if options.load is not None:
-        model = replace(model, load=options.load)
+    model = loaded(model, options.load)
     shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
-    speed = float(rpm(shaft_rpm))
-    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     numbers = (5 * model.bearing.n_rollers + 40) * SAMPLES * (options.revolutions + options.discard)
     job.require(Demand(1, options.revolutions + options.discard, 40.0 * numbers, 20.0 * numbers, RATE))
     with job.computing():
-        length = job.given("revolutions discard")
-        run = simulate_bearing(model, speed, **length, samples=SAMPLES, tolerance=tolerance)
-        if run.outcome not in ("successful", "inaccurate"):
-            raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
-        history = bearing_history(model, run, speed)
-    measures, orders = bearing_measures(model, run, speed), bearing_orders(model, run, speed)
-    spectra = bearing_spectra(history) if options.revolutions > 1 else {}
-    circumference = around(history)
+        found = examined(job.name, model, shaft_rpm, options.revolutions, options.discard, options.tolerance)
+    run, history = found.run, found.history
     at = f"_{shaft_rpm:g}rpm_shaft"
-    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N"
-    figure = bearing_figure(model, run, history, circumference, spectra, orders, title)
-    job.listed("figure", job.saved(figure, job.path(f"{at}.png")))
+    job.listed("figure", job.saved(found.figure, job.path(f"{at}.png")))
     job.columns(_columns(history), detail=at)
     if options.animate:
         with job.written("animation", job.path(f"{at}.gif")) as path:
@@ -75,20 +68,83 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
         "load_N": float(model.load),
         **chosen(options, "revolutions discard"),
         **chosen(run, "outcome error estimate steps"),
-        **dataclasses.asdict(measures),
+        **dataclasses.asdict(found.measures),
         "pocket_force_distribution_N": pocket_force_distribution(history),
-        "around": {"angle_deg": np.degrees(circumference.angle), **_without_angle(circumference)},
-        "orders": orders,
-        "spectra": _lines(spectra, orders),
+        "around": {"angle_deg": np.degrees(found.circumference.angle), **_without_angle(found.circumference)},
+        "orders": found.orders,
+        "spectra": _lines(found.spectra, found.orders),
     }
-    length = f"{options.revolutions} revolutions of the cage"
-    tables = [
-        Table(f"{title}, {length}", ("measure", "value", "unit"), _rows(measures)),
-        _circumference_table(circumference),
-        *_line_tables(spectra, orders),
-    ]
     said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
-    return Report(document, tables, [said])
+    return Report(document, found.tables, [said])
+
+
+@dataclasses.dataclass(frozen=True)
+class Examined:
+    """A whole bearing at one shaft speed."""
+
+    title: str
+    model: BearingModel
+    revolutions: int
+    run: BearingRun
+    history: BearingHistory
+    measures: BearingMeasures
+    orders: Mapping[str, float]
+    spectra: Mapping[str, OrderSpectrum]
+    circumference: Around
+
+    @property
+    def figure(self) -> Figure:
+        """Drawing, orbit, slips and forces around the bearing, forces over time, spectra."""
+        return bearing_figure(
+            self.model, self.run, self.history, self.circumference, self.spectra, self.orders, self.title
+        )
+
+    @property
+    def tables(self) -> list[Table]:
+        """Measures, rollers around the bearing, lines of the spectra."""
+        title = f"{self.title}, {self.revolutions} revolutions of the cage"
+        return [
+            Table(title, ("measure", "value", "unit"), _rows(self.measures)),
+            _circumference_table(self.circumference),
+            *_line_tables(self.spectra, self.orders),
+        ]
+
+
+def examined(
+    name: str, model: BearingModel, shaft_rpm: float, revolutions: int, discard: int, tolerance: float | None
+) -> Examined:
+    """Run a whole bearing at one speed, and all that is read off that run.
+
+    **Raises:** `NoResult` if the run fails.
+    """
+    speed = float(rpm(shaft_rpm))
+    run = simulate_bearing(
+        model,
+        speed,
+        revolutions=revolutions,
+        discard=discard,
+        samples=SAMPLES,
+        tolerance=TOLERANCE if tolerance is None else tolerance,
+    )
+    if run.outcome not in ("successful", "inaccurate"):
+        raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
+    history = bearing_history(model, run, speed)
+    return Examined(
+        f"{name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N",
+        model,
+        revolutions,
+        run,
+        history,
+        bearing_measures(model, run, speed),
+        bearing_orders(model, run, speed),
+        bearing_spectra(history) if revolutions > 1 else {},
+        around(history),
+    )
+
+
+def loaded(model: BearingModel, load: float | None) -> BearingModel:
+    """The bearing under the load of an option [N]."""
+    return model if load is None else replace(model, load=load)
 
 
 def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str = "--speed") -> float:
@@ -107,6 +163,19 @@ def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str =
             f"make {land:.0f} m/s."
         )
     return shaft
+
+
+def shaft_speeds(job: Job[Any], model: BearingModel, count: int) -> np.ndarray:
+    """Shaft speeds [rad/s] from --first to --last.
+
+    **Raises:** `InputError` for a range that is none, or in which no cage runs.
+    """
+    first, last = (shaft_rpm_of(model, getattr(job.options, n), job.speeds, flag(n)) for n in ("first", "last"))
+    if count == 1:
+        return np.array([rpm(first)])
+    if last <= first:
+        raise InputError(f"Option --last must be above --first, but the range is {first:g} to {last:g} rpm.")
+    return np.asarray(rpm(first, last, count))
 
 
 def _columns(history: BearingHistory) -> dict[str, np.ndarray]:

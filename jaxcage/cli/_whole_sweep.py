@@ -1,59 +1,46 @@
 """What a whole bearing does over the shaft's speed: slips, forces, losses, exponent, state of the cage's motion."""
 
 import collections
+import dataclasses
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .._errors import InputError, NoResult
-from ..analysis import BearingSweep
+from ..analysis import BearingSweep, BearingZone, bearing_zones
 from ..io import save_bearing_sweep
 from ..models import BearingModel
 from ..plotting import bearing_sweep_figure
 from ..report import Table, chosen
-from ..sweeps import rpm, sweep_bearing
+from ..sweeps import sweep_bearing
 from ._job import Job, blocks_of
 from ._limits import Demand
 from ._options import SweepOptions
 from ._readers import flag
 from ._show import Report
-from ._whole import shaft_rpm_of
+from ._whole import SWEEPING, loaded, shaft_speeds
 
 
 SPEEDS, STARTS = 13, 3
 NOT_YET = "solver steps waterfall horizon confirm draws seed nominal"
 """Options of sweeps of a cage that say nothing here."""
-RATE = 15.0
-"""Revolutions of lanes that a core makes in a second, about, exponents with them."""
 COLUMNS = (
-    "cage_slip roller_slip_max pocket_force_mean_sum_N pocket_force_max_N land_force_max_N friction_power_W "
-    "input_power_W eccentricity_mean eccentricity_std eccentricity_max whirl_ratio synchronous_force_x_N "
+    "cage_slip roller_slip_max pocket_force_mean_sum_N pocket_force_max_N pocket_impulse_N_s land_force_max_N "
+    "land_impulse_N_s pocket_wear_mm3_per_h land_wear_mm3_per_h friction_power_W input_power_W eccentricity_mean "
+    "eccentricity_std eccentricity_max whirl_ratio synchronous_force_x_N synchronous_force_y_N "
     "synchronous_force_error_N exponent exponent_error state outcome error steps"
 )
 
 
 def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
-    """`jaxcage sweep` of a whole bearing."""
-    options = job.options
+    """`jaxcage sweep` of a whole bearing, and `jaxcage zones`."""
+    options, model = job.options, loaded(model, job.options.load)
     speeds = _speeds(job, model)
-    lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
-    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, RATE))
-    given: dict[str, Any] = job.given("discard revolutions exponents")
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
-    with job.computing("sweep") as say:
-        found = sweep_bearing(
-            model,
-            speeds,
-            starts=STARTS,
-            blocks=blocks_of(options.revolutions),
-            progress=partial(say, ""),
-            **given,
-        )
-    if found.failed.all():
-        raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
+    found = swept(job, model, speeds)
     title = f"{job.name}, {float(model.load):g} N, {options.discard} + {options.revolutions} revolutions of the cage"
-    job.listed("figure", job.saved(bearing_sweep_figure(found, title), job.path(".png")))
+    found_zones = bearing_zones(found)
+    job.listed("figure", job.saved(bearing_sweep_figure(found, title, found_zones), job.path(".png")))
     job.listed("data", save_bearing_sweep(job.folder / f"sweep_{job.name}.zarr", found, model))
     outcomes = dict(sorted(collections.Counter(found.outcome.ravel().tolist()).items()))
     document = {
@@ -66,9 +53,36 @@ def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
         "standard_errors": {name: found.standard_error(name) for name in found.block_means},
         "power_parts_W": found.power_parts_W,
         "outcomes": outcomes,
+        "zones": [dataclasses.asdict(zone) for zone in found_zones],
     }
     said = ", ".join(f"{n} {name}" for name, n in outcomes.items())
-    return Report(document, [_table(title, found)], [f"Lanes: {said}"])
+    tables = [zones_table(job.name, found_zones), sweep_table(title, found)]
+    return Report(document, tables, [f"Lanes: {said}"])
+
+
+def swept(job: Job[Any], model: BearingModel, speeds: np.ndarray) -> BearingSweep:
+    """The sweep that the options describe.
+
+    **Raises:** `NoResult` if every lane fails.
+    """
+    options = job.options
+    lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
+    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
+    given: dict[str, Any] = job.given("discard revolutions")
+    given |= {"exponents": getattr(options, "exponents", 1)}
+    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
+    with job.computing("sweep") as say:
+        found = sweep_bearing(
+            model,
+            speeds,
+            starts=STARTS,
+            blocks=blocks_of(options.revolutions),
+            progress=partial(say, ""),
+            **given,
+        )
+    if found.failed.all():
+        raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
+    return found
 
 
 def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
@@ -82,16 +96,26 @@ def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
             raise InputError(f"Option {flag(name)} does not go with a whole bearing.")
     if options.exponents > 1:
         raise InputError(f"Option --exponents must be 1 for a whole bearing, but {options.exponents} was given.")
-    first, last = (shaft_rpm_of(model, getattr(options, n), job.speeds, flag(n)) for n in ("first", "last"))
-    count = options.count or SPEEDS
-    if count == 1:
-        return np.array([rpm(first)])
-    if last <= first:
-        raise InputError(f"Option --last must be above --first, but the range is {first:g} to {last:g} rpm.")
-    return np.asarray(rpm(first, last, count))
+    return shaft_speeds(job, model, options.count or SPEEDS)
 
 
-def _table(title: str, found: BearingSweep) -> Table:
+def zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
+    """Stretches of speed in which the cage does the same."""
+    rows = [
+        (
+            f"{zone.low_rpm:.0f} to {zone.high_rpm:.0f}",
+            " or ".join(zone.states),
+            "chaotic" if zone.chaotic else "not known to be chaotic",
+            f"{zone.exponent:.2f} ± {zone.exponent_error:.2f}",
+            str(zone.speeds),
+        )
+        for zone in found
+    ]
+    heads = ("shaft [rpm]", "state of the cage", "exponent says", "exponent", "speeds")
+    return Table(f"Zones of {name}, each edge halfway between two speeds of the sweep", heads, rows)
+
+
+def sweep_table(title: str, found: BearingSweep) -> Table:
     """One row for each speed, means over the starts that did not fail."""
     heads = ("shaft [rpm]", "slip [%]", "pockets, mean [N]", "largest [N]", "lost [W]", "eccentricity", "whirl ratio")
     rows = []

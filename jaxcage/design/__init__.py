@@ -13,6 +13,7 @@
 | `_edges`    | widths of zones and distances from edges, exact                               |
 | `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
+| `_bearing_gradient` | slip, impulses, wear and power of the whole bearing by its parameters |
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
 | `_optimise` | designs made better by gradient                                               |
@@ -21,6 +22,14 @@
 """
 
 from .._arguments import check_layer
+from ._bearing_gradient import (
+    DIRECTIONS as DIRECTIONS,
+    STATISTICS as STATISTICS,
+    BearingGradient as BearingGradient,
+    StatisticGradient as StatisticGradient,
+    bearing_gradient as bearing_gradient,
+    gradient_of_pairs as gradient_of_pairs,
+)
 from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
 from ._edges import (
     EdgeClearance as EdgeClearance,
@@ -70,5 +79,5 @@ from ._unknowns import Unknown as Unknown
 
 check_layer(
     globals(),
-    "fit_edges global_sensitivity optimise pareto_front screen tolerance_budget trade_off",
+    "bearing_gradient fit_edges global_sensitivity optimise pareto_front screen tolerance_budget trade_off",
 )

@@ -10,6 +10,7 @@
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
 | `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
+| `_bearing_gradient` | elasticities of the whole bearing's statistics with their errors      |
 | `_impact`        | impact of a roller on a cage bar                                        |
 | `_statics`       | load of every roller                                                    |
 | `_waterfall`     | spectra over speed                                                      |
@@ -29,7 +30,10 @@ from ._bearing import (
     bearing_animation as bearing_animation,
     bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
+    bearing_map_figure as bearing_map_figure,
+    bearing_ramp_figure as bearing_ramp_figure,
     bearing_sweep_figure as bearing_sweep_figure,
+    bearings_beside as bearings_beside,
     cage_orbit as cage_orbit,
     force_over_time as force_over_time,
     marked_spectrum as marked_spectrum,
@@ -37,6 +41,7 @@ from ._bearing import (
     pocket_force_around as pocket_force_around,
     slip_around as slip_around,
 )
+from ._bearing_gradient import statistic_bars as statistic_bars
 from ._branches import (
     MARKS as MARKS,
     PERIOD_COLOURS as PERIOD_COLOURS,

@@ -1,19 +1,35 @@
 """The whole bearing: drawn to scale with pocket forces, slips around it, whirl of the cage, spectra, an animation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patches import Annulus, Circle, FancyArrowPatch, Polygon
+from matplotlib.patches import Annulus, Circle, FancyArrowPatch, Patch, Polygon
 
-from ..analysis import Around, BearingHistory, BearingSweep, OrderSpectrum
+from ..analysis import Around, BearingHistory, BearingSweep, BearingZone, OrderSpectrum
 from ..integrate import BearingRun
 from ..models import BearingModel
-from ._style import BLACK, BLUE, GREEN, GREY, GRID, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, dress, new_figure
+from ..sweeps import BearingUpDown
+from ._style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    GRID,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    ZONE,
+    axes_or_new,
+    dress,
+    new_figure,
+)
 
 
 MM = 1e3
@@ -242,9 +258,13 @@ def force_over_time(history: BearingHistory, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def bearing_sweep_figure(found: BearingSweep, title: str = "") -> Figure:
-    """Slip, pocket forces, power lost, whirl, largest exponent and equivalent synchronous force over the shaft's speed,
-    a line for each start, with standard errors where they are known.
+STATE_COLOURS = {"circular": GREEN, "locally_periodic": BLUE, "disordered": VERMILION}
+"""Of what the cage's centre does; grey where the start decides, or lanes failed."""
+
+
+def bearing_sweep_figure(found: BearingSweep, title: str = "", zones: Sequence[BearingZone] = ()) -> Figure:
+    """Slip, pocket forces, power lost, largest exponent and equivalent synchronous force over the shaft's speed, a line
+    for each start, with standard errors where they are known. Zones are shaded by the state of the cage.
     """
     figure = new_figure(11.5, 8.5)
     axes = figure.subplots(3, 2, sharex=True)
@@ -260,7 +280,121 @@ def bearing_sweep_figure(found: BearingSweep, title: str = "") -> Figure:
     for ax in axes[2]:
         ax.set_xlabel("Shaft speed [rpm]")
     axes[0, 0].legend(frameon=False, fontsize=8)
+    for zone in zones if len(found.rpm) > 1 else ():
+        for ax in axes.ravel():
+            ax.axvspan(zone.low_rpm, zone.high_rpm, color=_state_colour(zone.states), alpha=0.1, linewidth=0, zorder=0)
+    if zones and len(found.rpm) > 1:
+        shown = dict.fromkeys(" or ".join(zone.states).replace("_", " ") for zone in zones)
+        colours = {" or ".join(zone.states).replace("_", " "): _state_colour(zone.states) for zone in zones}
+        patches = [Patch(color=colours[name], alpha=0.25, label=name) for name in shown]
+        figure.legend(handles=patches, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _state_colour(states: Sequence[str]) -> str:
+    return STATE_COLOURS.get(states[0], GREY) if len(states) == 1 else GREY
+
+
+def _pale(colour: str) -> tuple[float, float, float]:
+    r, g, b = (0.45 + 0.55 * x for x in _rgb(colour))
+    return r, g, b
+
+
+def bearing_map_figure(
+    found: Sequence[BearingSweep],
+    values: Float[np.ndarray, " rows"],
+    label: str,
+    title: str = "",
+    logarithmic: bool = False,
+) -> Figure:
+    """Slip, power lost, largest exponent and state over the shaft's speed and a parameter: means over starts.
+
+    **Arguments:** a sweep for each value, all at the same speeds; values as they are shown, ascending; the parameter's
+    label; whether the axis of the values is logarithmic.
+    """
+    figure = new_figure(11.5, 8.0)
+    axes = figure.subplots(2, 2, sharex=True, sharey=True)
+    speeds, mean = found[0].rpm, lambda name: np.array([np.nanmean(getattr(each, name), axis=1) for each in found])
+    x, y = _borders(speeds), np.exp(_borders(np.log(values))) if logarithmic else _borders(values)
+    panels = (("Cage slip [%]", 100 * mean("cage_slip")), ("Power lost [W]", mean("friction_power_W")))
+    for ax, (name, z) in zip(
+        axes.ravel(), (*panels, ("Largest exponent per revolution", mean("exponent"))), strict=False
+    ):
+        dress(ax).grid(False)
+        positive = np.nanmin(z) > 0 and np.nanmax(z) > 20 * np.nanmin(z)
+        drawn = ax.pcolormesh(x, y, z, cmap="viridis", norm=LogNorm() if positive else None)
+        figure.colorbar(drawn, ax=ax)
+        ax.set_title(name, fontsize=10, loc="left")
+    ax = dress(axes[1, 1])
+    ax.grid(False)
+    ax.pcolormesh(
+        x, y, np.array([[_pale(_state_colour(sorted(set(row.tolist())))) for row in each.state] for each in found])
+    )
+    ax.set_title("State of the cage (grey: the start decides, or failed)", fontsize=10, loc="left")
+    patches = [Patch(color=_pale(c), label=n.replace("_", " ")) for n, c in STATE_COLOURS.items()]
+    ax.legend(handles=patches, fontsize=8, loc="upper right")
+    for ax in axes[1]:
+        ax.set_xlabel("Shaft speed [rpm]")
+    for ax in axes[:, 0]:
+        ax.set_ylabel(label)
+        if logarithmic:
+            ax.set_yscale("log")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _borders(x: np.ndarray) -> np.ndarray:
+    """Of cells around ascending numbers."""
+    middle = (x[1:] + x[:-1]) / 2
+    return np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
+
+
+def bearing_ramp_figure(found: BearingUpDown, title: str = "") -> Figure:
+    """Slip, largest eccentricity ratio and power lost over the shaft's speed, both ways; shaded where slips differ."""
+    figure = new_figure(9.5, 8.0)
+    axes = figure.subplots(3, 1, sharex=True)
+    for way, colour, label in ((found.up, BLUE, "run-up"), (found.down, VERMILION, "run-down")):
+        style: Any = dict(color=colour, marker=".", linewidth=1.1, label=label)
+        axes[0].errorbar(found.rpm, 100 * way.cage_slip, 100 * np.nan_to_num(way.cage_slip_error), **style)
+        axes[1].plot(found.rpm, way.eccentricity, **style)
+        axes[2].plot(found.rpm, way.friction_power_W, **style)
+    half = 0.5 * float(found.rpm[1] - found.rpm[0])
+    for ax, name in zip(axes, ("Cage slip [%]", "Largest eccentricity ratio", "Power lost [W]"), strict=True):
+        dress(ax).set_ylabel(name)
+        for low, high in found.stretches:
+            ax.axvspan(low - half, high + half, color=ZONE, linewidth=0, zorder=0)
+    axes[0].legend(frameon=False, fontsize=9)
+    axes[-1].set_xlabel("Shaft speed [rpm]")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def bearings_beside(names: Sequence[str], found: Sequence[BearingSweep]) -> Figure:
+    """Slip, impulses, wear, power and exponent of several bearings over the shaft's speed: means over starts, with
+    standard errors.
+    """
+    figure = new_figure(11.5, 8.5)
+    axes = figure.subplots(3, 2, sharex=True)
+    panels = {
+        "cage_slip": ("Cage slip [%]", 100.0),
+        "friction_power_W": ("Power lost [W]", 1.0),
+        "pocket_impulse_N_s": ("Pocket impulse [N s]", 1.0),
+        "land_impulse_N_s": ("Land impulse [N s]", 1.0),
+        "pocket_wear_mm3_per_h": ("Pocket wear [mm³/h]", 1.0),
+        "exponent": ("Largest exponent per revolution", 1.0),
+    }
+    for ax, (measure, (label, factor)) in zip(axes.ravel(), panels.items(), strict=True):
+        for name, each, colour in zip(names, found, MARK_COLOURS[::4] + MARK_COLOURS[1:4], strict=False):
+            blocks = each.block_means[measure].reshape(each.speed.size, -1)
+            count = np.maximum(np.isfinite(blocks).sum(axis=1), 1)
+            mean, bars = np.nanmean(blocks, axis=1), np.nan_to_num(np.nanstd(blocks, axis=1) / np.sqrt(count))
+            style: Any = dict(color=colour, linewidth=1.0, marker=".", elinewidth=0.8, label=name)
+            dress(ax).errorbar(each.rpm, factor * mean, factor * bars, **style)
+        ax.set_ylabel(label)
+    for ax in axes[2]:
+        ax.set_xlabel("Shaft speed [rpm]")
+    axes[0, 0].legend(frameon=False, fontsize=9)
     return figure
 
 

@@ -7,6 +7,8 @@
 | `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
 | `_slopes`        | how every exact edge answers to the design                                  |
 | `_lasting`       | how edges of lasting chaos answer to the design, with error bars           |
+| `_bearing_gradient` | how the whole bearing's slip, wear and power answer to the design, with error bars |
+| `_bearing_page`  | the page of a whole bearing                                                 |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
 | `_statics`       | statics and the impact of a roller as tables                                |
@@ -22,6 +24,15 @@
 | `_page`          | the page                                                                    |
 """
 
+from ._bearing_gradient import (
+    bearing_gradient_document as bearing_gradient_document,
+    bearing_gradient_table as bearing_gradient_table,
+)
+from ._bearing_page import (
+    Section as Section,
+    bearing_page as bearing_page,
+    bearing_parameters_table as bearing_parameters_table,
+)
 from ._chances import (
     bands_table as bands_table,
     chances_document as chances_document,

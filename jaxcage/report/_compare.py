@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from ..analysis import Sweep, Zones
 from ..io import configuration
-from ..models import CageModel
+from ..models import BearingModel, CageModel
 from ..sweeps import Motion
 from ._sources import parameter_rows
 from ._table import Table, number
@@ -54,7 +54,7 @@ def _largest(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(found), found, np.nan)
 
 
-def differences_table(names: Sequence[str], models: Sequence[CageModel]) -> Table:
+def differences_table(names: Sequence[str], models: Sequence[CageModel | BearingModel]) -> Table:
     """Every value in which two designs differ, in the units people read."""
     rows = []
     for path, (text, *cells, unit, change) in differences(models).items():
@@ -63,7 +63,7 @@ def differences_table(names: Sequence[str], models: Sequence[CageModel]) -> Tabl
     return Table(title, ("value", *names, "unit", "change"), rows or [("nothing", "-", "-", "", "-")])
 
 
-def differences(models: Sequence[CageModel]) -> dict[str, tuple[str, str, str, str, str]]:
+def differences(models: Sequence[CageModel | BearingModel]) -> dict[str, tuple[str, str, str, str, str]]:
     """Text, both values, unit and change of each parameter or choice in which two designs differ, by dotted name."""
     shown = [{".".join(row.path): row for row in parameter_rows(model, None)} for model in models]
     exact = [_flat(configuration(model)) for model in models]

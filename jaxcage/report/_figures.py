@@ -203,6 +203,11 @@ def _map_words(findings: Findings) -> tuple[str, str]:
 
 def _picture(cage_speed_ratio: float, units: ShownUnits, key: str, figure: Figure, alt: str, caption: str) -> Picture:
     in_units(add_shaft_axes(figure, cage_speed_ratio), units)
+    return picture_of(key, figure, alt, caption)
+
+
+def picture_of(key: str, figure: Figure, alt: str, caption: str) -> Picture:
+    """A figure as the page holds it."""
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (96 * float(x) for x in figure.get_size_inches())

@@ -11,7 +11,7 @@ import numpy as np
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters, replace
 from ..integrate import AbstractMethod
-from ..models import CageModel
+from ..models import BearingModel, CageModel
 from ..orbits import Curve, Point, bifurcation, curve
 from ..sweeps import cores, sweep
 from ._table import shown_unit
@@ -63,7 +63,9 @@ def speed_axis(lower: float, upper: float) -> Axis:
     return Axis(SPEED, lower, upper, "rpm", RPM)
 
 
-def parameter_axis(model: CageModel, name: str, lower: float | None = None, upper: float | None = None) -> Axis:
+def parameter_axis(
+    model: CageModel | BearingModel, name: str, lower: float | None = None, upper: float | None = None
+) -> Axis:
     """A parameter between two values [SI], by default a fifth below to a quarter above its own.
 
     **Raises:** `ArgumentError` for a range that is not allowed, or does not hold the value itself.

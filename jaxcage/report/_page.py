@@ -28,7 +28,8 @@ from ._table import Table, in_units, number, with_shaft
 from ._zone_tables import transient_tables, zones_table
 
 
-_HERE = Path(__file__).parent
+TEMPLATES = Path(__file__).parent
+"""Folder of the pages' templates."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +74,7 @@ def page(
     still those of the template, by dotted name; units of tables and figures, if not mm and the like.
     """
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_HERE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+        loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     judged = judge(findings, operating)
     return environment.get_template("page.html.j2").render(

@@ -6,7 +6,7 @@ from typing import Any
 
 from .._parameters import EXTRA, get, walk
 from ..io import UNIT, ShownUnits, is_range
-from ..models import CageModel
+from ..models import BearingModel, CageModel
 
 
 _SHOWN = {
@@ -56,7 +56,9 @@ class Row:
         return ".".join(self.path[1:] or self.path)
 
 
-def parameter_rows(model: CageModel, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> list[Row]:
+def parameter_rows(
+    model: CageModel | BearingModel, table: Mapping[str, Any] | None, left: Sequence[str] = ()
+) -> list[Row]:
     """All parameters of `model` in the units people read.
 
     **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still
@@ -86,7 +88,7 @@ def shown(value: float, unit: str) -> tuple[str, float]:
 
 
 def _source(
-    model: CageModel,
+    model: CageModel | BearingModel,
     path: tuple[str, ...],
     field: dataclasses.Field,
     table: Mapping[str, Any] | None,
@@ -120,6 +122,6 @@ def _replaced(table: Mapping[str, Any]) -> set[str]:
     return {part for part, given in table.items() if isinstance(given, Mapping) and "kind" in given}
 
 
-def _is_default(model: CageModel, path: tuple[str, ...], field: dataclasses.Field) -> bool:
+def _is_default(model: CageModel | BearingModel, path: tuple[str, ...], field: dataclasses.Field) -> bool:
     default = field.default
     return default is not dataclasses.MISSING and bool(get(model, path) == default)

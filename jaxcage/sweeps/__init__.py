@@ -5,6 +5,7 @@
 | `_engine`  | lanes in chunks, on all cores                      |
 | `_speed`   | sweeps over speed from several starts              |
 | `_bearing` | sweeps of the whole bearing over shaft speed         |
+| `_bearing_ramp` | the whole bearing run up and down again     |
 | `_monodromy` | monodromy matrices of many lanes                 |
 | `_averages` | means and peaks of forces and the like over revolutions |
 | `_motion`  | size of the motion and frequency of the whirl      |
@@ -15,6 +16,11 @@
 from .._arguments import check_layer
 from ._averages import averages as averages
 from ._bearing import sweep_bearing as sweep_bearing, sweep_bearings as sweep_bearings
+from ._bearing_ramp import (
+    BearingRamp as BearingRamp,
+    BearingUpDown as BearingUpDown,
+    bearing_up_down as bearing_up_down,
+)
 from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs
 from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
@@ -38,5 +44,5 @@ from ._speed import (
 
 check_layer(
     globals(),
-    "monodromy run_up_down run_up_down_designs sweep sweep_bearing sweep_bearings sweep_designs",
+    "bearing_up_down monodromy run_up_down run_up_down_designs sweep sweep_bearing sweep_bearings sweep_designs",
 )

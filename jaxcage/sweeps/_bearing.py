@@ -36,6 +36,8 @@ CHUNKS = (8, 16, 32, 48, 64, 96)
 """Lanes per call: few sizes, as each is compiled."""
 CALL = 12
 """What a call costs beside its lanes, in lanes."""
+PER_HOUR = 1e9 * 3600
+"""mm^3 an hour in 1 m^3 a second."""
 LEAD = 10
 """Revolutions before those observed in which a tangent vector turns to the direction of fastest growth."""
 COARSER = 16.0
@@ -134,12 +136,13 @@ def sweep_bearings(
     settings = {"tolerance": str(tolerance), "allowed": str(allowed), **versions()}
     each = lanes // len(models)
     sweeps = []
-    for i in range(len(models)):
+    for i, model in enumerate(models):
         mine = jax.tree.map(lambda x: x[i * each : (i + 1) * each], found)
         sweeps.append(
             summed_up(
                 speed,
                 table.rolling[i * each : (i + 1) * each],
+                float(PER_HOUR * model.wear.volume(1.0)),
                 BearingRecord(**mine),
                 block=block,
                 samples=SAMPLES,

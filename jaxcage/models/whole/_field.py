@@ -398,6 +398,7 @@ class BearingAtSpeed(eqx.Module):
             hold,
             sums.rubbing,
             land.rubbing,
+            land.size,
             -sums.x * cos,
             -sums.x * sin,
             -sums.y * cos,

@@ -20,6 +20,10 @@ LEAST_DEPTH, LEAST_SPEED = 1e-5, 1e-3
 """Of a contact over the roller's diameter, and of the cage over the radial frequency of the rollers, for a scale."""
 
 
+LEAST_LOAD = 1e-3
+"""By which the inner ring is placed where there is no load [N]."""
+
+
 def rolling_start(model: BearingModel, speed: Scalar, cage: int = 0, turning: Scalar = 1.0) -> BearingState:
     """Rollers in the middle of their pockets, rolling without slip, pressed as in a static bearing; one at the bottom.
 
@@ -30,7 +34,7 @@ def rolling_start(model: BearingModel, speed: Scalar, cage: int = 0, turning: Sc
     omega, spin = turning * model.rolling_cage_speed(speed), turning * model.rolling_spin(speed)
     n, stiff = bearing.n_rollers, bearing.raceway_stiffness
     angles = -jnp.pi / 2 + 2 * np.pi / n * jnp.arange(n, dtype=float)
-    down = -load_distribution(bearing, model.load).shaft_shift
+    down = -load_distribution(bearing, jnp.maximum(model.load, LEAST_LOAD)).shaft_shift
     pitch = model.outer_radius - bearing.roller_diameter / 2
     centrifugal = bearing.roller_mass * pitch * omega**2
     approach = down * jnp.sin(angles) - bearing.radial_clearance / 2

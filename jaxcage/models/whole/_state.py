@@ -78,6 +78,7 @@ MEANS = (
     "hold_torque",
     "pocket_rubbing",
     "land_rubbing",
+    "land_force",
     "pocket_x_cos",
     "pocket_x_sin",
     "pocket_y_cos",
@@ -86,8 +87,8 @@ MEANS = (
 """Other quantities that are integrated over time: moment of all outer forces on the cage about the outer ring's centre
 [N m], sum of the pocket forces [N], eccentricity ratio, angular speed of the cage's centre about the land's [rad/s],
 cage speed [rad/s], mean spin of the rollers [rad/s], torque that holds the cage's speed [N m]; load times sliding speed
-of all pockets and of the land [W], which is what wears them; and the force of all rollers on the cage times cosine and
-sine of the cage's angle [N], for its first harmonic."""
+of all pockets and of the land [W], which is what wears them; the whole force of the land on the cage [N];
+and the force of all rollers on the cage times cosine and sine of the cage's angle [N], for its first harmonic."""
 PEAKS = ("pocket_force", "land_force", "roller_slip", "ring_imbalance", "eccentricity")
 """Largest values that are followed: of a pocket force [N], of the land's whole force on the cage [N], of the slip of a
 roller's spin against pure rolling, of the force by which a quasi-static ring is out of balance [N], and of the
