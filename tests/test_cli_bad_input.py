@@ -137,12 +137,12 @@ def test_unwritable_output_is_refused_before_the_computation(
 
 def test_a_name_cannot_turn_the_direction_of_writing(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     """Neither on the terminal nor in the command on a page."""
-    from jaxcage.cli import _page
     from jaxcage.cli._options import ReportOptions
+    from jaxcage.cli._whole_page import command_line
 
     path = tmp_path / "a\u202egpj.toml"
     path.write_text("base = '1a'")
-    assert "\u202e" not in _page._command(ReportOptions(str(path)))
+    assert "\u202e" not in command_line(ReportOptions(str(path)))
     assert main(["statics", str(path), "--out", str(tmp_path / "\u202eout")]) == 0
     out, err = capsys.readouterr()
     assert "\u202e" not in out + err and r"\u202eout" in out

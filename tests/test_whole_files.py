@@ -68,7 +68,7 @@ def test_every_table_that_can_be_put_in_place_of_another_is_accepted():
 
 def test_the_template_holds_and_explains_everything():
     written = set(re.findall(r"^(?:# |#: )?([a-z_0-9]+) = ", TEXT, flags=re.M))
-    assert written == {path[-1] for path in FIELDS} | {"grade", "base", "designation", "speeds", "model"}
+    assert written == {path[-1] for path in FIELDS} | {"grade", "base", "designation", "speeds", "units", "model"}
     for path, field in FIELDS.items():
         assert all(f'"{option}"' in TEXT for option in field.metadata.get("choice", ())), path
     for line in TEXT.splitlines():
