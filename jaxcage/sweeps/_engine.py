@@ -95,7 +95,7 @@ def cores() -> int:
 
 
 def _padded(lanes: np.ndarray, size: int) -> np.ndarray:
-    """`size` lanes: -1 stands for one that is not run."""
+    """Lanes up to `size`: -1 stands for one of which nothing is asked."""
     return np.pad(lanes, (0, size - lanes.size), constant_values=-1)
 
 
@@ -139,8 +139,7 @@ def run_parts(
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
-    state = np.where(lane[:, None] < 0, np.nan, y[lane])
-    return Part(jnp.asarray(speed[lane]), jnp.asarray(which[lane]), tuple(map(jnp.asarray, state.T)))
+    return Part(jnp.asarray(speed[lane]), jnp.asarray(which[lane]), tuple(map(jnp.asarray, y[lane].T)))
 
 
 def _chunk_size(lanes: int) -> int:
@@ -196,8 +195,10 @@ def run_lanes(
 
         return add
 
+    begun = np.vstack([y0, np.full(dim, np.nan)])  # a lane that begins nowhere has failed, and is not run
+
     def begin(lane: np.ndarray) -> tuple[Any, ...]:
-        got = _settle_chunk(designs, method, alone, limit, _part(speed, which, y0, lane))
+        got = _settle_chunk(designs, method, alone, limit, _part(speed, which, begun, lane))
         return *got.y, got.outcome, got.level, got.error
 
     *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0))
