@@ -78,7 +78,7 @@ def test_error_of_an_orbit_bounds_what_four_times_the_steps_change():
         finer = jc.periodic_orbit(model, rpm * RPM, guess=orbit, method=FixedSteps(orbit.solver, 4 * steps[-1]))
         np.testing.assert_allclose(np.sort(abs(orbit.multipliers)), np.sort(abs(finer.multipliers)), atol=1e-3)
         assert f"{steps[-1]} steps per revolution" in str(orbit)
-    assert steps[0] <= 512 and min(steps[1:]) >= 1024  # where the land is touched
+    assert max(steps[:2]) <= 1024 <= steps[2]  # shortened where the land is touched, many where the support is stiff
 
 
 @pytest.mark.wide

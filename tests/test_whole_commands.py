@@ -29,10 +29,18 @@ def swept():
 def made_up(found, states, exponents):
     """A sweep over other speeds with these states, and exponents that scatter by 0.1."""
     n, starts = np.shape(states)
+
+    def spread(x):
+        if isinstance(x, dict):
+            return {name: spread(each) for name, each in x.items()}
+        of_lanes = isinstance(x, np.ndarray) and x.ndim >= 2
+        return np.repeat(np.repeat(x[:1, :1], n, axis=0), starts, axis=1) if of_lanes else x
+
+    same = {f.name: spread(getattr(found, f.name)) for f in dataclasses.fields(found)}
     speed = np.asarray(jc.rpm(1000.0, 1000.0 * n, n))
     blocks = np.array(exponents, dtype=float)[:, None, None] + 0.1 * np.array([-1.0, 1.0]) * np.ones((n, starts, 2))
     means = {name: np.zeros((n, starts, 2)) for name in found.block_means} | {"exponent": blocks}
-    return dataclasses.replace(found, speed=speed, state=np.array(states), block_means=means)
+    return dataclasses.replace(found, **same | {"speed": speed, "state": np.array(states), "block_means": means})
 
 
 @pytest.mark.wide
