@@ -158,10 +158,11 @@ def bearing_gradient(
     - `directions`: parameters that are not 0; of those joined by `+` all change by the same factor.
     - `statistics`: names of `BearingSweep.block_means`, such as `cage_slip` or `exponent`. The largest exponent need
         not depend smoothly on the design: what comes of it is its mean slope over the box of designs.
-    - `designs`: how many, an even number; each parameter is at 1 + spread or 1 - spread times its value in half of
-        them. More of them make errors smaller by their root, and so do more revolutions and a larger spread.
+    - `designs`: how many, an even number; each parameter is moved up in half of them and down in the others, by half
+        of `spread` to all of it: no two designs are the same, however few the directions. More of them make errors
+        smaller by their root, and so do more revolutions and a larger spread.
     - `spread`: relative half width of the box of designs, above 0 and at most 0.3. Structure that is finer is smoothed
-        away; the slope is off by a sixth of spread^2 times the third derivative.
+        away; the slope is off by at most a sixth of spread^2 times the third derivative.
     - `starts`: how many of the model's own starts, or states with which every design begins.
     - `discard`, `revolutions`: revolutions of the cage left out, and observed after that, an even number.
     - `tolerance`, `progress`: as in `sweep_bearing`.
@@ -175,7 +176,7 @@ def bearing_gradient(
     """
     values = _values(model, directions)
     _require(directions, statistics, designs, spread, revolutions)
-    moved = spread * _signs(designs // 2, len(directions), seed)
+    moved = spread * _moves(designs // 2, len(directions), seed)
     boxed = [_design(model, values, directions, row) for row in np.concatenate([moved, -moved])]
     found = sweep_bearings(
         boxed,
@@ -255,11 +256,11 @@ def _require(
         raise ArgumentError("revolutions", said=f"must be an even number above 0, but {revolutions} was given.")
 
 
-def _signs(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
-    """Corners of the box: as many plus as minus in each column, in no order; of full rank."""
+def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
+    """Places in the box, half way out or further: as many plus as minus in each column, in no order; of full rank."""
     rng, even = np.random.default_rng(seed), np.resize([1.0, -1.0], pairs)
     while True:
-        found = np.stack([rng.permutation(even) for _ in range(directions)], axis=-1)
+        found = np.stack([rng.permutation(even) * rng.uniform(0.5, 1.0, pairs) for _ in range(directions)], axis=-1)
         if np.linalg.matrix_rank(found) == directions:
             return found
 
