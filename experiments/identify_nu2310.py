@@ -1,22 +1,30 @@
-"""The constants that the paper leaves out, from its edges: `python experiments/identify_nu2310.py [--minutes M]`.
+"""The constants that the paper leaves out, by chaos that lasts: `python experiments/identify_nu2310.py [--minutes M]`.
 
-Every candidate is swept over speeds in equal ratios in all six cases; its score is about the mean relative error of
-the edges, with a price for every band too many (`jaxcage.design.screen`). An evolution strategy starts again and again,
-in turns from the best set known and from quasi-random designs. `--cases 1a` fits cases of their own. Every better
-candidate is printed with its values; another run ends elsewhere. `--begin experiments/case_fits/1a.json --cases 1a
---check` shows what values do.
+A search in stages, each dearer than the one before and begun where that one ended: chaos seen in 200 revolutions on a
+coarse grid from the paper's start alone, chaos that lasts 1000 revolutions, and chaos that lasts 3000 from two starts
+on a grid twice as fine. Candidates are scored by `jaxcage.design.screen`: about the mean relative error of the edges,
+with a price for every band too many. The first stage begins with quasi-random designs and with the best set known.
+
+Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
+others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the
+paper. `--check` shows what the ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts;
+with four times the steps by `--steps 4`, to another horizon by `--horizon 6000`.
 """
 
 import argparse
+import csv
+import dataclasses
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.reproduction import LASTING, compare_edges, zones_in_range
+from jaxcage.integrate import controlled, finer
+from jaxcage.reproduction import LASTING, compare_edges, wide_zones
 
 
 jc.enable_x64()
@@ -36,6 +44,68 @@ UNKNOWNS = (
 )
 
 
+POPULATION = 4 + int(3 * np.log(len(UNKNOWNS)))
+"""Designs of a generation of the evolution strategy."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Stage:
+    """How long and how finely candidates are looked at, and how many."""
+
+    name: str
+    horizon: int
+    """Revolutions that chaos must last; 0 counts what is seen."""
+    speeds: int
+    starts: int
+    designs: int
+    """Quasi-random ones."""
+    generations: int
+    spread: float
+    """First step of the evolution strategy, as a part of the bounds."""
+
+
+STAGES = (
+    Stage("seen", 0, 40, 1, 64, 40, 0.15),
+    Stage("lasts 1000", 1000, 40, 1, 2, 16, 0.08),
+    Stage("lasts 3000", 3000, 80, 2, 2, 6, 0.04),
+)
+QUICK = tuple(dataclasses.replace(s, speeds=8, designs=2, generations=1, horizon=min(s.horizon, 100)) for s in STAGES)
+
+
+class Ledger:
+    """The designs tried, in a file."""
+
+    HEAD = ("stage", "score", *PUBLISHED_CASES, *(u.name for u in UNKNOWNS))
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.rows: list[dict[str, str]] = []
+        if path.exists():
+            with path.open() as file:
+                self.rows = list(csv.DictReader(file))
+
+    def add(self, stage: str, candidate: jc.design.Candidate) -> None:
+        """One more design."""
+        cases = [f"{candidate.by_case[c]:.4f}" if c in candidate.by_case else "" for c in PUBLISHED_CASES]
+        row = [stage, f"{candidate.score:.4f}", *cases, *(f"{candidate.values[u.name]:.6g}" for u in UNKNOWNS)]
+        self.rows.append(dict(zip(self.HEAD, row, strict=True)))
+        new = not self.path.exists()
+        with self.path.open("a") as file:
+            csv.writer(file, lineterminator="\n").writerows([self.HEAD, row] if new else [row])
+
+    def of(self, stage: str) -> list[dict[str, str]]:
+        """The designs of a stage, best first."""
+        return sorted((r for r in self.rows if r["stage"] == stage), key=lambda r: float(r["score"]))
+
+    def best(self) -> dict[str, float]:
+        """Values of the best design of the last stage that was reached, else of the package's set."""
+        for stage in reversed(STAGES):
+            if rows := self.of(stage.name):
+                return {u.name: float(rows[0][u.name]) for u in UNKNOWNS}
+        model = jc.case("1a", "identified")
+        return {u.name: float(jc.parameters(model)[u.targets[0]]) for u in UNKNOWNS}
+
+
 def edges(cases: list[str]) -> list[jc.design.MeasuredEdge]:
     """The published ones, with the 2 % to which a diagram can be read."""
     made = []
@@ -47,71 +117,82 @@ def edges(cases: list[str]) -> list[jc.design.MeasuredEdge]:
     return made
 
 
-def known(name: str) -> dict[str, float]:
-    """Values of a set of the package."""
-    model = jc.case("1a", name)
-    return {u.name: float(jc.parameters(model)[u.targets[0]]) for u in UNKNOWNS}
-
-
-def check(cases: list[str], values: dict[str, float]) -> None:
-    """Edges and number of zones with these values, at 100 rpm, from three starts."""
+def check(models: dict[str, jc.CageModel], values: dict[str, float], steps: int, horizon: int) -> None:
+    """Edges of lasting chaos and its wide zones with these values, at 100 rpm, from three starts."""
     chosen = {target: values[u.name] for u in UNKNOWNS for target in u.targets}
-    models = [jc.replace(jc.case(name), **chosen) for name in cases]
-    for name, swept in zip(cases, jc.sweep_designs(models, jc.rpm(2500, 27500, 251)), strict=True):
-        found = jc.zones(swept).zones
+    made = [jc.replace(model, **chosen) for model in models.values()]
+    method = finer(controlled(), steps.bit_length() - 1) if steps > 1 else None
+    errors = []
+    for name, model in zip(models, made, strict=True):
+        found = jc.zones(jc.sweep(model, jc.rpm(2500, 27500, 251), method=method, horizon=horizon)).zones
         rows = compare_edges(PUBLISHED_CASES[name], found, LASTING)
-        errors = [f"{r.edge} " + ("none" if r.ours_rpm is None else f"{r.error_percent:+.1f} %") for r in rows]
-        print(f"{name}: {', '.join(errors)}; {len(zones_in_range(found))} zones", flush=True)
+        errors += [30.0 if r.error_percent is None else abs(r.error_percent) for r in rows]
+        said = [f"{r.edge} " + ("none" if r.ours_rpm is None else f"{r.error_percent:+.1f} %") for r in rows]
+        print(f"{name}: {', '.join(said)}; {len(wide_zones(found))} wide zones", flush=True)
+    print(f"{np.sum(np.array(errors) <= 10)} of {len(errors)} within 10 %, median error {np.median(errors):.1f} %")
+
+
+def search(
+    stage: Stage, models: dict[str, jc.CageModel], ledger: Ledger, begin: dict[str, float], until: float, seed: int
+) -> bool:
+    """One stage, and whether it came to its end before the time was up."""
+    grid = np.geomspace(4000, 27500, stage.speeds) * np.pi / 30
+    starts = [tuple(float(c) for c in y) for y in jc.case("1a").starts(1000.0)[: stage.starts]]
+    began, best = time.perf_counter(), np.inf
+
+    class OutOfTime(Exception):
+        pass
+
+    def tried(count: int, candidate: jc.design.Candidate) -> None:
+        nonlocal best
+        ledger.add(stage.name, candidate)
+        if candidate.score < best:
+            best = candidate.score
+            print(f"{stage.name}: {time.perf_counter() - began:.0f} s, {count} tried: {candidate}", flush=True)
+        if time.perf_counter() > until:
+            raise OutOfTime
+
+    options: dict[str, Any] = dict(designs=stage.designs, generations=stage.generations, spread=stage.spread)
+    options |= dict(discard=100, revolutions=100, horizon=stage.horizon, seed=seed, starts=starts, report=tried)
+    try:
+        jc.design.screen(models, UNKNOWNS, edges(list(models)), grid, begin=begin, **options)
+    except OutOfTime:
+        return False
+    return True
 
 
 def main() -> None:
-    """Search until the time is up, and print every better candidate."""
+    """Search stage by stage until the time is up."""
     parser = argparse.ArgumentParser(description="Identify the constants that the paper leaves out.")
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--cases", nargs="+", default=list(PUBLISHED_CASES), choices=list(PUBLISHED_CASES))
-    parser.add_argument("--starts", type=int, default=2, choices=(1, 2, 3), help="starts of a sweep")
-    parser.add_argument("--by", default="motion", choices=("motion", "edges"), help="far from the answer, or near it")
-    parser.add_argument("--generations", type=int, default=150, help="of each start of the evolution strategy")
-    parser.add_argument("--speeds", type=int, default=56)
-    parser.add_argument("--spread", type=float, default=0.1, help="first step, as a part of the bounds")
-    parser.add_argument("--begin", type=Path, help="file of values to begin with, as --out writes it")
-    parser.add_argument("--check", action="store_true", help="no search: the edges with the values of --begin")
-    parser.add_argument("--out", type=Path, help="file for the best values")
+    parser.add_argument("--read", nargs="*", default=[], help="readings, each as name=value")
+    parser.add_argument("--ledger", type=Path, default=Path("lasting_search.csv"), help="file of the designs tried")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--begin", type=Path, help="JSON file of values, instead of the ledger's best")
+    parser.add_argument("--check", action="store_true", help="no search: the edges with the values to begin with")
+    parser.add_argument(
+        "--steps", type=int, default=1, choices=(1, 2, 4, 8), help="of a check: so many times the steps"
+    )
+    parser.add_argument("--horizon", type=int, default=3000, help="of a check [revolutions]")
     parser.add_argument("--quick", action="store_true", help="few designs, speeds and generations: for trying")
     given = parser.parse_args()
     jc.keep_compiled_programs()
-    systems = {name: jc.case(name, "identified") for name in given.cases}
-    grid = np.geomspace(4000, 27500, 12 if given.quick else given.speeds) * np.pi / 30
-    small = (
-        dict(designs=4, generations=4, discard=20, revolutions=20)
-        if given.quick
-        else dict(generations=given.generations)
-    )
-    small |= dict(discard=20, revolutions=20) if given.quick else dict(discard=120, revolutions=80)
-    starts = jc.case("1a", "identified").starts(1000.0)[: given.starts]
-    starts = [tuple(float(c) for c in start) for start in starts]
-    begin = json.loads(given.begin.read_text()) if given.begin else known("identified")
+    read = dict(each.split("=", 1) for each in given.read)
+    models = {name: jc.replace(jc.case(name, "identified"), **read) for name in given.cases}
+    ledger = Ledger(given.ledger)
+    begin = json.loads(given.begin.read_text()) if given.begin else None
     if given.check:
-        return check(given.cases, begin)
-    began, best, seed = time.perf_counter(), None, 0
-
-    def better(tried: int, candidate: jc.design.Candidate) -> None:
-        nonlocal best
-        if best is None or candidate.score < best.score:
-            best = candidate
-            cases = ", ".join(f"{name} {wrong:.3f}" for name, wrong in candidate.by_case.items())
-            print(f"{time.perf_counter() - began:.0f} s, {tried} tried: {candidate}\n  {cases}", flush=True)
-            if given.out:
-                given.out.write_text(json.dumps(candidate.values))
-
-    while best is None or time.perf_counter() - began < 60 * given.minutes:
-        near = best.values if best is not None else begin
-        own = dict(begin=near, designs=2) if seed % 2 == 0 else dict(designs=256)
-        options = dict(spread=given.spread, report=better, starts=starts, seed=seed, by=given.by) | own | small
-        jc.design.screen(systems, UNKNOWNS, edges(given.cases), grid, **options)
-        seed += 1
-        if given.quick:
-            break
+        return check(models, begin or ledger.best(), given.steps, given.horizon)
+    until = time.perf_counter() + 60 * given.minutes
+    for stage in QUICK if given.quick else STAGES:
+        if len(ledger.of(stage.name)) >= stage.designs + stage.generations * POPULATION:
+            continue  # done by a run before
+        first, begin = begin or ledger.best(), None
+        if not search(stage, models, ledger, first, until, given.seed + len(ledger.of(stage.name))):
+            print(f"time is up in the stage '{stage.name}'; another run goes on from there")
+            return
+    print(f"best: {ledger.best()}")
 
 
 if __name__ == "__main__":

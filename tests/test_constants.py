@@ -1,6 +1,6 @@
 """Sets of the constants that the paper leaves out: physical, complete, and what they do to the zones."""
 
-import json
+import csv
 import pathlib
 import subprocess
 import sys
@@ -60,14 +60,26 @@ def test_identified_constants_let_the_unbalance_act():
 
 
 @pytest.mark.wide
-def test_the_search_for_constants_runs(tmp_path: pathlib.Path):
-    """The smallest size of the experiment: it gets better, and its best values are within the bounds."""
+def test_the_search_for_constants_runs_and_goes_on(tmp_path: pathlib.Path):
+    """The smallest size of the experiment: every stage begins where the one before ended, each design is in the ledger
+    within the bounds, and another run has nothing left to do."""
     script = pathlib.Path(__file__).parent.parent / "experiments" / "identify_nu2310.py"
-    out = tmp_path / "best.json"
-    run = [sys.executable, str(script), "--quick", "--cases", "1a", "--starts", "1", "--out", str(out)]
-    done = subprocess.run(run, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    scores = [float(line.split("score ")[1].split(":")[0]) for line in done.stdout.splitlines() if "score" in line]
-    assert scores == sorted(scores, reverse=True) and len(scores) > 1
-    best = json.loads(out.read_text())
-    assert 0.20 <= best["cage_mass"] <= 0.36 and best["damping"] > 0
+    ledger = tmp_path / "ledger.csv"
+
+    def run() -> str:
+        line = [sys.executable, str(script), "--quick", "--cases", "1a", "--ledger", str(ledger)]
+        done = subprocess.run(line, capture_output=True, text=True, timeout=600)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    said = run()
+    rows = list(csv.DictReader(ledger.open()))
+    stages = [row["stage"] for row in rows]
+    assert [s for i, s in enumerate(stages) if s not in stages[:i]] == ["seen", "lasts 1000", "lasts 3000"]
+    assert all(0.20 <= float(row["cage_mass"]) <= 0.36 and float(row["damping"]) > 0 for row in rows)
+    for stage in set(stages):
+        printed = [float(x.split("score ")[1].split(":")[0]) for x in said.splitlines() if x.startswith(f"{stage}:")]
+        scores = [float(row["score"]) for row in rows if row["stage"] == stage]
+        assert printed == sorted(printed, reverse=True) and printed[-1] == min(scores)
+    run()
+    assert list(csv.DictReader(ledger.open())) == rows

@@ -187,12 +187,27 @@ def test_the_screen_finds_planted_zones():
             jc.design.MeasuredEdge(case, "zone 1 exit", last, 0.1),
         ]
     near = [jc.design.Unknown("damping", 0.2, 0.45), jc.design.Unknown("cubic", 0.7, 1.4)]
-    options = dict(starts=[(0.4, 0.3)], discard=100, revolutions=60)
+    options = dict(starts=[(0.4, 0.3)], discard=100, revolutions=60, horizon=0)
     best = jc.design.screen(systems, near, edges, grid, designs=32, best=32, **options)
     assert [c.score for c in best] == sorted(c.score for c in best)
     assert best[0].score < 0.6 * best[16].score
     evolved = jc.design.screen(systems, near, edges, grid, designs=32, generations=3, best=1, **options)
     assert evolved[0].score <= best[0].score
+
+
+@pytest.mark.wide
+def test_the_screen_counts_chaos_by_how_long_it_lasts():
+    """Where all speeds should be chaotic, lanes that leave chaos on the way to the horizon make the score worse."""
+    model, grid = jc.case("1a"), jc.rpm(7000, 9000, 8)
+    value = float(jc.parameters(model)["amplitude"])
+    only = [jc.design.Unknown("amplitude", value * (1 - 1e-12), value * (1 + 1e-12), "linear")]
+    edges = [jc.design.MeasuredEdge("1a", "zone 1 onset", 6000.0, 120.0)]
+    score = lambda horizon: (
+        jc.design.screen(
+            {"1a": model}, only, edges, grid, designs=1, best=1, discard=100, revolutions=100, horizon=horizon
+        )[0].score
+    )
+    assert score(800) > score(0) + 0.02, "some of this chaos is transient"
 
 
 def test_measured_zones_over_a_grid():

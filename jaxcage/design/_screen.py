@@ -1,7 +1,8 @@
 """The global stage of identification: which constants give chaos where it was measured, and only there.
 
 Every design is swept over speed in all cases at once, and its largest exponents are held against the measured zones. No
-edge is needed for that, so that the search works far from the answer, where zones are missing or too many.
+edge is needed for that, so that the search works far from the answer, where zones are missing or too many. Chaos counts
+by how much of the way to a horizon it lasts: a transient half as long is half as wrong.
 """
 
 import dataclasses
@@ -27,6 +28,9 @@ MISSING = 0.3
 """What a missing edge costs, as a relative error; one that is farther off costs no more."""
 TOGETHER = 64
 """Designs swept in one batch."""
+BLOCKS, KEEP = 5, 16
+"""Blocks of revolutions, which tell a chaotic lane from one of which nothing is known; strobe states, which tell where
+chaos has closed on an orbit of up to 8 revolutions."""
 NEEDLESS = 0.01
 """What a needless change between calm and chaos costs, as a relative error of the edges."""
 
@@ -66,7 +70,8 @@ class _Target:
         """How far a sweep is from what was measured."""
         if by == "edges":
             return self.wrong_edges(zones(found).zones, float(found.rpm[-1]))
-        return self.wrong_motion(found.exponents[..., 0])
+        lasted = 1.0 if found.escape is None else np.minimum(found.escape, found.horizon) / found.horizon
+        return self.wrong_motion(found.exponents[..., 0], lasted)
 
     def wrong_edges(self, found: Sequence[Zone], last_rpm: float) -> float:
         """Mean relative error of the edges, a missing one counted as `MISSING`, and `NEEDLESS` for each end of each
@@ -78,11 +83,15 @@ class _Target:
         extra = max(len(found) - len({m.zone for m in self.measured}), 0)
         return float(np.mean(np.minimum(near, MISSING)) + 2 * NEEDLESS * extra)
 
-    def wrong_motion(self, exponent: Float[np.ndarray, "speeds starts"]) -> float:
+    def wrong_motion(
+        self, exponent: Float[np.ndarray, "speeds starts"], lasted: Float[np.ndarray, "speeds starts"] | float = 1.0
+    ) -> float:
         """Mean relative error of the edges, were each wrong speed due to one that has moved; each needless change
         between calm and chaos costs `NEEDLESS` besides. A lane that failed is wrong whatever it should do.
+
+        **Arguments:** largest exponents; the part of the way to the horizon after which lanes are calm for good.
         """
-        chaos = np.clip((exponent - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1).max(axis=1)
+        chaos = (lasted * np.clip((exponent - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1)).max(axis=1)
         chaos = np.where(np.isfinite(chaos), chaos, 1.0 - self.chaotic)
         changes = np.sum(np.abs(np.diff(chaos))) - np.sum(np.abs(np.diff(self.chaotic.astype(float))))
         return float(self.width @ np.abs(self.chaotic - chaos) / self.edges + NEEDLESS * max(changes, 0.0))
@@ -104,6 +113,7 @@ def screen(
     starts: Sequence[tuple[float, ...]] | None = None,
     discard: int = 160,
     revolutions: int = 100,
+    horizon: int = 3000,
     method: AbstractMethod | None = None,
     report: Callable[[int, Candidate], None] | None = None,
 ) -> list[Candidate]:
@@ -121,7 +131,9 @@ def screen(
       from the answer; or the `edges` of the zones found, which is what counts near it.
     - `starts`: initial states, by default the first of each design's own; a speed is chaotic if any of them is.
     - `discard`, `revolutions`: revolutions left out and observed, at each speed.
-    - `report`: called with the designs tried so far and the best candidate.
+    - `horizon`: revolutions that chaos must last to count in full; where it is not beyond those observed, all chaos
+        counts that is seen.
+    - `report`: called with each candidate, and how many have been tried with it.
 
     **Returns:** the best candidates, best first.
 
@@ -148,9 +160,11 @@ def screen(
                 starts=1 if starts is None else starts,
                 discard=discard,
                 revolutions=revolutions,
+                confirm=by == "edges",
+                horizon=horizon,
                 exponents=1,
-                blocks=5 if by == "edges" else 1,
-                keep=8 if by == "edges" else 1,
+                blocks=BLOCKS,
+                keep=KEEP,
                 method=method,
             )
             for i, place in enumerate(part):
@@ -158,9 +172,9 @@ def screen(
                 wrong = [t.wrong(s, by) for s, t in zip(own, targets.values(), strict=True)]
                 by_case = dict(zip(systems, wrong, strict=True))
                 new.append(Candidate(values_at(unknowns, place), float(np.mean(wrong) + 0.5 * np.max(wrong)), by_case))
-            tried.extend(new[-len(part) :])
-            if report is not None:
-                report(len(tried), min(tried, key=lambda c: c.score))
+                tried.append(new[-1])
+                if report is not None:
+                    report(len(tried), new[-1])
         return np.array([c.score for c in new])
 
     from scipy.stats import qmc  # takes half a second to load
