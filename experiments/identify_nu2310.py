@@ -65,7 +65,7 @@ class Stage:
 
 
 STAGES = (
-    Stage("seen", 0, 40, 1, 64, 40, 0.15),
+    Stage("seen", 0, 40, 1, 8, 40, 0.15),
     Stage("lasts 1000", 1000, 40, 1, 2, 16, 0.08),
     Stage("lasts 3000", 3000, 80, 2, 2, 6, 0.04),
 )
