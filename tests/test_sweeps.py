@@ -129,6 +129,8 @@ def test_lanes_that_settle_early_are_what_they_are_when_run_on():
     chaotic &= early.label == "chaotic"
     apart, sure = whole.exponents - early.exponents, np.hypot(whole.standard_error, early.standard_error)
     assert np.max((np.abs(apart) / sure)[chaotic]) < 3.0
+    first, rest = early.block_growth[chaotic][:, 0], early.block_growth[chaotic][:, 1:]
+    assert abs(np.mean(first) - np.mean(rest)) < 3 * np.std(rest) / np.sqrt(first.size), "no block stands out"
     nearest = np.min(np.abs(whole.strobe[stopped] - early.last[stopped][:, None]).max(axis=-1), axis=-1)
     assert np.max(nearest) < 1e-3
 

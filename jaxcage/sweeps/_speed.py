@@ -232,7 +232,7 @@ def run_unsettled(
         strobe = np.full((plan.keep, *new.strobe.shape[1:]), np.nan)
         strobe[plan.keep - short :] = new.strobe
         growth = np.full((plan.blocks, plan.exponents, lanes.size), np.nan)
-        new = new._replace(strobe=strobe, growth=growth, doubt=growth[0])
+        new = new._replace(strobe=strobe, growth=growth, doubt=growth[0].copy())
         seen = new if seen is None else _after(seen, lanes, new)
         closed = closing_period(np.moveaxis(strobe[plan.keep - short :], -1, 0), scale[lanes]) > 0
         lanes, done = lanes[~closed & (np.asarray(new.outcome) == 0)], until
