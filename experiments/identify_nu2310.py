@@ -66,8 +66,8 @@ class Stage:
 
 STAGES = (
     Stage("seen", 0, 32, 1, 64, 40, 0.15),
-    Stage("lasts 600", 600, 32, 1, 2, 30, 0.06),
-    Stage("lasts 3000", 3000, 56, 1, 2, 8, 0.03),
+    Stage("lasts 600", 600, 32, 1, 2, 30, 0.04),
+    Stage("lasts 3000", 3000, 56, 1, 2, 8, 0.02),
 )
 QUICK = tuple(dataclasses.replace(s, speeds=8, designs=2, generations=1, horizon=min(s.horizon, 100)) for s in STAGES)
 
@@ -187,7 +187,7 @@ def main() -> None:
         return check(models, begin or ledger.best(), given.steps, given.horizon)
     until = time.perf_counter() + 60 * given.minutes
     for stage in (QUICK if given.quick else STAGES)[given.first :]:
-        if len(ledger.of(stage.name)) >= stage.designs + stage.generations * POPULATION:
+        if len(ledger.of(stage.name)) > stage.designs + stage.generations * POPULATION:
             continue  # done by a run before
         first, begin = begin or ledger.best(), None
         if not search(stage, models, ledger, first, until, given.seed + len(ledger.of(stage.name))):

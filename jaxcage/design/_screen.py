@@ -124,7 +124,8 @@ def screen(
     - `systems`, `unknowns`, `measured`: cases by name, what is unknown, and the edges of the zones.
     - `speeds`: grid [rad/s]; one in equal ratios weighs all edges alike.
     - `designs`: quasi-random designs (Sobol), rounded up to a power of 2.
-    - `generations`: of an evolution strategy (CMA-ES) that starts from the best of them, or from `begin` [SI].
+    - `begin`: a design [SI] that is looked at beside them.
+    - `generations`: of an evolution strategy (CMA-ES) that starts from the best of them all.
     - `spread`: its first standard deviation, as a part of the distance between the bounds.
     - `best`: how many candidates to return.
     - `by`: what is held against the measured edges: `motion`, chaotic or not at each speed, smoothly, which works far
@@ -180,10 +181,10 @@ def screen(
     from scipy.stats import qmc  # takes half a second to load
 
     sample = qmc.Sobol(len(unknowns), rng=seed).random_base2(max(1, int(np.ceil(np.log2(designs)))))
+    if begin is not None:
+        sample = np.vstack([np.clip([u.place(begin[u.name]) for u in unknowns], 0.0, 1.0), sample])
     first = scores(sample)
     start = sample[np.argmin(first)]
-    if begin is not None:
-        start = np.clip([u.place(begin[u.name]) for u in unknowns], 0.0, 1.0)
     if generations:
         import cma  # takes a second to load
 
