@@ -73,7 +73,7 @@ def test_the_search_for_constants_runs_and_goes_on(tmp_path: pathlib.Path):
         return done.stdout
 
     said = run()
-    rows = list(csv.DictReader(ledger.open()))
+    rows = list(csv.DictReader(ledger.read_text().splitlines()))
     stages = [row["stage"] for row in rows]
     assert [s for i, s in enumerate(stages) if s not in stages[:i]] == ["seen", "lasts 600", "lasts 3000"]
     assert all(0.20 <= float(row["cage_mass"]) <= 0.36 and float(row["damping"]) > 0 for row in rows)
@@ -82,4 +82,4 @@ def test_the_search_for_constants_runs_and_goes_on(tmp_path: pathlib.Path):
         scores = [float(row["score"]) for row in rows if row["stage"] == stage]
         assert printed == sorted(printed, reverse=True) and printed[-1] == min(scores)
     run()
-    assert list(csv.DictReader(ledger.open())) == rows
+    assert list(csv.DictReader(ledger.read_text().splitlines())) == rows
