@@ -249,6 +249,14 @@ def test_unknowns_names_the_measurement(
     assert found["measure"]["what"] == "support.stiffness" and found["designs"] == 256 * (len(labels) + 2)
     assert found["total"]["support.stiffness"] == pytest.approx(1.0, abs=0.1)
     assert all(abs(v) < 0.05 for n, v in found["total"].items() if n != "support.stiffness")
+    seldom = lambda *_, **__: (np.arange(16 * (len(labels) + 2)) == 3)[None].astype(float)
+    monkeypatch.setattr(
+        "jaxcage.cli._unknowns.chaotic_shares", lambda m, u, s, place, **_: seldom()[:, : place.shape[1]]
+    )
+    capsys.readouterr()
+    assert main(["unknowns", path, "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "do not tell what to measure first" in said and "Too few samples" in said and "nan" not in said
     assert main(["unknowns", "1a", "--out", str(tmp_path)]) == 2
     assert "Case 1a must be a TOML file with ranges" in capsys.readouterr().err
 

@@ -302,6 +302,8 @@ def test_sobol_indices_say_when_they_are_not_to_be_believed():
     assert above.doubtful == ("gap",) and "between 0 and 1" in str(above.warning)
     wide = dataclasses.replace(sure, first_interval=dict(gap=(-0.1, 1.1)))  # 1.2 wide: 16 times the samples for .3
     assert wide.doubtful == ("gap",) and wide.samples_wanted == 1024 and "1024 base samples" in str(wide)
+    none = dataclasses.replace(sure, total_interval=dict(gap=(float("nan"), float("nan"))))
+    assert none.doubtful == ("gap",) and none.samples_wanted == 1024
 
 
 def test_designs_that_no_other_beats_are_found_among_all():

@@ -31,12 +31,16 @@ def unknowns(job: Job[UnknownsOptions]) -> Report:
     info = parameter_info(job.model)
     sources = {u.label: info[u.names[0]].source for u in job.unknowns}
     most = max(found.total, key=lambda name: found.total[name])
-    document = report.chosen(found, "first total first_interval total_interval") | {
+    document = report.chosen(found, "first total first_interval total_interval samples_wanted") | {
+        "doubtful": list(found.doubtful),
         "designs": found.evaluations,
         "speeds_rpm": np.asarray(speeds) * 30 / np.pi,
         "measure": {"what": most, "how": sources[most]},
     }
-    told = "Nothing to decide: every draw does the same."
-    if any(abs(value) > 0 for value in found.total.values()):
-        told = f"Measure {most} first: {sources[most]}."
-    return Report(document, [report.verdict_table(job.name, found, sources)], [told])
+    told = f"Measure {most} first: {sources[most]}."
+    if not any(abs(value) > 0 for value in found.total.values()):
+        told = "Nothing to decide: every draw does the same."
+    elif most in found.doubtful:
+        told = "These draws do not tell what to measure first."
+    notes = [told, *([found.warning] if found.warning else [])]
+    return Report(document, [report.verdict_table(job.name, found, sources)], notes)

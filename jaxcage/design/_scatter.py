@@ -36,16 +36,18 @@ class SobolIndices:
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Parameters of which an index lies outside 0 to 1, or has an interval wider than itself and than `NARROW`."""
+        """Parameters of which an index lies outside 0 to 1, or has an interval wider than itself and than `NARROW`, or
+        none: then so few samples differ that some of the bootstrap's are all alike."""
         rows = [(self.first, self.first_interval), (self.total, self.total_interval)]
-        bad = lambda value, pair: not 0 <= value <= 1 or pair[1] - pair[0] > max(abs(value), NARROW)
+        bad = lambda value, pair: not (0 <= value <= 1 and pair[1] - pair[0] <= max(abs(value), NARROW))
         return tuple(n for n in self.first if any(bad(value[n], pair[n]) for value, pair in rows))
 
     @property
     def samples_wanted(self) -> int:
         """Base samples, a power of 2, by which all intervals should be no wider than `NARROW`: widths fall with the
-        root of their number."""
-        widest = max(b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values())
+        root of their number. Where one has no interval, it is taken as 1 wide."""
+        widths = [b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values()]
+        widest = max(1.0 if math.isnan(w) else w for w in widths)
         return max(self.samples, 1 << math.ceil(math.log2(self.samples * (widest / NARROW) ** 2)))
 
     @property

@@ -180,7 +180,8 @@ def operating_chances(found: Ensemble, operating: Sequence[Operating], ratio: fl
 
 def verdict_table(name: str, shares: SobolIndices, sources: Mapping[str, str]) -> Table:
     """What each unknown does to the chaotic share, alone and with the others, and how to measure it."""
-    cell = lambda value, pair: f"{value:+.2f} ({pair[0]:+.2f} to {pair[1]:+.2f})"
+    span = lambda pair: "not known" if np.isnan(pair).any() else f"{pair[0]:+.2f} to {pair[1]:+.2f}"
+    cell = lambda value, pair: f"{value:+.2f} ({span(pair)})"
     columns = {
         "value": str,
         "alone": lambda n: cell(shares.first[n], shares.first_interval[n]),
