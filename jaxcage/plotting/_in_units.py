@@ -51,6 +51,7 @@ def _show_times(axis: Axis, factor: float) -> None:
 class _Locator(AutoLocator):
     def __init__(self, factor: float):
         super().__init__()
+        self.set_params(nbins=6)  # numbers such as 0.0125 inch are wider than matplotlib takes them to be
         self.factor = factor
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
