@@ -272,7 +272,8 @@ def test_a_design_is_judged_alike_whatever_it_is_swept_with():
 
 @pytest.mark.wide
 def test_loads_of_the_land_are_those_of_a_time_history():
-    space, width = cage_at_speeds(discard=60, revolutions=20)
+    space, width = cage_at_speeds(discard=60, revolutions=20, method=jc.method("rk4", steps=1024))
+    fine = jc.method("rk4", steps=2048)
     places = np.array([[1.0, 0.33], [0.0, 0.98]])
     # Where motion is chaotic two integrations part: they are compared over two revolutions.
     wear, peak = (jc.design.LandMeasure(width, what, revolutions=2) for what in ("wear load", "peak land force"))
@@ -282,7 +283,8 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     for k, place in enumerate(places):
         model = space.model(place)
         for i, speed in enumerate(width.speeds):
-            runs = [jc.simulate(model, speed, revolutions=2, samples=1024, start=tuple(y)) for y in last[k, i]]
+            length = dict(revolutions=2, samples=1024, method=fine)
+            runs = [jc.simulate(model, speed, start=tuple(y), **length) for y in last[k, i]]
             seen = [jc.orbit_measures(model, run) for run in runs]
             load = np.mean([o.mean_contact_force for o in seen]) * speed * float(model.land_radius)
             assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
