@@ -165,13 +165,13 @@ def test_summary_counts_failures_apart():
 def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
     """A soft land lets a cage pass eps = 1 on its way: no start, but no failure where another run has left it."""
     outside = np.array([[1.005 * C, 0.0, 0.0, 0.0]])
-    ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 0), SPEEDS[:1], outside, onward=on) for on in (False, True)]
+    ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 1), SPEEDS[:1], outside, onward=on) for on in (False, True)]
     assert [OUTCOMES[int(end.outcome[0])] for end in ends] == ["outside", "successful"]
     assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005
 
 
 def test_a_lane_that_is_not_to_run_costs_nothing_and_stays():
-    strobe = strobe_map(MODEL, SPEEDS[0], controlled())
+    strobe = strobe_map(MODEL, SPEEDS[0], controlled(3e-3, [("rk4", 128), ("rk4", 256), ("rk4", 512)]))
     state = tuple(map(jnp.asarray, HEALTHY))
     stays, runs = (revolution(strobe, state, (), jnp.asarray(level)) for level in (-1, 0))
     assert stays.y == state and np.isinf(stays.error)

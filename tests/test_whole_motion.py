@@ -269,6 +269,7 @@ def cage_alone():
     return same, cage
 
 
+@pytest.mark.wide
 def test_held_cage_is_that_of_the_cage_model():
     held, cage = cage_alone()
     omega, c = 450.0, float(held.clearance)

@@ -53,7 +53,7 @@ def _unbalance() -> list[Comparison]:
 
 def _divergence() -> list[Comparison]:
     model, speed = with_values(replace(case("1a"), restitution=1.0), {"land_width": 1e-7}), 15000 * RPM
-    options = dict(exponents=4, blocks=10, keep=1, method=method(steps=2048))
+    options = dict(exponents=4, blocks=10, keep=1, method=method(steps=2048), confirm=False, horizon=0)
     found = sweep(model, np.array([speed]), discard=20, revolutions=50, **options)  # pyright: ignore
     theirs = -2 * float(model.support.damping / model.cage_mass) * 2 * math.pi / speed
     ours = found.exponents.sum(axis=-1).mean()
