@@ -124,6 +124,7 @@ def test_steps_that_are_asked_for_are_kept():
     assert own.converged and np.isnan(own.error)
 
 
+@pytest.mark.wide
 def test_an_orbit_is_found_again_by_its_own_method():
     orbit = jc.periodic_orbit(stop(), 0.6)
     again = jc.periodic_orbit(stop(), 0.6, guess=orbit, method=orbit.method)

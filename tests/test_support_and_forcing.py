@@ -243,6 +243,7 @@ def test_impact_gives_the_roller_the_impulse_it_loses(samples, tolerance):
     assert float(h.impulse) == pytest.approx(lost, rel=tolerance)
 
 
+@pytest.mark.wide
 def test_momentum_of_both_changes_by_the_force_of_the_bar():
     h = history(samples=2049, substeps=1)
     total = ROLLER * h.roller_velocity + float(IMPACT.bar_mass) * h.bar_velocity

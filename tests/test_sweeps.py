@@ -8,10 +8,7 @@ import pytest
 from helpers import raw_sweep
 
 import jaxcage as jc
-from jaxcage._recent import Recent
-from jaxcage.analysis import Plan
 from jaxcage.models import FirstOrderField
-from jaxcage.sweeps import run_lanes
 from jaxcage.validation import DUFFING_FOLDS
 
 
@@ -37,18 +34,6 @@ def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
     for i, piece in enumerate(pieces):
         assert np.array_equal(whole.strobe[i::2], piece.strobe)
         assert np.array_equal(whole.block_growth[i::2], piece.block_growth)
-
-
-def test_runs_of_one_size_of_chunks_share_their_programs(monkeypatch):
-    """Some lanes again, in chunks with room for all of them: nothing is compiled anew, and they do the same."""
-    monkeypatch.setattr("jaxcage.integrate._traced.programs", programs := Recent(16))
-    speeds, plan = np.linspace(1.0, 1.4, 40), Plan(8, 4, 2, 4, 1)
-    states = np.tile([0.4, 0.3], (40, 1))
-    run = lambda lanes: run_lanes(HARDENING, FAST, plan, speeds[lanes], states[lanes], size=48)
-    every, some = run(np.arange(40)), run(np.arange(3, 30, 2))
-    assert len(programs) == 2 and np.all(every.outcome == 0)
-    for here, there in zip(some, every, strict=True):
-        np.testing.assert_array_equal(here, there[..., 3:30:2])
 
 
 def test_kept_states_are_the_last_ones_in_order():
