@@ -107,6 +107,7 @@ def test_second_derivative_against_difference_of_gradients():
     assert float(second) == pytest.approx(float(difference), rel=1e-4)
 
 
+@pytest.mark.wide
 def test_gradient_in_speed_is_zero_at_rest():
     *_, gradient = _slopes(One(jnp.asarray(0)), [jb.nu2310(), jnp.asarray(4450.0), jnp.asarray(0.0)])
     assert float(gradient) == 0.0

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import wide_but
+from helpers import slow_but, wide_but
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
@@ -299,7 +299,7 @@ class Ring(eqx.Module):
         return ((self.p - 2) ** 2 + x * x - self.r**2, -0.5 * u + jnp.cos(tau))
 
 
-@pytest.mark.parametrize("degrees", [-90, 60, *(pytest.param(d, marks=pytest.mark.slow) for d in (-3, -0.3, 176))])
+@pytest.mark.parametrize("degrees", [60, pytest.param(-90, marks=pytest.mark.wide), *slow_but((-3, -0.3, 176))])
 def test_closed_branch_is_covered_once(degrees):
     """Folds at p = 2 +- r, wherever on the circle it begins; multipliers exp(2 x T) and exp(-T/2): exact."""
     radius, speed = 0.3, 1.5

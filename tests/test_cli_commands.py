@@ -103,6 +103,7 @@ def test_sweep_prints_the_zone_table_beside_the_published_edges(capsys: pytest.C
     assert "Failed lanes: none" in out
 
 
+@pytest.mark.wide
 def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     arguments = ["--speed", "15000", "--discard", "20", "--revolutions", "20", "--solver", "rk4", "--steps", "256"]
     found = document(capsys, "poincare", "1a", *arguments, "--out", str(tmp_path))
@@ -167,6 +168,7 @@ def test_statics_with_a_turning_shaft(capsys: pytest.CaptureFixture[str], tmp_pa
         assert roller["outer_load"] - roller["inner_load"] == pytest.approx(centrifugal)
 
 
+@pytest.mark.wide
 def test_impact(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "impact", "1a", "--speed", "8500", "--out", str(tmp_path))
     omega = 8500 * np.pi / 30

@@ -30,6 +30,7 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, A
     return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
+@pytest.mark.wide
 def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     out = ["--out", str(tmp_path)]
     half = document(capsys, *SMALL, *out, "--shard", "2/2")

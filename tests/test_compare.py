@@ -126,9 +126,11 @@ def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path):
 @pytest.mark.wide
 def test_size_and_whirl_against_a_time_history():
     model = jc.case("1a")
-    found = jc.sweep(model, jc.rpm(14000, 15000), starts=1, discard=200, revolutions=20, confirm=False, horizon=0)
+    method = jc.method("rk4", steps=1024)
+    length = dict(discard=200, revolutions=20, confirm=False, horizon=0)
+    found = jc.sweep(model, jc.rpm(14000, 15000), starts=1, method=method, **length)
     motion = motions([model], [found])[0]
-    run = jc.simulate(model, found.speed[0], revolutions=32, samples=512, start=tuple(found.last[0, 0]))
+    run = jc.simulate(model, found.speed[0], revolutions=32, samples=512, start=tuple(found.last[0, 0]), method=method)
     x, y = np.ptp(run.state[:, :2], axis=0)
     assert motion.horizontal[0, 0] == pytest.approx(x, rel=0.01) and motion.vertical[0, 0] == pytest.approx(y, rel=0.01)
     assert motion.whirl_order[0, 0] == pytest.approx(orbit_measures(model, run).whirl_ratio, abs=0.01)

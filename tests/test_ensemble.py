@@ -270,4 +270,3 @@ def test_the_page_shows_what_is_known_and_what_it_decides():
     assert (
         "the template&#39;s, not yours" in text and "still the template&#39;s, another bearing&#39;s: cage_mass" in text
     )
-    assert 'id="known"' not in page(findings(), at)

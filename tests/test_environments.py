@@ -61,7 +61,8 @@ def test_surroundings_change_no_number(tmp_path: Path, usual: dict[str, object],
     assert [line.split(" in ")[0] for line in said(found)] == ["Warning: Compiled programs are not kept"] * without_home
 
 
-@pytest.mark.parametrize("name", ["a b\nc\u202e", pytest.param(os.fsdecode(b"x\xff y"), marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("name", ["a b\nc\u202e", os.fsdecode(b"x\xff y")])
 def test_any_path_will_do(tmp_path: Path, name: str, usual: dict[str, object]):
     folder = tmp_path / name
     try:
@@ -97,7 +98,7 @@ def test_without_sources_it_is_another_version_by_its_bytecode(tmp_path: Path, u
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell of POSIX")
-@pytest.mark.parametrize("closed", ["<&- 2>&-", ">&- 2>&-"])
+@pytest.mark.parametrize("closed", [pytest.param("<&- 2>&-", marks=pytest.mark.wide), ">&- 2>&-"])
 def test_nothing_to_write_to_is_no_failure(tmp_path: Path, closed: str):
     line = f"'{sys.executable}' -m jaxcage init new.toml {closed}"
     assert subprocess.run(line, shell=True, cwd=tmp_path, env=OURS, capture_output=True).returncode == 0

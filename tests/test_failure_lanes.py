@@ -13,7 +13,7 @@ from helpers import wide_but
 
 from jaxcage.analysis import Plan
 from jaxcage.integrate import OUTCOMES, controlled, method, revolution, strobe_map
-from jaxcage.models import case
+from jaxcage.models import ForcedOscillator, case
 from jaxcage.sweeps import run_lanes, sweep
 
 
@@ -132,19 +132,24 @@ def test_failed_lanes_whatever_is_observed(exponents):
     assert np.all(np.isfinite(mixed.exponents[0, 0]))
 
 
+def pendulum(tau, q, v, speed):
+    return (-0.2 * v[0] - jnp.sin(q[0]) + 0.4 * jnp.cos(tau),)
+
+
 @pytest.mark.wide
 def test_bad_start_fails_alone_with_adaptive_steps():
     settings = dict(discard=1, revolutions=2, blocks=2, keep=2, confirm=False, horizon=0)
     settings |= dict(method=method("rodas3", tolerance=1e-5))
-    bad = (float("nan"), 0.0, 0.0, 0.0)
+    system = ForcedOscillator(pendulum, coordinates=1)
+    good, other, bad = (0.1, 0.2), (0.5, 0.0), (float("nan"), 0.0)
 
     def timed(first):
         before = time.perf_counter()
-        result = sweep(MODEL, SPEEDS[:1], starts=[first, HEALTHY], **settings)
+        result = sweep(system, np.array([1.1]), starts=[first, good], **settings)
         return result, time.perf_counter() - before
 
-    timed(OTHER)  # compiles
-    (healthy, alone), (mixed, together) = timed(OTHER), timed(bad)
+    timed(other)  # compiles
+    (healthy, alone), (mixed, together) = timed(other), timed(bad)
     assert_same_bytes(mixed, healthy, np.s_[:, 1])
     assert_failed(mixed, (0, 0))
     # A failed lane must not go on to the largest number of steps in every revolution.
@@ -160,13 +165,13 @@ def test_summary_counts_failures_apart():
 def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
     """A soft land lets a cage pass eps = 1 on its way: no start, but no failure where another run has left it."""
     outside = np.array([[1.005 * C, 0.0, 0.0, 0.0]])
-    ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 0), SPEEDS[:1], outside, onward=on) for on in (False, True)]
+    ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 1), SPEEDS[:1], outside, onward=on) for on in (False, True)]
     assert [OUTCOMES[int(end.outcome[0])] for end in ends] == ["outside", "successful"]
     assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005
 
 
 def test_a_lane_that_is_not_to_run_costs_nothing_and_stays():
-    strobe = strobe_map(MODEL, SPEEDS[0], controlled())
+    strobe = strobe_map(MODEL, SPEEDS[0], controlled(3e-3, [("rk4", 128), ("rk4", 256), ("rk4", 512)]))
     state = tuple(map(jnp.asarray, HEALTHY))
     stays, runs = (revolution(strobe, state, (), jnp.asarray(level)) for level in (-1, 0))
     assert stays.y == state and np.isinf(stays.error)

@@ -33,7 +33,7 @@ STATE = np.zeros(2)
 ROW = np.zeros(3)
 TRAJECTORY = jc.Trajectory(ROW, ROW, np.zeros((3, 4)), ROW, 2, 0.0, "finished")
 WHOLE = jc.whole_bearing("nu2310")
-START = jc.models.rolling_start(WHOLE, 1000.0)
+START = jc.models.BearingState(jnp.zeros((5, 13)), jnp.zeros(9), jnp.zeros(2))
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
@@ -143,7 +143,7 @@ def _thrown() -> tuple[np.ndarray, Any]:
     "solver, steps",
     [
         ("rk4", 16),
-        ("rk4", 128),
+        pytest.param("rk4", 128, marks=pytest.mark.wide),
         pytest.param("newmark", 64, marks=pytest.mark.wide),
         pytest.param("rodas3", 32, marks=pytest.mark.wide),
     ],

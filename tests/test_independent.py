@@ -113,7 +113,7 @@ def chaos():
     rng = np.random.default_rng(0)
     reach = np.array([0.6, 0.6, 0.3, 0.3]) * independent.scale(1500.0)
     starts = [tuple(map(float, s)) for s in rng.uniform(-1, 1, (12, 4)) * reach]
-    seen = sweep(model, speeds, starts=starts, discard=150, revolutions=400, keep=400)
+    seen = sweep(model, speeds, starts=starts, discard=150, revolutions=400, keep=400, horizon=0)
     ours, states = [], []
     for k in range(speeds.size):
         chaotic = seen.label[k] == "chaotic"

@@ -261,7 +261,8 @@ def after(model, speed, state, phase=0.0, seen=None):
     return np.asarray(revolution(seen or model, model.scale(at), at, start, phase))
 
 
-@pytest.mark.parametrize("kind", wide_but(SYSTEMS, "fixed_half"))
+@pytest.mark.wide
+@pytest.mark.parametrize("kind", SYSTEMS)
 @random(20)
 @given(designs, speeds, states(0.01, 0.9), states(0.0, 0.05, 0.05), angles)
 def test_turned_starts_have_turned_ends(kind, design, speed, cage, rib, angle):
@@ -282,7 +283,8 @@ class Mirrored(eqx.Module):
         return mirrored(self.model).at_speed(-speed).acceleration(-tau, q, v)
 
 
-@pytest.mark.parametrize("film", wide_but(["positive_pressure", "full"], "full"))
+@pytest.mark.wide
+@pytest.mark.parametrize("film", ["positive_pressure", "full"])
 @random(20)
 @given(designs, speeds, states(0.01, 0.9))
 def test_mirrored_starts_have_mirrored_ends(film, design, speed, start):

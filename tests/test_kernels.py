@@ -723,7 +723,7 @@ def test_the_gpu_kernel_in_interpret_mode(solver, tangents):
         np.testing.assert_allclose(new / scale, ran / scale, atol=1e-11)
 
 
-@pytest.mark.parametrize("solver, tangents", [(ClassicalRK4(), 0), wide(ClassicalRK4(), 4), wide(Rodas4(), 1)])
+@pytest.mark.parametrize("solver, tangents", [wide(ClassicalRK4(), 0), wide(ClassicalRK4(), 4), wide(Rodas4(), 1)])
 def test_the_gpu_kernel_translates_for_cuda(solver, tangents):
     """Every operation of the step has its counterpart in Triton; no GPU is needed to see that."""
     run, numbers, *_ = on_device(solver, tangents)

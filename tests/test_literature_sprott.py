@@ -46,6 +46,7 @@ def agrees(found, known: tuple[Number, ...]):
         assert ours == pytest.approx(theirs.value, abs=theirs.tolerance)
 
 
+@pytest.mark.wide
 def test_lorenz():
     """The sum is the divergence -41/3, exactly."""
     found = spectrum(lorenz(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 256, 400)

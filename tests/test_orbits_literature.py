@@ -244,6 +244,7 @@ DAMPED = [
 ]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind, z, bracket, sign", DAMPED)
 def test_edges_of_damped_mathieu(kind, z, bracket, sign):
     """A multiplier is +-1 where the undamped trace at a - z^2 is +-2 cosh(z pi); the trace here is SciPy's."""

@@ -124,6 +124,7 @@ def test_steps_that_are_asked_for_are_kept():
     assert own.converged and np.isnan(own.error)
 
 
+@pytest.mark.wide
 def test_an_orbit_is_found_again_by_its_own_method():
     orbit = jc.periodic_orbit(stop(), 0.6)
     again = jc.periodic_orbit(stop(), 0.6, guess=orbit, method=orbit.method)
@@ -171,6 +172,7 @@ def test_bifurcation_that_half_the_steps_move_is_not_converged():
     assert np.isnan(jax.grad(lambda w: find(w).value)(1.2))
 
 
+@pytest.mark.wide
 def test_branch_takes_more_steps_where_the_stop_is_touched():
     branch = jc.branch(stop(), jc.periodic_orbit(stop(), 2.5), lower=0.5, upper=3.0)
     highest = np.array([np.max(np.abs(s)) for s in branch.state])

@@ -73,6 +73,7 @@ def with_extra(*laws: AbstractForce) -> jc.CageModel:
 # --- motion ----------------------------------------------------------------------------------
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("solver", wide_but(["rk4", "rodas4"], "rk4"))
 @pytest.mark.parametrize("rib", wide_but(["rigid", "elastic"], "rigid"))
 def test_a_drag_moves_the_cage_like_the_damping_of_its_support(solver: str, rib: str):

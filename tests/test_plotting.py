@@ -15,7 +15,6 @@ from test_io_dataset import sweep_of
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones, zones
 from jaxcage.bearing import load_distribution
-from jaxcage.forces import impact_history
 from jaxcage.plotting import (
     exponent_strip,
     force_history,
@@ -207,7 +206,9 @@ def test_each_force_is_drawn():
 
 
 def test_impact_history():
-    history = impact_history(jc.forces.PocketImpact(), 0.0423, 0.16, jnp.asarray(6e-4), samples=64)
+    time, zero = jnp.linspace(0.0, 6e-4, 64), jnp.zeros(64)
+    push = 100 * jnp.sin(time * jnp.pi / 6e-4)
+    history = jc.forces.ImpactHistory(time, push, -push / 2, zero, zero, zero, zero)
     ax = impact_forces(history)
     contact = points(ax, "roller-bar contact force $Q_{cw}$")
     np.testing.assert_allclose(contact[:, 1], history.contact_force)

@@ -1,7 +1,6 @@
 """The code of README and pages runs, its numbers hold, and the commands are those of the check."""
 
 import contextlib
-import functools
 import io
 import pathlib
 import re
@@ -10,7 +9,6 @@ import jax
 import numpy as np
 import pytest
 
-import jaxcage as jc
 from jaxcage.validation import DUFFING_DOUBLINGS, EXPONENTS
 
 
@@ -29,13 +27,8 @@ def run_blocks(page: str) -> tuple[dict, str]:
     return space, out.getvalue()
 
 
-@pytest.mark.parametrize("quick", [True, pytest.param(False, marks=pytest.mark.wide)])
-def test_python_blocks_of_the_readme(quick: bool, monkeypatch: pytest.MonkeyPatch):
-    """As they stand; or by one solver, with lanes neither confirmed nor followed, which compiles sooner."""
-    if quick:
-        method = jc.method("rk4", steps=256)
-        monkeypatch.setattr(jc, "sweep", functools.partial(jc.sweep, method=method, confirm=False, horizon=0))
-        monkeypatch.setattr(jc, "simulate", functools.partial(jc.simulate, method=method))
+@pytest.mark.wide
+def test_python_blocks_of_the_readme():
     space, text = run_blocks(README)
     assert "Sweep of 9 speeds x 3 starts" in text and "at a resolution of 500 rpm" in text
     assert float(space["force"]) == pytest.approx(DUFFING_DOUBLINGS[1][1].value, abs=1e-7)

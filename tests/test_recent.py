@@ -97,6 +97,7 @@ def test_old_programs_are_dropped_with_their_laws(few: _recent.Recent):
     assert len(few) == 4 and [ref() is None for ref in laws] == [True] * 8 + [False] * 4
 
 
+@pytest.mark.wide
 @needs_maps
 def test_memory_maps_stay_as_they_are(few: _recent.Recent):
     """Without dropping, each of them holds a few for good."""
@@ -124,3 +125,19 @@ def test_memory_maps_stay_as_they_are_over_laws_of_ones_own(few: _recent.Recent)
         jc.sweep(law(0.3 + 0.01 * n), np.array([1.1]), method=jc.method("rk4", steps=16), **options)
         at.append(maps())
     assert at[4] - at[2] < 60, at
+
+
+def test_runs_of_one_size_of_chunks_share_their_programs(monkeypatch: pytest.MonkeyPatch):
+    """Some lanes again, in chunks with room for all of them: nothing is compiled anew, and they do the same."""
+    monkeypatch.setattr("jaxcage.integrate._traced.programs", programs := Recent(16))
+    hardening = jc.ForcedOscillator(
+        lambda tau, q, v, speed: (-0.1 * v[0] - q[0] - q[0] ** 3 + 0.3 * jnp.cos(tau),), coordinates=1
+    )
+    method = jc.method("rk4", steps=128)
+    speeds, plan = np.linspace(1.0, 1.4, 40), jc.analysis.Plan(8, 4, 2, 4, 1)
+    states = np.tile([0.4, 0.3], (40, 1))
+    run = lambda lanes: jc.sweeps.run_lanes(hardening, method, plan, speeds[lanes], states[lanes], size=48)
+    every, some = run(np.arange(40)), run(np.arange(3, 30, 2))
+    assert len(programs) == 2 and np.all(every.outcome == 0)
+    for here, there in zip(some, every, strict=True):
+        np.testing.assert_array_equal(here, there[..., 3:30:2])

@@ -16,7 +16,10 @@ from jaxcage.report import page, read_operating
 
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here to look at the report")
+pytestmark = [
+    pytest.mark.wide,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here to look at the report"),
+]
 WIDTH, HEIGHT = 1280, 6000
 QUIET = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
@@ -113,7 +116,7 @@ class Addresses(html.parser.HTMLParser):
         return reader.found
 
 
-@pytest.mark.parametrize("scheme, options", [("light", ()), pytest.param("dark", (DARK,), marks=pytest.mark.wide)])
+@pytest.mark.parametrize("scheme, options", [("light", ()), ("dark", (DARK,))])
 def test_figures_are_not_blank_in_either_scheme(
     report: Path, measured: list[str], scheme: str, options: tuple[str, ...]
 ):

@@ -77,7 +77,7 @@ def test_an_observer_reads_zones_off_a_diagram():
     """Where the motion is chaotic it fills a band, where it is periodic it does not, whatever is in between."""
     model = jc.case("1a")
     speeds = np.concatenate([jc.rpm(10400, 10800, 3), jc.rpm(16000, 16400, 3)])
-    seen = jc.sweep(model, speeds, starts=1, horizon=0)
+    seen = jc.sweep(model, speeds, starts=1, horizon=0, method=jc.method("rk4", steps=1024))
     assert list(np.char.startswith(seen.label[:, 0], "periodic")) == [False] * 3 + [True] * 3
     ((found,),) = observed_zones([model], speeds, Observer("late", steps=128, discard=300, drawn=200))
     assert found.onset is None and found.exit is not None and found.exit.speed_rpm == pytest.approx(13400)
@@ -174,5 +174,6 @@ def test_a_cubic_term_that_falls_with_the_gap_is_that_of_the_narrow_gap():
 def test_every_reading_can_be_taken(reading):
     model = reading.model(jc.case(reading.case))
     assert model.dimension == (8 if reading.answer == "elastic" else 4)
-    y = jc.strobe_map(model, jc.rpm(9000.0), reading.method() or jc.controlled())(model.starts(jc.rpm(9000.0))[0])
+    speed, method = jc.rpm(9000.0), reading.method() or jc.method("rk4", steps=512)
+    y = jc.strobe_map(model, speed, method)(model.starts(speed)[0])
     assert np.all(np.isfinite(np.asarray(y.y)))

@@ -74,6 +74,7 @@ def sommerfeld(eps: float, half: bool) -> np.ndarray:
     return np.array([-12 * eps**2 / ((2 + eps**2) * (1 - eps**2)), tangential / 2])
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("cavitation", wide_but(["full", "guembel"], "full"))
 @pytest.mark.parametrize("eps", [0.3, 0.7])
 def test_long_limit_in_closed_form(cavitation: str, eps: float):
@@ -177,7 +178,8 @@ def test_film_breaks_off_without_a_slope(slenderness: float):
     assert fine < 0.2 * coarse and fine < 0.2 * cut
 
 
-@pytest.mark.parametrize("slenderness", wide_but([0.05, 0.5], 0.5))
+@pytest.mark.wide
+@pytest.mark.parametrize("slenderness", [0.05, 0.5])
 def test_film_is_what_it_is_by_relaxation(slenderness: float):
     """The same problem by projected Gauss-Seidel on a plain grid in NumPy: uniform in theta and z, p >= 0."""
     eps, n, m = 0.5, 96, 8

@@ -102,6 +102,7 @@ def test_commands_show_them_and_json_stays(capsys: pytest.CaptureFixture[str], t
     assert given["m"]["measures"] == given["um, mm/s"]["measures"]
 
 
+@pytest.mark.wide
 def test_the_page_shows_them():
     text = page(findings(), read_operating("6500"), table={"base": "1a"}, units=ShownUnits.read("inch"))
     assert "inch" in text and "<td>mm</td>" not in text and "<td>µm</td>" not in text

@@ -12,6 +12,7 @@ import jaxcage
 
 
 pytest.importorskip("mkdocs", reason="the site needs `.[docs]`")
+pytestmark = pytest.mark.wide
 ROOT = pathlib.Path(__file__).parent.parent
 LAYERS = sorted(p.parent.name for p in (ROOT / "jaxcage").glob("*/__init__.py"))
 NOTEBOOKS = sorted(p.stem for p in ROOT.glob("experiments/*.ipynb"))

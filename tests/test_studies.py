@@ -356,6 +356,7 @@ def test_a_store_is_made_once_by_whoever_comes_first(tmp_path: Path):
     assert [p.name for p in tmp_path.iterdir()] == ["study.zarr"]
 
 
+@pytest.mark.wide
 def test_what_no_rung_can_is_inaccurate_and_no_calm(tmp_path: Path):
     """A lane beyond its tolerance is stored by its label, and on a map it counts as failed."""
     coarse = jc.controlled(1e-9, [("rk4", 4), ("rk4", 8), ("rk4", 16)])

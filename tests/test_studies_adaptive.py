@@ -168,7 +168,7 @@ def test_chaos_must_persist_if_asked():
     """Starts found chaotic are judged again after more revolutions, all others stay as they were."""
     system = jc.ForcedOscillator(Ueda(jnp.array(7.5)), coordinates=1)
     x, y = {"speed": np.linspace(0.95, 1.15, 9)}, {"force": np.linspace(6.0, 8.0, 6)}
-    length = dict(revolutions=60, blocks=6, method=jc.method("rodas4", steps=32), starts=2, refine_by="everything")
+    length = dict(revolutions=60, blocks=6, method=jc.method("rk4", steps=64), starts=2, refine_by="everything")
     soon, late = (jc.label_map(system, x, y, discard=n, **length) for n in (20, 400))
     found = jc.label_map(system, x, y, discard=20, persist=400, **length)
     chaotic = soon.label == LABELS.index("chaotic")

@@ -76,9 +76,9 @@ def test_two_grooves_whirl_near_half_speed():
 
 @pytest.mark.wide
 def test_cascade_of_the_driven_pendulum():
-    rows = pendulum_comparisons((1, 2, 4, 8))
-    assert len(rows) == 4 and failures(rows) == []
-    *_, before, middle, last = (row.ours for row in rows)
+    rows = pendulum_comparisons((2, 4, 8))
+    assert len(rows) == 3 and failures(rows) == []
+    before, middle, last = (row.ours for row in rows)
     assert (middle - before) / (last - middle) == pytest.approx(FEIGENBAUM.value, rel=0.02)
 
 

@@ -125,6 +125,7 @@ def test_measures(run):
     assert 1 - spin.min() - 1e-12 <= found.roller_slip_max < 1 - spin.min() + 0.01
 
 
+@pytest.mark.wide
 def test_rollers_that_do_not_slip():
     """Pressed between the rings, with nothing to hold them back: psi' = omega_i (r - h_i)/(r (1 + h_i/h_o)).
 
@@ -269,6 +270,7 @@ def cage_alone():
     return same, cage
 
 
+@pytest.mark.wide
 def test_held_cage_is_that_of_the_cage_model():
     held, cage = cage_alone()
     omega, c = 450.0, float(held.clearance)

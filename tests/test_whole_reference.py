@@ -76,6 +76,7 @@ def test_right_side_at_random_states(kind):
             np.testing.assert_allclose(np.asarray(found.bodies)[part], bodies[part], rtol=0, atol=room)
 
 
+@pytest.mark.wide
 def test_a_short_arc():
     """A thirtieth of a revolution from a cage near its land: integrated over time there, over the angle here."""
     model = jc.whole_bearing("nu2310")

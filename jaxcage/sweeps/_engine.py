@@ -94,23 +94,33 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
+def _workers() -> int:
+    """Chunks that run at a time."""
+    return cores() if jax.default_backend() == "cpu" else 1
+
+
 def _padded(lanes: np.ndarray, size: int) -> np.ndarray:
     """Lanes up to `size`: -1 stands for one of which nothing is asked."""
     return np.pad(lanes, (0, size - lanes.size), constant_values=-1)
 
 
 def _in_chunks(
-    work: Callable[[np.ndarray], Any], lanes: np.ndarray, size: int, report: Callable[[int], None]
+    work: Callable[[np.ndarray], Any],
+    lanes: np.ndarray,
+    size: int,
+    report: Callable[[int], None] = lambda _: None,
+    least: int = 1,
 ) -> tuple[np.ndarray, ...]:
-    """`work` on `lanes`, chunk by chunk on all cores; results in the order of their numbers.
+    """`work` on `lanes`, chunk by chunk on all cores, in `least` chunks at least if there are enough blocks of lanes;
+    results in the order of their numbers.
 
     Neighbours need about as many steps. They are dealt out to the chunks as many at a time as are run together: so the
     few lanes that need the most share their blocks, and every chunk takes as long.
     """
-    chunks = -(-lanes.size // size)
     blocks = np.split(lanes, range(BLOCK, lanes.size, BLOCK))
+    chunks = max(-(-lanes.size // size), min(least, len(blocks)))
     parts = [np.concatenate(blocks[i::chunks]) for i in range(chunks)]
-    with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
+    with concurrent.futures.ThreadPoolExecutor(_workers()) as pool:
         futures = [pool.submit(lambda p: [np.asarray(x) for x in work(_padded(p, size))], part) for part in parts]
         try:
             for future, part in zip(futures, parts, strict=True):
@@ -135,14 +145,14 @@ def run_parts(
 ) -> tuple[np.ndarray, ...]:
     """`work` on all lanes, chunk by chunk on all cores."""
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    return _in_chunks(begin, np.arange(speed.size), _chunk_size(speed.size), lambda _: None)
+    return _in_chunks(begin, np.arange(speed.size), chunk_size(speed.size))
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
     return Part(jnp.asarray(speed[lane]), jnp.asarray(which[lane]), tuple(map(jnp.asarray, y[lane].T)))
 
 
-def _chunk_size(lanes: int) -> int:
+def chunk_size(lanes: int) -> int:
     """The size with which all cores are done first, each taking one chunk after the other."""
     if jax.default_backend() != "cpu":
         return lanes
@@ -164,12 +174,15 @@ def run_lanes(
     progress: Progress | None = None,
     which: Int[np.ndarray, " lanes"] | None = None,
     onward: bool = False,
+    size: int | None = None,
 ) -> Observation:
     """Observe lanes given by their speeds [rad/s] and initial states, and with several systems by which they have.
 
     Lanes that go `onward`, from where another run left them, may be as far out as lanes come on their way.
 
-    Lanes run beside their neighbours, and after the discarded revolutions beside those that need as many steps.
+    Lanes run beside their neighbours, and after the discarded revolutions beside those that need as many steps. Runs
+    that name the same `size` of their chunks share their programs; what a chunk has room for beyond its lanes costs
+    next to nothing.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
@@ -178,7 +191,7 @@ def run_lanes(
         systems = Designs.of(list(systems) if isinstance(systems, Sequence) else [systems])
     designs = systems
     which = np.zeros(lanes, int) if which is None else which
-    size = _chunk_size(lanes)
+    size = chunk_size(lanes) if size is None else size
     plan = Plan(*map(int, plan))
     first, watched = plan.discard - plan.align, plan.align + plan.block * plan.blocks
     share = np.array([first, watched]) / (first + watched)
@@ -201,12 +214,12 @@ def run_lanes(
         got = _settle_chunk(designs, method, alone, limit, _part(speed, which, begun, lane))
         return *got.y, got.outcome, got.level, got.error
 
-    *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0))
+    *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0), _workers())
     settled = np.stack(y, axis=-1).reshape(lanes, dim)
 
     def follow(lane: np.ndarray) -> Observation:
         rest = [jnp.asarray(x) for x in (np.where(lane < 0, 1, outcome[lane]), level[lane], error[lane])]
         return _observe_chunk(designs, method, lengths, room, _part(speed, which, settled, lane), *rest)
 
-    seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1)))
+    seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1), _workers()))
     return seen._replace(strobe=seen.strobe[room.keep - plan.keep :], growth=seen.growth[: plan.blocks])

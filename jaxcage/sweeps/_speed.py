@@ -21,7 +21,7 @@ from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, c
 from ..integrate import AbstractMethod, controlled, finer
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._confirm import Judged, confirm as confirm_lanes, doubtful
-from ._engine import Progress, run_lanes
+from ._engine import Progress, chunk_size, run_lanes
 from ._lasting import follow
 
 
@@ -170,11 +170,11 @@ def sweep_designs(
     which = np.repeat(np.arange(len(systems)), each)
     lane_speed = np.repeat(speed.ravel(), shape[1])
     lane_start = y0.reshape(-1, dim)
-    how = settings_of(chosen)
+    how, size = settings_of(chosen), chunk_size(which.size)  # one for all that follows: else each compiles its own
 
     def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray | None = None) -> Observation:
         begin = lane_start[lane] if y is None else y
-        return run_lanes(systems, method, plan, lane_speed[lane], begin, progress, which[lane], onward=y is not None)
+        return run_lanes(systems, method, plan, lane_speed[lane], begin, progress, which[lane], y is not None, size)
 
     def each_system(seen: Observation) -> list[Sweep]:
         parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
