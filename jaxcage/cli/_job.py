@@ -40,7 +40,7 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report")
+WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report", "design")
 """What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
