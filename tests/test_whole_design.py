@@ -238,7 +238,7 @@ def test_drawn_places_are_starts_of_every_design():
     assert np.all(np.hypot(*np.array(places)[:, :2].T) < 0.8) and drawn_places(2, 5) == places != drawn_places(2, 6)
     how = dict(discard=0, revolutions=1, blocks=1, exponents=0)
     a = jc.sweep_bearing(model, SPEED, starts=places, **how)
-    states = [jc.models.rolling_start(model, SPEED, place) for place in places]
+    states = [jc.models.rolling_start(model, SPEED, place=place) for place in places]
     b = jc.sweep_bearing(model, SPEED, starts=states, **how)
     np.testing.assert_array_equal(a.last_bodies, b.last_bodies)
     assert not np.allclose(a.last_bodies[0, 0], a.last_bodies[0, 1])
@@ -248,3 +248,8 @@ def test_drawn_places_are_starts_of_every_design():
 def test_places_outside_are_refused(starts):
     with pytest.raises(ValueError, match="`starts` must hold places of the cage within its clearance"):
         jc.sweep_bearing(jc.whole_bearing("nu2310"), SPEED, starts=starts)
+
+
+def test_a_study_says_what_to_use_instead(tmp_path: pathlib.Path):
+    with pytest.raises(ValueError, match="`system` must be a forced system such as a cage, but is a whole bearing"):
+        jc.study(jc.whole_bearing("nu2310"), {"speed": np.array([SPEED])}, store=tmp_path / "store")

@@ -225,7 +225,7 @@ def _laws(model: BearingModel, speeds: Float[Array, " speeds"]) -> tuple[Bearing
 
 @eqx.filter_jit
 def _starts(model: BearingModel, speeds: Float[Array, " speeds"], place: Float[Array, " 4"]) -> BearingState:
-    return jax.vmap(lambda speed: rolling_start(model, speed, place))(speeds)
+    return jax.vmap(lambda speed: rolling_start(model, speed, place=place))(speeds)
 
 
 class _Table:

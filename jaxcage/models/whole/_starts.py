@@ -50,13 +50,14 @@ def drawn_places(count: int, seed: int = 0) -> tuple[CagePlace, ...]:
 def rolling_start(
     model: BearingModel,
     speed: Scalar,
-    cage: int | Sequence[float] | Float[Array, " 4"] = 0,
+    cage: int = 0,
     turning: Scalar = 1.0,
+    place: Sequence[float] | Float[Array, " 4"] | None = None,
 ) -> BearingState:
     """Rollers in the middle of their pockets, rolling without slip, pressed as in a static bearing; one at the bottom.
 
-    **Arguments:** model; shaft speed [rad/s]; which of the `CAGE_STARTS`, or a place such as they are; the speed of
-    cage and rollers over that of pure rolling, with which a start below 1 slips.
+    **Arguments:** model; shaft speed [rad/s]; which of the `CAGE_STARTS`; the speed of cage and rollers over that of
+    pure rolling, with which a start below 1 slips; a place such as the `CAGE_STARTS` are, instead of one of them.
     """
     bearing, c = model.bearing, model.clearance
     omega, spin = turning * model.rolling_cage_speed(speed), turning * model.rolling_spin(speed)
@@ -68,7 +69,7 @@ def rolling_start(
     approach = down * jnp.sin(angles) - bearing.radial_clearance / 2
     _, outer = raceway_loads_of_all(approach, stiff, stiff, centrifugal)
     radius = pitch + jax.vmap(line_contact_approach, in_axes=(None, 0))(stiff, outer)
-    x, y, vx, vy = CAGE_STARTS[cage] if isinstance(cage, int) else cage
+    x, y, vx, vy = CAGE_STARTS[cage] if place is None else place
     lag = jnp.arcsin(c * (y * jnp.cos(angles) - x * jnp.sin(angles)) / radius)
     full = lambda value: jnp.ones((n,)) * value
     rollers = Rollers(lag, full(spin), radius, full(0.0), full(omega))
