@@ -78,7 +78,7 @@ def study(
         raise ArgumentError(
             "system",
             said="must be a forced system such as a cage, but is a whole bearing: `jaxcage.sweep_bearings` runs "
-            "many of them over speeds and starts, and `jaxcage map nu2310 --y NAME` maps them over speed and a parameter.",
+            "many of them over speeds and starts, `jaxcage map nu2310 --y NAME` maps speed and a parameter.",
         )
     plan = make_study_plan(system, vary, samples, seed, starts, lanes)
     chosen = controlled() if method is None else method
