@@ -20,6 +20,7 @@ from ..integrate import (
     LONGEST_BLOCK,
     OUTCOMES,
     SAMPLES,
+    WITH_TANGENT,
     BearingLanes,
     bearing_states,
     begin_lanes,
@@ -292,10 +293,11 @@ def _direction(begin: BearingState) -> BearingState:
     return jax.tree.map(each, begin)
 
 
-def _in_parts(revolutions: int) -> list[int]:
-    """Stretches of at most `LONGEST_BLOCK` revolutions."""
-    whole, rest = divmod(revolutions, LONGEST_BLOCK)
-    return [LONGEST_BLOCK] * whole + [rest] * (rest > 0)
+def _in_parts(revolutions: int, tangent: bool) -> list[int]:
+    """Stretches as long as they may be, with a tangent vector or without."""
+    longest = WITH_TANGENT if tangent else LONGEST_BLOCK
+    whole, rest = divmod(revolutions, longest)
+    return [longest] * whole + [rest] * (rest > 0)
 
 
 def _followed(
@@ -314,19 +316,19 @@ def _followed(
     lead = min(discard, LEAD) if exponents else 0
     go = lambda lanes, samples: run_block(at, scale, lanes, jnp.asarray(samples), tight)
     lanes = begin_lanes(at, scale, begin, None if lead < discard else direction)
-    for part in _in_parts(discard - lead):
+    for part in _in_parts(discard - lead, False):
         lanes, _ = go(lanes, part * SAMPLES)
         done(part)
     if exponents and lead < discard:
         lanes = _with_direction(at, scale, lanes, direction)
-    for part in _in_parts(lead):
+    for part in _in_parts(lead, True):
         lanes, _ = go(lanes, part * SAMPLES)
         done(part)
 
     integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
     for block in blocks:
         trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose)
-        samples, gathered = [1, *(part * SAMPLES for part in _in_parts(block))], []
+        samples, gathered = [1, *(part * SAMPLES for part in _in_parts(block, exponents > 0))], []
         samples[-1] -= 1
         for k, count in enumerate(samples):
             lanes, found = go(lanes, count)
