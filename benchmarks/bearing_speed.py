@@ -1,12 +1,12 @@
 """`python -m benchmarks.bearing_speed`: how long a sweep of the whole bearing takes, and what others take for the same.
 
 The aim: 100 shaft speeds from 4000 to 16000 rpm, 3 starts, 300 revolutions of the cage, NU2310 at 4450 N, with slips,
-forces and the largest exponent, in 15 minutes on two cores. By default every tenth speed is run, fewer revolutions
-long; `--whole` runs all of it. Beside it stand two that do the same arcs of a sixteenth of a revolution, without
-forces, exponent and control of the error: plain Runge-Kutta steps in C, and SciPy on the second implementation in
-NumPy. Errors are those reached at the end of an arc, in units of the state's scale, against the C program with far
-shorter steps, which is held against SciPy's DOP853. Processor time counts all threads: other jobs on the machine change
-it less than wall time.
+forces and the largest exponent, in 15 minutes on two cores. By default every second speed is run, fewer revolutions
+long, in chunks of as many lanes as the whole has; `--whole` runs all of it. Beside it stand two that do the same arcs
+of a sixteenth of a revolution, without forces, exponent and control of the error: plain Runge-Kutta steps in C, and
+SciPy on the second implementation in NumPy. Errors are those reached at the end of an arc, in units of the state's
+scale, against the C program with far shorter steps, which is held against SciPy's DOP853. Processor time counts all
+threads: other jobs on the machine change it less than wall time.
 """
 
 import argparse
@@ -37,7 +37,7 @@ STEPS = (100, 200, 400, 800, 1600)
 """Steps of an arc in C."""
 TOLERANCES = (1e-4, 1e-5, 1e-6)
 """Of LSODA."""
-BLOCK = 10
+BLOCK = 5
 """Revolutions of a block of the sweep."""
 CHECKED = 3
 """Arcs on which SciPy is tried."""
@@ -202,9 +202,9 @@ def main() -> None:
     """Read the options and run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--whole", action="store_true", help="all speeds, 100 revolutions left out and 200 observed")
-    parser.add_argument("--every", type=int, default=10, help="n-th speed")
-    parser.add_argument("--discard", type=int, default=10)
-    parser.add_argument("--revolutions", type=int, default=20, help=f"observed, a multiple of {BLOCK}")
+    parser.add_argument("--every", type=int, default=2, help="n-th speed")
+    parser.add_argument("--discard", type=int, default=2)
+    parser.add_argument("--revolutions", type=int, default=10, help=f"observed, a multiple of {BLOCK}")
     parser.add_argument("--no-sweep", action="store_true", help="the arcs only")
     given = parser.parse_args()
     jc.enable_x64()

@@ -33,7 +33,7 @@ from ._engine import Progress, cores
 from ._speed import checked_speeds, versions
 
 
-CHUNKS = (8, 16, 32, 48, 64, 96)
+CHUNKS = (8, 16, 32, 48, 64, 80, 96)
 """Lanes per call: few sizes, as each is compiled."""
 CALL = 12
 """What a call costs beside its lanes, in lanes."""
