@@ -7,43 +7,21 @@ designs that are run from common random starts, one parameter at a time; z is th
 import argparse
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 import jaxcage as jc
 from benchmarks.bearing_trends import table
 from jaxcage.design import StatisticGradient, bearing_gradient
-from jaxcage.models.whole import BearingState, rolling_start
+from jaxcage.models.whole import CagePlace, drawn_places
 
 
-CASES = ((4450.0, 10000.0), (300.0, 10000.0), (4450.0, 20000.0))
+CASES = ((4450.0, 10000.0), (300.0, 10000.0), (4450.0, 20000.0), (1000.0, 6000.0), (4450.0, 14000.0))
 """Load [N] and shaft speed [rpm]."""
 COMPARED = ("guidance_gap", "pocket_clearance", "viscosity_1+viscosity_2")
-WITHIN = 0.8
-"""Of the clearance, in which the cage starts."""
-
-
-def random_starts(model: jc.BearingModel, speed: float, count: int, seed: int) -> list[BearingState]:
-    """The cage anywhere in most of its clearance, at the speed of rolling."""
-    rng, c = np.random.default_rng(seed), float(model.clearance)
-    found = []
-    for _ in range(count):
-        start = rolling_start(model, speed, 0)
-        place = WITHIN * c * np.sqrt(rng.uniform()) * np.exp(2j * np.pi * rng.uniform())
-        moved = np.array([place.real, place.imag]) - np.asarray(start.bodies[:2])
-        angles = (
-            np.asarray(start.rollers[0])
-            - np.pi / 2
-            + 2 * np.pi / model.bearing.n_rollers * np.arange(model.bearing.n_rollers)
-        )
-        lag = (moved[1] * np.cos(angles) - moved[0] * np.sin(angles)) / np.asarray(start.rollers[2])
-        rollers = start.rollers.at[0].add(jnp.asarray(lag))
-        found.append(BearingState(rollers, start.bodies.at[:2].add(jnp.asarray(moved)), start.clock))
-    return found
 
 
 def differences(
-    model: jc.BearingModel, speed: float, direction: str, starts: list[BearingState], spread: float, length: Any
+    model: jc.BearingModel, speed: float, direction: str, starts: tuple[CagePlace, ...], spread: float, length: Any
 ) -> dict[str, tuple[float, float]]:
     """Elasticity of every statistic and its error, from pairs of runs that begin alike."""
     names = direction.split("+")
@@ -99,7 +77,7 @@ def main() -> None:
             bearing_gradient(model, speed, designs=given.designs, spread=given.spread, seed=seed, **length)
             for seed in range(given.seeds)
         ]
-        starts = random_starts(model, speed, given.starts, seed=100)
+        starts = drawn_places(given.starts, seed=100)
         other = {name: differences(model, speed, name, starts, given.spread, length) for name in COMPARED}
         print(f"\n{load:.0f} N, {rpm:.0f} rpm of the shaft; failed {[g.failed for g in several]}")
         heads = ("statistic", "by", *(f"seed {seed}" for seed in range(given.seeds)), "differences", "z")

@@ -1,5 +1,8 @@
 """Optimisation: known optima from many starts, within bounds, resumable; sensitivities against closed forms."""
 
+from typing import Any
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -10,7 +13,7 @@ from tests.test_identification import TRUTH, DoubleWell
 
 
 VARY = {"damping": (0.1, 1.0), "cubic": (0.5, 3.0)}
-OPTIMISERS = optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1)
+OPTIMISERS = optax.adam(0.2), optax.sgd(0.3, momentum=0.5), optax.rmsprop(0.1), jc.design.walk(0.15, 0.005, 150)
 
 
 def double_well():
@@ -34,6 +37,29 @@ def test_any_optimiser_finds_a_known_optimum(optimiser):
     assert found.values == pytest.approx({"damping": 0.4, "cubic": 1.5}, rel=0.1)
     assert found.at_bound == ()
     assert found.model.acceleration.cubic == pytest.approx(found.values["cubic"], rel=1e-12)
+
+
+def test_a_walk_has_steps_of_given_length_between_the_bounds():
+    """Along the slope, whatever its size; from a bound too; a parameter without slope stays; nobody leaves."""
+    walk = jc.design.walk(0.1, 0.01, 10)
+    update_of: Any = walk.update
+
+    def step(*given):
+        with jax.numpy_dtype_promotion("standard"):  # as `optimise` does for optax
+            return update_of(*given)
+
+    place = np.array([0.995, 0.5, 0.3])
+    slope = 1e-4 * np.array([4.0, 0.0, 3.0])
+    z = jnp.asarray(np.log(place / (1 - place)))
+    update, state = step(jnp.asarray(slope * place * (1 - place)), walk.init(z), z)
+    new = 1 / (1 + np.exp(-np.asarray(z + update)))
+    np.testing.assert_allclose(new, place - 0.1 * np.array([0.8, 0.0, 0.6]), atol=1e-12)
+    for _ in range(10):
+        _, state = step(jnp.asarray(slope), state, z)
+    update, _ = step(jnp.asarray([-1.0, 0.0, 0.0]), state, z)
+    assert 1 / (1 + np.exp(-float(z[0] + update[0]))) == pytest.approx(0.995)  # at its bound already
+    update, _ = step(jnp.asarray([0.0, 1.0, 0.0]), state, z)
+    assert 1 / (1 + np.exp(-float(z[1] + update[1]))) == pytest.approx(0.49)  # the last step
 
 
 def test_starts_that_lead_to_one_optimum_are_one():

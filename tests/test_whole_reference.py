@@ -1,5 +1,7 @@
 """The whole bearing against its second implementation: right side at random states, and a short arc."""
 
+import shutil
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -8,6 +10,7 @@ from helpers import wide_but
 from reference import WholeBearing
 
 import jaxcage as jc
+from benchmarks import bearing_speed
 from jaxcage.models.whole import BearingState, state_scale
 
 
@@ -87,3 +90,20 @@ def test_a_short_arc():
     unit = state_scale(model, SPEED)
     np.testing.assert_allclose((run.rollers[1] - end[0]) / np.asarray(unit.rollers), 0, atol=1e-6)
     np.testing.assert_allclose((run.bodies[1] - end[1]) / np.asarray(unit.bodies), 0, atol=1e-6)
+
+
+@pytest.mark.wide
+@pytest.mark.skipif(not shutil.which("cc"), reason="no compiler")
+def test_the_benchmark_in_c_solves_the_same_equations():
+    """From a state with contacts of all kinds, the land too, by many short steps against SciPy's."""
+    theirs, span = WholeBearing(jc.whole_bearing("nu2310"), float(SPEED)), 2e-3
+    turned = bearing_speed.compiled()
+    for reach in (0.6, 1.0):
+        state = random_state(theirs, 3, reach)
+        begin = bearing_speed.flat(np.asarray(state.rollers), np.asarray(state.bodies))
+        angle = float(state.clock[0])
+        found = turned(bearing_speed.law(theirs)[None], np.array([angle]), begin[None], span, 4000)[0]
+        expected = bearing_speed.flat(*theirs.arc(angle, np.asarray(state.rollers), np.asarray(state.bodies), span))
+        scale = state_scale(jc.whole_bearing("nu2310"), SPEED)
+        size = bearing_speed.flat(np.asarray(scale.rollers), np.asarray(scale.bodies))
+        assert np.max(np.abs(found - expected) / size) < 1e-6 < 1e-2 < np.max(np.abs(found - begin) / size)

@@ -86,6 +86,17 @@ def test_growth_is_that_of_the_distance_of_two_runs(start):
     assert float(block.growth[0]) == pytest.approx(expected, abs=2e-3)
 
 
+def test_growth_is_that_of_any_tangent_vector_however_long(start):
+    """A vector whose squares are no numbers any more, as at low speed and light load, grows like a short one."""
+    model = bearing()
+    grown = []
+    for long in (1.0, 1e200):
+        direction = jax.tree.map(lambda x, long=long: long * x, along())
+        at, scale, lanes = lanes_of(model, [start, start, start], direction)
+        grown.append(float(run_block(at, scale, lanes, jnp.asarray(1), jnp.asarray(1e-5))[1].growth[0]))
+    assert grown[1] == pytest.approx(grown[0], rel=1e-9) and abs(grown[0]) > 0.05
+
+
 def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     """Beside a cage that hardly turns, and one that starts with no number, a lane is bit for bit what it is alone."""
     model = bearing()

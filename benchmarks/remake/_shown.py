@@ -62,6 +62,9 @@ README, EDGES, DESIGNS, STUDIES, REPRODUCTION = (
     *(f"docs/{name}.md" for name in ("edges", "design", "studies", "reproduction")),
 )
 WHOLE, TRENDS = "docs/whole-bearing.md", "python -m benchmarks.bearing_trends"
+SLOPES = "python -m benchmarks.bearing_gradients"
+SMALL = "--designs 32 --starts 16 --seeds 1 --discard 10 --revolutions 20"
+BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
 PAPER = "python -m benchmarks.bearing_paper"
 PAPER_PARTS = (("force", ""), ("support", " --revolutions 12 --discard 8"), ("cases", ""))
 CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
@@ -96,7 +99,9 @@ SHOWN = (
     Shown("identify", REPRODUCTION, ["python -m benchmarks.identify"], ex.lines("+-")),
     Shown("bearing-threshold", WHOLE, [f"{TRENDS} threshold --discard 100 --revolutions 50"], ex.printed),
     Shown("bearing-trends", WHOLE, [f"{TRENDS} trends --starts 1 --discard 10 --revolutions 10"], ex.printed),
-    Shown("bearing-gradients", WHOLE, ["python -m benchmarks.bearing_gradients --cases 0"], ex.printed),
+    Shown("bearing-gradients", WHOLE, [f"{SLOPES} --cases 0"], ex.printed),
+    Shown("bearing-gradients-elsewhere", WHOLE, [f"{SLOPES} --cases 3 4 {SMALL}"], ex.printed),
+    Shown("bearing-design", WHOLE, [BETTER], ex.tables("Design of", "Before and after")),
     *(Shown(f"bearing-paper-{what}", WHOLE, [f"{PAPER} {what}{more}"], ex.printed) for what, more in PAPER_PARTS),
     Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
     _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),

@@ -39,6 +39,7 @@ from ._bearing_measures import (
 )
 from ._bearing_sweep import (
     AVERAGED as AVERAGED,
+    STATISTIC_UNITS as STATISTIC_UNITS,
     BearingRecord as BearingRecord,
     BearingSweep as BearingSweep,
     summed_up as summed_up,

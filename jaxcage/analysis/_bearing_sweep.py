@@ -24,9 +24,11 @@ AVERAGED = (
     "land_wear_mm3_per_h",
     "eccentricity_mean",
     "whirl_ratio",
+    "pocket_force_peak_N",
+    "land_force_peak_N",
     "exponent",
 )
-"""What `BearingSweep.block_means` has."""
+"""What `BearingSweep.block_means` has. Peaks are the largest of each block: means of them grow with its length."""
 OfLanes = Float[np.ndarray, "speeds starts"]
 
 
@@ -95,6 +97,15 @@ class BearingSweep:
         return scatter(self.block_means[name])
 
 
+STATISTIC_UNITS: dict[str, str] = {
+    LandPower: "W",
+    "pocket_force_peak_N": "N",
+    "land_force_peak_N": "N",
+    **{field.name: field.metadata["unit"] for field in dataclasses.fields(BearingSweep) if field.name in AVERAGED},
+}
+"""Units of what `BearingSweep.block_means` has."""
+
+
 def scatter(blocks: Float[np.ndarray, "*lanes blocks"]) -> Float[np.ndarray, "*lanes"]:
     """Standard error of the mean of blocks; infinite for a single one."""
     count = blocks.shape[-1]
@@ -109,7 +120,7 @@ class BearingRecord:
 
     integrals: dict[str, Float[np.ndarray, "lanes blocks"]]
     """`time`, and the names of `jaxcage.integrate.INTEGRATED`."""
-    peaks: dict[str, Float[np.ndarray, " lanes"]]
+    peaks: dict[str, Float[np.ndarray, "lanes blocks"]]
     growth: Float[np.ndarray, "lanes blocks"]
     place: Float[np.ndarray, "lanes samples 2"]
     """Of the cage's centre from the land's, in clearances."""
@@ -163,12 +174,14 @@ def summed_up(
         "land_wear_mm3_per_h": worn * of_blocks("land_rubbing"),
         "eccentricity_mean": of_blocks("eccentricity"),
         "whirl_ratio": shaped(record.integrals["whirl"] / record.integrals["cage_speed"]),
+        "pocket_force_peak_N": shaped(record.peaks["pocket_force"]),
+        "land_force_peak_N": shaped(record.peaks["land_force"]),
         "exponent": shaped(growth),
     }
     states = [
         cage_state(place, samples) if not bad else "failed" for place, bad in zip(record.place, lost, strict=True)
     ]
-    peak = lambda name: shaped(record.peaks[name])
+    peak = lambda name: shaped(record.peaks[name].max(axis=1))
     harmonic = np.stack([[of_blocks(f"pocket_{axis}_{part}") for part in ("cos", "sin")] for axis in "xy"])
     force_x, force_y = 2 * np.hypot(*np.moveaxis(harmonic.mean(axis=-1), 1, 0))
     return BearingSweep(

@@ -1,17 +1,13 @@
 """Designs with fewer chaotic speeds, what that costs, and what each parameter and its tolerance does."""
 
 import concurrent.futures
-import dataclasses
-import hashlib
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import report
-from .._errors import InputError
 from ..analysis import Sweep, zones
 from ..design import (
     MEASURES,
@@ -38,8 +34,10 @@ from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job
 from ._options import DesignOptions, SensitivityOptions, VaryOptions
+from ._search import kept_search, no_worse_balance
 from ._show import Report
 from ._vary import read_bounds, read_scatter
+from ._whole_design import design_bearing
 
 
 VARY = ("guidance_gap=0.3mm:0.6mm", "eccentricity=5um:60um")
@@ -53,14 +51,17 @@ def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
 
 
 def design(job: Job[DesignOptions]) -> Report:
-    """`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs."""
+    """`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs; of a whole bearing less wear,
+    force, friction and slip."""
+    if job.whole is not None:
+        return design_bearing(job, job.whole)
     options = job.options
     vary = read_bounds(options.vary or VARY, job.model)
-    balance = None if options.worse_balance else _no_worse_balance(job.model, vary)
+    balance = None if options.worse_balance else no_worse_balance(job.model, vary)
     scatter = read_scatter(options.scatter, list(vary))
     range_ = options.first, options.last, options.speeds
     width = chaotic_width(*range_, **job.given("cloud spread seed"))
-    kept = _kept_search(job)
+    kept = kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
         objective = _objective(job, width, vary)
         if scatter:
@@ -112,22 +113,6 @@ def design(job: Job[DesignOptions]) -> Report:
     return Report(document, tables, [*_notes(document, found), *([balance] if balance else [])])
 
 
-def _no_worse_balance(model: CageModel, vary: dict[str, tuple[float, float]]) -> str | None:
-    """Lower the upper bound of the eccentricity to what it is now; what there is to say of that."""
-    if "eccentricity" not in vary:
-        return None
-    (lower, upper), own = vary["eccentricity"], float(model.eccentricity)
-    if upper <= own:
-        return None
-    if lower >= own:
-        raise InputError(
-            f"Option --vary must let the eccentricity become smaller than the {own:g} m that it is, but it is "
-            f"{lower:g} to {upper:g} m; with --worse-balance it may become larger."
-        )
-    vary["eccentricity"] = lower, own
-    return f"Balance may only get better: eccentricity of at most {own * 1e6:g} um (--worse-balance lifts that)."
-
-
 def _objective(job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tuple[float, float]]) -> AbstractObjective:
     """Chaotic speeds, and what the land feels beside what it feels now."""
     options, space = job.options, DesignSpace.of(job.model, vary)
@@ -164,12 +149,6 @@ def _balance_grade(model: CageModel, last_rpm: float) -> float:
     return float(model.eccentricity) * rpm(last_rpm) * 1e3
 
 
-def _kept_search(job: Job[DesignOptions]) -> Path:
-    """File of the search until the command is through; another search has another file."""
-    asked = dataclasses.replace(job.options, json=False, out="", style="light", no_cache=False, quick=False)
-    return job.folder / f".design_{job.name}_{hashlib.sha256(repr(asked).encode()).hexdigest()[:12]}.npz"
-
-
 def _check(model: CageModel, options: DesignOptions) -> Sweep:
     """A sweep with starts that the search did not use, its labels confirmed."""
     rng, c = np.random.default_rng(options.seed + 1), float(model.clearance)
@@ -188,8 +167,9 @@ def _chaotic_rpm(found: Sweep) -> float:
 def _swept(found: Optimised, options: DesignOptions, width: AbstractObjective) -> int:
     """Designs whose speeds were swept in the search."""
     draws = width.draws if isinstance(width, Robust) else 1
-    clouds = options.cloud * sum(len(o.history) for o in found.optima)
-    return (clouds + (options.scouts if options.starts > 1 else 0)) * draws
+    given = vars(options)  # filled
+    clouds = given["cloud"] * sum(len(o.history) for o in found.optima)
+    return (clouds + (given["scouts"] if given["starts"] > 1 else 0)) * draws
 
 
 def _ends(zone: Any) -> dict[str, Any]:

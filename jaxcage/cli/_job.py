@@ -40,8 +40,12 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report")
+WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report", "design")
 """What takes a whole bearing."""
+INSTEAD = {
+    "study": "; `jaxcage map` varies the speed and any one parameter",
+    "sensitivity": "; `jaxcage gradient` has slopes",
+}
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
 
@@ -261,7 +265,7 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     if command not in WHOLE_COMMANDS:
         raise InputError(
             f"Case '{given}' is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with "
-            f"{', '.join(WHOLE_COMMANDS)}."
+            f"{', '.join(WHOLE_COMMANDS)}{INSTEAD.get(command, '')}."
         )
     if not _is_file(given):
         return given.lower(), whole_bearing(given), None

@@ -28,6 +28,7 @@ Tens = Annotated[int, whole(10, of=10)]
 OptionalSpeed = Annotated[float | None, number("be a speed above 0 rpm", lambda x: x > 0, "rpm")]
 Load = Annotated[float | None, number("be from 0 to 1e7 N", lambda x: x >= 0, "N", "own")]
 """[N]."""
+Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
 OptionalText = Annotated[str | None, text()]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 
@@ -383,14 +384,49 @@ class VaryOptions(_Range):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DesignOptions(VaryOptions):
-    """Make the chaotic speeds few by changing the design: gradient search, checked by a fresh sweep."""
+    """Make the chaotic speeds few by changing the design: gradient search, checked by a fresh sweep. Of a whole bearing
+    (nu2310), make wear, forces, impulses, friction power, slip and unbalance small at one speed."""
 
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
+        "wear": (1000.0, 1.0),
+        "force": (1000.0, 1.0),
+        "impulse": (None, 1.0),
+        "power": (None, 1.0),
+        "slip": (None, 1.0),
+        "balance": (None, 1.0),
+        "starts": (3, 1),
+        "scouts": (32, 0),
+        "cloud": (12, 16),
+        "ensemble": (None, 4),
+        "discard": (None, 10),
+        "revolutions": (None, 20),
+    }
+    of_cage: ClassVar[tuple[str, ...]] = (*("first", "last", "speeds", "quick", "cost", "front", "scatter", "worst"),)
+    of_whole: ClassVar[tuple[str, ...]] = (
+        *("speed", "load", "impulse", "power", "slip", "balance", "ensemble", "discard", "revolutions"),
+    )
+    called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
+
+    speed: OptionalSpeed = None
+    """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
     cost: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What one unit of manufacturing cost is worth, in rpm of chaotic speeds; the paper's case 1a costs 2 units."""
-    wear: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
-    """What the wear load of the guiding land as it is now is worth, in rpm of chaotic speeds."""
-    force: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
-    """What the peak force on the guiding land as it is now is worth, in rpm of chaotic speeds."""
+    wear: Price = None
+    """What the wear load of the guiding land as it is now is worth, in rpm of chaotic speeds; 1000 if left out. Of a
+    whole bearing: what the wear of its cage counts beside the other terms; 1 if left out, 0 leaves it out."""
+    force: Price = None
+    """What the peak force on the guiding land as it is now is worth, in rpm of chaotic speeds; 1000 if left out. Of a
+    whole bearing: what the peak forces of pockets and land count; 1 if left out."""
+    impulse: Price = None
+    """Of a whole bearing: what the impulses of pockets and land in a revolution count; 1 if left out."""
+    power: Price = None
+    """Of a whole bearing: what the friction power counts; 1 if left out."""
+    slip: Price = None
+    """Of a whole bearing: what the slip of its cage counts; 1 if left out."""
+    balance: Price = None
+    """Of a whole bearing: what the balance grade G of its cage counts; 1 if left out."""
     front: FromZero = 0
     """Designs all over the bounds, of which those are listed that no other beats in chaotic speeds, wear load, peak
     force and cost at once; 0 lists none."""
@@ -401,21 +437,30 @@ class DesignOptions(VaryOptions):
     The mean over it is then made small."""
     worst: Share = 1.0
     """With --scatter: mean of this share of the made cages, the worst ones."""
-    starts: FromOne = 3
-    """Searches: one from the design itself, others from the best of the scouts."""
-    scouts: FromZero = 32
-    """Designs all over the bounds that are looked at beforehand."""
+    starts: Annotated[int | None, whole(1)] = None
+    """Searches: one from the design itself, others from the best of the scouts; 3 if left out, 1 of a whole bearing."""
+    scouts: Annotated[int | None, whole(0)] = None
+    """Designs all over the bounds that are looked at beforehand; 32 if left out, none of a whole bearing."""
     steps: FromOne = 12
     """Steps of each search at most."""
-    cloud: Annotated[int, whole(4)] = 12
-    """Designs around each one from which its gradient is taken."""
+    cloud: Annotated[int | None, whole(4)] = None
+    """Designs around each one from which its gradient is taken; 12 if left out, 16 of a whole bearing."""
     spread: Share = 0.1
     """Their scatter, as a part of the distance between the bounds: structure that is finer is smoothed away."""
+    ensemble: Annotated[int | None, whole(1)] = None
+    """Of a whole bearing: drawn starts of each design; 4 if left out."""
+    discard: Annotated[int | None, whole(0)] = None
+    """Of a whole bearing: revolutions of the cage left out at the beginning; 10 if left out."""
+    revolutions: Annotated[int | None, whole(2, of=2)] = None
+    """Of a whole bearing: revolutions of the cage observed, an even number; 20 if left out."""
 
     def check(self) -> None:
         super().check()
-        if self.scouts < self.starts - 1:
-            raise InputError(f"Option --scouts must be at least {self.starts - 1}, but {self.scouts} was given.")
+        usual = {name: pair[self.speed is not None] for name, pair in self.usual.items()}
+        starts = usual["starts"] if self.starts is None else self.starts
+        scouts = usual["scouts"] if self.scouts is None else self.scouts
+        if scouts < starts - 1 and (scouts or self.speed is None):
+            raise InputError(f"Option --scouts must be at least {starts - 1}, but {scouts} was given.")
         if self.worst != DesignOptions.worst and not self.scatter:
             raise InputError("Option --worst goes with --scatter.")
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from .._errors import ArgumentError, InputError
-from .._parameters import parameter_info
+from .._parameters import parameter_info, replace
 from ..design import Scatter, rayleigh, uniform
-from ..io import Whose, cage_rpm, configuration, model_from, to_si
-from ..models import CageModel
+from ..io import Whose, cage_rpm, configuration, model_from, to_si, whole_bearing_from
+from ..models import BearingModel, CageModel
 from ..studies import OIL, SPEED, Between, Spread, Tolerance, with_values
 from ..sweeps import rpm
 from ._readers import MOST, read_quantity
@@ -37,7 +37,7 @@ def read_vary(given: Sequence[str], model: CageModel, speeds: Whose = "cage") ->
     return found
 
 
-def read_bounds(given: Sequence[str], model: CageModel) -> dict[str, tuple[float, float]]:
+def read_bounds(given: Sequence[str], model: CageModel | BearingModel) -> dict[str, tuple[float, float]]:
     """Every `NAME=LOWER:UPPER` of parameters that are to be chosen, in SI units.
 
     **Raises:** `InputError`.
@@ -96,7 +96,7 @@ def _each(option: str, given: Sequence[str], form: str, read: Callable[[str, str
     return found
 
 
-def _read(name: str, text: str, model: CageModel, speeds: Whose = "cage") -> np.ndarray | Spread:
+def _read(name: str, text: str, model: CageModel | BearingModel, speeds: Whose = "cage") -> np.ndarray | Spread:
     number = _number(name, model, speeds)
     parts = text.split(":")
     if "+-" in text or "±" in text:
@@ -115,7 +115,7 @@ def _read(name: str, text: str, model: CageModel, speeds: Whose = "cage") -> np.
     return found
 
 
-def _number(name: str, model: CageModel, speeds: Whose) -> Callable[[str], float]:
+def _number(name: str, model: CageModel | BearingModel, speeds: Whose) -> Callable[[str], float]:
     """How a number of this parameter is read: with its unit, or bare in SI units, a speed in rpm."""
     known = parameter_info(model)
     if name == SPEED:
@@ -135,7 +135,7 @@ def _count(text: str) -> int:
     return count
 
 
-def _check_range(name: str, values: Sequence[float] | np.ndarray, model: CageModel) -> None:
+def _check_range(name: str, values: Sequence[float] | np.ndarray, model: CageModel | BearingModel) -> None:
     info = parameter_info(model).get(name)
     low, high = (info.lower, info.upper) if info else GRADES if name == OIL else (0.0, math.inf)
     unit = "rad/s" if name == SPEED else "" if info is None or info.unit == "1" else info.unit
@@ -145,16 +145,23 @@ def _check_range(name: str, values: Sequence[float] | np.ndarray, model: CageMod
             raise ValueError(f"must stay {allowed} {unit}".rstrip() + f", but holds {value:g}.")
 
 
-def _check_corners(vary: Vary, model: CageModel) -> None:
+def _check_corners(vary: Vary, model: CageModel | BearingModel) -> None:
     """What ranges of single values cannot see, at the corners of all that is varied."""
     ends = {
         name: sorted(set(how.bounds if isinstance(how, Spread) else (how.min(), how.max())))
         for name, how in vary.items()
         if name != SPEED
     }
+
+    def try_out(corner: dict[str, float]) -> None:
+        if isinstance(model, BearingModel):
+            whole_bearing_from(configuration(replace(model, **corner)))
+        else:
+            model_from(configuration(with_values(model, corner)))  # pyright: ignore[reportArgumentType]
+
     for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):
         corner = dict(zip(ends, map(float, values), strict=True))
         try:
-            model_from(configuration(with_values(model, corner)))  # pyright: ignore[reportArgumentType]
+            try_out(corner)
         except ValueError as error:
             raise InputError(f"Option --vary: {error}") from error

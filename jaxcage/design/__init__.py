@@ -14,6 +14,7 @@
 | `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
 | `_bearing_gradient` | slip, impulses, wear and power of the whole bearing by its parameters |
+| `_bearing_design` | the whole bearing's wear, forces, power and slip as an objective, before and after |
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
 | `_optimise` | designs made better by gradient                                               |
@@ -22,6 +23,18 @@
 """
 
 from .._arguments import check_layer
+from ._bearing_design import (
+    CAGE_PARAMETERS as CAGE_PARAMETERS,
+    JUDGED as JUDGED,
+    TERMS as TERMS,
+    BearingObjective as BearingObjective,
+    BearingRuns as BearingRuns,
+    BeforeAfter as BeforeAfter,
+    balance_grade as balance_grade,
+    bearing_objective as bearing_objective,
+    before_and_after as before_and_after,
+    usual_bounds as usual_bounds,
+)
 from ._bearing_gradient import (
     DIRECTIONS as DIRECTIONS,
     STATISTICS as STATISTICS,
@@ -59,7 +72,7 @@ from ._objective import (
     Measured as Measured,
     Smooth as Smooth,
 )
-from ._optimise import Optimised as Optimised, Optimum as Optimum, optimise as optimise
+from ._optimise import Optimised as Optimised, Optimum as Optimum, optimise as optimise, walk as walk
 from ._robust import Robust as Robust, Scatter as Scatter, rayleigh as rayleigh, uniform as uniform
 from ._scatter import (
     ParetoPoint as ParetoPoint,

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
-from ..analysis import AVERAGED, BearingSweep
+from ..analysis import AVERAGED, STATISTIC_UNITS
 from ..models import BearingModel, BearingState
 from ..sweeps import Progress, sweep_bearings
 
@@ -176,7 +176,7 @@ def bearing_gradient(
     """
     values = _values(model, directions)
     _require(directions, statistics, designs, spread, revolutions)
-    moved = spread * _moves(designs // 2, len(directions), seed)
+    moved = spread * moves(designs // 2, len(directions), seed)
     boxed = [_design(model, values, directions, row) for row in np.concatenate([moved, -moved])]
     found = sweep_bearings(
         boxed,
@@ -196,11 +196,10 @@ def bearing_gradient(
             "designs",
             said=f"must be more: only {whole.sum()} pairs came to their ends, for {len(directions)} slopes.",
         )
-    units = {field.name: field.metadata.get("unit", "") for field in dataclasses.fields(BearingSweep)}
     fitted = {
         name: gradient_of_pairs(
             name,
-            units.get(name, "W"),
+            STATISTIC_UNITS[name],
             tuple(directions),
             moved[whole],
             np.stack([each.block_means[name][0].mean(axis=0) for each in found]).reshape(2, -1, 2)[:, whole],
@@ -256,7 +255,7 @@ def _require(
         raise ArgumentError("revolutions", said=f"must be an even number above 0, but {revolutions} was given.")
 
 
-def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
+def moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
     """Places in the box, half way out or further: as many plus as minus in each column, in no order; of full rank."""
     rng, even = np.random.default_rng(seed), np.resize([1.0, -1.0], pairs)
     while True:

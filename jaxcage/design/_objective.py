@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from .._parameters import parameters, replace
 from .._recent import jitted
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, BearingModel
 from ._unknowns import Unknown, check_unknowns, slope_in_place, values_at, with_values
 
 
@@ -24,11 +24,12 @@ from ._unknowns import Unknown, check_unknowns, slope_in_place, values_at, with_
 class DesignSpace:
     """A design and what may be changed in it."""
 
-    system: AbstractForcedSystem
+    system: Any
+    """A forced system, or a whole bearing."""
     unknowns: tuple[Unknown, ...]
 
     @classmethod
-    def of(cls, system: AbstractForcedSystem, vary: Mapping[str, tuple[float, float]]) -> "DesignSpace":
+    def of(cls, system: AbstractForcedSystem | BearingModel, vary: Mapping[str, tuple[float, float]]) -> "DesignSpace":
         """From bounds [SI] by parameter name.
 
         **Raises:** `ValueError` for a parameter that the system does not have, bounds that do not ascend, or none.
@@ -52,7 +53,7 @@ class DesignSpace:
         """Parameters [SI] at a place."""
         return values_at(self.unknowns, place)
 
-    def model(self, place: Float[np.ndarray, " n"]) -> AbstractForcedSystem:
+    def model(self, place: Float[np.ndarray, " n"]) -> Any:
         """The design at a place."""
         return with_values({"": self.system}, self.unknowns, place)[""]
 

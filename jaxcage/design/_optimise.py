@@ -17,12 +17,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
 from .._parameters import parameters
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, BearingModel
 from ._objective import AbstractObjective, DesignSpace, Measured
 
 
@@ -34,6 +34,27 @@ SAME = 0.05
 """Two optima within this part of the bounds' distance in every parameter are one."""
 PATIENCE = 3
 """Steps in a row for which the slope must be within its error before a search ends there."""
+
+
+def walk(first: float = 0.15, last: float = 0.03, steps: int = 12) -> optax.GradientTransformation:
+    """Steps of given length down the slope, between the bounds themselves: for slopes with noise.
+
+    A parameter that does nothing has a small part of the slope and stays about where it is, where Adam would make its
+    noise as large as any slope; one at its bound leaves it as readily as another.
+
+    **Arguments:** lengths of the first and the last of so many steps, as parts of the distance between the bounds.
+    """
+    length = optax.cosine_decay_schedule(first, max(steps, 1), last / first)
+
+    def update(gradient: Array, count: Array, z: Array | None = None) -> tuple[Array, Array]:
+        assert z is not None
+        place = jax.nn.sigmoid(z)
+        slope = gradient / (place * (1 - place))
+        step = length(count) * slope / jnp.maximum(jnp.sqrt(jnp.sum(slope * slope)), 1e-300)
+        new = jnp.clip(place - step, AT_BOUND / 2, 1 - AT_BOUND / 2)
+        return jnp.log(new / (1 - new)) - z, count + 1
+
+    return optax.GradientTransformation(lambda z: jnp.zeros((), jnp.int32), update)  # pyright: ignore[reportArgumentType]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +82,8 @@ class Optimum:
     history: tuple[Step, ...]
     status: str
     """`slope is small`, `slope within its error`, `step limit`, or why the objective could not be had."""
-    model: AbstractForcedSystem
+    model: Any
+    """A forced system or a whole bearing, as what was searched from."""
 
     def __str__(self) -> str:
         rows = [
@@ -103,7 +125,7 @@ class Optimised:
 
 
 def optimise(
-    system: AbstractForcedSystem,
+    system: AbstractForcedSystem | BearingModel,
     vary: Mapping[str, tuple[float, float]],
     objective: AbstractObjective,
     *,

@@ -2,14 +2,14 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from .._errors import ArgumentError, InputError
 from .._parameters import parameter_paths, replace
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, BearingModel
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Unknown:
         return None if self.prior is None else (self.place(self.prior[0]), self.prior[1] / self.span)
 
 
-def check_unknowns(systems: Mapping[str, AbstractForcedSystem], unknowns: Sequence[Unknown]) -> None:
+def check_unknowns(systems: Mapping[str, AbstractForcedSystem | BearingModel], unknowns: Sequence[Unknown]) -> None:
     """**Raises:** `ValueError` for no unknowns, one named twice, or a parameter that a system does not have."""
     names = [u.name for u in unknowns]
     if not names or len(set(names)) < len(names):
@@ -84,8 +84,8 @@ def values_at(unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]) -> di
 
 
 def with_values(
-    systems: Mapping[str, AbstractForcedSystem], unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]
-) -> dict[str, AbstractForcedSystem]:
+    systems: Mapping[str, Any], unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]
+) -> dict[str, Any]:
     """The cases with the unknowns at `place`."""
     values = values_at(unknowns, place)
     chosen = {target: values[u.name] for u in unknowns for target in u.targets}

@@ -28,6 +28,7 @@ from ._bearing import (
 from ._bearing_blocks import (
     LONGEST_BLOCK as LONGEST_BLOCK,
     SAMPLES as SAMPLES,
+    WITH_TANGENT as WITH_TANGENT,
     BearingBlock as BearingBlock,
     BearingLanes as BearingLanes,
     bearing_states as bearing_states,

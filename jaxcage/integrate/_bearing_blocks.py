@@ -22,8 +22,9 @@ from ._results import INACCURATE
 TURN = 2 * np.pi
 SAMPLES = 16
 """Of a revolution of the cage."""
-LONGEST_BLOCK = 12
-"""Revolutions in one go: a tangent vector may grow by a factor of 1e20 in each, and its length still is a number."""
+LONGEST_BLOCK, WITH_TANGENT = 12, 4
+"""Revolutions in one go; with a tangent vector fewer: it may grow by a factor of 1e75 in each, and its length still is
+a number. At low speeds and light loads it grows by 1e16."""
 SPACING = TURN / SAMPLES
 FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
 """First, longest and shortest step [rad] of the cage's angle."""
@@ -128,10 +129,11 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     """Of tangent vectors, in units of the state; 1 where there are none."""
     if not tangent.bodies:
         return jnp.ones_like(units.bodies[0])
-    parts = [jnp.square(x * u) for x, u in zip(tangent.bodies, units.bodies, strict=True)]
-    over = lambda x, u: jnp.sum(jnp.square(x.reshape(rollers, -1) * u[None]), axis=0)
-    squares = map(over, tangent.rollers, units.rollers)
-    length = jnp.sqrt(sum(parts) + sum(squares))
+    parts = [(x * u)[None] for x, u in zip(tangent.bodies, units.bodies, strict=True)]
+    parts += [x.reshape(rollers, -1) * u[None] for x, u in zip(tangent.rollers, units.rollers, strict=True)]
+    every = jnp.concatenate(parts)
+    largest = jnp.max(jnp.abs(every), axis=0)  # squares of numbers beyond 1e154 are none
+    length = largest * jnp.sqrt(jnp.sum(jnp.square(every / jnp.where(largest > 0, largest, 1.0)[None]), axis=0))
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
 

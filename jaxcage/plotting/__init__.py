@@ -11,6 +11,7 @@
 | `_history`       | time history, orbit in the clearance circle, each force                 |
 | `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
 | `_bearing_gradient` | elasticities of the whole bearing's statistics with their errors      |
+| `_bearing_design` | a search for a better whole bearing, and what it changed              |
 | `_impact`        | impact of a roller on a cage bar                                        |
 | `_statics`       | load of every roller                                                    |
 | `_waterfall`     | spectra over speed                                                      |
@@ -41,6 +42,7 @@ from ._bearing import (
     pocket_force_around as pocket_force_around,
     slip_around as slip_around,
 )
+from ._bearing_design import bearing_design_figure as bearing_design_figure
 from ._bearing_gradient import statistic_bars as statistic_bars
 from ._branches import (
     MARKS as MARKS,

@@ -8,6 +8,7 @@
 | `_slopes`        | how every exact edge answers to the design                                  |
 | `_lasting`       | how edges of lasting chaos answer to the design, with error bars           |
 | `_bearing_gradient` | how the whole bearing's slip, wear and power answer to the design, with error bars |
+| `_bearing_design` | the whole bearing before and after a search                                |
 | `_bearing_page`  | the page of a whole bearing                                                 |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
@@ -24,6 +25,10 @@
 | `_page`          | the page                                                                    |
 """
 
+from ._bearing_design import (
+    before_and_after_table as before_and_after_table,
+    changed_parameters_table as changed_parameters_table,
+)
 from ._bearing_gradient import (
     bearing_gradient_document as bearing_gradient_document,
     bearing_gradient_table as bearing_gradient_table,

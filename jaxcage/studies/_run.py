@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..integrate import AbstractMethod, controlled
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, BearingModel
 from ..sweeps import Progress
 from ._plan import LANES, Plan
 from ._store import Store, open_study
@@ -28,7 +28,7 @@ Shard = tuple[int, int]
 
 
 def study(
-    system: AbstractForcedSystem,
+    system: AbstractForcedSystem | BearingModel,
     vary: Vary,
     *,
     store: str | Path,
@@ -55,7 +55,7 @@ def study(
 
     **Arguments:**
 
-    - `system`: any `AbstractForcedSystem`.
+    - `system`: any `AbstractForcedSystem`; no whole bearing yet.
     - `vary`: what is varied. Arrays are axes of a grid [SI]; `Between` and `Tolerance` are sampled together. The speed
         [rad/s] must be among them; `oil`, for cages, is the ISO VG grade of a mineral oil.
     - `store`: the folder.
@@ -74,6 +74,12 @@ def study(
     **Raises:** `ValueError` for what makes no sense, and for a store of another study; `ImportError` without dask.
     """
     require_x64()
+    if isinstance(system, BearingModel):
+        raise ArgumentError(
+            "system",
+            said="must be a forced system such as a cage, but is a whole bearing: `jaxcage.sweep_bearings` runs "
+            "many of them over speeds and starts, `jaxcage map nu2310 --y NAME` maps speed and a parameter.",
+        )
     plan = make_study_plan(system, vary, samples, seed, starts, lanes)
     chosen = controlled() if method is None else method
     about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)

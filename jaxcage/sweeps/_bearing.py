@@ -20,6 +20,7 @@ from ..integrate import (
     LONGEST_BLOCK,
     OUTCOMES,
     SAMPLES,
+    WITH_TANGENT,
     BearingLanes,
     bearing_states,
     begin_lanes,
@@ -27,12 +28,12 @@ from ..integrate import (
     run_block,
 )
 from ..models import BearingModel, BearingState, rolling_start
-from ..models.whole import CAGE_STARTS, BearingAtSpeed, state_scale
+from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
 from ._engine import Progress, cores
 from ._speed import checked_speeds, versions
 
 
-CHUNKS = (8, 16, 32, 48, 64, 96)
+CHUNKS = (8, 16, 32, 48, 64, 80, 96)
 """Lanes per call: few sizes, as each is compiled."""
 CALL = 12
 """What a call costs beside its lanes, in lanes."""
@@ -42,13 +43,15 @@ LEAD = 10
 """Revolutions before those observed in which a tangent vector turns to the direction of fastest growth."""
 COARSER = 16.0
 """A tolerance so many times larger makes steps of fourth order about twice as long."""
+Starts = int | Sequence[BearingState] | Sequence[CagePlace]
+"""How many of the model's own, or states, or places of the cage such as `CAGE_STARTS`."""
 
 
 def sweep_bearing(
     model: BearingModel,
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
-    starts: int | Sequence[BearingState] = 3,
+    starts: Starts = 3,
     discard: int = 100,
     revolutions: int = 200,
     blocks: int = 20,
@@ -63,7 +66,8 @@ def sweep_bearing(
 
     - `model`: bearing, with an inner ring that is `dynamic`.
     - `speeds`: ascending shaft speeds [rad/s].
-    - `starts`: how many of the model's own starts (`rolling_start`), or states with which every speed begins.
+    - `starts`: how many of the model's own starts (`rolling_start`), places of the cage as it takes them, or states
+        with which every speed begins.
     - `discard`, `revolutions`: revolutions of the cage left out at the beginning, and observed after that.
     - `blocks`: of the observed revolutions, from whose scatter standard errors come.
     - `exponents`: 1 for the largest Lyapunov exponent, 0 for none.
@@ -89,7 +93,7 @@ def sweep_bearings(
     models: Sequence[BearingModel],
     speeds: float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"],
     *,
-    starts: int | Sequence[BearingState] = 3,
+    starts: Starts = 3,
     discard: int = 100,
     revolutions: int = 200,
     blocks: int = 20,
@@ -180,8 +184,16 @@ def _require(
             )
         return
     n = models[0].bearing.n_rollers
-    if not starts or any(np.shape(s.rollers) != (5, n) or np.shape(s.bodies) != (9,) for s in starts):
-        raise ArgumentError("starts", said=f"must hold states of a bearing with {n} rollers.")
+    if not starts:
+        raise ArgumentError("starts", said="must hold at least one place or state, but it is empty.")
+    for start in starts:
+        if isinstance(start, BearingState):
+            if np.shape(start.rollers) != (5, n) or np.shape(start.bodies) != (9,):
+                raise ArgumentError("starts", said=f"must hold states of a bearing with {n} rollers.")
+        elif np.shape(start) != (4,) or not np.all(np.isfinite(start)) or not np.hypot(*start[:2]) < 1:
+            raise ArgumentError(
+                "starts", said=f"must hold places of the cage within its clearance, four numbers each, but has {start}."
+            )
 
 
 class _Counted:
@@ -213,8 +225,8 @@ def _laws(model: BearingModel, speeds: Float[Array, " speeds"]) -> tuple[Bearing
 
 
 @eqx.filter_jit
-def _starts(model: BearingModel, speeds: Float[Array, " speeds"], cage: int) -> BearingState:
-    return jax.vmap(lambda speed: rolling_start(model, speed, cage))(speeds)
+def _starts(model: BearingModel, speeds: Float[Array, " speeds"], place: Float[Array, " 4"]) -> BearingState:
+    return jax.vmap(lambda speed: rolling_start(model, speed, place=place))(speeds)
 
 
 class _Table:
@@ -231,7 +243,7 @@ class _Table:
         )
 
     @classmethod
-    def of(cls, models: list[BearingModel], speed: np.ndarray, starts: int | Sequence[BearingState]) -> "_Table":
+    def of(cls, models: list[BearingModel], speed: np.ndarray, starts: Starts) -> "_Table":
         """**Raises:** `ValueError` for designs that differ in more than their numbers."""
         arrays = [
             jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, model)
@@ -246,11 +258,15 @@ class _Table:
         at = [to_numpy(law) for law in laws]
         own = [len(models) > 1 or bool(x[0] != x[-1]) for x in jax.tree.leaves(at[0])]
         many = np.asarray(speed)
-        if isinstance(starts, int):
-            states = [[to_numpy(_starts(model, jnp.asarray(many), k)) for k in range(starts)] for model in arrays]
-        else:
-            at_all = lambda x: np.broadcast_to(np.asarray(x), (many.size, *np.shape(x)))
-            states = [[jax.tree.map(at_all, s) for s in starts] for _ in models]
+        begun = CAGE_STARTS[:starts] if isinstance(starts, int) else starts
+        at_all = lambda x: np.broadcast_to(np.asarray(x), (many.size, *np.shape(x)))
+
+        def begin_with(model: BearingModel, start: BearingState | CagePlace) -> BearingState:
+            if isinstance(start, BearingState):
+                return jax.tree.map(at_all, start)
+            return to_numpy(_starts(model, jnp.asarray(many), jnp.asarray(start, dtype=float)))
+
+        states = [[begin_with(model, start) for start in begun] for model in arrays]
         rows = lambda *x: np.stack(x, axis=1).reshape(-1, *x[0].shape[1:])  # speeds, then starts
         begin = jax.tree.map(lambda *x: np.concatenate(x), *(jax.tree.map(rows, *of_model) for of_model in states))
         scale = jax.tree.map(lambda *x: np.stack(x), *(to_numpy(s) for s in scales))
@@ -277,10 +293,11 @@ def _direction(begin: BearingState) -> BearingState:
     return jax.tree.map(each, begin)
 
 
-def _in_parts(revolutions: int) -> list[int]:
-    """Stretches of at most `LONGEST_BLOCK` revolutions."""
-    whole, rest = divmod(revolutions, LONGEST_BLOCK)
-    return [LONGEST_BLOCK] * whole + [rest] * (rest > 0)
+def _in_parts(revolutions: int, tangent: bool) -> list[int]:
+    """Stretches as long as they may be, with a tangent vector or without."""
+    longest = WITH_TANGENT if tangent else LONGEST_BLOCK
+    whole, rest = divmod(revolutions, longest)
+    return [longest] * whole + [rest] * (rest > 0)
 
 
 def _followed(
@@ -299,19 +316,19 @@ def _followed(
     lead = min(discard, LEAD) if exponents else 0
     go = lambda lanes, samples: run_block(at, scale, lanes, jnp.asarray(samples), tight)
     lanes = begin_lanes(at, scale, begin, None if lead < discard else direction)
-    for part in _in_parts(discard - lead):
+    for part in _in_parts(discard - lead, False):
         lanes, _ = go(lanes, part * SAMPLES)
         done(part)
     if exponents and lead < discard:
         lanes = _with_direction(at, scale, lanes, direction)
-    for part in _in_parts(lead):
+    for part in _in_parts(lead, True):
         lanes, _ = go(lanes, part * SAMPLES)
         done(part)
 
     integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
     for block in blocks:
         trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose)
-        samples, gathered = [1, *(part * SAMPLES for part in _in_parts(block))], []
+        samples, gathered = [1, *(part * SAMPLES for part in _in_parts(block, exponents > 0))], []
         samples[-1] -= 1
         for k, count in enumerate(samples):
             lanes, found = go(lanes, count)
@@ -326,10 +343,9 @@ def _followed(
         done(block)
     rollers, bodies = bearing_states(lanes)
     total = np.stack(integrals, axis=-1)  # quantities, lanes, blocks
-    highest = np.max(peaks, axis=0)
     return {
         "integrals": dict(zip(("time", *INTEGRATED), total, strict=True)),
-        "peaks": dict(zip(FOLLOWED, highest, strict=True)),
+        "peaks": dict(zip(FOLLOWED, np.stack(peaks, axis=-1), strict=True)),
         "growth": np.stack(growths, axis=-1),
         "place": np.moveaxis(np.concatenate(places), -1, 0),
         "error": np.max(errors, axis=0),

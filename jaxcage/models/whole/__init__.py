@@ -28,7 +28,13 @@ from ._field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed a
 from ._model import BearingModel as BearingModel, InnerRing as InnerRing
 from ._pockets import Pockets as Pockets, bar_stiffness as bar_stiffness
 from ._raceway import Raceways as Raceways
-from ._starts import CAGE_STARTS as CAGE_STARTS, rolling_start as rolling_start, state_scale as state_scale
+from ._starts import (
+    CAGE_STARTS as CAGE_STARTS,
+    CagePlace as CagePlace,
+    drawn_places as drawn_places,
+    rolling_start as rolling_start,
+    state_scale as state_scale,
+)
 from ._state import (
     LEDGER as LEDGER,
     MEANS as MEANS,

@@ -1,9 +1,13 @@
 """States to start from, and the magnitude of each part of a state."""
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
+from ..._errors import ArgumentError
 from ..._types import Scalar
 from ...bearing import line_contact_approach, load_distribution
 from ...bearing._line_contact import raceway_loads_of_all
@@ -11,9 +15,14 @@ from ._model import BearingModel
 from ._state import BearingState, Bodies, Rollers
 
 
-CAGE_STARTS = ((0.0, -0.9, 0.0, 0.0), (0.4, 0.3, 0.0, 0.0), (-0.6, 0.1, 0.2, -0.3))
-"""Place of the cage's centre in clearances, and its velocity in clearances times the cage's speed: near its lowest
-place, and twice inside the clearance."""
+CagePlace = tuple[float, float, float, float]
+"""Place of the cage's centre in clearances, and its velocity in clearances times the cage's speed."""
+CAGE_STARTS: tuple[CagePlace, ...] = ((0.0, -0.9, 0.0, 0.0), (0.4, 0.3, 0.0, 0.0), (-0.6, 0.1, 0.2, -0.3))
+"""Near its lowest place, and twice inside the clearance."""
+
+
+WITHIN = 0.8
+"""Of the clearance, in which drawn starts lie."""
 
 
 LEAST_DEPTH, LEAST_SPEED = 1e-5, 1e-3
@@ -24,11 +33,31 @@ LEAST_LOAD = 1e-3
 """By which the inner ring is placed where there is no load [N]."""
 
 
-def rolling_start(model: BearingModel, speed: Scalar, cage: int = 0, turning: Scalar = 1.0) -> BearingState:
+def drawn_places(count: int, seed: int = 0) -> tuple[CagePlace, ...]:
+    """Places of the cage drawn evenly from most of its clearance, at the speed of rolling.
+
+    **Arguments:** how many; seed.
+
+    **Raises:** `ValueError` for none.
+    """
+    if count < 1:
+        raise ArgumentError("count", said=f"must be at least 1, but {count} was given.")
+    rng = np.random.default_rng(seed)
+    place = WITHIN * np.sqrt(rng.uniform(size=count)) * np.exp(2j * np.pi * rng.uniform(size=count))
+    return tuple((float(z.real), float(z.imag), 0.0, 0.0) for z in place)
+
+
+def rolling_start(
+    model: BearingModel,
+    speed: Scalar,
+    cage: int = 0,
+    turning: Scalar = 1.0,
+    place: Sequence[float] | Float[Array, " 4"] | None = None,
+) -> BearingState:
     """Rollers in the middle of their pockets, rolling without slip, pressed as in a static bearing; one at the bottom.
 
     **Arguments:** model; shaft speed [rad/s]; which of the `CAGE_STARTS`; the speed of cage and rollers over that of
-    pure rolling, with which a start below 1 slips.
+    pure rolling, with which a start below 1 slips; a place such as the `CAGE_STARTS` are, instead of one of them.
     """
     bearing, c = model.bearing, model.clearance
     omega, spin = turning * model.rolling_cage_speed(speed), turning * model.rolling_spin(speed)
@@ -40,7 +69,7 @@ def rolling_start(model: BearingModel, speed: Scalar, cage: int = 0, turning: Sc
     approach = down * jnp.sin(angles) - bearing.radial_clearance / 2
     _, outer = raceway_loads_of_all(approach, stiff, stiff, centrifugal)
     radius = pitch + jax.vmap(line_contact_approach, in_axes=(None, 0))(stiff, outer)
-    x, y, vx, vy = CAGE_STARTS[cage]
+    x, y, vx, vy = CAGE_STARTS[cage] if place is None else place
     lag = jnp.arcsin(c * (y * jnp.cos(angles) - x * jnp.sin(angles)) / radius)
     full = lambda value: jnp.ones((n,)) * value
     rollers = Rollers(lag, full(spin), radius, full(0.0), full(omega))

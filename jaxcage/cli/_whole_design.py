@@ -1,0 +1,112 @@
+"""A better cage for a whole bearing, by gradients of what it is judged by: `jaxcage design nu2310`."""
+
+import dataclasses
+
+import numpy as np
+
+from .. import report
+from .._errors import InputError
+from ..bearing import design_rule_violations
+from ..design import (
+    CAGE_PARAMETERS,
+    TERMS,
+    BearingRuns,
+    bearing_objective,
+    before_and_after,
+    optimise,
+    usual_bounds,
+    walk,
+)
+from ..models import BearingModel
+from ..plotting import bearing_design_figure
+from ..sweeps import rpm
+from ._job import Job
+from ._limits import Demand
+from ._options import DesignOptions
+from ._search import kept_search, no_worse_balance
+from ._show import Report
+from ._vary import read_bounds
+from ._whole import SWEEPING, loaded, shaft_rpm_of
+
+
+CHECKED, LONGER = 8, 2
+"""Starts of the check, and how many times as many revolutions it leaves out."""
+
+
+def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
+    """Carry out `jaxcage design` of a whole bearing."""
+    options = job.options
+    if options.speed is None:
+        raise InputError('Option --speed must be given for a whole bearing, e.g. --speed "10000 rpm shaft".')
+    model = loaded(whole, options.load)
+    shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
+    vary = read_bounds(options.vary, model) if options.vary else usual_bounds(model)
+    if wrong := [name for name in vary if name not in CAGE_PARAMETERS]:
+        raise InputError(f"Option --vary must name one of {', '.join(CAGE_PARAMETERS)}, but names '{wrong[0]}'.")
+    balance = None if options.worse_balance else no_worse_balance(model, vary)
+    prices = job.given(" ".join(TERMS))
+    if not sum(prices.values()):
+        raise InputError(f"Options {', '.join(f'--{name}' for name in TERMS)} must not all be 0.")
+    filled = vars(options)
+    runs = BearingRuns(
+        float(rpm(shaft_rpm)),
+        starts=filled["ensemble"],
+        designs=filled["cloud"],
+        **job.given("discard revolutions spread seed"),
+    )
+    runs.require_designs(len(vary))
+    fresh = runs.fresh(starts=CHECKED, longer=LONGER)
+    lanes = runs.designs * runs.starts * filled["starts"]
+    length = (runs.discard + runs.revolutions) * (options.steps + 1)
+    job.require(Demand(lanes, length, 2e4 * lanes, rate=2 * SWEEPING))
+    kept = kept_search(job)
+    with job.computing(advice="the same command goes on where the search stopped") as say:
+        found = optimise(
+            model,
+            vary,
+            bearing_objective(model, vary, runs, prices),
+            optimiser=walk(steps=options.steps),
+            keep=kept,
+            report=lambda step, _: say("search", step, options.steps),
+            **job.given("starts scouts steps seed"),
+        )
+        searched = job.seconds
+        say("check", 0, 1)
+        best = found.best.model
+        rows, failed = before_and_after(model, best, fresh)
+    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N"
+    at = f"_{shaft_rpm:g}rpm_shaft"
+    job.listed("figure", job.saved(bearing_design_figure(found, rows, title), job.path(f"{at}.png")))
+    kept.unlink(missing_ok=True)
+    document = {
+        "shaft_speed_rpm": shaft_rpm,
+        "load_N": float(model.load),
+        "vary": vary,
+        "prices": prices,
+        **report.chosen(found.best, "objective at_bound status"),
+        "objective_error": found.best.error,
+        "optimum": found.best.values,
+        "optima": [report.chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
+        "before_and_after": {row.name: dataclasses.asdict(row) | {"known": row.known} for row in rows},
+        "check": report.chosen(fresh, "starts discard revolutions tolerance seed") | {"failed": failed},
+        "designs_run": runs.designs * sum(len(o.history) for o in found.optima) + filled["scouts"] + 1,
+        "search_seconds": round(searched, 1),
+    }
+    tables = [
+        report.changed_parameters_table(title, model, found, vary),
+        report.before_and_after_table(rows, fresh.revolutions // 2),
+    ]
+    broken = design_rule_violations(best.bearing, best.guidance_gap)
+    notes = [
+        f"Search: {found.best.status}, {len(found.best.history)} steps, objective {found.best.objective:.3f} ± "
+        f"{found.best.error:.3f} of what it was, {document['designs_run']} designs in {searched:.0f} s",
+        f"At a bound: {', '.join(found.best.at_bound)}." if found.best.at_bound else "No parameter ended at a bound.",
+        f"Before and after: {fresh.starts} other starts, the same for both, a tenth of the tolerance, "
+        f"{fresh.discard} revolutions left out, {fresh.revolutions} observed; failed lanes: {failed}",
+        *([] if design_rule_violations(model.bearing, model.guidance_gap) else broken),
+        *([balance] if balance else []),
+    ]
+    unclear = [row.name for row in rows if not row.known and np.any(row.before)]
+    if unclear:
+        notes.append(f"Within twice the error, no change: {', '.join(unclear)}")
+    return Report(document, tables, notes)
