@@ -15,6 +15,7 @@ from benchmarks.remake._excerpts import (
     every_kind,
     fenced,
     lasting,
+    lasting_fit,
     printed,
     readings,
     speed,
@@ -222,6 +223,9 @@ def test_what_lasts_of_zone_1():
 
 def test_fits_of_each_case_and_the_row_of_the_speed_table():
     text = "1a: zone 1 onset +6.0 %, zone 1 exit none, zone 2 onset -4.9 %; 4 zones\n"
+    both = lasting_fit([Run(f"{text}{n} of 3 within 10 %", {}, ROOT, {}) for n in (1, 2)])
+    assert both.splitlines()[3].split() == "1a search +6.0 % none -4.9 % 4".split()
+    assert both.endswith("In all, package: 1 of 3 within 10 %; search: 2 of 3 within 10 %.")
     assert case_fits([Run(text, {}, ROOT, {})]).splitlines()[2].split() == "1a +6.0 % none -4.9 % 4".split()
     head, _, row = speed([document()]).splitlines()
     assert head.split(" | ")[0] == "| jaxcage sweep" and len(re.findall(r"\d", row)) > 5

@@ -132,6 +132,20 @@ def case_fits(runs: Sequence[Run]) -> str:
     return aligned([("case fitted alone", *EDGES, "zones"), *rows])
 
 
+def lasting_fit(runs: Sequence[Run]) -> str:
+    """Constants of the package beside those of a search on lasting chaos, case by case, from `identify_nu2310.py`."""
+    whose, rows = ("package", "search"), []
+    lines = [run.text.strip().splitlines() for run in runs]
+    for pair in zip(*(each[:-1] for each in lines), strict=True):
+        for constants, line in zip(whose, pair, strict=True):
+            name, rest = line.split(": ", 1)
+            found = dict(re.findall(r"(zone \d \w+) (none|\S+ %)", rest))
+            rows.append((name, constants, *(found[e] for e in EDGES), rest.split("; ")[1].split()[0]))
+    counts = (f"{constants}: {each[-1]}" for constants, each in zip(whose, lines, strict=True))
+    table = aligned([("case", "constants", *EDGES, "wide zones"), *rows])
+    return f"{table}\n\nIn all, {'; '.join(counts)}."
+
+
 RIVALS = {
     "jaxcage sweep": "jaxcage, default",
     "diffrax Tsit5": "diffrax Tsit5, vmap",

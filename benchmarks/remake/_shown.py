@@ -72,6 +72,7 @@ SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxca
 SPEED = "python -m benchmarks"
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 FIT = "python experiments/identify_nu2310.py --check --cases {0} --begin experiments/case_fits/{0}.json"
+CHECK = "python experiments/identify_nu2310.py --check"
 OPTIMISE = _notebook("optimise_gap_and_balance", "gradient_or_not")
 
 SHOWN = (
@@ -93,6 +94,7 @@ SHOWN = (
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
     Shown("case-fits", REPRODUCTION, [FIT.format(c) for c in CASES], ex.case_fits),
+    Shown("lasting-fit", REPRODUCTION, [CHECK, f"{CHECK} --ledger experiments/lasting_search.csv"], ex.lasting_fit),
     _figure("reproduction-figure", REPRODUCTION, REPRODUCE, "reproduce_7a.png"),
     Shown("readings", REPRODUCTION, ["jaxcage reproduce --quick"], ex.readings),
     Shown("lasting", REPRODUCTION, [f"jaxcage sweep {c}{o}" for c in CASES for o in (" --horizon 0", "")], ex.lasting),
