@@ -116,6 +116,13 @@ def test_a_block_changed_by_hand_is_found(checkout: pathlib.Path, capsys: pytest
     assert "force = 1" in path.read_text()
 
 
+def test_a_block_with_nothing_in_it_does_not_reach_for_the_next(checkout: pathlib.Path):
+    path = checkout / "page.md"
+    path.write_text("<!-- made: law -->\n<!-- end -->\n\nBetween\n\n<!-- made: other -->\nx\n<!-- end -->\n")
+    with pytest.raises(ValueError, match="must have the block 'law' once"):
+        stamps.read(LAW, checkout)
+
+
 def test_a_stale_block_says_so(checkout: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     remake(checkout)
     (checkout / "jaxcage" / "law.py").write_text("force = 2\n")

@@ -97,7 +97,8 @@ def _lacks(commit: str, change: str, root: pathlib.Path) -> bool:
 
 def _block(name: str) -> re.Pattern[str]:
     last = r"(?:\n\n<!-- stamp (?P<stamp>.*?) -->\n<sub>.*?</sub>)?"
-    return re.compile(rf"<!-- made: {re.escape(name)} -->\n(?P<content>.*?){last}\n<!-- end -->", re.S)
+    inside = r"(?P<content>(?:(?!<!-- end -->).)*?)"  # one without its own end does not reach for that of the next
+    return re.compile(rf"<!-- made: {re.escape(name)} -->\n{inside}{last}\n<!-- end -->", re.S)
 
 
 def read(shown: Shown, root: pathlib.Path = ROOT) -> tuple[str, Stamp | None]:
