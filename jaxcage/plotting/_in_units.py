@@ -44,14 +44,15 @@ def in_units(figure: Figure, units: Units) -> Figure:
 def _show_times(axis: Axis, factor: float) -> None:
     """Ticks at round numbers of the new unit."""
     if axis.get_scale() == "linear":
-        axis.set_major_locator(_Locator(factor))
+        axis.set_major_locator(locator := _Locator(factor))
+        if axis.axis_name == "x":
+            locator.set_params(nbins=6)  # numbers such as 0.0125 inch are wider than matplotlib takes them to be
     axis.set_major_formatter(_Formatter(factor))
 
 
 class _Locator(AutoLocator):
     def __init__(self, factor: float):
         super().__init__()
-        self.set_params(nbins=6)  # numbers such as 0.0125 inch are wider than matplotlib takes them to be
         self.factor = factor
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
