@@ -3,7 +3,7 @@
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from matplotlib.axis import Axis
+from matplotlib.axis import Axis, XAxis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import AutoLocator, Formatter
@@ -45,7 +45,7 @@ def _show_times(axis: Axis, factor: float) -> None:
     """Ticks at round numbers of the new unit."""
     if axis.get_scale() == "linear":
         axis.set_major_locator(locator := _Locator(factor))
-        if axis.axis_name == "x":
+        if isinstance(axis, XAxis):
             locator.set_params(nbins=6)  # numbers such as 0.0125 inch are wider than matplotlib takes them to be
     axis.set_major_formatter(_Formatter(factor))
 
