@@ -13,6 +13,9 @@ import jaxcage as jc
 from jaxcage.orbits import loss_zones
 
 
+NAMES = ("sweep", "zones", "loss", "orbits", "branch", "curve", "slopes")
+
+
 @functools.cache
 def results() -> dict[str, Any]:
     sweep = swept()
@@ -35,7 +38,7 @@ def words(text: str) -> list[str]:
     return text.split()
 
 
-@pytest.mark.parametrize("name", results())
+@pytest.mark.parametrize("name", NAMES)
 def test_html_has_the_words_and_numbers_of_the_text(name: str):
     result = results()[name]
     shown = result._repr_html_()
