@@ -894,7 +894,7 @@ def check_function(name: str, given: dict[str, Any]) -> str:
     try:
         f(**given)
         became = "done"
-    except ValueError as error:
+    except (ValueError, FileNotFoundError) as error:  # the latter of a path with nothing there
         check_sentence(str(error))
         return "refused"
     except TypeError as error:

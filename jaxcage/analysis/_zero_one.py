@@ -86,7 +86,7 @@ def zero_one(
 
     **Raises:** `ValueError` for a series or a number of frequencies that is too short.
     """
-    n = series.shape[-1]
+    n = np.atleast_1d(series).shape[-1]
     if n < SHORTEST:
         raise ArgumentError("series", said=f"must have at least {SHORTEST} values, but it has {n}.")
     if frequencies < 1:
