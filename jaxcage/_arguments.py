@@ -33,7 +33,7 @@ CHECKED: dict[str, Callable[..., Any]] = {}
 SPEEDS = frozenset({"speed", "first", "last"})
 """Names of single speeds, which are above 0 and finite."""
 POSITIVE = frozenset(
-    "cage_diameter inner_radius outer_radius palmgren_constant pitch_diameter pitch_radius pocket_radius "
+    "cage_diameter guidance_gap inner_radius outer_radius palmgren_constant pitch_diameter pitch_radius pocket_radius "
     "raceway_diameter radius rib_diameter roller_diameter slenderness temperature temperature_1 temperature_2 "
     "viscosity viscosity_1 viscosity_2 width".split()
 )
@@ -214,6 +214,8 @@ def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: An
         return "a number or an array of numbers" if or_array else "a number or a row of them" if rows else "a number"
     if isinstance(value, bool | np.bool_):
         return "a number"
+    if type(value) is int and not -(2**63) <= value < 2**63:
+        return "a number, of 64 bits if it is whole"
     try:
         number = float(value)
     except (OverflowError, TypeError):

@@ -177,3 +177,11 @@ def test_what_is_traced_has_no_value_yet():
 def test_a_checked_function_is_where_pickle_looks_for_it():
     for f in (jc.sweep, jc.studies.study, jc.simulate):
         assert pickle.loads(pickle.dumps(f)) is f
+
+
+def test_numbers_that_no_formula_takes_are_refused():
+    """Found by random calls: a whole number beyond 64 bits, and a gap that divides by nothing."""
+    with pytest.raises(ValueError, match="`tau` must be a number, of 64 bits if it is whole"):
+        jc.forces.synchronous_force(tau=2**63, amplitude=1.0)
+    with pytest.raises(ValueError, match="`guidance_gap` must be positive and finite"):
+        jc.bearing.relative_mass_eccentricity(0.0, 0.0)

@@ -191,6 +191,6 @@ def test_signs_within_a_number_or_a_unit_are_no_range(text: str, value: float):
 
 def test_a_cage_heavier_than_its_bearing_is_refused():
     """The NU2310 has 2.68 kg of bronze between shaft and housing: pi/4 (0.11^2 - 0.05^2) 0.04 m^3 of 8900 kg/m^3."""
-    with pytest.raises(ConfigError, match=r"`cage_mass` must be at most 2.68 kg, .* but is 60 kg: are these grams"):
+    with pytest.raises(ConfigError, match=r"`cage_mass` must be at most 2.68 kg, .* but is 60 kg; grams are written"):
         model_from({"base": "1a", "cage_mass": 60})
     assert float(model_from({"base": "1a", "cage_mass": "2.6 kg"}).cage_mass) == 2.6

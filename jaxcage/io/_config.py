@@ -398,8 +398,8 @@ def check_together(model: CageModel | BearingModel) -> None:
         mass, most = float(model.cage_mass), HEAVIEST * _volume(model)
         if mass > most:
             raise ConfigError(
-                f"`cage_mass` must be at most {most:.3g} kg, as of a bearing full of bronze, but is {mass:g} kg: "
-                'are these grams ("60 g")?'
+                f"`cage_mass` must be at most {most:.3g} kg, as of a bearing of this size full of bronze, but is "
+                f'{mass:g} kg; grams are written "60 g".'
             )
     if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
         raise ConfigError(
