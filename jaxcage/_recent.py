@@ -4,6 +4,9 @@ A program holds memory, and some of the memory maps of which Linux gives a proce
 takes a few dozen programs. JAX keeps what it has compiled as long as somebody holds the function, and `equinox` hands
 functions to JAX in a way that holds them for good. Here each form of arguments has a function of its own, of arrays
 alone, and what is compiled for it goes when it goes.
+
+JAX also keeps what it has traced on the way, thousands of functions long: some 4 MB of a user's law. That is dropped
+too, whenever as many programs have gone as are kept.
 """
 
 import collections
@@ -26,6 +29,7 @@ class Recent:
 
     def __init__(self, most: int):
         self._most, self._things, self._lock = most, collections.OrderedDict[Hashable, Any](), threading.Lock()
+        self._gone = 0
 
     def __len__(self) -> int:
         return len(self._things)
@@ -41,7 +45,12 @@ class Recent:
             thing = self._things.setdefault(key, made)  # of two threads that make it the first
             self._things.move_to_end(key)
             old = [self._things.popitem(last=False) for _ in range(len(self._things) - self._most)]
+            self._gone += len(old)
+            many = self._gone >= self._most
+            self._gone = 0 if many else self._gone
         del old  # without the lock: it takes a while
+        if many:
+            jax.clear_caches()
         return thing
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.extend as jex
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -111,20 +112,22 @@ def test_memory_maps_stay_as_they_are(few: _recent.Recent):
 
 @needs_maps
 @pytest.mark.wide
-def test_memory_maps_stay_as_they_are_over_laws_of_ones_own(few: _recent.Recent):
-    """A sweep takes several programs of some 90 maps each; they were kept for good."""
+def test_memory_stays_as_it_is_over_laws_of_ones_own(few: _recent.Recent):
+    """A sweep takes several programs of some 90 maps each, and JAX keeps what it traces on the way."""
 
     def law(height: float) -> jc.ForcedOscillator:
         return jc.ForcedOscillator(
             lambda tau, q, v, speed: (-0.1 * v[0] - q[0] - q[0] ** 3 + height * jnp.cos(tau),), coordinates=1
         )
 
-    at = []
-    for n in range(5):
+    at, traced = [], []
+    for n in range(9):
         options: dict[str, Any] = dict(discard=4, revolutions=4, blocks=2, confirm=False, horizon=0)
         jc.sweep(law(0.3 + 0.01 * n), np.array([1.1]), method=jc.method("rk4", steps=16), **options)
         at.append(maps())
-    assert at[4] - at[2] < 60, at
+        traced.append(sum(isinstance(x, jex.core.Jaxpr) for x in gc.get_objects()))
+    assert max(at[5:]) - max(at[:5]) < 60, at
+    assert max(traced[5:]) <= max(traced[:5]), traced
 
 
 def test_runs_of_one_size_of_chunks_share_their_programs(monkeypatch: pytest.MonkeyPatch):
