@@ -32,6 +32,7 @@ from ._bearing_history import (
     pocket_force_distribution as pocket_force_distribution,
 )
 from ._bearing_measures import (
+    CAGE_STATES as CAGE_STATES,
     BearingMeasures as BearingMeasures,
     bearing_measures as bearing_measures,
     cage_state as cage_state,
@@ -42,6 +43,7 @@ from ._bearing_sweep import (
     STATISTIC_UNITS as STATISTIC_UNITS,
     BearingRecord as BearingRecord,
     BearingSweep as BearingSweep,
+    OfLanes as OfLanes,
     summed_up as summed_up,
 )
 from ._bearing_zones import BearingZone as BearingZone, bearing_zones as bearing_zones

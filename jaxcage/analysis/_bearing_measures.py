@@ -120,6 +120,10 @@ def from_land(model: BearingModel, run: BearingRun) -> Float[np.ndarray, "n 2"]:
     return run.bodies[:, 0:2] - (run.bodies[:, 5:7] if model.guidance == "inner" else 0.0)
 
 
+CAGE_STATES = ("failed", "circular", "locally_periodic", "disordered")
+"""What `cage_state` may say, in the order of the codes that studies store."""
+
+
 def cage_state(place: Float[np.ndarray, "n 2"], samples: int) -> str:
     """Name of the motion of a cage's centre, after those that the literature of cage stability uses.
 

@@ -40,12 +40,9 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report", "design")
+WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report", "design", "study")
 """What takes a whole bearing."""
-INSTEAD = {
-    "study": "; `jaxcage map` varies the speed and any one parameter",
-    "sensitivity": "; `jaxcage gradient` has slopes",
-}
+INSTEAD = {"sensitivity": "; `jaxcage gradient` has slopes"}
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
 

@@ -328,10 +328,13 @@ class StudyOptions(_Length, IntegrationOptions):
     """A sweep over any grid or sample of parameters, stored as it goes; the same command goes on where one stopped."""
 
     called: ClassVar[Mapping[str, str]] = {"lanes": "chunk", "samples": "sample"}
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"chunk": (2048, 48)}
+    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "strobe")
 
     vary: Annotated[Texts, tyro.conf.arg(metavar="NAME=VALUES")] = ()
-    """What to vary, once for each parameter, `speed` among them. A grid: speed=4000rpm:27500rpm:100, or single values:
-    oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or within a tolerance: eccentricity=20um+-3um."""
+    """What to vary, once for each parameter, `speed` among them, of a whole bearing the shaft's. A grid:
+    speed=4000rpm:27500rpm:100, or single values: oil=32,56,78 (ISO VG grades). Sampled: guidance_gap=0.3mm:0.6mm, or
+    within a tolerance: eccentricity=20um+-3um."""
     sample: FromZero = 0
     """Number of samples, best a power of 2."""
     seed: FromZero = 0
@@ -344,8 +347,8 @@ class StudyOptions(_Length, IntegrationOptions):
     """Strobe states stored of each lane, the last ones."""
     store: Annotated[str | None, text("name a folder within --out", is_within)] = None
     """Name of the store within the output folder."""
-    chunk: FromOne = 2048
-    """Lanes computed and stored together."""
+    chunk: Annotated[int | None, whole(1)] = None
+    """Lanes computed and stored together; 2048 if left out, 48 of a whole bearing."""
     shard: Annotated[tuple[int, int], two("/", _PART, lambda i, n: 1 <= i <= n)] = (1, 1)
     """Part of the work, e.g. 2/4: every fourth chunk from the second on. All parts write to the same store."""
     executor: Literal["local", "dask"] = "local"

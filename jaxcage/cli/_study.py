@@ -3,24 +3,45 @@
 import time
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._errors import InputError
+from ..analysis import CAGE_STATES
 from ..integrate import OUTCOMES
+from ..models import BearingModel, CageModel
+from ..models.whole import CAGE_STARTS
 from ..report import require_some, shares_table
-from ..studies import LABELS, DamagedStore, Plan, Spread, Study, check_study, open_study, run_study, too_short
+from ..studies import (
+    LABELS,
+    AbstractStudy,
+    BearingStudy,
+    DamagedStore,
+    Plan,
+    Spread,
+    Study,
+    check_study,
+    open_study,
+    run_study,
+    too_short,
+)
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of
-from ._limits import demand_of_study
+from ._limits import Demand, demand_of_study
 from ._options import StudyOptions
 from ._show import Report
 from ._vary import read_vary
+from ._whole import SWEEPING
 
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MOST_LANES = 100_000_000
 """A week at a rate of 150 a second; what is kept of them in memory is a small part of it."""
+MEASURES = ("cage_slip", "pocket_force_max_N", "land_force_max_N", "friction_power_W", "eccentricity_mean", "exponent")
+"""Of a whole bearing, what is told of all lanes together."""
 ADVICE = "what is stored stays, and the same command goes on from there"
 
 
@@ -29,9 +50,15 @@ def study(job: Job[StudyOptions]) -> Report:
     options = job.options
     if options.verify:
         return _verify(job)
-    length = job.given("discard revolutions exponents strobe")
-    work = Study(job.model, _plan(job), job.method, blocks=blocks_of(options.revolutions), **length)
-    job.require(demand_of_study(work))
+    length: dict[str, Any] = job.given("discard revolutions exponents") | {"blocks": blocks_of(options.revolutions)}
+    if job.whole is not None:
+        given = 1e-4 if options.tolerance is None else options.tolerance
+        work = BearingStudy(job.whole, _plan(job, job.whole, len(CAGE_STARTS)), **length, tolerance=given)
+        job.require(_demand(work))
+    else:
+        plan = _plan(job, job.model, len(job.model.starts(1.0)))
+        work = Study(job.model, plan, job.method, **length, strobe=options.strobe)
+        job.require(demand_of_study(work))
     path = job.folder / _name(job)
     before, began = _lanes_stored(path), time.perf_counter()
     with job.computing(unit="lanes", advice=ADVICE) as bar:
@@ -41,19 +68,28 @@ def study(job: Job[StudyOptions]) -> Report:
             raise InputError(str(error)) from error
     seconds = time.perf_counter() - began
     document = _document(work, path, before, seconds)
-    warn_of_short(document["too_short"])
+    warn_of_short(document.get("too_short", 0))
     if document["stored"] < work.plan.size:
         say(f"Warning: {work.plan.size - document['stored']} lanes are left for the other shards.")
     job.listed("store", path)
     shape = " x ".join(f"{n} {axis}" for axis, n in document["axes"].items())
-    table = shares_table(f"Lanes: {shape}", "label lanes", document["labels"])
+    kind = "label" if "labels" in document else "state"
+    table = shares_table(f"Lanes: {shape}", f"{kind} lanes", document[f"{kind}s"])
     rate = document["lanes_per_second"]
     notes = [
         f"Failed lanes: {', '.join(f'{n} {what}' for what, n in document['failed'].items()) or 'none'}",
-        f"Computed: {document['stored'] - before} lanes" + (f", {rate:.0f} a second" if rate else ""),
+        f"Computed: {document['stored'] - before} lanes" + (f", {rate:.3g} a second" if rate else ""),
         f"Open it: jaxcage.open_study({str(path)!r})",
     ]
     return Report(document, [table], notes)
+
+
+def _demand(work: BearingStudy) -> Demand:
+    """What a study of whole bearings takes, about."""
+    lanes, revolutions = work.plan.size, work.discard + work.revolutions
+    stored = 8.0 * len(work.variables) * lanes
+    memory = min(work.plan.lanes, lanes) * (2e4 + 600.0 * revolutions) + stored
+    return Demand(lanes, revolutions, memory, stored, SWEEPING)
 
 
 def _name(job: Job[StudyOptions]) -> str:
@@ -74,12 +110,13 @@ def _verify(job: Job[StudyOptions]) -> Report:
     return Report({"store": str(path), **counts}, notes=str(state).splitlines(), failure=failure)
 
 
-def _plan(job: Job[StudyOptions]) -> Plan:
-    options, vary = job.options, read_vary(job.options.vary, job.model, job.speeds)
+def _plan(job: Job[StudyOptions], model: CageModel | BearingModel, own: int) -> Plan:
+    """What the options vary; `own` is how many starts the model has."""
+    options, vary = job.options, read_vary(job.options.vary, model, job.speeds)
     sampled = {name: how for name, how in vary.items() if isinstance(how, Spread)}
     grid = {name: how for name, how in vary.items() if not isinstance(how, Spread)}
-    starts = options.starts or len(job.model.starts(1.0))
-    plan = Plan(grid, sampled, options.sample, options.seed, starts, options.chunk)
+    assert options.chunk is not None
+    plan = Plan(grid, sampled, options.sample, options.seed, options.starts or own, options.chunk)
     if plan.size > MOST_LANES:
         raise InputError(
             f"Options --vary, --sample and --starts must make at most {MOST_LANES} lanes, not {plan.size}."
@@ -95,23 +132,45 @@ def _lanes_stored(path: Path) -> int:
         return 0  # nothing yet, or nothing of ours: that is said later
 
 
-def _document(work: Study, path: Path, before: int, seconds: float) -> dict[str, Any]:
+def _document(work: AbstractStudy, path: Path, before: int, seconds: float) -> dict[str, Any]:
     with open_study(path) as dataset:
         outcome = dataset["outcome"].values
-        judged = {name: dataset[name].values for name in ("label", "largest_exponent", "standard_error")}
-    done = outcome >= 0
+        done = outcome >= 0
+        about = _of_bearings(dataset, done) if isinstance(work, BearingStudy) else _of_cages(dataset, done, work)
     stored = int(np.sum(done))
     if stored:
         require_some(outcome[done])
-    named = lambda codes, names: {names[c]: int(n) for c, n in zip(*np.unique(codes, return_counts=True), strict=True)}
     return {
         "axes": work.plan.axes,
         "lanes": work.plan.size,
         "stored": stored,
         "stored_before": before,
         "chunks": work.plan.chunks,
-        "labels": named(judged["label"][done], LABELS),
-        "failed": named(outcome[outcome > 0], OUTCOMES),
-        "too_short": int(np.sum(too_short(judged, work.revolutions))),
-        "lanes_per_second": round((stored - before) / seconds, 1) if stored > before else None,
+        **about,
+        "failed": _named(outcome[outcome > 0], OUTCOMES),
+        "lanes_per_second": round((stored - before) / seconds, 3) if stored > before else None,
     }
+
+
+def _named(codes: np.ndarray, names: tuple[str, ...]) -> dict[str, int]:
+    """How many there are of each code, by its name."""
+    return {names[c]: int(n) for c, n in zip(*np.unique(codes, return_counts=True), strict=True)}
+
+
+def _of_cages(dataset: "xr.Dataset", done: np.ndarray, work: AbstractStudy) -> dict[str, Any]:
+    judged = {name: dataset[name].values for name in ("label", "largest_exponent", "standard_error")}
+    return {
+        "labels": _named(judged["label"][done], LABELS),
+        "too_short": int(np.sum(too_short(judged, work.revolutions))),
+    }
+
+
+def _of_bearings(dataset: "xr.Dataset", done: np.ndarray) -> dict[str, Any]:
+    """States, and the smallest, median and largest of some measures over all lanes."""
+
+    def spread(values: np.ndarray) -> list[float | None]:
+        known = values[np.isfinite(values)]
+        return [float(x) for x in np.percentile(known, (0, 50, 100))] if known.size else [None] * 3
+
+    measures = {name: spread(dataset[name].values) for name in MEASURES}
+    return {"states": _named(dataset["state"].values[done], CAGE_STATES), "least_median_most": measures}

@@ -15,6 +15,7 @@ from ..models import BearingModel, CageModel
 from ..studies import OIL, SPEED, Between, Spread, Tolerance, with_values
 from ..sweeps import rpm
 from ._readers import MOST, read_quantity
+from ._whole import shaft_rpm_of
 
 
 FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um+-3um or 32,56,78"
@@ -25,7 +26,7 @@ MOST_CORNERS = 256
 Vary = dict[str, np.ndarray | Spread]
 
 
-def read_vary(given: Sequence[str], model: CageModel, speeds: Whose = "cage") -> Vary:
+def read_vary(given: Sequence[str], model: CageModel | BearingModel, speeds: Whose = "cage") -> Vary:
     """Every `NAME=VALUES`, in SI units; `speeds` says whose speeds those are that do not say it.
 
     **Raises:** `InputError`.
@@ -118,11 +119,14 @@ def _read(name: str, text: str, model: CageModel | BearingModel, speeds: Whose =
 def _number(name: str, model: CageModel | BearingModel, speeds: Whose) -> Callable[[str], float]:
     """How a number of this parameter is read: with its unit, or bare in SI units, a speed in rpm."""
     known = parameter_info(model)
+    if name == SPEED and isinstance(model, BearingModel):
+        return lambda text: rpm(shaft_rpm_of(model, read_quantity(text.strip(), "rpm"), speeds, "--vary"))
     if name == SPEED:
         ratio = float(model.bearing.cage_speed_ratio)
         return lambda text: rpm(cage_rpm(read_quantity(text.strip(), "rpm"), speeds, ratio))
-    if name not in (OIL, *known):
-        raise InputError(f"Option --vary must name one of {', '.join([SPEED, OIL, *known])}, but names '{name}'.")
+    own = [SPEED, *known] if isinstance(model, BearingModel) else [SPEED, OIL, *known]
+    if name not in own:
+        raise InputError(f"Option --vary must name one of {', '.join(own)}, but names '{name}'.")
     return lambda text: to_si(text, "1" if name == OIL else known[name].unit)
 
 

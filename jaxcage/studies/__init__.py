@@ -4,7 +4,9 @@
 |-------------|-------------------------------------------------------------------------------|
 | `_vary`     | how a parameter is sampled                                                    |
 | `_plan`     | what is varied, lanes and chunks                                              |
-| `_study`    | what is computed of a lane, the same bits anywhere                            |
+| `_stored`   | what a store must know of a study                                             |
+| `_study`    | what is computed of a cage's lane, the same bits anywhere                     |
+| `_whole_study` | what is computed of a whole bearing's                                      |
 | `_references` | what code refers to                                                         |
 | `_fingerprint` | digests of all that the numbers follow from                                |
 | `_store`    | the zarr folder, whole at any time                                            |
@@ -52,16 +54,16 @@ from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, la
 from ._plan import Plan as Plan
 from ._run import run_study as run_study, study as study
 from ._store import OtherStudy as OtherStudy, Store as Store, label_names as label_names, open_study as open_study
+from ._stored import PENDING as PENDING, SPEED as SPEED, AbstractStudy as AbstractStudy
 from ._study import (
     LABELS as LABELS,
     OIL as OIL,
-    PENDING as PENDING,
-    SPEED as SPEED,
     Study as Study,
     too_short as too_short,
     with_values as with_values,
 )
 from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance
+from ._whole_study import BearingStudy as BearingStudy
 
 
 check_layer(

@@ -6,7 +6,6 @@ grow with the study.
 """
 
 import contextlib
-import dataclasses
 import itertools
 import pickle
 import tempfile
@@ -17,7 +16,7 @@ from typing import Any
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError
 from ..sweeps import cores
-from ._study import Results, Study
+from ._stored import AbstractStudy, Results
 
 
 AHEAD = 2
@@ -30,7 +29,7 @@ _one_at_a_time = threading.Lock()  # a chunk uses all cores, however many thread
 
 
 def chunks_on_dask(
-    about: Study, chunks: Sequence[int], scheduler: str | None = None, workers: int | None = None
+    about: AbstractStudy, chunks: Sequence[int], scheduler: str | None = None, workers: int | None = None
 ) -> Iterator[tuple[int, Results]]:
     """The results of `chunks` as they arrive.
 
@@ -40,7 +39,7 @@ def chunks_on_dask(
     import_distributed()
     import cloudpickle  # comes with it
 
-    waiting, packed = iter(chunks), cloudpickle.dumps(dataclasses.replace(about))  # without what it has worked out
+    waiting, packed = iter(chunks), cloudpickle.dumps(about.anew())  # without what it has worked out
     with _client(scheduler, workers) as client:
         submit = lambda n: client.submit(_compute, packed, n, about.fingerprint, pure=False, key=f"chunk-{n}")
         room = AHEAD * len(client.scheduler_info()["workers"])
@@ -88,7 +87,7 @@ def _compute(packed: bytes, chunk: int, fingerprint: str) -> Results:
     with _one_at_a_time:
         jax.config.update("jax_enable_x64", True)
         keep_compiled_programs()
-        about: Study = pickle.loads(packed)
+        about: AbstractStudy = pickle.loads(packed)
         if about.fingerprint != fingerprint:
             raise RuntimeError("A worker has another version of jaxcage, jax or NumPy than this process.")
         return about.chunk(chunk)

@@ -10,17 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from .._glossary import component_names, quantity
+from .._glossary import quantity
 from .._parameters import parameter_info
-from ..integrate import OUTCOMES
 from ..io import put_bytes, sync
-from ..models import CageModel
 from ._manifest import ABOUT, FOLDER, FORMAT, describing, is_as_marked, make_way, mark, write_entry
 from ._plan import SAMPLE
-from ._study import LABELS, OIL, PENDING, SPEED, Study
+from ._stored import PENDING, SPEED, AbstractStudy, Variable
+from ._study import OIL
 
 
-def create(path: Path, study: Study) -> None:
+def create(path: Path, study: AbstractStudy) -> None:
     """Make an empty store beside its place and move it there in one step; whoever comes second leaves it alone."""
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
@@ -35,7 +34,7 @@ def create(path: Path, study: Study) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def mend(path: Path, study: Study) -> None:
+def mend(path: Path, study: AbstractStudy) -> None:
     """Write again what describes a store, where it is not what it was."""
     with tempfile.TemporaryDirectory() as scratch:
         new = Path(scratch) / "store"
@@ -47,29 +46,29 @@ def mend(path: Path, study: Study) -> None:
                 put_bytes(there, wanted)
 
 
-def _write(path: Path, study: Study) -> None:
+def _write(path: Path, study: AbstractStudy) -> None:
     import xarray as xr
     import zarr
 
     from ._zarr import compressors
 
-    plan, shape = study.plan, _shapes(study)
-    coordinates = _coordinates(study, shape)
+    plan, variables = study.plan, study.variables
+    coordinates = _coordinates(study)
     dataset = xr.Dataset(coords=coordinates, attrs=_attributes(study))
     checked = {name: {"compressors": compressors()} for name in coordinates}
     dataset.to_zarr(path, mode="w", consolidated=False, encoding=checked)
     group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
-    for name, (dims, kind) in shape.items():
-        extra = [_extents(study)[d] for d in dims[len(plan.shape) :]]
+    for name, variable in variables.items():
+        extra = [study.extents[d] for d in variable.within]
         group.create_array(
             name,
             shape=(*plan.shape, *extra),
             chunks=(*plan.block, *extra),
-            dtype=kind,
-            fill_value=np.nan if kind == "float64" else PENDING,
+            dtype=variable.kind,
+            fill_value=np.nan if variable.kind == "float64" else PENDING,
             compressors=compressors(),
-            dimension_names=dims,
-            attributes=_words(name),
+            dimension_names=_dims(study, variable),
+            attributes=_words(variable),
         )
     group.create_group(FOLDER, attributes={"long_name": "digests of what is finished, by jaxcage.studies.check_study"})
     with warnings.catch_warnings():  # zarr warns that the specification does not have this yet; xarray warns without it
@@ -79,71 +78,45 @@ def _write(path: Path, study: Study) -> None:
         "format": FORMAT,
         "fingerprint": study.fingerprint,
         "blocks": list(plan.blocks),
-        "variables": {name: len(dims) - len(plan.shape) for name, (dims, _) in shape.items()},
+        "variables": {name: len(variable.within) for name, variable in variables.items()},
         "files": describing(path),
     }
     write_entry(path / ABOUT, about)
 
 
-def _extents(study: Study) -> dict[str, int]:
-    """Lengths of the axes within a lane."""
-    return {"exponent": study.exponents, "revolution": study.strobe, "component": study.system.dimension}
+def _dims(study: AbstractStudy, variable: Variable) -> tuple[str, ...]:
+    return (*study.plan.axes, *variable.within)
 
 
-def _shapes(study: Study) -> dict[str, tuple[tuple[str, ...], str]]:
-    """Dimensions and kind of number of every variable."""
-    lanes = tuple(study.plan.axes)
-    one = {name: (lanes, "float64") for name in ("largest_exponent", "standard_error", "peak", "error")}
-    one |= {name: (lanes, "int8") for name in ("period", "label", "outcome")}
-    if study.exponents > 1:
-        one |= {name: ((*lanes, "exponent"), "float64") for name in ("exponents", "standard_errors")}
-    if study.strobe:
-        one["strobe"] = ((*lanes, "revolution", "component"), "float64")
-    return one
-
-
-def _words(name: str) -> dict[str, Any]:
-    known = quantity({"exponents": "exponent", "standard_errors": "standard_error"}.get(name, name))
-    words: dict[str, Any] = {"long_name": known.text, "units": known.unit}
-    meanings = {"label": LABELS, "outcome": OUTCOMES}.get(name)
-    if meanings is None:
+def _words(variable: Variable) -> dict[str, Any]:
+    words: dict[str, Any] = {"long_name": variable.text, "units": variable.unit}
+    if not variable.names:
         return words
-    codes = [PENDING, *range(len(meanings))]
-    return words | {"flag_values": codes, "flag_meanings": " ".join(["pending", *meanings])}
+    codes = [PENDING, *range(len(variable.names))]
+    return words | {"flag_values": codes, "flag_meanings": " ".join(["pending", *variable.names])}
 
 
-def _coordinates(study: Study, shapes: dict[str, tuple[tuple[str, ...], str]]) -> dict[str, Any]:
-    plan = study.plan
-    info = parameter_info(study.system)
+def _coordinates(study: AbstractStudy) -> dict[str, Any]:
+    plan, info = study.plan, parameter_info(study.subject)
 
     def words(name: str) -> dict[str, str]:
         if name == OIL:
             return {"long_name": "ISO VG grade of the oil", "units": "mm^2/s"}
-        known = quantity(name) if name == SPEED or name not in info else None
-        return {
-            "long_name": known.text if known else info[name].text,
-            "units": known.unit if known else info[name].unit,
-        }
+        if name == SPEED:
+            return {"long_name": study.speed_text, "units": "rad/s"}
+        known = info.get(name) or quantity(name)
+        return {"long_name": known.text, "units": known.unit}
 
     found: dict[str, Any] = {name: (name, np.asarray(x), words(name)) for name, x in plan.grid.items()}
     found |= {name: (SAMPLE, x, words(name)) for name, x in plan.cloud.items()}
     if SPEED in plan.names:
         dims, speed, _ = found[SPEED]
-        known = quantity("speed_rpm")
-        found["speed_rpm"] = (dims, speed * 30 / np.pi, {"long_name": known.text, "units": known.unit})
-    if "strobe" in shapes:
-        last = study.discard + study.revolutions
-        found["revolution"] = np.arange(last - study.strobe + 1, last + 1)
-        names = component_names(study.system.dimension, isinstance(study.system, CageModel))
-        found["component"] = np.array(names, dtype=object)
-    return found
+        found["speed_rpm"] = (dims, speed * 30 / np.pi, {"long_name": study.speed_text, "units": "rpm"})
+    return found | study.labels_within
 
 
-def _attributes(study: Study) -> dict[str, Any]:
-    described = study.describe()
-    system, configured = study.system, {}
-    if isinstance(system, CageModel) and not system.extra:  # a configuration cannot hold forces of one's own
-        configured = {"configuration": json.dumps(described["system"])}
+def _attributes(study: AbstractStudy) -> dict[str, Any]:
+    described, configured = study.describe(), study.configuration
     return {
         "title": "jaxcage study",
         "store_format": FORMAT,
@@ -152,6 +125,6 @@ def _attributes(study: Study) -> dict[str, Any]:
         "discard": study.discard,
         "revolutions": study.revolutions,
         "seed": study.plan.seed,
-        **configured,
+        **({} if configured is None else {"configuration": json.dumps(configured)}),
         **{name: text for name, text in described.items() if name.startswith("version_")},
     }

@@ -15,7 +15,8 @@ from ..models import AbstractForcedSystem
 from ..sweeps import require_persist
 from ._adaptive import AdaptiveGrid, Points, refine
 from ._plan import LANES, Plan
-from ._study import LABELS, PENDING, SPEED, Study, too_short
+from ._stored import PENDING, SPEED
+from ._study import LABELS, Study, too_short
 
 
 if TYPE_CHECKING:

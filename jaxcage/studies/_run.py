@@ -11,11 +11,14 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem, BearingModel
+from ..models.whole import CAGE_STARTS
 from ..sweeps import Progress
 from ._plan import LANES, Plan
 from ._store import Store, open_study
-from ._study import Results, Study
+from ._stored import AbstractStudy, Results
+from ._study import Study
 from ._vary import Spread
+from ._whole_study import WHOLE_LANES, BearingStudy
 
 
 if TYPE_CHECKING:
@@ -41,7 +44,8 @@ def study(
     exponents: int = 1,
     strobe: int = 0,
     method: AbstractMethod | None = None,
-    lanes: int = LANES,
+    tolerance: float = 1e-4,
+    lanes: int | None = None,
     shard: Shard = (1, 1),
     executor: Literal["local", "dask"] = "local",
     scheduler: str | None = None,
@@ -55,15 +59,17 @@ def study(
 
     **Arguments:**
 
-    - `system`: any `AbstractForcedSystem`; no whole bearing yet.
+    - `system`: any `AbstractForcedSystem`, or a whole bearing, of which measures are kept as in `BearingSweep`.
     - `vary`: what is varied. Arrays are axes of a grid [SI]; `Between` and `Tolerance` are sampled together. The speed
-        [rad/s] must be among them; `oil`, for cages, is the ISO VG grade of a mineral oil.
+        [rad/s] must be among them, of a whole bearing the shaft's, as an axis; `oil`, for cages, is the ISO VG grade of
+        a mineral oil.
     - `store`: the folder.
     - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
     - `starts`: how many of the system's own starts are run at each point, by default all.
     - `discard`, `revolutions`, `blocks`, `exponents`, `method`: as for `sweep`.
-    - `strobe`: strobe states stored of each lane, by default none.
-    - `lanes`: lanes of a chunk, at most.
+    - `strobe`: strobe states stored of each lane of a cage, by default none.
+    - `tolerance`: of a whole bearing, as for `sweep_bearing`.
+    - `lanes`: lanes of a chunk, at most; 2048 if left out, 48 of a whole bearing.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
     - `executor`: `"local"` runs on all cores of this process, `"dask"` on a dask.distributed cluster.
     - `scheduler`, `workers`: address of the scheduler of a cluster, by default one of its own with so many processes.
@@ -74,31 +80,37 @@ def study(
     **Raises:** `ValueError` for what makes no sense, and for a store of another study; `ImportError` without dask.
     """
     require_x64()
-    if isinstance(system, BearingModel):
-        raise ArgumentError(
-            "system",
-            said="must be a forced system such as a cage, but is a whole bearing: `jaxcage.sweep_bearings` runs "
-            "many of them over speeds and starts, `jaxcage map nu2310 --y NAME` maps speed and a parameter.",
-        )
     plan = make_study_plan(system, vary, samples, seed, starts, lanes)
-    chosen = controlled() if method is None else method
-    about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)
+    if isinstance(system, BearingModel):
+        if strobe or method is not None:
+            raise ArgumentError("strobe", "method", said="must be left out for a whole bearing.")
+        about = BearingStudy(system, plan, discard, revolutions, blocks, exponents, tolerance)
+    else:
+        chosen = controlled() if method is None else method
+        about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)
     run_study(about, store, shard, executor, scheduler, workers, progress)
     return open_study(store)
 
 
 def make_study_plan(
-    system: AbstractForcedSystem, vary: Vary, samples: int, seed: int, starts: int | None, lanes: int
+    system: AbstractForcedSystem | BearingModel,
+    vary: Vary,
+    samples: int,
+    seed: int,
+    starts: int | None,
+    lanes: int | None,
 ) -> Plan:
     """The plan that the arguments of `study` describe."""
     sampled: dict[str, Spread] = {name: how for name, how in vary.items() if isinstance(how, Spread)}
     grid = {name: np.asarray(x, dtype=float) for name, x in vary.items() if name not in sampled}
-    own = len(system.starts(1.0)) if starts is None else starts
-    return Plan(grid, sampled, samples, seed, own, lanes)
+    whole = isinstance(system, BearingModel)
+    own = len(CAGE_STARTS if whole else system.starts(1.0)) if starts is None else starts
+    most = (WHOLE_LANES if whole else LANES) if lanes is None else lanes
+    return Plan(grid, sampled, samples, seed, own, most)
 
 
 def run_study(
-    about: Study,
+    about: AbstractStudy,
     path: str | Path,
     shard: Shard = (1, 1),
     executor: str = "local",
@@ -136,6 +148,6 @@ def run_study(
         store.tidy()
 
 
-def _chunks_here(about: Study, chunks: Iterable[int]) -> Iterator[tuple[int, Results]]:
+def _chunks_here(about: AbstractStudy, chunks: Iterable[int]) -> Iterator[tuple[int, Results]]:
     for chunk in chunks:
         yield chunk, about.chunk(chunk)

@@ -22,7 +22,8 @@ from ..io import read_bytes
 from ._check import DamagedStore, OldStore, about_store
 from ._empty import create, mend
 from ._manifest import damage, damaged_metadata, entry_of, make_way, read_entry, write_entry
-from ._study import LABELS, Results, Study
+from ._stored import AbstractStudy, Results
+from ._study import LABELS
 
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class OtherStudy(ArgumentError):
 class Store:
     """The store of a study, made if there is none."""
 
-    def __init__(self, path: str | Path, study: Study):
+    def __init__(self, path: str | Path, study: AbstractStudy):
         """**Raises:** `OtherStudy` for a folder that holds anything else than results of this very study, or for a
         study of which that cannot be told.
         """
@@ -130,7 +131,7 @@ def _going_on(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _same(path: Path, study: Study) -> Mapping[str, Any]:
+def _same(path: Path, study: AbstractStudy) -> Mapping[str, Any]:
     """What the manifest says of the store of this study, after what describes the store has been mended if need be.
 
     **Raises:** `OtherStudy`.
@@ -158,7 +159,7 @@ def _same(path: Path, study: Study) -> Mapping[str, Any]:
     return about
 
 
-def _claimed(path: Path, study: Study) -> str | None:
+def _claimed(path: Path, study: AbstractStudy) -> str | None:
     """Whose study a store without a manifest is, by its attributes or any chunk that is left."""
     found = _attributes_of(path).get("fingerprint")
     chunks = (path / "manifest" / "chunks").glob("*")

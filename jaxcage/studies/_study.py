@@ -1,11 +1,7 @@
-"""What a study computes: a system, a plan of lanes, how long to run them; and the numbers kept of each lane."""
+"""What a study of a cage computes: a plan of lanes, how long to run them, and the numbers kept of each."""
 
 import dataclasses
-import functools
-import hashlib
-import json
 from collections.abc import Mapping
-from importlib.metadata import version
 from typing import Any
 
 import equinox as eqx
@@ -15,21 +11,21 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .._errors import ArgumentError
+from .._glossary import component_names, quantity
 from .._parameters import replace
 from .._recent import jitted
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
-from ..integrate import AbstractMethod
+from ..integrate import OUTCOMES, AbstractMethod
 from ..models import AbstractForcedSystem, CageModel
 from ..orbits import pick
 from ..sweeps import Designs, Progress, make_plan, run_lanes, settings_of
-from ._fingerprint import fingerprint, package_digest, platform_traits
 from ._plan import Plan, Values
-from ._references import Unknown
+from ._stored import SPEED, AbstractStudy, Results, Variable
 
 
-SPEED, OIL = "speed", "oil"
-"""Names beside those of the system's parameters: the speed [rad/s], and the ISO VG grade of a mineral oil."""
+OIL = "oil"
+"""Name of the ISO VG grade of a mineral oil beside those of the system's parameters."""
 CLOSING = 16
 """Strobe states by which a lane's period is judged: twice the longest period that is looked for."""
 FEW, SOME = 256, 1024
@@ -37,15 +33,10 @@ FEW, SOME = 256, 1024
 
 LABELS = ("failed", *(f"periodic-{k}" for k in range(1, 9)), "chaotic", "quasi-periodic", "undecided", "inaccurate")
 """What a lane does, in the order of the integer codes that a study stores."""
-PENDING = -1
-"""Code of a lane that has not been run yet."""
-
-Results = dict[str, np.ndarray]
-"""Output by name; the lanes are the first axis."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Study:
+class Study(AbstractStudy):
     """Lanes over any parameters, and what to compute in each of them."""
 
     system: AbstractForcedSystem
@@ -82,8 +73,18 @@ class Study:
         keep = max(CLOSING, self.strobe)
         return make_plan(self.discard, self.revolutions, self.blocks, keep, self.exponents, self.system.dimension)
 
-    def describe(self) -> dict[str, Any]:
-        """Everything that the results follow from."""
+    @property
+    def subject(self) -> AbstractForcedSystem:
+        """The system."""
+        return self.system
+
+    @property
+    def law(self) -> dict[str, Any]:
+        """System and method."""
+        return {"model": self.system, "integration": self.method}
+
+    def settings(self) -> dict[str, Any]:
+        """System, lanes, their length, and method."""
         return {
             "system": _described(self.system),
             "plan": self.plan.describe(),
@@ -93,28 +94,48 @@ class Study:
             "exponents": self.exponents,
             "strobe": self.strobe,
             **settings_of(self.method),
-            "version_jaxlib": version("jaxlib"),
-            "package": package_digest(),
-            "platform": platform_traits(),
-            "code": {"unknown": self.unknown} if self.unknown else self._code,
         }
 
-    @functools.cached_property
-    def _code(self) -> dict[str, str]:
-        return fingerprint(model=self.system, integration=self.method)
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """Exponents, peaks, errors, labels; strobe states if asked for."""
 
-    @functools.cached_property
-    def unknown(self) -> str:
-        """Why it cannot be told whether another study is this one: a reason, or nothing if it can."""
-        try:
-            return "" if self._code else ""
-        except Unknown as error:
-            return str(error)
+        def known(name: str, called: str = "", **more: Any) -> Variable:
+            about = quantity(called or name)
+            return Variable(about.text, about.unit, **more)
 
-    @functools.cached_property
-    def fingerprint(self) -> str:
-        """A digest of `describe`: studies that share it have the same results."""
-        return hashlib.sha256(json.dumps(self.describe(), sort_keys=True).encode()).hexdigest()
+        found = {name: known(name) for name in ("largest_exponent", "standard_error", "peak", "error")}
+        names = {"period": (), "label": LABELS, "outcome": OUTCOMES}
+        found |= {name: known(name, kind="int8", names=codes) for name, codes in names.items()}
+        if self.exponents > 1:
+            several = {"exponents": "exponent", "standard_errors": "standard_error"}
+            found |= {name: known(name, one, within=("exponent",)) for name, one in several.items()}
+        if self.strobe:
+            found["strobe"] = known("strobe", within=("revolution", "component"))
+        return found
+
+    @property
+    def extents(self) -> dict[str, int]:
+        """Exponents, revolutions stored, components of a state."""
+        return {"exponent": self.exponents, "revolution": self.strobe, "component": self.system.dimension}
+
+    @property
+    def labels_within(self) -> dict[str, np.ndarray]:
+        """Numbers of the revolutions stored, names of the components."""
+        if not self.strobe:
+            return {}
+        last = self.discard + self.revolutions
+        names = component_names(self.system.dimension, isinstance(self.system, CageModel))
+        return {
+            "revolution": np.arange(last - self.strobe + 1, last + 1),
+            "component": np.array(names, dtype=object),
+        }
+
+    @property
+    def configuration(self) -> Any:
+        """That of a cage, unless it has forces of one's own, which no file can hold."""
+        plain = isinstance(self.system, CageModel) and not self.system.extra
+        return _described(self.system) if plain else None
 
     def chunk(self, number: int) -> Results:
         """The results of a chunk, laid out as its block of the grid."""

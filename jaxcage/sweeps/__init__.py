@@ -15,7 +15,11 @@
 
 from .._arguments import check_layer
 from ._averages import averages as averages
-from ._bearing import sweep_bearing as sweep_bearing, sweep_bearings as sweep_bearings
+from ._bearing import (
+    require_bearings as require_bearings,
+    sweep_bearing as sweep_bearing,
+    sweep_bearings as sweep_bearings,
+)
 from ._bearing_ramp import (
     BearingRamp as BearingRamp,
     BearingUpDown as BearingUpDown,
@@ -39,6 +43,7 @@ from ._speed import (
     settings_of as settings_of,
     sweep as sweep,
     sweep_designs as sweep_designs,
+    versions as versions,
 )
 
 

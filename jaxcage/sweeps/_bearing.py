@@ -111,7 +111,7 @@ def sweep_bearings(
     require_x64()
     speed = checked_speeds(speeds)
     models = list(models)
-    _require(models, starts, discard, revolutions, blocks, exponents)
+    require_bearings(models, starts, discard, revolutions, blocks, exponents)
     table = _Table.of(models, speed, starts)
     lanes, block = table.which.size, revolutions // blocks
     size = min(CHUNKS, key=lambda size: (-(-lanes // (size * cores())) * (size + CALL), size))
@@ -158,10 +158,10 @@ def sweep_bearings(
     return sweeps
 
 
-def _require(
+def require_bearings(
     models: list[BearingModel], starts: Any, discard: int, revolutions: int, blocks: int, exponents: int
 ) -> None:
-    """**Raises:** `ValueError` for what cannot be swept."""
+    """**Raises:** `ValueError` for what `sweep_bearings` cannot run."""
     if not models:
         raise ArgumentError("models", said="must hold at least one bearing, but it is empty.")
     for model in models:
