@@ -248,8 +248,3 @@ def test_drawn_places_are_starts_of_every_design():
 def test_places_outside_are_refused(starts):
     with pytest.raises(ValueError, match="`starts` must hold places of the cage within its clearance"):
         jc.sweep_bearing(jc.whole_bearing("nu2310"), SPEED, starts=starts)
-
-
-def test_a_study_says_what_to_use_instead(tmp_path: pathlib.Path):
-    with pytest.raises(ValueError, match="`system` must be a forced system such as a cage, but is a whole bearing"):
-        jc.study(jc.whole_bearing("nu2310"), {"speed": np.array([SPEED])}, store=tmp_path / "store")
