@@ -116,7 +116,7 @@ def test_another_version_or_machine_is_another_study(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, other: Any
 ):
     Store(tmp_path / "study.zarr", study_of(by_global))
-    monkeypatch.setattr(f"jaxcage.studies._study.{name}", lambda: other)
+    monkeypatch.setattr(f"jaxcage.studies._stored.{name}", lambda: other)
     refused(tmp_path, by_global, "differs in package" if isinstance(other, str) else "differs in platform.*arithmetic")
 
 
