@@ -1,5 +1,6 @@
 """A study that goes on is of the very system that began it: closures, globals, classes, arrays, versions, machine."""
 
+import copy
 import functools
 import random
 import types
@@ -109,6 +110,17 @@ def test_a_method_is_known_by_all_its_numbers():
     few, many = (jc.integrate.FixedSteps(jc.method("rk4").solver, jnp.array([n, 64])) for n in (16, 32))
     assert str(few) == str(many)
     assert study_of(Law(jnp.array(0.1)), few).fingerprint != study_of(Law(jnp.array(0.1)), many).fingerprint
+
+
+def test_a_system_that_was_copied_or_sent_is_still_the_same():
+    """Copying and pickling leave a list of its slots on a class, which a study on a cluster would count as a change."""
+
+    class Sent(Law):
+        pass
+
+    before = study_of(Sent(jnp.array(0.1))).fingerprint
+    copy.copy(Sent(jnp.array(0.1)))
+    assert "__slotnames__" in vars(Sent) and study_of(Sent(jnp.array(0.1))).fingerprint == before
 
 
 @pytest.mark.parametrize("name, other", [("package_digest", "other"), ("platform_traits", {"arithmetic": "none"})])

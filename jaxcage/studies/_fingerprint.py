@@ -30,7 +30,7 @@ LAYERS = ("bearing", "forces", "models", "integrate", "analysis", "sweeps", "stu
 """Of this package, what the numbers of a study are computed by."""
 _NOT_OF_A_CLASS = frozenset(
     "__dict__ __weakref__ __doc__ __module__ __qualname__ __abstractmethods__ __abstractvars__ __abstractclassvars__ "
-    "_abc_impl __annotations__ __annotations_cache__ __annotate__ __annotate_func__ __dataclass_fields__ "
+    "_abc_impl __slotnames__ __annotations__ __annotations_cache__ __annotate__ __annotate_func__ __dataclass_fields__ "
     "__dataclass_params__ __match_args__ __parameters__ __orig_bases__ __firstlineno__ __static_attributes__".split()
 )
 _NOT_OF_A_THING = frozenset("__name__ __qualname__ __doc__ __module__ __annotations__ __type_params__".split())
