@@ -29,8 +29,14 @@ def bearing_design_figure(found: Optimised, rows: Sequence[BeforeAfter], title: 
     right.errorbar(change, place, xerr=2 * error, fmt="none", ecolor=BLACK, elinewidth=1.1)
     right.axvline(0, color=BLACK, linewidth=0.8)
     right.grid(False, axis="y")
-    right.set_yticks(place, [readable(row.name) for row in shown], fontsize=8)
+    right.set_yticks(place, [_without_unit(row) for row in shown], fontsize=8)
     right.set_ylim(len(shown) - 0.5, -0.5)
     right.set_xlabel("Change [%], with two standard errors", fontsize=9)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
+
+
+def _without_unit(row: BeforeAfter) -> str:
+    """Its name but for the unit, of which a change in per cent has none."""
+    unit = row.unit.replace("^", "").replace("/", "_per_").replace(" ", "_")
+    return readable(row.name.removesuffix(f"_{unit}"))
