@@ -401,9 +401,17 @@ class DesignOptions(VaryOptions):
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[tuple[str, ...]] = (*("first", "last", "speeds", "quick", "cost", "front", "scatter", "worst"),)
+    of_cage: ClassVar[tuple[str, ...]] = ("first", "last", "speeds", "quick", "cost", "front", "scatter", "worst")
     of_whole: ClassVar[tuple[str, ...]] = (
-        *("speed", "load", "impulse", "power", "slip", "balance", "ensemble", "discard", "revolutions"),
+        "speed",
+        "load",
+        "impulse",
+        "power",
+        "slip",
+        "balance",
+        "ensemble",
+        "discard",
+        "revolutions",
     )
     called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
 

@@ -8,7 +8,6 @@ only the cage is changed.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -149,7 +148,7 @@ class BearingObjective(AbstractObjective):
 
     def _totals(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k 2"]:
         """The sum of each design in both halves of the run; NaN where one of its lanes failed."""
-        models: list[Any] = [space.model(place) for place in places]
+        models = [space.model(place) for place in places]
         rows = []
         for model, found in zip(models, self.runs.run(models), strict=True):
             exact = self.weights.get(BALANCE, 0.0) * balance_grade(model, self.runs.speeds)
@@ -173,7 +172,7 @@ def _fitted(
 
 
 def bearing_objective(
-    model: BearingModel, vary: Mapping[str, Any], runs: BearingRuns, prices: Mapping[str, float]
+    model: BearingModel, vary: Mapping[str, tuple[float, float]], runs: BearingRuns, prices: Mapping[str, float]
 ) -> BearingObjective:
     """Wear, forces, impulses, friction power, slip and balance of a whole bearing, each beside what it is now.
 
@@ -208,7 +207,7 @@ def bearing_objective(
     return BearingObjective(runs, weights)
 
 
-def _least(name: str, model: BearingModel, speeds: Any) -> float:
+def _least(name: str, model: BearingModel, speeds: Float[np.ndarray, " speeds"] | float) -> float:
     """What the cage's weight would do: as a force, over a revolution, rubbing with a hundredth of it."""
     weight = float(model.cage_mass * model.gravity)
     turning = float(np.mean(np.abs(model.rolling_cage_speed(jnp.asarray(speeds)))))

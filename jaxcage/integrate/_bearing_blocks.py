@@ -270,7 +270,9 @@ def lanes_apart(scale: BearingState, a: Point, b: Point) -> Float[Array, " lanes
     return jnp.max(jnp.stack([*(jnp.max(x, axis=0) for x in rollers), *bodies]), axis=0)
 
 
-def bearing_states(lanes: BearingLanes) -> tuple[Any, Any]:
+def bearing_states(
+    lanes: BearingLanes,
+) -> tuple[Float[np.ndarray, "lanes 5 rollers"], Float[np.ndarray, "lanes 9"]]:
     """Rollers and bodies of each lane, lanes first."""
     count = lanes.angle.shape[0]
     rollers = np.stack([np.asarray(x).reshape(-1, count) for x in lanes.point.y.rollers])

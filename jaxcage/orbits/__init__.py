@@ -46,7 +46,14 @@ from ._normal_form import (
     normal_form_coefficient as normal_form_coefficient,
     normal_form_places as normal_form_places,
 )
-from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
+from ._orbit import (
+    Guess as Guess,
+    NearOrbit as NearOrbit,
+    Orbit as Orbit,
+    PointGuess as PointGuess,
+    StateLike as StateLike,
+    periodic_orbit as periodic_orbit,
+)
 from ._point import Point as Point
 from ._search import (
     Stretch as Stretch,

@@ -5,7 +5,7 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -25,7 +25,11 @@ from ._engine import Progress, chunk_size, run_lanes
 from ._lasting import follow
 
 
-def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> Any:
+@overload
+def rpm(first: float | int) -> float: ...
+@overload
+def rpm(first: float | int, last: float | int, count: int = 2) -> Float[np.ndarray, " count"]: ...
+def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> float | Float[np.ndarray, " count"]:
     """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`.
 
     **Raises:** `ValueError` for what is no finite number, and for a count below 1.
