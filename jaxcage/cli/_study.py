@@ -98,7 +98,7 @@ def _lanes_stored(path: Path) -> int:
 def _document(work: Study, path: Path, before: int, seconds: float) -> dict[str, Any]:
     with open_study(path) as dataset:
         outcome = dataset["outcome"].values
-        judged = {name: dataset[name].values for name in ("label", "largest_exponent", "standard_error")}
+        found = {name: dataset[name].values for name in ("label", "largest_exponent", "standard_error")}
     done = outcome >= 0
     stored = int(np.sum(done))
     if stored:
@@ -110,8 +110,8 @@ def _document(work: Study, path: Path, before: int, seconds: float) -> dict[str,
         "stored": stored,
         "stored_before": before,
         "chunks": work.plan.chunks,
-        "labels": named(judged["label"][done], LABELS),
+        "labels": named(found["label"][done], LABELS),
         "failed": named(outcome[outcome > 0], OUTCOMES),
-        "too_short": int(np.sum(too_short(judged, work.revolutions))),
+        "too_short": int(np.sum(too_short(found, work.revolutions))),
         "lanes_per_second": round((stored - before) / seconds, 1) if stored > before else None,
     }

@@ -44,7 +44,7 @@ TERMS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "balance": ((BALANCE,),),
 }
 """What a design is judged by: sums of statistics, each sum beside what it is now; of two sums each counts half."""
-JUDGED = (*STATISTICS, "pocket_force_peak_N", "land_force_peak_N")
+COMPARED = (*STATISTICS, "pocket_force_peak_N", "land_force_peak_N")
 """What is shown before and after, with the balance grade."""
 LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
 """A slip below this, and wear below that of this part of the cage's weight, count as nothing to compare with."""
@@ -194,7 +194,7 @@ def bearing_objective(
         raise ArgumentError("prices", said=f"must be at least 0 and not all 0, but are {dict(prices)}.")
     runs.require_designs(len(vary))
     found = runs.run([model])[0]
-    now = {name: float(np.nanmean(_halves(found, name))) for name in JUDGED}
+    now = {name: float(np.nanmean(_halves(found, name))) for name in COMPARED}
     now[BALANCE] = balance_grade(model, runs.speeds)
     if not np.all(np.isfinite(list(now.values()))):
         raise ArgumentError("model", said="must run through from one of the starts at least, but fails from all.")
@@ -246,7 +246,7 @@ def before_and_after(before: BearingModel, after: BearingModel, runs: BearingRun
 
     **Arguments:** designs; how to run them, best `BearingRuns.fresh` of those that the search had.
 
-    **Returns:** a row for each of `JUDGED` and the balance grade; the number of lanes that failed, which are left out
+    **Returns:** a row for each of `COMPARED` and the balance grade; the number of lanes that failed, which are left out
     with those that began alike.
     """
     old, new = runs.run([before, after])
@@ -254,7 +254,7 @@ def before_and_after(before: BearingModel, after: BearingModel, runs: BearingRun
     mean = lambda x: float(x.mean()) if x.size else math.nan
     error = lambda x: float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan
     rows = []
-    for name in JUDGED:
+    for name in COMPARED:
         a, b = (_halves(each, name)[whole].mean(axis=-1) for each in (old, new))
         unit = STATISTIC_UNITS[name]
         rows.append(BeforeAfter(name, unit, mean(a), error(a), mean(b), error(b), mean(b - a), error(b - a)))

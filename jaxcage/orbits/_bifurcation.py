@@ -14,9 +14,9 @@ from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
+from ._by_name import SPEED, Parameter, value as value_of, with_value
 from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
-from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point

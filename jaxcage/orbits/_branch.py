@@ -16,6 +16,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, follow, take
+from ._by_name import SPEED, Parameter, value as value_of
 from ._follower import (
     Follower,
     Start,
@@ -26,7 +27,6 @@ from ._follower import (
     stable_steps,
     turned,
 )
-from ._lens import SPEED, Parameter, value as value_of
 from ._located import Seen, account
 from ._normal_form import coefficients
 from ._orbit import NearOrbit, Orbit, guess_state

@@ -13,8 +13,8 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
 from ._branch import Branch, describe
+from ._by_name import SPEED, Parameter
 from ._follower import Follower, eigenvalues, make_follower
-from ._lens import SPEED, Parameter
 from ._point import Point
 from ._singularity import test_functions
 

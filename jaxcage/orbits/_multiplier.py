@@ -16,7 +16,7 @@ from .._checks import require_x64
 from .._parameters import get, parameter_paths
 from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
-from ._lens import SPEED
+from ._by_name import SPEED
 from ._orbit import StateLike
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._sensitivity import _expand, _Expansion, _pull_back

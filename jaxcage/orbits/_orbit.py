@@ -183,14 +183,14 @@ def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, 
 
     def turn(i: Array, carry: tuple) -> tuple:
         y, done = carry
-        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.rung(i)).method)
+        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.steps(i)).method)
         begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
         row = tuple(begin[k] for k in range(start.size))
         spin = jnp.where(done, 0, revolutions)
         z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
         return z, done | (jnp.max(jnp.abs(z - y) / scale) < AT_REST * counts.tolerance)
 
-    return jax.lax.fori_loop(0, counts.rungs, turn, (start, jnp.array(False)))[0]
+    return jax.lax.fori_loop(0, counts.tries, turn, (start, jnp.array(False)))[0]
 
 
 @compiled

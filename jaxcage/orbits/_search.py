@@ -20,8 +20,8 @@ from ..models import AbstractForcedSystem
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
+from ._by_name import SPEED
 from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
-from ._lens import SPEED
 from ._point import Point
 
 

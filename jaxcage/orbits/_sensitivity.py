@@ -25,9 +25,9 @@ from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
 from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
+from ._by_name import SPEED
 from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import Push, Slopes, by_columns, numbers_of
-from ._lens import SPEED
 from ._point import Point
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix

@@ -27,7 +27,7 @@ REVOLUTIONS = 100
 SETTLED = 64
 """A draw that is periodic by then is left where it is: as it is at the end of what is left out: three in five are."""
 ERROR = 1e-2
-"""Of a revolution [clearances]: with fewer rungs than the default method has, a quarter of the draws fail."""
+"""Of a revolution [clearances]: with fewer levels than the default method has, a quarter of the draws fail."""
 RARE = 0.05
 """Chance below which a speed is called calm, and above one less which it is called chaotic."""
 FEWEST = 29

@@ -151,8 +151,8 @@ def identify(
     **Arguments:** design; what is unknown of it; measurements; draws of each stage; stages at most; seed of the draws;
     method and progress as in `sweep`.
     """
-    judge = lambda place: misses(model, unknowns, measured, place, method=method, progress=progress)
-    return narrow(unknowns, judge, draws=draws, stages=stages, seed=seed)
+    missed_by = lambda place: misses(model, unknowns, measured, place, method=method, progress=progress)
+    return narrow(unknowns, missed_by, draws=draws, stages=stages, seed=seed)
 
 
 def misses(

@@ -20,7 +20,7 @@ from .._types import State
 from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
 from ..integrate import AbstractMethod, controlled, finer
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
-from ._confirm import Judged, confirm as confirm_lanes, doubtful
+from ._confirm import Labelled, confirm as confirm_lanes, doubtful
 from ._engine import Progress, chunk_size, run_lanes
 from ._lasting import follow
 
@@ -194,18 +194,18 @@ def sweep_designs(
         return found
     rounds: tuple[Confirmation, ...] = ()
     if confirm:
-        judged = _judged(found)
+        labelled = _labelled(found)
 
-        def again(lanes: np.ndarray, times: int) -> Judged:
+        def again(lanes: np.ndarray, times: int) -> Labelled:
             _put(seen, lanes, run(plan, lanes, finer(chosen, times)))
-            return _judged(each_system(seen)).at(lanes)
+            return _labelled(each_system(seen)).at(lanes)
 
-        wanted = doubtful(judged.label.reshape(len(systems), *shape))
-        rounds = confirm_lanes(wanted, judged, again)
+        wanted = doubtful(labelled.label.reshape(len(systems), *shape))
+        rounds = confirm_lanes(wanted, labelled, again)
         found = each_system(seen)
     if horizon <= discard + revolutions:
         return [dataclasses.replace(s, confirmed=rounds) for s in found]
-    label = _judged(found).label
+    label = _labelled(found).label
     scale = np.concatenate([np.repeat(s.scale, shape[1], axis=0) for s in found])
     lasting = follow(label, seen, plan, scale, horizon, lambda plan, lanes, y: run(plan, lanes, chosen, y))
     escapes = np.split(lasting.escape, len(systems))
@@ -267,10 +267,10 @@ def _speeds_of_each(speeds: Any, systems: int) -> Float[np.ndarray, "systems spe
     return np.stack([checked_speeds(row) for row in speeds])
 
 
-def _judged(found: Sequence[Sweep]) -> Judged:
+def _labelled(found: Sequence[Sweep]) -> Labelled:
     """What the lanes of several sweeps are called, in a row."""
     rows = [(s.observed_label, s.exponents[..., 0], s.standard_error[..., 0]) for s in found]
-    return Judged(*(np.concatenate([x.ravel() for x in column]) for column in zip(*rows, strict=True)))
+    return Labelled(*(np.concatenate([x.ravel() for x in column]) for column in zip(*rows, strict=True)))
 
 
 def _put(seen: Observation, lanes: np.ndarray, new: Observation) -> None:
