@@ -239,7 +239,10 @@ def _lines(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) ->
 
 
 def _line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
-    titles = {"cage_place": "Cage's vertical place over the clearance", "pocket_force": "Pockets on cage, vertical [N]"}
+    titles = {
+        "cage_place": "Cage's vertical position over the clearance",
+        "pocket_force": "Pockets on cage, vertical [N]",
+    }
     return [
         Table(
             f"Spectrum, {titles[name]}",
@@ -265,7 +268,7 @@ def _circumference_table(found: Around) -> Table:
         )
         for i, part in enumerate(eighths)
     ]
-    heads = ("place, load at 270°", "slip [%]", "inner load [N]", "driving [N]", "braking [N]", "largest [N]")
+    heads = ("position, load at 270°", "slip [%]", "inner load [N]", "driving [N]", "braking [N]", "largest [N]")
     return Table("Rollers around the bearing: slip, load, pocket force", heads, rows)
 
 

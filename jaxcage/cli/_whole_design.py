@@ -1,4 +1,4 @@
-"""A better cage for a whole bearing, by gradients of what it is judged by: `jaxcage design nu2310`."""
+"""A better cage for a whole bearing, by gradients of what it is measured by: `jaxcage design nu2310`."""
 
 import dataclasses
 

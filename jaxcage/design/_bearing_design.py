@@ -1,8 +1,8 @@
 """Designs of the whole bearing: wear, forces, friction, slip and balance, beside what they are now.
 
-Its motion is chaotic, so that a design is judged by means over drawn starts, the same ones for every design, and its
-slope is that of scattered pairs of designs, as in `bearing_gradient`. Load, speed, oil and traction stay what they are:
-only the cage is changed.
+Its motion is chaotic, so a design is measured by means over drawn initial states, the same ones for every design, and
+its slope is that of scattered pairs of designs, as in `bearing_gradient`. Load, speed, oil and traction stay what they
+are: only the cage is changed.
 """
 
 import dataclasses
@@ -43,7 +43,8 @@ TERMS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "slip": (("cage_slip",),),
     "balance": ((BALANCE,),),
 }
-"""What a design is judged by: sums of statistics, each sum beside what it is now; of two sums each counts half."""
+"""What a design is measured by: sums of statistics, each sum relative to its present value; of two sums each counts
+half."""
 COMPARED = (*STATISTICS, "pocket_force_peak_N", "land_force_peak_N")
 """What is shown before and after, with the balance grade."""
 LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
@@ -52,7 +53,7 @@ LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BearingRuns:
-    """How designs are run to be judged. All designs begin with the same drawn places of the cage."""
+    """How designs are run to be measured. All begin with the same drawn positions of the cage."""
 
     speeds: Float[np.ndarray, " speeds"] | float
     """Ascending shaft speeds [rad/s]; all count alike."""

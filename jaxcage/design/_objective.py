@@ -1,4 +1,4 @@
-"""What a design is judged by: numbers with a slope, each exact or with a standard error, that add up.
+"""What a design is measured by: numbers with a slope, each exact or with a standard error, that add up.
 
 An objective is asked for its value and slope at many places of a design space at once, so that what is expensive runs
 in one batch. Slopes are with respect to places: 0 is a parameter's lower bound, 1 the upper one.
@@ -22,7 +22,7 @@ from ._unknowns import Design, Unknown, check_unknowns, slope_in_place, values_a
 
 @dataclasses.dataclass(frozen=True)
 class DesignSpace(Generic[Design]):
-    """A design and what may be changed in it."""
+    """A design, the parameters that may change, and their bounds."""
 
     system: Design
     """A forced system, or a whole bearing."""

@@ -1,8 +1,8 @@
 """Designs made better by gradient: bounded parameters, any optax optimiser, many starts at a time.
 
-A place between the bounds is a logistic function of an unbounded number, so that no step leaves the bounds. All starts
-take their steps together, and what their objective costs runs in one batch. A step that leads where the objective
-cannot be had is taken back by half. The search ends when the slope is small, or no larger than its own error.
+A position between the bounds is a logistic function of an unbounded number, so that no step leaves the bounds. All
+searches take their steps together, and their objectives are computed in one batch. A step to where the objective has no
+value is undone by half. The search ends when the slope is small, or no larger than its own error.
 """
 
 import dataclasses
@@ -81,7 +81,7 @@ class Optimum(Generic[Design]):
     """Parameters that ended at a bound: there the bound chose, not the objective."""
     history: tuple[Step, ...]
     status: str
-    """`slope is small`, `slope within its error`, `step limit`, or why the objective could not be had."""
+    """`slope is small`, `slope within its error`, `step limit`, or why the objective has no value."""
     model: Design
     """The design itself, of the kind that the search began with."""
 
@@ -138,18 +138,19 @@ def optimise(
     keep: str | Path | None = None,
     report: Callable[[int, Sequence[Measured]], None] | None = None,
 ) -> Optimised[Design]:
-    """Make `objective` small over some parameters of a design.
+    """Minimise `objective` over some parameters of a design.
 
     **Arguments:**
 
     - `system`: the design; `vary`: bounds [SI] by parameter name.
     - `objective`: a sum of objectives, such as `chaotic_width(4000, 27500) + 500 * cost()`.
-    - `optimiser`: of optax, for the unbounded numbers behind the places; by default Adam with a falling rate.
-    - `starts`: how many searches: the first from the design itself, others from quasi-random places; or places.
-    - `scouts`: so many quasi-random places are looked at beforehand, without slopes; searches start from the best.
-    - `steps`: at most so many; `tolerance`: a slope below this part of the objective's first size is small.
-    - `seed`: of the quasi-random places.
-    - `keep`: file to keep the state in after each step; if it is there, the search goes on from it.
+        - `optimiser`: an optax optimiser of the unbounded variables; by default Adam with a decreasing rate.
+    - `starts`: number of searches, the first from the design itself, the others from quasi-random points; or these
+        points, as fractions of the way from the lower bounds to the upper ones.
+    - `scouts`: number of quasi-random points evaluated beforehand, without slopes; searches start from the best.
+    - `steps`: at most so many; `tolerance`: a slope below this fraction of the first value of the objective is small.
+    - `seed`: of the quasi-random points.
+    - `keep`: file in which the state is saved after each step; if it exists, the search continues from it.
     - `report`: called with the step and what was measured in each search.
 
     **Returns:** `Optimised`.

@@ -262,7 +262,7 @@ def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] =
         of the system's own scale (for a cage: clearances).
     - `ladder`: solvers by name with their steps per revolution, in the order in which they are tried.
 
-    **Raises:** `ValueError` for an error that is not positive, fewer than two entries in `ladder`, or an unknown solver.
+    **Raises:** `ValueError` for an error that is not positive, fewer than two entries, or an unknown solver.
     """
     if len(ladder) < 2 or any(int(steps) < 1 for _, steps in ladder):
         raise ArgumentError("ladder", said=f"must have two or more pairs of a solver and its steps, but is {ladder}.")

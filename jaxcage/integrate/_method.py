@@ -261,11 +261,11 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
 
     - `solver`: `rodas3`, `rodas4` (ours, structured), `rk4` (classical), `newmark` (the paper's), `tsit5`, `kvaerno3`,
         `kvaerno5`, `kencarp4` (diffrax's).
-    - `steps`: equal steps per revolution; the default is what `benchmarks/convergence.py` settled.
+    - `steps`: equal steps per revolution; the default was chosen with `benchmarks/convergence.py`.
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
 
-    **Raises:** `ValueError` for a name that is not known, or both `steps` and `tolerance`.
+    **Raises:** `ValueError` for an unknown name, or both `steps` and `tolerance`.
     """
     if tolerance is None:
         return make_fixed(solver, DEFAULT_STEPS if steps is None else steps)

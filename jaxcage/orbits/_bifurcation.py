@@ -126,8 +126,8 @@ def bifurcation(
     - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
-    - `reach`: how far the branch is followed, in parts of the parameter's value (of 1 where that is 0); 0 for not at
-        all, as under `jit`, `vmap` and `grad`, where nothing is known of what Newton's method finds.
+    - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 where that is 0); 0 turns
+        this off. It is off under `jit`, `vmap` and `grad`, where it is not known what Newton's method finds.
 
     **Returns:** `Point`; it does not raise if there is none, but says where it looked. Works under `jit` and
     `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`, by the implicit

@@ -86,7 +86,7 @@ class Orbit(eqx.Module):
     """Largest component of P(z) - z, in units of the system's scale."""
     liouville: Float[Array, ""]
     """log|det M| less the integral of the field's divergence over the orbit, which it must equal; both not below what
-    rounding resolves of the smallest multiplier, so that orbits with strong damping are judged by the others."""
+    rounding resolves of the smallest multiplier, so that orbits with strong damping are checked by the others."""
     steps: Int[Array, ""]
     """Steps per revolution; 1 where the method has no such number."""
     error: Float[Array, ""]

@@ -32,7 +32,7 @@ def rpm(first: float | int, last: float | int, count: int = 2) -> Float[np.ndarr
 def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> float | Float[np.ndarray, " count"]:
     """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`.
 
-    **Raises:** `ValueError` for what is no finite number, and for a count below 1.
+    **Raises:** `ValueError` for anything but finite numbers, and for a count below 1.
     """
     for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
         if wrong("", float, value) or not math.isfinite(value):
@@ -110,7 +110,7 @@ def sweep(
     - `confirm`: run what is not periodic, its neighbours in speed and a tenth of the rest again with steps at most half
         as long, and what changes with finer ones still (`Sweep.confirmed`).
     - `horizon`: revolutions of the whole run to which lanes that have not settled are followed, to tell how long their
-        chaos lasts (`Sweep.survival`); with 0 that is not asked.
+        chaos lasts (`Sweep.survival`); 0 turns this off.
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
     - `keep`: number of strobe states kept, the last ones.
@@ -153,8 +153,8 @@ def sweep_designs(
     """`sweep` for several designs or cases at once, all lanes in one batch: one program, full chunks.
 
     **Arguments:** systems that differ in their numbers only; speeds of all of them, or a row for each; `settled`,
-    revolutions after which a lane whose kept strobe states close is left where it is, periodic, its exponents NaN (0
-    runs all lanes to the end); the rest as for `sweep`.
+    revolutions after which a lane whose kept strobe states repeat is stopped as periodic, its exponents NaN (0 runs all
+    lanes to the end); the rest as for `sweep`.
 
     **Returns:** a `Sweep` for each system, the same as one by one to rounding (which chaos makes large).
     """
