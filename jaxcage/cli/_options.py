@@ -441,8 +441,8 @@ class DesignOptions(VaryOptions):
     worse_balance: bool = False
     """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
     scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()
-    """Manufacturing scatter of a parameter: uniform within a part of it, guidance_gap=10%, or eccentricity=rayleigh. The
-    mean over it is then minimised."""
+    """Manufacturing scatter of a parameter: uniform within a part of it, guidance_gap=10%, or eccentricity=rayleigh.
+    The mean over it is then minimised."""
     worst: Share = 1.0
     """With --scatter: mean over this share of the manufactured cages, the worst ones."""
     starts: Annotated[int | None, whole(1)] = None

@@ -45,7 +45,7 @@ def run_up_down(
 ) -> Hysteresis:
     """Sweep up and down in speed, each speed starting from the final state of the one before.
 
-        After a failure the next speed begins from the initial state again, so that one failure does not spoil the rest.
+    After a failure the next speed begins from the initial state again, so that one failure does not spoil the rest.
 
     **Arguments:** as for `sweep`, with a single start.
 
