@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numpy.typing import ArrayLike
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
@@ -151,7 +150,9 @@ def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
     return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
 
 
-def binomial_interval(hits: ArrayLike, of: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+def binomial_interval(
+    hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
+) -> tuple[np.ndarray, np.ndarray]:
     """Clopper and Pearson's bounds of a share of which `hits` of `of` were seen."""
     from scipy.stats import beta  # takes half a second to load
 
