@@ -205,8 +205,10 @@ def _read_guess(
     spin, known_speed = False, speed
     if isinstance(guess, Orbit | Point):
         state, known_speed = guess.state, guess.speed
-        its_own = isinstance(guess, Point) and guess.parameter == parameter
-        at = guess.value if its_own else value_of(system, known_speed, parameter)
+        if isinstance(guess, Point) and guess.parameter == parameter:
+            at = guess.value
+        else:
+            at = value_of(system, known_speed, parameter)
     elif isinstance(guess, tuple) and len(guess) == 2:
         state, at = guess
     else:
