@@ -91,7 +91,9 @@ def _signature(f: Callable[..., Any]) -> inspect.Signature:
 
 
 def options(annotation: Any) -> tuple[Any, ...]:
-    """The members of a union, or the annotation alone."""
+    """The members of a union, or the annotation alone; of a type variable those of its bound."""
+    if isinstance(annotation, typing.TypeVar) and annotation.__bound__ is not None:
+        return options(annotation.__bound__)
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
         return tuple(one for member in typing.get_args(annotation) for one in options(member))
     return (annotation,)

@@ -204,7 +204,7 @@ def parameter_paths(module: eqx.Module) -> dict[str, tuple[str, ...]]:
 def parameters(module: eqx.Module) -> dict[str, Array]:
     """All differentiable parameters of `module` by name, in SI units.
 
-    **Raises:** `ValueError` for what is no model.
+    **Raises:** `ValueError` for anything but a model.
     """
     _require_module(module)
     return {name: get(module, path) for name, path in parameter_paths(module).items()}
@@ -213,7 +213,7 @@ def parameters(module: eqx.Module) -> dict[str, Array]:
 def parameter_info(module: eqx.Module) -> dict[str, ParameterInfo]:
     """Unit, range and description of every differentiable parameter of `module`, by name.
 
-    **Raises:** `ValueError` for what is no model.
+    **Raises:** `ValueError` for anything but a model.
     """
     _require_module(module)
     infos = {path: field.metadata["parameter"] for path, field in walk(module) if "parameter" in field.metadata}

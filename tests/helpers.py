@@ -13,15 +13,20 @@ import pytest
 import jaxcage as jc
 
 
-UNITS = pint.UnitRegistry()
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
 """Lanes as they run, none confirmed or followed further."""
 raw_sweeps = functools.partial(jc.sweep_designs, confirm=False, horizon=0)
 
 
+@functools.cache
+def units() -> pint.UnitRegistry:
+    """Made when it is first asked for: that takes a second."""
+    return pint.UnitRegistry()
+
+
 def unit_exponents(unit: str) -> dict[str, float]:
     """Exponents of mass, length and time in a parameter's unit."""
-    dims = UNITS.parse_units("dimensionless" if unit == "1" else unit).dimensionality
+    dims = units().parse_units("dimensionless" if unit == "1" else unit).dimensionality
     return {name: float(dims.get(f"[{name}]", 0)) for name in ("mass", "length", "time")}
 
 

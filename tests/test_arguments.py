@@ -18,7 +18,7 @@ from jaxcage._errors import ArgumentError
 
 assert jc.studies  # loads all layers
 FUNCTIONS = _arguments.CHECKED
-UNDECLARED = {("guess", "Any"), ("speed", "Any"), ("which", "Any"), ("periods", "Any"), ("orbit", "Any")}
+UNDECLARED = {"guess", "orbit"}
 """Arguments whose functions say themselves what they may be."""
 
 
@@ -54,7 +54,7 @@ class Stranger:
 
 @pytest.mark.parametrize("f, parameter", list(arguments()))
 def test_wrong_kinds_are_refused(f: Callable[..., Any], parameter: inspect.Parameter):
-    if (parameter.name, getattr(parameter.annotation, "__name__", "")) in UNDECLARED:
+    if parameter.name in UNDECLARED and _has(parameter, object):
         pytest.skip("says itself what it may be")
     for value in (Stranger(), np.ma.array([1.0, 2.0], mask=[0, 1]), np.array(["2020-01-01"], dtype="datetime64[D]")):
         with pytest.raises(ArgumentError, match=rf"^Argument `{parameter.name}` must be .*, but .* was given\.$"):
@@ -184,4 +184,4 @@ def test_numbers_that_no_formula_takes_are_refused():
     with pytest.raises(ValueError, match="`tau` must be a number, of 64 bits if it is whole"):
         jc.forces.synchronous_force(tau=2**63, amplitude=1.0)
     with pytest.raises(ValueError, match="`guidance_gap` must be positive and finite"):
-        jc.bearing.relative_mass_eccentricity(0.0, 0.0)
+        jc.bearing.guiding_radius(92.1e-3, 0.0)

@@ -4,8 +4,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import pint
 import pytest
+from helpers import unit_exponents
 
 import jaxcage.bearing as jb
 from jaxcage import parameter_info, parameters, replace
@@ -113,14 +113,9 @@ def test_gradient_in_speed_is_zero_at_rest():
     assert float(gradient) == 0.0
 
 
-UNITS = pint.UnitRegistry()
-DIMENSIONS = "[mass]", "[length]", "[time]"
-
-
 def exponents(unit):
     """Exponents of mass, length and time in a unit."""
-    dimensionality = dict(UNITS.Quantity(1.0, unit).dimensionality) if unit != "1" else {}
-    return np.array([dimensionality.get(d, 0.0) for d in DIMENSIONS], dtype=float)
+    return np.array(list(unit_exponents(unit).values()))
 
 
 @eqx.filter_jit

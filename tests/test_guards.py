@@ -37,7 +37,7 @@ START = jc.models.BearingState(jnp.zeros((5, 13)), jnp.zeros(9), jnp.zeros(2))
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
-    "branches": lambda m: jc.orbits.branches([OSCILLATOR], [STATE], lower=1.0, upper=2.0),
+    "branches": lambda m: jc.orbits.branches([OSCILLATOR], [DOUBLING], lower=1.0, upper=2.0),
     "cage_forces": lambda m: jc.analysis.cage_forces(m, TRAJECTORY),
     "cage_moments": lambda m: jc.analysis.cage_moments(m, TRAJECTORY),
     "cage_mass": lambda m: jc.bearing.cage_mass(m.bearing, 5e-4),
@@ -45,7 +45,6 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "case": lambda m: jc.case("1a"),
     "coexisting_orbits": lambda m: jc.orbits.coexisting_orbits(OSCILLATOR, 1.0),
     "curve": lambda m: jc.curve(m, FOLD, lower=4e-4, upper=5e-4, x_lower=600.0, x_upper=900.0),
-    "dimensionless_groups": lambda m: jc.models.dimensionless_groups(m, 900.0),
     "doubled_branch": lambda m: jc.orbits.doubled_branch(OSCILLATOR, DOUBLING, lower=1.0, upper=2.0),
     "equilibrium": lambda m: jc.equilibrium(m, 900.0),
     "film_coefficients": lambda m: jc.analysis.film_coefficients(0.5),

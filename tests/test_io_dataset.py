@@ -20,8 +20,8 @@ from jaxcage.io import (
     save_sweep,
     stored_configuration,
     to_dataset,
+    trajectory_columns,
     write_columns,
-    write_trajectory,
 )
 
 
@@ -163,7 +163,7 @@ def test_trajectory_as_csv(tmp_path: Path):
     time, state = np.arange(n) * 1e-3, rng.normal(size=(n, 4)) * 1e-4
     run = jc.Trajectory(time, time * 100, state, np.full(n, 100.0), 4, 0.5, "successful")
     force = {"film": rng.normal(size=(n, 2))}
-    columns = read_columns(write_trajectory(tmp_path / "run.csv", run, force))
+    columns = read_columns(write_columns(tmp_path / "run.csv", trajectory_columns(run, force)))
     expected = "time [s],tau [rad],x_C [m],y_C [m],vx_C [m/s],vy_C [m/s],film_x [N],film_y [N]"
     assert ",".join(columns) == expected
     np.testing.assert_allclose(columns["vy_C [m/s]"], state[:, 3], rtol=1e-11)

@@ -151,19 +151,6 @@ def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool
     assert abs(turns[-1] - turns[0]) / (run.tau[-1] - run.tau[800]) == pytest.approx(0.5146, abs=0.01)
 
 
-@pytest.mark.parametrize("base", ["mass", "length", "time"])
-def test_dimensionless_groups_have_no_dimension(base: str):
-    model, factor = jc.case("1a", "preliminary"), 2.3
-    rate = factor ** (-1.0 if base == "time" else 0.0)
-    here = jc.models.dimensionless_groups(model, 1000.0)
-    there = jc.models.dimensionless_groups(helpers.in_other_units(model, base, factor), 1000.0 * rate)
-    assert len(here) == 7
-    for name, value in here.items():
-        assert float(there[name]) == pytest.approx(float(value), rel=1e-12), name
-    assert float(here["eccentricity"]) == pytest.approx(23 / 450)
-    assert float(here["speed"]) == pytest.approx(1000 * np.sqrt(0.45e-3 / 9.81))
-
-
 @pytest.mark.parametrize("harmonics", [pytest.param(1, marks=pytest.mark.wide), 5])
 @pytest.mark.parametrize("name", ["rigid", "elastic", "roller-pass"])
 def test_harmonics_are_where_the_spectrum_of_the_forcing_ends(name: str, harmonics: int):

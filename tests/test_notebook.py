@@ -80,6 +80,6 @@ def test_an_orbit_shows_its_multipliers():
         steps=jnp.array(512),
         error=jnp.array(1e-8),
         self_excited=False,
-        solver=None,
+        solver=jc.method(),
     )
     assert "0.5+0.1j" in orbit._repr_html_() and "8594.4 rpm" in orbit._repr_html_()

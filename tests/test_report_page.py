@@ -21,10 +21,10 @@ from jaxcage.report import (
     Operating,
     _findings,
     _page,
+    assess,
     calmest,
     chaotic_verdict,
     examine,
-    judge,
     loss_verdict,
     page,
     parameter_rows,
@@ -140,8 +140,8 @@ def test_calmest_range_is_outside_both_kinds(example: Findings):
     assert calmest(example) == pytest.approx((12050.0, 20000.0))  # chaos ends at 12050, the orbit is lost at 20000
 
 
-def test_both_kinds_judge_each_speed(example: Findings):
-    (first,) = judge(example, [Operating(8500.0, 8500.0)])
+def test_both_kinds_assess_each_speed(example: Findings):
+    (first,) = assess(example, [Operating(8500.0, 8500.0)])
     assert first.verdicts["synchronous-loss"].state == "inside"
     assert first.verdicts["chaotic"].state == "clear"
     assert first.verdicts["chaotic"].edge_rpm == pytest.approx(9050.0)

@@ -11,7 +11,7 @@ import pytest
 import jaxcage as jc
 from jaxcage.analysis import BearingSweep
 from jaxcage.cli import main
-from jaxcage.design import JUDGED, BearingRuns, DesignSpace, bearing_objective, before_and_after, usual_bounds
+from jaxcage.design import COMPARED, BearingRuns, DesignSpace, bearing_objective, before_and_after, usual_bounds
 from jaxcage.models.whole import drawn_places
 
 
@@ -30,7 +30,7 @@ def made_up(noise=0.0, broken=lambda model, start: False, seed=3):
         found = []
         for model in models:
             gap, pocket = float(model.guidance_gap) / 0.45e-3, float(model.bearing.pocket_clearance) / 0.3e-3
-            value = dict.fromkeys(JUDGED, 1.0) | {
+            value = dict.fromkeys(COMPARED, 1.0) | {
                 "friction_power_W": 400 / gap,
                 "cage_slip": 0.01 * gap**0.5,
                 "pocket_force_peak_N": 200 * (1 + (pocket - 0.35 / 0.3) ** 2),

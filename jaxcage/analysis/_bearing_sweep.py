@@ -36,8 +36,8 @@ OfLanes = Float[np.ndarray, "speeds starts"]
 class BearingSweep:
     """Lanes over shaft speeds, from several starts. Means are means over time.
 
-    A lane that could not be followed to the end is NaN, with an outcome that says why. One that is `inaccurate` has its
-    values all the same.
+    A lane that could not be followed to the end is NaN, with an outcome that says why. One that is `inaccurate` keeps
+    its values.
     """
 
     speed: Float[np.ndarray, " speeds"] = measure("rad/s", "shaft speeds")

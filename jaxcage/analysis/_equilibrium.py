@@ -307,15 +307,15 @@ def _equilibrium(model: CageModel, speed: Array, start: Array | None) -> Equilib
 
 
 def equilibrium(model: CageModel, speed: Scalar, *, start: Float[Array, " coordinates"] | None = None) -> Equilibrium:
-    """Where film, support, contact, weight and forces of one's own hold the cage without unbalance and impacts.
+    """Where film, support, contact, weight and user-defined forces hold the cage, without unbalance and impacts.
 
     Differentiable with respect to speed and every parameter, by the implicit function theorem.
 
     **Arguments:** model; cage speed [rad/s]; where the root find starts [m], by default at Ocvirk's
     equilibrium of the film alone. A nonlinear support can allow more than one equilibrium.
 
-    **Raises:** an error as the computation runs, where no equilibrium is found or a force of one's own changes with the
-    phase (one that depends on the phase alone, an `AbstractForcing`, is left out like the unbalance).
+    **Raises:** an error at run time where no equilibrium is found, or a user-defined force changes with the phase (one
+    that depends on the phase alone, an `AbstractForcing`, is left out like the unbalance).
     """
     require_x64()
     first = None if start is None else jnp.asarray(start) / model.clearance

@@ -167,9 +167,9 @@ def survival(
 ) -> Survival:
     """Censored maximum likelihood of the mean life from escape times.
 
-    Lanes that are calm at t0 do not count, neither do lanes that failed; those that escape after the horizon or never
-    count with the time that they were followed. Lanes that start off the chaotic set need a t0 of several e-foldings
-    of their approach to it; `when_t0_doubles` tells whether it was long enough.
+    Lanes that failed, or are calm at t0, are left out. Those that escape after the horizon, or never, are censored at
+    the time to which they were followed. Lanes that start off the chaotic set need a t0 of several e-foldings of their
+    approach to it; `when_t0_doubles` tells whether it was long enough.
 
     **Arguments:**
 

@@ -42,8 +42,6 @@ from ._kinematics import (
     guidance_gap as guidance_gap,
     guiding_radius as guiding_radius,
     raceway_surface_speed as raceway_surface_speed,
-    relative_cage_speed as relative_cage_speed,
-    relative_mass_eccentricity as relative_mass_eccentricity,
 )
 from ._line_contact import (
     LINE_CONTACT_EXPONENT as LINE_CONTACT_EXPONENT,
@@ -81,6 +79,6 @@ check_layer(
     "cage_mass cage_speed cage_speed_ratio centrifugal_force clipped_pocket_area "
     "design_rule_violations guidance_gap guiding_radius line_contact_approach line_contact_load "
     "line_contact_stiffness load_distribution loaded_half_angle published_case raceway_loads "
-    "raceway_surface_speed relative_cage_speed relative_mass_eccentricity roller_angles "
+    "raceway_surface_speed roller_angles "
     "series_stiffness static_cage_displacement vg walther_viscosity",
 )

@@ -45,11 +45,6 @@ def centrifugal_force(roller_mass: Scalar, cage_speed: Scalar, pitch_diameter: S
     return jnp.asarray(roller_mass * cage_speed**2 * pitch_diameter / 2)
 
 
-def relative_cage_speed(cage_speed: Scalar, outer_speed: Scalar) -> Array:
-    """Cage speed relative to the outer-ring rib, w_co = w_c - w_o, (11) [rad/s]."""
-    return jnp.asarray(cage_speed - outer_speed)
-
-
 def guidance_gap(rib_diameter: Scalar, cage_diameter: Scalar) -> Array:
     """Cage guidance gap C_r = d_g - d_c, (12) [m].
 
@@ -61,11 +56,3 @@ def guidance_gap(rib_diameter: Scalar, cage_diameter: Scalar) -> Array:
 def guiding_radius(rib_diameter: Scalar, guidance_gap: Scalar) -> Array:
     """Radius of the cage's guiding lands, R = (d_g - C_r)/2, from (12) [m]."""
     return jnp.asarray((rib_diameter - guidance_gap) / 2)
-
-
-def relative_mass_eccentricity(eccentricity: Scalar, guidance_gap: Scalar) -> Array:
-    """Distance of the mass centre over the gap, rho = e/C_r, (13) [1].
-
-    Table 2 heads e with "(mm)", impossible in a gap of 0.45 mm: its numbers are micrometres.
-    """
-    return jnp.asarray(eccentricity / guidance_gap)

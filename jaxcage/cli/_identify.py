@@ -16,7 +16,7 @@ from ._show import Report
 
 
 LENGTH = 232
-"""Revolutions of a draw at a measured speed: 100 left out, 100 judged, 32 sampled."""
+"""Revolutions of a draw at a measured speed: 100 left out, 100 observed, 32 sampled."""
 
 
 def identify_from(job: Job[IdentifyOptions]) -> Report:

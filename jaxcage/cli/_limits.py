@@ -12,7 +12,16 @@ from ..models import CageModel
 from ..studies import Study
 from ..sweeps import cores
 from ._console import say
-from ._options import CommonOptions, MapOptions, SearchOptions, SimulateOptions, StudyOptions
+from ._options import (
+    CommonOptions,
+    DesignOptions,
+    ImpactOptions,
+    MapOptions,
+    PoincareOptions,
+    SearchOptions,
+    SimulateOptions,
+    StudyOptions,
+)
 
 
 RATE = 5000.0
@@ -73,9 +82,8 @@ def demand_of(options: CommonOptions, model: CageModel | None) -> Demand:
         return Demand(lanes, revolutions + count("persist", 0), _kept(lanes, 16, 20, 1, dimension))
     points = count("count", 0) or count("speeds", 1)
     lanes = points * own * (1 + count("cloud", 0))
-    if hasattr(options, "samples"):
-        lanes *= count("samples", 1)
-    keep = revolutions if not hasattr(options, "count") and hasattr(options, "speed") else 64
+    lanes *= count("samples", 1)
+    keep = revolutions if isinstance(options, PoincareOptions | ImpactOptions | DesignOptions) else 64
     if isinstance(options, SearchOptions):
         keep = 16
     spectra = 64 * 256 * count("waterfall", 0)

@@ -146,7 +146,7 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     confirm: bool = True
     """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
     horizon: FromZero = 3000
-    """Revolutions to which chaos is followed, to tell how long it lasts; 0 does not ask."""
+    """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
     exponents: FromOne = 1
     """Number of Lyapunov exponents."""
     waterfall: FromZero = 0
@@ -378,7 +378,7 @@ class VaryOptions(_Range):
     last: Speed = 27500.0
     """Last cage speed that matters [rpm]."""
     speeds: Annotated[int, whole(4)] = 48
-    """Speeds at which a design is judged."""
+    """Speeds at which a design is assessed."""
     seed: FromZero = 0
     """Seed of all that is drawn."""
     quick: bool = False
@@ -387,7 +387,7 @@ class VaryOptions(_Range):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DesignOptions(VaryOptions):
-    """Make the chaotic speeds few by changing the design: gradient search, checked by a fresh sweep. Of a whole bearing
+    """Change the design so that fewer speeds are chaotic: gradient search, checked by a fresh sweep. Of a whole bearing
     (nu2310), make wear, forces, impulses, friction power, slip and unbalance small at one speed."""
 
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
@@ -404,9 +404,17 @@ class DesignOptions(VaryOptions):
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[tuple[str, ...]] = (*("first", "last", "speeds", "quick", "cost", "front", "scatter", "worst"),)
+    of_cage: ClassVar[tuple[str, ...]] = ("first", "last", "speeds", "quick", "cost", "front", "scatter", "worst")
     of_whole: ClassVar[tuple[str, ...]] = (
-        *("speed", "load", "impulse", "power", "slip", "balance", "ensemble", "discard", "revolutions"),
+        "speed",
+        "load",
+        "impulse",
+        "power",
+        "slip",
+        "balance",
+        "ensemble",
+        "discard",
+        "revolutions",
     )
     called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
 
@@ -436,10 +444,10 @@ class DesignOptions(VaryOptions):
     worse_balance: bool = False
     """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
     scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()
-    """What manufacture makes of a parameter: evenly within a part of it, guidance_gap=10%, or eccentricity=rayleigh.
-    The mean over it is then made small."""
+    """Manufacturing scatter of a parameter: uniform within a part of it, guidance_gap=10%, or eccentricity=rayleigh.
+    The mean over it is then minimised."""
     worst: Share = 1.0
-    """With --scatter: mean of this share of the made cages, the worst ones."""
+    """With --scatter: mean over this share of the manufactured cages, the worst ones."""
     starts: Annotated[int | None, whole(1)] = None
     """Searches: one from the design itself, others from the best of the scouts; 3 if left out, 1 of a whole bearing."""
     scouts: Annotated[int | None, whole(0)] = None
@@ -561,7 +569,7 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
     of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "draws", "seed")
 
     operating: str = ""
-    """Cage speeds and ranges to judge, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
+    """Cage speeds and ranges to assess, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
     count: Annotated[int | None, whole(2)] = None
     """Number of speeds; if left out 251, or 126 with --quick; of a whole bearing 13, or 5."""
     draws: Annotated[int, whole(0)] = 64
@@ -577,7 +585,7 @@ class UnknownsOptions(_Range, IntegrationOptions):
     """Which measurement would decide: Sobol indices of the chaotic share over the ranges of a TOML file."""
 
     speeds: Annotated[int, whole(1)] = 8
-    """Speeds at which a draw is judged."""
+    """Speeds at which a draw is assessed."""
     samples: FromTwo = 16
     """Base samples of the Sobol indices, a power of 2; so many times the number of ranges and 2 are run."""
     seed: FromZero = 0
@@ -606,12 +614,12 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
     confirm: bool = True
     """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
     horizon: FromZero = 3000
-    """Revolutions to which chaos is followed, to tell how long it lasts; 0 does not ask."""
+    """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunUpOptions(_Range, IntegrationOptions):
-    """The speed raised and lowered again at a steady pace: how far the cage moves both ways, and where that differs; of
+    """Run-up and run-down at a constant rate: how far the cage moves both ways, and where that differs; of
     a whole bearing its slip, eccentricity and power, whose speeds are the shaft's."""
 
     called: ClassVar[Mapping[str, str]] = {"settle": "discard", "steps": "windows"}

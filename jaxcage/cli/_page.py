@@ -43,36 +43,36 @@ def report_on(job: Job[ReportOptions]) -> Report:
         findings, operating, table=table, command=command_line(options), chances=drawn, left=left, units=job.units
     )
     job.text(html, job.path(".html"), "report")
-    judged = report.judge(findings, operating)
+    assessed = report.assess(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())
-    document = _document(findings, judged) | {"failed": failed, "stages": findings.seconds, "bytes": size}
+    document = _document(findings, assessed) | {"failed": failed, "stages": findings.seconds, "bytes": size}
     known = [] if drawn is None else report.chances_tables(job.name, drawn)
     if drawn is not None:
         document |= report.chances_document(drawn)
         known = [*([report.operating_chances(drawn, operating, job.ratio)] if operating else []), *known]
     stages = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in findings.seconds.items())
     notes = [f"Failed simulations: {failed}", f"Stages: {stages}", f"Size: {size / 1e6:.1f} MB"]
-    return Report(document, [*known, *_tables(findings, judged)], notes)
+    return Report(document, [*known, *_tables(findings, assessed)], notes)
 
 
-def _document(findings: report.Findings, judged: list[report.Judged]) -> dict[str, Any]:
+def _document(findings: report.Findings, assessed: list[report.Assessed]) -> dict[str, Any]:
     return report.zones_document(findings.name, findings.zones, findings.published) | {
         "quick": findings.quick,
         "synchronous_loss": [report.zone_document(zone) for zone in findings.loss.zones],
         "operating": [
             {"low_rpm": j.at.low_rpm, "high_rpm": j.at.high_rpm} | {kind: vars(v) for kind, v in j.verdicts.items()}
-            for j in judged
+            for j in assessed
         ],
         "elasticities": {name: s.elasticity for name, s in findings.slopes.items() if s.trusted},
     }
 
 
-def _tables(findings: report.Findings, judged: list[report.Judged]) -> list[report.Table]:
+def _tables(findings: report.Findings, assessed: list[report.Assessed]) -> list[report.Table]:
     swept = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
     ratio = float(findings.model.bearing.cage_speed_ratio)
     rows = [
         (*((str(j.at), str(j.at.of_shaft(ratio))) if i == 0 else ("", "")), kind, v.state, str(v))
-        for j in judged
+        for j in assessed
         for i, (kind, v) in enumerate(j.verdicts.items())
     ]
     verdicts = report.Table("Operating speeds", ("cage speed", "shaft speed", "kind of zone", "verdict", "where"), rows)

@@ -9,6 +9,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import jax
+import numpy as np
+
 from ..report import Table
 
 
@@ -43,7 +46,7 @@ def plain(value: Any) -> Any:
         return [plain(v) for v in value]
     if value is None or isinstance(value, str | bool | int):
         return value
-    if hasattr(value, "tolist") and not isinstance(value, float):
+    if isinstance(value, np.ndarray | np.generic | jax.Array) and not isinstance(value, float):
         return plain(value.tolist())
     number = float(value)
     return number if math.isfinite(number) else None

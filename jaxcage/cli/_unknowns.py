@@ -24,10 +24,10 @@ def unknowns(job: Job[UnknownsOptions]) -> Report:
         )
     speeds = rpm(options.first, options.last, options.speeds) if options.speeds > 1 else np.array([rpm(options.first)])
     with job.computing("draws") as say:
-        judge = partial(
+        share = partial(
             chaotic_shares, job.model, job.unknowns, speeds, method=job.asked, progress=partial(say, "draws")
         )
-        found = sobol_of(judge, [u.label for u in job.unknowns], samples=options.samples, seed=options.seed)
+        found = sobol_of(share, [u.label for u in job.unknowns], samples=options.samples, seed=options.seed)
     info = parameter_info(job.model)
     sources = {u.label: info[u.names[0]].source for u in job.unknowns}
     most = max(found.total, key=lambda name: found.total[name])

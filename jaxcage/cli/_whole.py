@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ from ..report import Table, chosen, number
 from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
-from ._options import SimulateOptions
+from ._options import DesignOptions, GradientOptions, SimulateOptions
 from ._readers import flag
 from ._show import Report
 
@@ -45,27 +45,50 @@ SWEEPING = 15.0
 """Revolutions of lanes that a core makes in a second in a sweep, about, exponents with them."""
 
 
+class AtShaftSpeed(NamedTuple):
+    """A whole bearing at one speed of its shaft."""
+
+    model: BearingModel
+    shaft_rpm: float
+
+    @property
+    def speed(self) -> float:
+        """[rad/s]."""
+        return float(rpm(self.shaft_rpm))
+
+    @property
+    def ending(self) -> str:
+        """What the names of files about it end in."""
+        return f"_{self.shaft_rpm:g}rpm_shaft"
+
+    @property
+    def document(self) -> dict[str, float]:
+        """Speed and load."""
+        return {"shaft_speed_rpm": self.shaft_rpm, "load_N": float(self.model.load)}
+
+    def title(self, name: str) -> str:
+        """The bearing called `name`, its speed and load."""
+        return f"{name}, {self.shaft_rpm:g} rpm of the shaft, {float(self.model.load):g} N"
+
+
 def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     """`jaxcage simulate` of a whole bearing."""
     options = job.options
     if options.solver is not None or options.steps is not None:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
-    model = loaded(model, options.load)
-    shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
+    at = at_shaft_speed(job, model)
     numbers = (5 * model.bearing.n_rollers + 40) * SAMPLES * (options.revolutions + options.discard)
     job.require(Demand(1, options.revolutions + options.discard, 40.0 * numbers, 20.0 * numbers, RATE))
     with job.computing():
-        found = examined(job.name, model, shaft_rpm, options.revolutions, options.discard, options.tolerance)
+        found = examined(job.name, at, options.revolutions, options.discard, options.tolerance)
     run, history = found.run, found.history
-    at = f"_{shaft_rpm:g}rpm_shaft"
-    job.listed("figure", job.saved(found.figure, job.path(f"{at}.png")))
-    job.columns(_columns(history), detail=at)
+    job.listed("figure", job.saved(found.figure, job.path(f"{at.ending}.png")))
+    job.columns(_columns(history), detail=at.ending)
     if options.animate:
-        with job.written("animation", job.path(f"{at}.gif")) as path:
-            bearing_animation(model, run, history, path)
+        with job.written("animation", job.path(f"{at.ending}.gif")) as path:
+            bearing_animation(at.model, run, history, path)
     document = {
-        "shaft_speed_rpm": shaft_rpm,
-        "load_N": float(model.load),
+        **at.document,
         **chosen(options, "revolutions discard"),
         **chosen(run, "outcome error estimate steps"),
         **dataclasses.asdict(found.measures),
@@ -110,14 +133,12 @@ class Examined:
         ]
 
 
-def examined(
-    name: str, model: BearingModel, shaft_rpm: float, revolutions: int, discard: int, tolerance: float | None
-) -> Examined:
+def examined(name: str, at: AtShaftSpeed, revolutions: int, discard: int, tolerance: float | None) -> Examined:
     """Run a whole bearing at one speed, and all that is read off that run.
 
     **Raises:** `NoResult` if the run fails.
     """
-    speed = float(rpm(shaft_rpm))
+    model, speed = at.model, at.speed
     run = simulate_bearing(
         model,
         speed,
@@ -127,10 +148,10 @@ def examined(
         tolerance=TOLERANCE if tolerance is None else tolerance,
     )
     if run.outcome not in ("successful", "inaccurate"):
-        raise NoResult(f"The simulation at {shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
+        raise NoResult(f"The simulation at {at.shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
     history = bearing_history(model, run, speed)
     return Examined(
-        f"{name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N",
+        at.title(name),
         model,
         revolutions,
         run,
@@ -140,6 +161,18 @@ def examined(
         bearing_spectra(history) if revolutions > 1 else {},
         around(history),
     )
+
+
+def at_shaft_speed(job: Job[SimulateOptions | GradientOptions | DesignOptions], model: BearingModel) -> AtShaftSpeed:
+    """The bearing under the load, and at the speed, of a command's options.
+
+    **Raises:** `InputError` for no speed, or one at which no cage runs.
+    """
+    options = job.options
+    if options.speed is None:
+        raise InputError('Option --speed must be given for a whole bearing, e.g. --speed "10000 rpm shaft".')
+    model = loaded(model, options.load)
+    return AtShaftSpeed(model, shaft_rpm_of(model, options.speed, job.speeds))
 
 
 def loaded(model: BearingModel, load: float | None) -> BearingModel:
@@ -206,7 +239,10 @@ def _lines(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) ->
 
 
 def _line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
-    titles = {"cage_place": "Cage's vertical place over the clearance", "pocket_force": "Pockets on cage, vertical [N]"}
+    titles = {
+        "cage_place": "Cage's vertical position over the clearance",
+        "pocket_force": "Pockets on cage, vertical [N]",
+    }
     return [
         Table(
             f"Spectrum, {titles[name]}",
@@ -232,7 +268,7 @@ def _circumference_table(found: Around) -> Table:
         )
         for i, part in enumerate(eighths)
     ]
-    heads = ("place, load at 270°", "slip [%]", "inner load [N]", "driving [N]", "braking [N]", "largest [N]")
+    heads = ("position, load at 270°", "slip [%]", "inner load [N]", "driving [N]", "braking [N]", "largest [N]")
     return Table("Rollers around the bearing: slip, load, pocket force", heads, rows)
 
 

@@ -1,4 +1,4 @@
-"""A better cage for a whole bearing, by gradients of what it is judged by: `jaxcage design nu2310`."""
+"""A better cage for a whole bearing, by gradients of what it is measured by: `jaxcage design nu2310`."""
 
 import dataclasses
 
@@ -19,14 +19,13 @@ from ..design import (
 )
 from ..models import BearingModel
 from ..plotting import bearing_design_figure
-from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
 from ._options import DesignOptions
 from ._search import kept_search, no_worse_balance
 from ._show import Report
 from ._vary import read_bounds
-from ._whole import SWEEPING, loaded, shaft_rpm_of
+from ._whole import SWEEPING, at_shaft_speed
 
 
 CHECKED, LONGER = 8, 2
@@ -36,10 +35,8 @@ CHECKED, LONGER = 8, 2
 def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
     """Carry out `jaxcage design` of a whole bearing."""
     options = job.options
-    if options.speed is None:
-        raise InputError('Option --speed must be given for a whole bearing, e.g. --speed "10000 rpm shaft".')
-    model = loaded(whole, options.load)
-    shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
+    at = at_shaft_speed(job, whole)
+    model = at.model
     vary = read_bounds(options.vary, model) if options.vary else usual_bounds(model)
     if wrong := [name for name in vary if name not in CAGE_PARAMETERS]:
         raise InputError(f"Option --vary must name one of {', '.join(CAGE_PARAMETERS)}, but names '{wrong[0]}'.")
@@ -49,7 +46,7 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
         raise InputError(f"Options {', '.join(f'--{name}' for name in TERMS)} must not all be 0.")
     filled = vars(options)
     runs = BearingRuns(
-        float(rpm(shaft_rpm)),
+        at.speed,
         starts=filled["ensemble"],
         designs=filled["cloud"],
         **job.given("discard revolutions spread seed"),
@@ -74,13 +71,11 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
         say("check", 0, 1)
         best = found.best.model
         rows, failed = before_and_after(model, best, fresh)
-    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N"
-    at = f"_{shaft_rpm:g}rpm_shaft"
-    job.listed("figure", job.saved(bearing_design_figure(found, rows, title), job.path(f"{at}.png")))
+    title = at.title(job.name)
+    job.listed("figure", job.saved(bearing_design_figure(found, rows, title), job.path(f"{at.ending}.png")))
     kept.unlink(missing_ok=True)
     document = {
-        "shaft_speed_rpm": shaft_rpm,
-        "load_N": float(model.load),
+        **at.document,
         "vary": vary,
         "prices": prices,
         **report.chosen(found.best, "objective at_bound status"),

@@ -5,42 +5,36 @@ from functools import partial
 import numpy as np
 
 from .. import report
-from .._errors import InputError
 from ..design import DIRECTIONS, STATISTICS, bearing_gradient
 from ..models import BearingModel
 from ..plotting import statistic_bars
-from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
 from ._options import GradientOptions
 from ._show import Report
-from ._whole import SWEEPING, loaded, shaft_rpm_of
+from ._whole import SWEEPING, at_shaft_speed
 
 
 def bearing_gradients(job: Job[GradientOptions], model: BearingModel) -> Report:
     """Carry out `jaxcage gradient` of a whole bearing."""
     options = job.options
-    if options.speed is None:
-        raise InputError('Option --speed must be given for a whole bearing, e.g. --speed "10000 rpm shaft".')
-    model = loaded(model, options.load)
-    shaft_rpm = shaft_rpm_of(model, options.speed, job.speeds)
+    at = at_shaft_speed(job, model)
     given = job.given("designs spread starts discard revolutions seed")
     given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
     lanes, length = options.designs * given["starts"], given["discard"] + given["revolutions"]
     job.require(Demand(lanes, length, 2e4 * lanes, rate=SWEEPING * (1 if options.chaos else 2)))
     with job.computing("designs") as say:
         found = bearing_gradient(
-            model,
-            float(rpm(shaft_rpm)),
+            at.model,
+            at.speed,
             directions=options.by or DIRECTIONS,
             statistics=(*STATISTICS, "exponent") if options.chaos else STATISTICS,
             progress=partial(say, ""),
             **given,
         )
-    title = f"{job.name}, {shaft_rpm:g} rpm of the shaft, {float(model.load):g} N: elasticities"
-    at = f"_{shaft_rpm:g}rpm_shaft"
-    job.listed("figure", job.saved(statistic_bars(found, title), job.path(f"{at}.png")))
-    document = {"shaft_speed_rpm": shaft_rpm, "load_N": float(model.load), **report.bearing_gradient_document(found)}
+    title = f"{at.title(job.name)}: elasticities"
+    job.listed("figure", job.saved(statistic_bars(found, title), job.path(f"{at.ending}.png")))
+    document = {**at.document, **report.bearing_gradient_document(found)}
     notes = [
         "Elasticity: relative change of a mean by that of a parameter, with its standard error; "
         f"{found.pairs} pairs of designs within ±{100 * found.spread:g} %, {found.starts} starts, "

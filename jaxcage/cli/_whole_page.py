@@ -19,7 +19,7 @@ from ._console import visible
 from ._job import Job
 from ._options import ReportOptions
 from ._show import Report
-from ._whole import Examined, examined, shaft_speeds
+from ._whole import AtShaftSpeed, Examined, examined, shaft_speeds
 from ._whole_sweep import sweep_table, swept, zones_table
 
 
@@ -42,7 +42,7 @@ def bearing_report(job: Job[ReportOptions], model: BearingModel) -> Report:
     at = _operating(job, model) or [float(np.median(speeds)) * 30 / np.pi]
     found = swept(job, model, speeds)
     with job.computing() as say:
-        close = examined(job.name, model, at[0], REVOLUTIONS, DISCARD, options.tolerance)
+        close = examined(job.name, AtShaftSpeed(model, at[0]), REVOLUTIONS, DISCARD, options.tolerance)
         slopes = None if options.quick else bearing_gradient(model, float(rpm(at[0])), progress=partial(say, "designs"))
     zones = bearing_zones(found)
     sections = _sections(job.name, model, found, zones, close, slopes, at)

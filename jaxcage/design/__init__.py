@@ -25,7 +25,7 @@
 from .._arguments import check_layer
 from ._bearing_design import (
     CAGE_PARAMETERS as CAGE_PARAMETERS,
-    JUDGED as JUDGED,
+    COMPARED as COMPARED,
     TERMS as TERMS,
     BearingObjective as BearingObjective,
     BearingRuns as BearingRuns,

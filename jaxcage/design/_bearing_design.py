@@ -1,14 +1,13 @@
 """Designs of the whole bearing: wear, forces, friction, slip and balance, beside what they are now.
 
-Its motion is chaotic, so that a design is judged by means over drawn starts, the same ones for every design, and its
-slope is that of scattered pairs of designs, as in `bearing_gradient`. Load, speed, oil and traction stay what they are:
-only the cage is changed.
+Its motion is chaotic, so a design is measured by means over drawn initial states, the same ones for every design, and
+its slope is that of scattered pairs of designs, as in `bearing_gradient`. Load, speed, oil and traction stay what they
+are: only the cage is changed.
 """
 
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -44,8 +43,9 @@ TERMS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "slip": (("cage_slip",),),
     "balance": ((BALANCE,),),
 }
-"""What a design is judged by: sums of statistics, each sum beside what it is now; of two sums each counts half."""
-JUDGED = (*STATISTICS, "pocket_force_peak_N", "land_force_peak_N")
+"""What a design is measured by: sums of statistics, each sum relative to its present value; of two sums each counts
+half."""
+COMPARED = (*STATISTICS, "pocket_force_peak_N", "land_force_peak_N")
 """What is shown before and after, with the balance grade."""
 LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
 """A slip below this, and wear below that of this part of the cage's weight, count as nothing to compare with."""
@@ -53,7 +53,7 @@ LEAST_SLIP, LEAST_SHARE = 1e-3, 0.01
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BearingRuns:
-    """How designs are run to be judged. All designs begin with the same drawn places of the cage."""
+    """How designs are run to be measured. All begin with the same drawn positions of the cage."""
 
     speeds: Float[np.ndarray, " speeds"] | float
     """Ascending shaft speeds [rad/s]; all count alike."""
@@ -149,7 +149,7 @@ class BearingObjective(AbstractObjective):
 
     def _totals(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k 2"]:
         """The sum of each design in both halves of the run; NaN where one of its lanes failed."""
-        models: list[Any] = [space.model(place) for place in places]
+        models = [space.model(place) for place in places]
         rows = []
         for model, found in zip(models, self.runs.run(models), strict=True):
             exact = self.weights.get(BALANCE, 0.0) * balance_grade(model, self.runs.speeds)
@@ -173,7 +173,7 @@ def _fitted(
 
 
 def bearing_objective(
-    model: BearingModel, vary: Mapping[str, Any], runs: BearingRuns, prices: Mapping[str, float]
+    model: BearingModel, vary: Mapping[str, tuple[float, float]], runs: BearingRuns, prices: Mapping[str, float]
 ) -> BearingObjective:
     """Wear, forces, impulses, friction power, slip and balance of a whole bearing, each beside what it is now.
 
@@ -195,7 +195,7 @@ def bearing_objective(
         raise ArgumentError("prices", said=f"must be at least 0 and not all 0, but are {dict(prices)}.")
     runs.require_designs(len(vary))
     found = runs.run([model])[0]
-    now = {name: float(np.nanmean(_halves(found, name))) for name in JUDGED}
+    now = {name: float(np.nanmean(_halves(found, name))) for name in COMPARED}
     now[BALANCE] = balance_grade(model, runs.speeds)
     if not np.all(np.isfinite(list(now.values()))):
         raise ArgumentError("model", said="must run through from one of the starts at least, but fails from all.")
@@ -208,7 +208,7 @@ def bearing_objective(
     return BearingObjective(runs, weights)
 
 
-def _least(name: str, model: BearingModel, speeds: Any) -> float:
+def _least(name: str, model: BearingModel, speeds: Float[np.ndarray, " speeds"] | float) -> float:
     """What the cage's weight would do: as a force, over a revolution, rubbing with a hundredth of it."""
     weight = float(model.cage_mass * model.gravity)
     turning = float(np.mean(np.abs(model.rolling_cage_speed(jnp.asarray(speeds)))))
@@ -247,7 +247,7 @@ def before_and_after(before: BearingModel, after: BearingModel, runs: BearingRun
 
     **Arguments:** designs; how to run them, best `BearingRuns.fresh` of those that the search had.
 
-    **Returns:** a row for each of `JUDGED` and the balance grade; the number of lanes that failed, which are left out
+    **Returns:** a row for each of `COMPARED` and the balance grade; the number of lanes that failed, which are left out
     with those that began alike.
     """
     old, new = runs.run([before, after])
@@ -255,7 +255,7 @@ def before_and_after(before: BearingModel, after: BearingModel, runs: BearingRun
     mean = lambda x: float(x.mean()) if x.size else math.nan
     error = lambda x: float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan
     rows = []
-    for name in JUDGED:
+    for name in COMPARED:
         a, b = (_halves(each, name)[whole].mean(axis=-1) for each in (old, new))
         unit = STATISTIC_UNITS[name]
         rows.append(BeforeAfter(name, unit, mean(a), error(a), mean(b), error(b), mean(b - a), error(b - a)))

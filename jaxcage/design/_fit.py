@@ -130,15 +130,15 @@ def fit_edges(
 
     **Arguments:**
 
-    - `systems`: the cases by name; what is unknown is overwritten.
+    - `systems`: the cases by name; their unknown parameters are overwritten.
     - `unknowns`: what is to be found, shared by all cases.
     - `measured`: edges with their uncertainties, all synchronous-loss.
     - `points`: for each of them the bifurcation that it is, as located with the unknowns at `start`.
     - `start`: values of the unknowns [SI] to start from.
     - `method`: integration method of the orbits.
 
-    **Returns:** `Fit`. If an edge vanishes on the way, the step that led there is taken back and a shorter one tried;
-    `status` says if the search ended against such a wall.
+    **Returns:** `Fit`. If an edge vanishes on the way, the step that led there is undone and a shorter one tried;
+    `status` says if the search ended at such a limit.
 
     **Raises:** `ValueError` for edges that are chaotic, of a case that is not there, or without a point; unknowns that
     no case has; a start out of bounds.

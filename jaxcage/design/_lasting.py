@@ -19,7 +19,7 @@ from .._parameters import parameters, replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
 from ..integrate import AbstractMethod
 from ..models import CageModel
-from ..sweeps import sweep_designs
+from ..sweeps import Progress, sweep_designs
 
 
 NAMES = ("guidance_gap", "eccentricity")
@@ -127,7 +127,7 @@ def lasting_edge(
     spread: float = SPREAD,
     seed: int = 0,
     method: AbstractMethod | None = None,
-    progress: Any = None,
+    progress: Progress | None = None,
 ) -> LastingEdge:
     """Solve for an edge of lasting chaos and its elasticities, by survival regression.
 
@@ -195,7 +195,7 @@ def _escapes(
     rpm: Float[np.ndarray, " designs"],
     horizon: int,
     method: AbstractMethod | None,
-    progress: Any,
+    progress: Progress | None,
 ) -> tuple[Float[np.ndarray, "designs starts"], int]:
     """Revolutions after which lanes are calm, from all starts of each design; and to where they were followed."""
     designs = [replace(model, **dict(zip(names, row.tolist(), strict=True))) for row in values]

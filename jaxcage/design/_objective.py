@@ -1,4 +1,4 @@
-"""What a design is judged by: numbers with a slope, each exact or with a standard error, that add up.
+"""What a design is measured by: numbers with a slope, each exact or with a standard error, that add up.
 
 An objective is asked for its value and slope at many places of a design space at once, so that what is expensive runs
 in one batch. Slopes are with respect to places: 0 is a parameter's lower bound, 1 the upper one.
@@ -7,7 +7,7 @@ in one batch. Slopes are with respect to places: 0 is a parameter's lower bound,
 import abc
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Generic
 
 import jax
 import jax.numpy as jnp
@@ -16,20 +16,20 @@ from jaxtyping import Array, Float
 
 from .._parameters import parameters, replace
 from .._recent import jitted
-from ..models import AbstractForcedSystem, BearingModel
-from ._unknowns import Unknown, check_unknowns, slope_in_place, values_at, with_values
+from .._types import Scalar
+from ._unknowns import Design, Unknown, check_unknowns, slope_in_place, values_at, with_values
 
 
 @dataclasses.dataclass(frozen=True)
-class DesignSpace:
-    """A design and what may be changed in it."""
+class DesignSpace(Generic[Design]):
+    """A design, the parameters that may change, and their bounds."""
 
-    system: Any
+    system: Design
     """A forced system, or a whole bearing."""
     unknowns: tuple[Unknown, ...]
 
     @classmethod
-    def of(cls, system: AbstractForcedSystem | BearingModel, vary: Mapping[str, tuple[float, float]]) -> "DesignSpace":
+    def of(cls, system: Design, vary: Mapping[str, tuple[float, float]]) -> "DesignSpace[Design]":
         """From bounds [SI] by parameter name.
 
         **Raises:** `ValueError` for a parameter that the system does not have, bounds that do not ascend, or none.
@@ -53,7 +53,7 @@ class DesignSpace:
         """Parameters [SI] at a place."""
         return values_at(self.unknowns, place)
 
-    def model(self, place: Float[np.ndarray, " n"]) -> Any:
+    def model(self, place: Float[np.ndarray, " n"]) -> Design:
         """The design at a place."""
         return with_values({"": self.system}, self.unknowns, place)[""]
 
@@ -129,7 +129,7 @@ class Smooth(AbstractObjective):
     exact. All places are worked out under one `vmap`.
     """
 
-    function: Callable[[Any], Any]
+    function: Callable[..., Scalar]
     """From the system to a number."""
 
     def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:

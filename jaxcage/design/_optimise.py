@@ -1,8 +1,8 @@
 """Designs made better by gradient: bounded parameters, any optax optimiser, many starts at a time.
 
-A place between the bounds is a logistic function of an unbounded number, so that no step leaves the bounds. All starts
-take their steps together, and what their objective costs runs in one batch. A step that leads where the objective
-cannot be had is taken back by half. The search ends when the slope is small, or no larger than its own error.
+A position between the bounds is a logistic function of an unbounded number, so that no step leaves the bounds. All
+searches take their steps together, and their objectives are computed in one batch. A step to where the objective has no
+value is undone by half. The search ends when the slope is small, or no larger than its own error.
 """
 
 import dataclasses
@@ -11,7 +11,7 @@ import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 import jax
 import jax.numpy as jnp
@@ -22,8 +22,8 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
 from .._parameters import parameters
-from ..models import AbstractForcedSystem, BearingModel
 from ._objective import AbstractObjective, DesignSpace, Measured
+from ._unknowns import Design
 
 
 AT_BOUND = 0.01
@@ -70,7 +70,7 @@ class Step:
 
 
 @dataclasses.dataclass(frozen=True)
-class Optimum:
+class Optimum(Generic[Design]):
     """Where one search ended: its best design."""
 
     values: dict[str, float]
@@ -81,9 +81,9 @@ class Optimum:
     """Parameters that ended at a bound: there the bound chose, not the objective."""
     history: tuple[Step, ...]
     status: str
-    """`slope is small`, `slope within its error`, `step limit`, or why the objective could not be had."""
-    model: Any
-    """A forced system or a whole bearing, as what was searched from."""
+    """`slope is small`, `slope within its error`, `step limit`, or why the objective has no value."""
+    model: Design
+    """The design itself, of the kind that the search began with."""
 
     def __str__(self) -> str:
         rows = [
@@ -94,21 +94,21 @@ class Optimum:
 
 
 @dataclasses.dataclass(frozen=True)
-class Optimised:
+class Optimised(Generic[Design]):
     """What the searches from all starts found, the best first."""
 
-    optima: tuple[Optimum, ...]
-    space: DesignSpace
+    optima: tuple[Optimum[Design], ...]
+    space: DesignSpace[Design]
 
     @property
-    def best(self) -> Optimum:
+    def best(self) -> Optimum[Design]:
         """The best of all."""
         return self.optima[0]
 
     @property
-    def distinct(self) -> tuple[tuple[Optimum, int], ...]:
+    def distinct(self) -> tuple[tuple[Optimum[Design], int], ...]:
         """Optima that differ, with how many starts led to each."""
-        found: list[tuple[Optimum, int]] = []
+        found: list[tuple[Optimum[Design], int]] = []
         place = lambda o: np.array([u.place(o.values[u.name]) for u in self.space.unknowns])
         for optimum in self.optima:
             for i, (other, count) in enumerate(found):
@@ -125,7 +125,7 @@ class Optimised:
 
 
 def optimise(
-    system: AbstractForcedSystem | BearingModel,
+    system: Design,
     vary: Mapping[str, tuple[float, float]],
     objective: AbstractObjective,
     *,
@@ -137,19 +137,20 @@ def optimise(
     seed: int = 0,
     keep: str | Path | None = None,
     report: Callable[[int, Sequence[Measured]], None] | None = None,
-) -> Optimised:
-    """Make `objective` small over some parameters of a design.
+) -> Optimised[Design]:
+    """Minimise `objective` over some parameters of a design.
 
     **Arguments:**
 
     - `system`: the design; `vary`: bounds [SI] by parameter name.
     - `objective`: a sum of objectives, such as `chaotic_width(4000, 27500) + 500 * cost()`.
-    - `optimiser`: of optax, for the unbounded numbers behind the places; by default Adam with a falling rate.
-    - `starts`: how many searches: the first from the design itself, others from quasi-random places; or places.
-    - `scouts`: so many quasi-random places are looked at beforehand, without slopes; searches start from the best.
-    - `steps`: at most so many; `tolerance`: a slope below this part of the objective's first size is small.
-    - `seed`: of the quasi-random places.
-    - `keep`: file to keep the state in after each step; if it is there, the search goes on from it.
+        - `optimiser`: an optax optimiser of the unbounded variables; by default Adam with a decreasing rate.
+    - `starts`: number of searches, the first from the design itself, the others from quasi-random points; or these
+        points, as fractions of the way from the lower bounds to the upper ones.
+    - `scouts`: number of quasi-random points evaluated beforehand, without slopes; searches start from the best.
+    - `steps`: at most so many; `tolerance`: a slope below this fraction of the first value of the objective is small.
+    - `seed`: of the quasi-random points.
+    - `keep`: file in which the state is saved after each step; if it exists, the search continues from it.
     - `report`: called with the step and what was measured in each search.
 
     **Returns:** `Optimised`.
@@ -198,7 +199,7 @@ def optimise(
 
 
 def _first_places(
-    space: DesignSpace, objective: AbstractObjective, starts: Any, scouts: int, seed: int
+    space: DesignSpace, objective: AbstractObjective, starts: int | np.ndarray, scouts: int, seed: int
 ) -> Float[np.ndarray, "starts n"]:
     if isinstance(starts, np.ndarray):
         if starts.ndim != 2 or starts.shape[1] != len(space.unknowns) or not np.all((starts >= 0) & (starts <= 1)):
@@ -248,7 +249,7 @@ def _ended(history: Sequence[Step], tolerance: float) -> str | None:
     return None
 
 
-def _optimum(space: DesignSpace, history: Sequence[Step], status: str) -> Optimum:
+def _optimum(space: DesignSpace[Design], history: Sequence[Step], status: str) -> Optimum[Design]:
     known = [s for s in history if s.status == "ok"] or [history[-1]]
     best = min(known, key=lambda s: s.value)
     place = np.array(best.place)

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +11,7 @@ from .._errors import ArgumentError
 from .._parameters import parameters
 from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, CageModel
-from ..orbits import periodic_orbit
+from ..orbits import Guess, periodic_orbit
 from ._objective import Smooth
 
 
@@ -46,7 +45,7 @@ def cost(prices: Mapping[str, Price] = COSTS) -> Smooth:
 
 
 def regular_motion(
-    measure: str, speed: float, guess: Any, *, samples: int = 64, method: AbstractMethod | None = None
+    measure: str, speed: float, guess: Guess, *, samples: int = 64, method: AbstractMethod | None = None
 ) -> Smooth:
     """A measure of the synchronous motion of a cage at one speed.
 

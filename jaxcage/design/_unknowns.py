@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -10,6 +10,10 @@ from jaxtyping import Float
 from .._errors import ArgumentError, InputError
 from .._parameters import parameter_paths, replace
 from ..models import AbstractForcedSystem, BearingModel
+
+
+Design = TypeVar("Design", bound=AbstractForcedSystem | BearingModel)
+"""What is designed, whose kind its changed designs have too: a forced system such as a cage, or a whole bearing."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,8 +88,8 @@ def values_at(unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]) -> di
 
 
 def with_values(
-    systems: Mapping[str, Any], unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]
-) -> dict[str, Any]:
+    systems: Mapping[str, Design], unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]
+) -> dict[str, Design]:
     """The cases with the unknowns at `place`."""
     values = values_at(unknowns, place)
     chosen = {target: values[u.name] for u in unknowns for target in u.targets}

@@ -32,7 +32,7 @@ HALF = 16.0
 
 @dataclasses.dataclass(frozen=True)
 class BearingRun:
-    """What a bearing did: samples at equal angles of the cage, or at given times, and what was gathered between."""
+    """A run of a whole bearing: samples at equal angles of the cage, or at given times, and integrals between them."""
 
     time: Float[np.ndarray, " n"]
     """[s]."""
@@ -135,13 +135,13 @@ def simulate_bearing(
     samples per revolution; initial state, by default `rolling_start(model, speed)`; largest estimated error of a step
     and largest measured error between two samples, in units of `state_scale`.
 
-    **Returns:** `BearingRun`. Steps are as short as the tolerance asks for. From sample to sample the run is made a
+    **Returns:** `BearingRun`. Steps are as short as the tolerance requires. From sample to sample the run is made a
     second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
-    enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions part within a revolution or
-    two: longer stretches cannot be compared. A cage that comes to rest, or leaves its land, is `outside`: follow it
+    enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions diverge within a revolution
+    or two: longer stretches cannot be compared. A cage that comes to rest, or leaves its land, is `outside`: follow it
     over time, with `bearing_over_time`.
 
-    **Raises:** `ValueError` for a speed that is zero or no number, or impossible counts.
+    **Raises:** `ValueError` for a speed that is zero or not a number, or impossible counts.
     """
     require_x64()
     value = float(speed)
@@ -170,9 +170,9 @@ def bearing_over_time(
     tolerance: float = 1e-5,
     allowed: float = 1e-2,
 ) -> BearingRun:
-    """Time history over time: starting up, coasting, free flight, where the cage's angle is no measure.
+    """Time history with time as independent variable: for starting, coasting and free flight.
 
-    **Arguments:** model; shaft speed [rad/s]; times of the samples, growing, of which the first is that of `start` [s];
+    **Arguments:** model; shaft speed [rad/s]; ascending times of the samples, the first that of `start` [s];
     the rest as in `simulate_bearing`.
 
     **Returns:** `BearingRun`.

@@ -181,12 +181,12 @@ def run_block(
         leaves, tree = jax.tree.flatten(course)
         own = (error, h, new.y.bodies[4], slowest, sense, *old.integrand, *new.integrand, *new.watched)
 
-        def judge(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> list[Any]:
+        def accept(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> list[Any]:
             course, own = jax.tree.unflatten(tree, lane[: len(leaves)]), lane[len(leaves) :]
-            after, taken, hit = _judged(_Limits(*shared), course, own)
+            after, taken, hit = _accepted(_Limits(*shared), course, own)
             return [*jax.tree.leaves(after), taken, hit]
 
-        *after, taken, hit = lanewise(judge, len(leaves) + 2, tuple(limits), (*leaves, *own))
+        *after, taken, hit = lanewise(accept, len(leaves) + 2, tuple(limits), (*leaves, *own))
         point = kept(law, taken, new, old)
         here = (number == course.reached[None, None]) & (hit > 0)[None, None]
         places = jnp.where(here, place(point)[None], going.place)
@@ -225,7 +225,7 @@ def _to_try(base: Any, within: Any, step: Any, sense: Any) -> tuple[Any, Any]:
     return h, base + sense * within
 
 
-def _judged(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_Course, Any, Any]:
+def _accepted(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_Course, Any, Any]:
     """Take the step of a lane or refuse it, and choose the next one."""
     error, h, cage_speed, slowest, sense, *rest = own
     size = len(course.integrals)
@@ -270,7 +270,9 @@ def lanes_apart(scale: BearingState, a: Point, b: Point) -> Float[Array, " lanes
     return jnp.max(jnp.stack([*(jnp.max(x, axis=0) for x in rollers), *bodies]), axis=0)
 
 
-def bearing_states(lanes: BearingLanes) -> tuple[Any, Any]:
+def bearing_states(
+    lanes: BearingLanes,
+) -> tuple[Float[np.ndarray, "lanes 5 rollers"], Float[np.ndarray, "lanes 9"]]:
     """Rollers and bodies of each lane, lanes first."""
     count = lanes.angle.shape[0]
     rollers = np.stack([np.asarray(x).reshape(-1, count) for x in lanes.point.y.rollers])

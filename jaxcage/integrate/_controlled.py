@@ -32,23 +32,23 @@ TURN = 0.5
 """Largest difference that half as many steps may make to the leading tangent vector, relative to its length, at the
 default error."""
 FALL = 16.0
-"""What the difference of two rungs is never below, however well they agree: so many times less than that of the two
-before them. By fourth order it is 16; where it falls faster two rungs agree by accident: both may miss a contact."""
+"""What the difference of two levels is never below, however well they agree: so many times less than that of the two
+before them. By fourth order it is 16; where it falls faster two levels agree by accident: both may miss a contact."""
 CHANCE = 32.0
-"""Two rungs that agree so many times better than the two before them do so by chance: no order is assumed of them."""
+"""Two levels that agree so many times better than the two before them do so by chance: no order is assumed of them."""
 SLOW = 4.0
-"""Where the difference of two rungs is not so many times below that of the two before them, the law jumps on the way
+"""Where the difference of two levels is not so many times below that of the two before them, the law jumps on the way
 (the film's at its centre), and the error is that of first order: so many times the difference."""
 SURE = 3.0
 """So many times the difference is stated: where contacts and the ends of the film's arc move between the steps of two
-rungs, the finer one may be a little further from the truth than from the coarser."""
+levels, the finer one may be a little further from the truth than from the coarser."""
 EASY = 8
-"""A lane whose error is so many times below the tolerance begins the next revolution one rung lower: in vain that
-costs an eighth of the steps of the rung that is taken."""
+"""A lane whose error is so many times below the tolerance begins the next revolution one level lower: in vain that
+costs an eighth of the steps of the level that is taken."""
 
-Rungs = FixedSteps | AdaptiveSteps
-Attempt = Callable[[Rungs, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
-"""The revolution of those lanes that are marked by the i-th rung of a solver."""
+Levels = FixedSteps | AdaptiveSteps
+Attempt = Callable[[Levels, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
+"""The revolution of those lanes that are marked by the i-th level of a solver."""
 
 
 class Pieces(NamedTuple):
@@ -60,22 +60,22 @@ class Pieces(NamedTuple):
 
 
 class ControlledSteps(AbstractMethod):
-    """The first rung of a ladder at which the error of a revolution is within the tolerance.
+    """The first level of a ladder at which the error of a revolution is within the tolerance.
 
-    Each rung has about twice the steps of the one before it, with which it is compared. A cage that stays off the rib
-    for a revolution needs far fewer steps than a contact asks for, and neither is stiff as a rule: explicit rungs come
-    first, L-stable ones last. A revolution whose error is too large on the last rung too is `inaccurate`. The price of
-    control is that the strobe map is smooth only between the states at which the rung changes: for sweeps, not for
-    Newton's method. One program serves all tolerances and step counts.
+    A level is a solver with a number of steps, about twice that of the level before, with which it is compared. A cage
+    that stays off the rib for a revolution needs far fewer steps than one in contact, and neither is stiff as a rule:
+    explicit levels come first, L-stable ones last. A revolution whose error is too large on the last level too is
+    `inaccurate`. The price of control is that the strobe map is smooth only between the states at which the level
+    changes: it is for sweeps, not for Newton's method. One program serves all tolerances and step counts.
     """
 
-    ladder: tuple[Rungs, ...]
-    """One after the other: a solver with an array of step counts, or one with tolerances of its own. Two rungs at least
-    in all."""
+    ladder: tuple[Levels, ...]
+    """One after the other: a solver with an array of step counts, or one with tolerances of its own. At least two
+    levels in all."""
     tolerance: Float[Array, ""]
-    """Infinite where the last rung is to be taken whatever its error, which is stated all the same."""
+    """Infinite where the last level is to be taken whatever its error, which is stated all the same."""
     turn: Float[Array, ""]
-    """Largest difference that the rung before may make to the leading tangent vector, relative to its length."""
+    """Largest difference that the level before may make to the leading tangent vector, relative to its length."""
     multiple: int = eqx.field(static=True)
     """What all step counts are multiples of."""
 
@@ -88,30 +88,30 @@ class ControlledSteps(AbstractMethod):
         phase: Scalar,
         parts: Int[Array, ""] | int,
     ) -> Stretch:
-        """One part, by the first rung whose error is within the part's share of the tolerance, else by the last."""
+        """One part, by the first level whose error is within the part's share of the tolerance, else by the last."""
         pieces = Pieces(field, system, scale)
-        attempt = lambda rungs, i, _: moved_by(run_rung(self, rungs, i, pieces, phase, parts), y, ())
+        attempt = lambda levels, i, _: moved_by(run_level(self, levels, i, pieces, phase, parts), y, ())
         moved = climb(self, jnp.zeros((), jnp.int32), nowhere(y, ()), scale, attempt, system.harmonics, parts)
         return Stretch(moved.y, moved.peak, result_of(moved.outcome), moved.error)
 
     @property
     def sizes(self) -> list[int]:
-        """Rungs of each solver."""
+        """Levels of each solver."""
         return [r.steps.size if isinstance(r, FixedSteps) else 1 for r in self.ladder]  # pyright: ignore
 
     @property
     def floors(self) -> list[int]:
-        """For each rung, the lowest one of its own solver that can be judged by that solver too."""
+        """For each level, the lowest one of its own solver whose error can be measured by that solver too."""
         firsts = [0, *itertools.accumulate(self.sizes)]
         return [first + min(self.before, n - 1) for first, n in zip(firsts, self.sizes, strict=False) for _ in range(n)]
 
     @property
     def before(self) -> int:
-        """Rungs below the one that is taken, by which it is judged: two, unless there are but two in all."""
+        """Levels below the one that is taken, by which its error is measured: two, unless there are but two in all."""
         return min(2, sum(self.sizes) - 1)
 
     def lowest(self, harmonics: int) -> Int[Array, ""]:
-        """The first rung of two steps at least to a period of the forcing's highest harmonic: two rungs with fewer
+        """The first level of two steps at least to a period of the forcing's highest harmonic: two levels with fewer
         would agree on a slower forcing that is not there."""
         coarse = [
             jnp.sum(r.steps < 2 * harmonics, dtype=jnp.int32) for r in self.ladder[:1] if isinstance(r, FixedSteps)
@@ -120,21 +120,21 @@ class ControlledSteps(AbstractMethod):
 
     def __str__(self) -> str:
         of = lambda r: f"{type(r.solver).__name__} {', '.join(map(str, r.steps.tolist()))}"  # pyright: ignore
-        rungs = [of(r) if isinstance(r, FixedSteps) else str(r) for r in self.ladder]
-        return f"steps per revolution for an error of {float(self.tolerance):g}: {'; '.join(rungs)}"
+        levels = [of(r) if isinstance(r, FixedSteps) else str(r) for r in self.ladder]
+        return f"steps per revolution for an error of {float(self.tolerance):g}: {'; '.join(levels)}"
 
 
-def run_rung(
-    method: ControlledSteps, rungs: Rungs, i: Int[Array, ""], pieces: Pieces, phase: Any = 0.0, parts: Any = 1
+def run_level(
+    method: ControlledSteps, levels: Levels, i: Int[Array, ""], pieces: Pieces, phase: Any = 0.0, parts: Any = 1
 ) -> Callable[[State], Stretch]:
-    """One part by the i-th of `rungs`, with as many times the steps of the ladder's first rung as in a revolution."""
-    if isinstance(rungs, AdaptiveSteps):
-        return lambda y: rungs.advance(*pieces, y, phase, parts)
-    steps, multiple = jnp.asarray(rungs.steps)[i], method.multiple
+    """One part by the i-th of `levels`, with as many times the steps of the ladder's first level as in a revolution."""
+    if isinstance(levels, AdaptiveSteps):
+        return lambda y: levels.advance(*pieces, y, phase, parts)
+    steps, multiple = jnp.asarray(levels.steps)[i], method.multiple
     if not (isinstance(parts, int) and parts == 1):
         unit = jnp.asarray(method.ladder[0].steps)[0] if isinstance(method.ladder[0], FixedSteps) else 1
         steps, multiple = -(-(-(-unit // parts) * steps) // unit) * parts, 1
-    return lambda y: run_steps(rungs.solver, steps, *pieces, y, phase, parts, multiple=multiple)
+    return lambda y: run_steps(levels.solver, steps, *pieces, y, phase, parts, multiple=multiple)
 
 
 def nowhere(y: Any, tangents: Any) -> Moved:
@@ -153,7 +153,7 @@ def climb(
     harmonics: int = 1,
     parts: Any = 1,
 ) -> Moved:
-    """Lanes, or one without an axis, by the first rung whose error is small enough, beginning two below `level`.
+    """Lanes, or one without an axis, by the first level whose error is small enough, beginning two below `level`.
 
     One whose level is negative stays where it is.
     """
@@ -161,27 +161,27 @@ def climb(
     begin = jnp.maximum(level - method.before, lowest)
     carry = (begin, start, level < 0, start.error)
     first = 0
-    for rungs, size in zip(method.ladder, method.sizes, strict=True):
+    for levels, size in zip(method.ladder, method.sizes, strict=True):
 
         def asked(carry: tuple, end: int = first + size) -> Any:
-            rung, _, done, _ = carry
-            return jnp.any(~done & (rung < end))
+            at, _, done, _ = carry
+            return jnp.any(~done & (at < end))
 
-        def once(carry: tuple, rungs: Rungs = rungs, first: int = first) -> tuple:
-            rung, before, done, gap = carry
-            lowest = jnp.min(jnp.where(done, sum(method.sizes), rung))
-            mine = ~done & (rung == lowest)
-            tried = attempt(rungs, lowest - first, mine)
-            height = rung - begin
+        def once(carry: tuple, levels: Levels = levels, first: int = first) -> tuple:
+            at, before, done, gap = carry
+            lowest = jnp.min(jnp.where(done, sum(method.sizes), at))
+            mine = ~done & (at == lowest)
+            tried = attempt(levels, lowest - first, mine)
+            height = at - begin
             apart = jnp.where(height == 0, jnp.inf, _apart(tried.y, before.y, scale))
             error = apart if method.before == 1 else _error(apart, gap)
             fine = (tried.outcome == 0) & (error <= method.tolerance / parts) & (height >= method.before)
             if tried.tangents:
                 fine &= _turned(tried.tangents[0], before.tangents[0], scale) <= method.turn
-            tried = tried._replace(error=error, half=before.tangents, level=rung)
+            tried = tried._replace(error=error, half=before.tangents, level=at)
             now = jax.tree.map(lambda a, b: jnp.where(mine, a, b), tried, before)
             gap = jnp.where(mine, apart, gap)
-            return jnp.where(mine & ~fine, rung + 1, rung), now, done | (mine & fine), gap
+            return jnp.where(mine & ~fine, at + 1, at), now, done | (mine & fine), gap
 
         carry = jax.lax.while_loop(asked, once, carry)
         first += size
@@ -196,7 +196,7 @@ def climb(
 
 
 def _error(apart: Any, gap: Any) -> Any:
-    """Of a rung, from its difference to the one before it, and the difference of that to the one before."""
+    """Of a level, from its difference to the one before it, and the difference of that to the one before."""
     least = gap / jnp.where(gap > CHANCE * apart, SLOW, FALL)
     return SURE * jnp.maximum(jnp.where(SLOW * apart > gap, SLOW * apart, apart), least)
 
@@ -225,11 +225,11 @@ def stated(method: AbstractMethod) -> ControlledSteps:
     return ControlledSteps(ladder, unbounded, unbounded, 1)
 
 
-def _ladder(rungs: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:
+def _ladder(levels: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:
     """Of solvers with their step counts."""
-    counts = [steps for _, each in rungs for steps in each]
+    counts = [steps for _, each in levels for steps in each]
     multiple = math.gcd(*counts, 4) if all(isinstance(c, int) for c in counts) else 1
-    fixed = tuple(FixedSteps(solver, jnp.asarray(each, jnp.int32)) for solver, each in rungs)
+    fixed = tuple(FixedSteps(solver, jnp.asarray(each, jnp.int32)) for solver, each in levels)
     turn = TURN if math.isfinite(tolerance) else math.inf
     return ControlledSteps(fixed, jnp.asarray(float(tolerance)), jnp.asarray(turn), multiple)
 
@@ -254,17 +254,19 @@ def finer(method: AbstractMethod, times: int = 1) -> ControlledSteps:
 
 
 def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] = DEFAULT_LADDER) -> ControlledSteps:
-    """The default method: in each revolution the first rung of `ladder` whose error is at most `error`.
+    """The default method: each revolution is run with more and more steps until its error is at most `error`.
 
-    **Arguments:** how far the end of a revolution may move if it is run with the rung before, in units of the system's
-    own scale (for a cage: clearances); solvers by name with their steps per revolution, in the order in which they are
-    tried.
+    **Arguments:**
 
-    **Raises:** `ValueError` for an error that is not positive, a ladder of fewer than two rungs, or an unknown solver.
+    - `error`: how far the end of a revolution may move when it is run with the steps that were tried before, in units
+        of the system's own scale (for a cage: clearances).
+    - `ladder`: solvers by name with their steps per revolution, in the order in which they are tried.
+
+    **Raises:** `ValueError` for an error that is not positive, fewer than two entries, or an unknown solver.
     """
     if len(ladder) < 2 or any(int(steps) < 1 for _, steps in ladder):
         raise ArgumentError("ladder", said=f"must have two or more pairs of a solver and its steps, but is {ladder}.")
     if not error > 0:
         raise ArgumentError("error", said=f"must be positive, but {error} was given.")
     groups = itertools.groupby(ladder, key=lambda pair: pair[0])
-    return _ladder([(make_fixed(name, 1).solver, [int(n) for _, n in rungs]) for name, rungs in groups], error)
+    return _ladder([(make_fixed(name, 1).solver, [int(n) for _, n in levels]) for name, levels in groups], error)

@@ -138,7 +138,7 @@ def advance(
         difference = (k4 - k5)[: n_state - 2]
         error = _over(lambda h, d, u: jnp.max(jnp.abs(h / 6 * d) * u), h, difference, units)
         error = jax.lax.stop_gradient(error)
-        new, done = _judged(lanes, found, h, left, error, done, span, controls)
+        new, done = _accepted(lanes, found, h, left, error, done, span, controls)
         lost = (jnp.abs(new.rates[n_state - 2]) < controls.slowest) | (new.peaks[-1] > FAR)
         outcome = jnp.where((new.outcome == 0) & lost, OUTSIDE, new.outcome).astype(jnp.int32)
         return new._replace(outcome=outcome), jnp.where(outcome == OUTSIDE, span, done)
@@ -148,7 +148,7 @@ def advance(
     return lanes
 
 
-def _judged(
+def _accepted(
     lanes: Lanes,
     found: tuple[Array, Array, Array],
     h: Array,

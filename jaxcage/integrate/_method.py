@@ -76,7 +76,7 @@ def _worse(first: RESULTS, second: RESULTS) -> RESULTS:
     return RESULTS.where(first == RESULTS.successful, second, first)  # pyright: ignore[reportReturnType]
 
 
-def judge(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
+def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
     """What to say of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
@@ -115,7 +115,7 @@ def run_steps(
             parts=parts,
             multiple=multiple or 1,
         )
-        return Stretch(y, peak, judge(dfx.RESULTS.successful, y, peak, ESCAPE))
+        return Stretch(y, peak, result_at(dfx.RESULTS.successful, y, peak, ESCAPE))
     return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), *pieces, y, phase)
 
 
@@ -150,14 +150,14 @@ def _by_solver(
     start = (y, jnp.zeros(()), dfx.RESULTS.successful, state)
     y, peak, result, _ = jax.lax.fori_loop(0, count, step, start)
     y = unscale(y)
-    return Stretch(y, peak, judge(result, y, peak, ESCAPE))
+    return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
 
 
 class FixedSteps(AbstractMethod):
     """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
 
     solver: dfx.AbstractSolver
-    steps: int | Int[Array, "*rungs"]
+    steps: int | Int[Array, "*levels"]
     """An array where one program is to serve all numbers of steps."""
 
     def __check_init__(self):
@@ -212,7 +212,7 @@ class AdaptiveSteps(AbstractMethod):
         y = multiply(tuple(c[-1] for c in solution.ys), scale)
         excursions = jax.vmap(lambda z: jnp.asarray(system.excursion(multiply(z, scale))))(solution.ys)
         excursion = jax.lax.stop_gradient(jnp.max(excursions))
-        return Stretch(y, excursion, judge(solution.result, y, excursion, ESCAPE))
+        return Stretch(y, excursion, result_at(solution.result, y, excursion, ESCAPE))
 
 
 # `scan_kind="lax"`: outside `diffeqsolve`, diffrax's own solvers are differentiable in forward mode only with this.
@@ -261,11 +261,11 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
 
     - `solver`: `rodas3`, `rodas4` (ours, structured), `rk4` (classical), `newmark` (the paper's), `tsit5`, `kvaerno3`,
         `kvaerno5`, `kencarp4` (diffrax's).
-    - `steps`: equal steps per revolution; the default is what `benchmarks/convergence.py` settled.
+    - `steps`: equal steps per revolution; the default was chosen with `benchmarks/convergence.py`.
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
 
-    **Raises:** `ValueError` for a name that is not known, or both `steps` and `tolerance`.
+    **Raises:** `ValueError` for an unknown name, or both `steps` and `tolerance`.
     """
     if tolerance is None:
         return make_fixed(solver, DEFAULT_STEPS if steps is None else steps)

@@ -16,9 +16,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar, State
 from ..models import ESCAPE
-from ._controlled import ControlledSteps, Pieces, Rungs, climb, nowhere, run_rung
+from ._controlled import ControlledSteps, Levels, Pieces, climb, nowhere, run_level
 from ._kernel import KernelSolver, can_be_kernel, steps_through
-from ._method import FixedSteps, Stretch, judge
+from ._method import FixedSteps, Stretch, result_at
 from ._moved import Moved, Tangents, moved_by
 from ._results import outcome_code
 from ._strobe import StrobeMap
@@ -56,7 +56,7 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
         return _pushed_from_outside(strobe, y, tangents, drifts)
     solver = cast(KernelSolver, method.solver)
     y, peak, after = steps_through(solver, method.steps, strobe.field, strobe.system, strobe.scale, y, tangents, drifts)
-    code = outcome_code(judge(dfx.RESULTS.successful, y, peak, ESCAPE))
+    code = outcome_code(result_at(dfx.RESULTS.successful, y, peak, ESCAPE))
     return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(jnp.nan), ())
 
 
@@ -81,7 +81,7 @@ def _pushed_from_outside(strobe: StrobeMap, y: State, tangents: Tangents, drifts
 
 
 def _controlled(strobe: StrobeMap, y: State, tangents: Tangents, level: Any) -> Moved:
-    """A lane one revolution on; under `jax.vmap`, lanes that ask for the same rung are packed together."""
+    """A lane one revolution on; under `jax.vmap`, lanes that ask for the same level are packed together."""
     numbers, rest = eqx.partition(strobe, eqx.is_array)
     row, form = jax.tree.flatten(numbers)
     remake = lambda row: eqx.combine(jax.tree.unflatten(form, row), rest)
@@ -113,10 +113,12 @@ def _lanes(
     method, harmonics = alike.method, alike.system.harmonics
     assert isinstance(method, ControlledSteps)
 
-    def attempt(rungs: Rungs, i: Array, mine: Bool[Array, " lanes"]) -> Moved:
+    def attempt(levels: Levels, i: Array, mine: Bool[Array, " lanes"]) -> Moved:
         def one(row: Sequence[Any], y: State, tangents: Tangents) -> Moved:
             strobe = remake(row)
-            return moved_by(run_rung(method, rungs, i, Pieces(strobe.field, strobe.system, strobe.scale)), y, tangents)
+            return moved_by(
+                run_level(method, levels, i, Pieces(strobe.field, strobe.system, strobe.scale)), y, tangents
+            )
 
         return _packed(one, mine, row, own, y, tangents)
 

@@ -172,7 +172,7 @@ def ramp(
     start: State | None = None,
     method: AbstractMethod | None = None,
 ) -> Trajectory:
-    """Time history of a true speed ramp: the speed changes all the time, by the same amount in every revolution.
+    """Time history of a true speed ramp: the speed changes continuously, by the same amount in every revolution.
 
     Within a revolution the speed rises in `samples` steps. The tangential force M e dw/dt of the unbalance is left out:
     its ratio to M e w^2 is the relative change of speed in one radian.

@@ -13,7 +13,7 @@ from .._checks import require_x64
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
 from ._controlled import controlled
-from ._method import REVOLUTION, AbstractMethod, Stretch, judge
+from ._method import REVOLUTION, AbstractMethod, Stretch, result_at
 from ._results import RESULTS
 
 
@@ -36,7 +36,7 @@ class StrobeMap(eqx.Module):
 
     def admit(self, y: State, limit: Scalar = 1.0) -> RESULTS:
         """Whether a lane may start from `y`: no further out than `limit`."""
-        return judge(dfx.RESULTS.successful, y, self.system.excursion(y), limit)
+        return result_at(dfx.RESULTS.successful, y, self.system.excursion(y), limit)
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:

@@ -38,7 +38,6 @@ from ._csv import (
     strobe_columns as strobe_columns,
     trajectory_columns as trajectory_columns,
     write_columns as write_columns,
-    write_trajectory as write_trajectory,
 )
 from ._dataset import (
     from_dataset as from_dataset,

@@ -50,15 +50,6 @@ def trajectory_columns(
     return {name: np.asarray(column) for name, column in columns.items()}
 
 
-def write_trajectory(
-    path: str | Path,
-    trajectory: Trajectory,
-    forces: Mapping[str, Float[np.ndarray, "samples 2"]] | None = None,
-) -> Path:
-    """Write a trajectory, with the forces on the cage if given, as CSV in SI units."""
-    return write_columns(path, trajectory_columns(trajectory, forces))
-
-
 def strobe_columns(found: Sweep) -> dict[str, Shaped[np.ndarray, " points"]]:
     """Strobe points of all starts of a sweep at its first speed, in SI units."""
     _, starts, keep, dimension = found.strobe.shape

@@ -7,7 +7,6 @@
 | `_cage`           | the cage in its rib: parameters                                                  |
 | `_cage_at_speed`  | the cage in its rib: forces at one speed                                         |
 | `_door`           | refusal of traced arguments and of speeds that no cage has                       |
-| `_groups`         | dimensionless groups                                                             |
 | `_cases`          | the paper's six cases as models                                                  |
 | `_constants`      | what the paper leaves out, in sets                                               |
 | `_printed`        | a model as people read it                                                        |
@@ -36,7 +35,6 @@ from ._field import (
     divide as divide,
     multiply as multiply,
 )
-from ._groups import dimensionless_groups as dimensionless_groups
 from ._system import (
     ESCAPE as ESCAPE,
     AbstractForcedSystem as AbstractForcedSystem,
@@ -53,5 +51,5 @@ from .whole import (
 
 check_layer(
     globals(),
-    "case dimensionless_groups fastest_speed rolling_start whole_bearing",
+    "case fastest_speed rolling_start whole_bearing",
 )

@@ -10,7 +10,7 @@ from ._constants import constants as constants_named
 def case(name: str, constants: str = "identified") -> CageModel:
     """The published case `name`, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2).
 
-    **Arguments:** name; which set of constants the paper does not print (`jaxcage.models.CONSTANTS`).
+    **Arguments:** name; which set of the constants that the paper does not give (`jaxcage.models.CONSTANTS`).
 
     **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
     """

@@ -40,7 +40,7 @@ def require_speeds(system: AbstractForcedSystem, speeds: Any, name: str = "speed
         )
 
 
-def require_known(function: str, instead: str, *arguments: Any) -> None:
+def require_known(function: str, instead: str, *arguments: object) -> None:
     """Stop where `jax.vmap`, `jax.grad` or `jax.jit` goes over a function that steers by what it finds.
 
     **Raises:** `ValueError` that says what to call `instead`.
@@ -55,7 +55,7 @@ def require_known(function: str, instead: str, *arguments: Any) -> None:
         )
 
 
-def _is_traced(arguments: Any) -> bool:
+def _is_traced(arguments: object) -> bool:
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(arguments))
 
 

@@ -84,7 +84,7 @@ class ForcedSystem(AbstractForcedSystem):
     rates: Callable[[Scalar, State, Scalar], State]
     _dimension: int = eqx.field(static=True)
     _scale: float | tuple[float, ...] = eqx.field(static=True)
-    _starts: tuple[Any, ...] = eqx.field(static=True)
+    _starts: tuple[tuple[float, ...], ...] = eqx.field(static=True)
     _harmonics: int = eqx.field(static=True, default=1)
 
     @checked
@@ -142,7 +142,7 @@ class ForcedOscillator(AbstractForcedSystem):
     acceleration: Callable[[Scalar, State, State, Scalar], State]
     coordinates: int = eqx.field(static=True)
     _scale: float | tuple[float, ...] = eqx.field(static=True)
-    _starts: tuple[Any, ...] = eqx.field(static=True)
+    _starts: tuple[tuple[float, ...], ...] = eqx.field(static=True)
     _harmonics: int = eqx.field(static=True, default=1)
 
     @checked

@@ -6,6 +6,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from .._errors import InputError
 from .._types import State
@@ -34,7 +35,7 @@ def components(what: str, law: Callable[..., State], *arguments: Any, number: in
     wanted = f"{what} must return a tuple of {number} scalar{'s' if number > 1 else ''}, one for each component"
     if isinstance(found, tuple | list):
         shapes = [jnp.shape(part) for part in found]
-    elif hasattr(found, "shape") and len(found.shape) > 0:
+    elif isinstance(found, jax.Array | np.ndarray) and found.ndim > 0:
         shapes = [found.shape[1:]] * found.shape[0]
     else:
         raise InputError(f"{wanted}, but returned {_named(found)}: a single one is written `(a,)`.")

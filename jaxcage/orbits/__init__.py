@@ -2,7 +2,7 @@
 
 | module         | responsibility                                                                     |
 |----------------|------------------------------------------------------------------------------------|
-| `_lens`        | parameters by name                                                                 |
+| `_by_name`     | parameters by name                                                                 |
 | `_problem`     | the equations of an orbit and their unknowns                                       |
 | `_newton`      | damped Newton as an optimistix solver                                              |
 | `_implicit`    | roots with derivatives by the implicit function theorem                            |
@@ -18,7 +18,7 @@
 | `_illinois`    | where a function along a curve vanishes                                            |
 | `_follower`    | what the lanes of one continuation of orbits share                                 |
 | `_located`     | bifurcations between orbits of a branch, every change of stability accounted for   |
-| `_normal_form` | super- or subcritical period doublings and Neimark-Sacker bifurcations                      |
+| `_normal_form` | super- or subcritical period doublings and Neimark-Sacker bifurcations             |
 | `_branch`      | branches of orbits with their bifurcations                                         |
 | `_search`      | the synchronous orbits of a speed range, found without a hint                      |
 | `_loss`        | synchronous-loss zones and their edges                                             |
@@ -33,10 +33,10 @@ from .._arguments import check_layer
 from ._arclength import Steps as Steps
 from ._bifurcation import bifurcation as bifurcation
 from ._branch import Branch as Branch, branch as branch, branches as branches
+from ._by_name import pick as pick
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
 from ._coexisting import coexisting_orbits as coexisting_orbits
 from ._curve import CodimensionTwo as CodimensionTwo, Curve as Curve, curve as curve
-from ._lens import pick as pick
 from ._loss import LossZones as LossZones, loss_zones as loss_zones
 from ._mechanism import Explained as Explained, explain as explain
 from ._multiplier import LeadingMultiplier as LeadingMultiplier, leading_multiplier as leading_multiplier
@@ -46,7 +46,14 @@ from ._normal_form import (
     normal_form_coefficient as normal_form_coefficient,
     normal_form_places as normal_form_places,
 )
-from ._orbit import Orbit as Orbit, periodic_orbit as periodic_orbit
+from ._orbit import (
+    Guess as Guess,
+    NearOrbit as NearOrbit,
+    Orbit as Orbit,
+    PointGuess as PointGuess,
+    StateLike as StateLike,
+    periodic_orbit as periodic_orbit,
+)
 from ._point import Point as Point
 from ._search import (
     Stretch as Stretch,

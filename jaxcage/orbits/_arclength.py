@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
-from ._astray import ASIDE, CROSSED, judged
+from ._astray import ASIDE, CROSSED, classified
 from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, Counts
 
@@ -335,7 +335,7 @@ def follow(
         ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
         closely = np.clip(OF_A_STEP * length[index], 2 * TOLERANCE, FOLLOWING)
         got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True)
-        missed, turned, sure, same = judged(steps, last, got, ahead, normal, length[index], apart)
+        missed, turned, sure, same = classified(steps, last, got, ahead, normal, length[index], apart)
         same |= update is not None  # new equations have an orientation of their own
         good = sure & (same | crosses[index])
         finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)

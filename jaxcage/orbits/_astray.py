@@ -32,10 +32,10 @@ class Step(NamedTuple):
     """Whether the orientation is."""
 
 
-def judged(
+def classified(
     steps: Any, last: Any, got: Any, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
 ) -> Step:
-    """Steps judged by the points that they begin and end with.
+    """Steps classified by the points that they begin and end with.
 
     **Arguments:** what is allowed (`Steps`); last points and new ones (`Corrected`); predictions and their unit
     tangents; lengths of the steps and of those before, infinite where there was none.

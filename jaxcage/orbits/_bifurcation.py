@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, cast, get_args
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float
+from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._arguments import shown, wrong
 from .._checks import require_x64
@@ -14,11 +14,11 @@ from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
+from ._by_name import SPEED, Parameter, value as value_of, with_value
 from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
-from ._lens import SPEED, Parameter, value as value_of, with_value
 from ._normal_form import KINDS_WITH_ONE, coefficients
-from ._orbit import OrbitEquations, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
+from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point
 from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, across_orbit, frozen, is_traced, make_frame
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
@@ -103,11 +103,11 @@ def critical_matrix(
 def bifurcation(
     system: AbstractForcedSystem,
     kind: str,
-    guess: Any,
+    guess: PointGuess,
     parameter: Parameter = SPEED,
     *,
     speed: Scalar | None = None,
-    periods: Any = None,
+    periods: int | Int[Array, ""] | None = None,
     period: str = "driven",
     reach: float | int = 0.1,
     method: AbstractMethod | None = None,
@@ -126,8 +126,8 @@ def bifurcation(
     - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
-    - `reach`: how far the branch is followed, in parts of the parameter's value (of 1 where that is 0); 0 for not at
-        all, as under `jit`, `vmap` and `grad`, where nothing is known of what Newton's method finds.
+    - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 where that is 0); 0 turns
+        this off. It is off under `jit`, `vmap` and `grad`, where it is not known what Newton's method finds.
 
     **Returns:** `Point`; it does not raise if there is none, but says where it looked. Works under `jit` and
     `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`, by the implicit
@@ -143,12 +143,13 @@ def bifurcation(
     free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
-    periods = jnp.asarray(getattr(guess, "periods", 1) if periods is None else periods)
+    near = guess if isinstance(guess, Orbit | Point) else None
+    periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)
 
     def find(state: Any, speed: Any, at: Any, spin: bool) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:
             problem = OrbitProblem(method, system.dimension, free, (parameter,))
-            counts = from_steps(counts, getattr(guess, "steps", None))
+            counts = from_steps(counts, None if near is None else near.steps)
             begin = jnp.asarray(speed, dtype=float)
             numbers = frozen((given, state, begin, at))
             found, equations, u, known = _find_point(problem, counts, cast(Kind, kind), *numbers, periods, spin)
@@ -198,21 +199,20 @@ def _classed(point: Point, follower: Follower) -> Point:
 
 
 def _read_guess(
-    system: AbstractForcedSystem, guess: Any, parameter: Parameter, speed: Scalar | None
+    system: AbstractForcedSystem, guess: PointGuess, parameter: Parameter, speed: Scalar | None
 ) -> tuple[Array, Any, Array, bool]:
     """State, speed, value of the parameter, and whether the state is to be found by simulation."""
-    spin = False
-    known_speed = getattr(guess, "speed", speed)
-    if hasattr(guess, "state"):
-        state = guess.state
-        at = getattr(guess, "value", None)
-        if at is None or getattr(guess, "parameter", parameter) != parameter:
+    spin, known_speed = False, speed
+    if isinstance(guess, Orbit | Point):
+        state, known_speed = guess.state, guess.speed
+        if isinstance(guess, Point) and guess.parameter == parameter:
+            at = guess.value
+        else:
             at = value_of(system, known_speed, parameter)
     elif isinstance(guess, tuple) and len(guess) == 2:
         state, at = guess
     else:
-        spin, at = True, cast(Any, guess)
-        state = None
+        spin, state, at = True, None, guess
     if wrong("guess", Scalar, at):
         said = "must be a number, a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")

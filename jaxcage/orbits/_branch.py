@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -17,6 +16,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, follow, take
+from ._by_name import SPEED, Parameter, value as value_of
 from ._follower import (
     Follower,
     Start,
@@ -27,10 +27,9 @@ from ._follower import (
     stable_steps,
     turned,
 )
-from ._lens import SPEED, Parameter, value as value_of
 from ._located import Seen, account
 from ._normal_form import coefficients
-from ._orbit import guess_state
+from ._orbit import NearOrbit, Orbit, guess_state
 from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point
 from ._problem import Frame, Given, across_orbit
 from ._steps import SETTLED
@@ -81,7 +80,7 @@ class Branch:
 
 def branch(
     system: AbstractForcedSystem,
-    orbit: Any,
+    orbit: NearOrbit,
     parameter: Parameter = SPEED,
     *,
     lower: float,
@@ -109,15 +108,17 @@ def branch(
     require_x64()
     if not lower < upper:
         raise ArgumentError("upper", said=f"must be above `lower`, but they are {upper:g} and {lower:g}.")
-    known_speed: Any = getattr(orbit, "speed", speed)
-    state, at = orbit if isinstance(orbit, tuple) else (orbit.state, value_of(system, known_speed, parameter))
-    known_speed = at if parameter == SPEED else known_speed
+    if isinstance(orbit, Orbit | Point):
+        speed, periods = orbit.speed, int(orbit.periods)
+        state, at = orbit.state, value_of(system, speed, parameter)
+    else:
+        state, at = orbit
+    known_speed = at if parameter == SPEED else speed
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
     state = guess_state(system, known_speed, state)
-    count = int(getattr(orbit, "periods", periods))
-    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], count, steps)
+    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], periods, steps)
     if found is None:
         raise ArgumentError("orbit", said=f"must be near a periodic orbit, but none is near it at {float(at):g}.")
     return found
@@ -125,7 +126,7 @@ def branch(
 
 def branches(
     systems: Sequence[AbstractForcedSystem],
-    orbits: Sequence[Any],
+    orbits: Sequence[Orbit | Point],
     parameter: Parameter = SPEED,
     *,
     lower: float,

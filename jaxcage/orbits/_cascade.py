@@ -1,7 +1,6 @@
 """Period-doubling cascades: doubling after doubling along the doubled branches, and where they accumulate."""
 
 import dataclasses
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,12 +8,13 @@ import numpy as np
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
+from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
 from ._branch import Branch, describe
+from ._by_name import SPEED, Parameter
 from ._follower import Follower, eigenvalues, make_follower
-from ._lens import SPEED, Parameter
 from ._point import Point
 from ._singularity import test_functions
 
@@ -71,7 +71,7 @@ def doubled_branch(
     *,
     lower: float,
     upper: float,
-    speed: Any = None,
+    speed: Scalar | None = None,
     period: str = "driven",
     steps: Steps = Steps(first=0.01, shortest=1e-7),
     amplitude: float = 0.02,
@@ -127,7 +127,7 @@ def cascade(
     lower: float,
     upper: float,
     levels: int = 4,
-    speed: Any = None,
+    speed: Scalar | None = None,
     period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Cascade:

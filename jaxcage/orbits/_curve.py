@@ -17,9 +17,9 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Curves, Steps, follow, settle_on, stack, take
 from ._bifurcation import PointEquations, critical_matrix
+from ._by_name import SPEED, value as value_of
 from ._follower import eigenvalues, turned
 from ._illinois import zeros
-from ._lens import SPEED, value as value_of
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import Point

@@ -12,7 +12,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Curves, settle_on, stack, take
-from ._lens import Parameter, with_value
+from ._by_name import Parameter, with_value
 from ._orbit import OrbitEquations, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._steps import STIFF_FIRST, Counts, counted

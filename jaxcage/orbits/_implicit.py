@@ -139,7 +139,7 @@ def settled(
 
     def turn(carry: tuple) -> tuple:
         i, u, before, done = carry
-        steps = counts.rung(i)  # the same in all lanes: numbers of their own would make them pass every step
+        steps = counts.steps(i)  # the same in all lanes: numbers of their own would make them pass every step
         v, found = once(steps, jnp.where(before.converged, u, guess), done)
         both = before.converged & found.converged
         error, over = equations.apart(v - u, before.newton.jacobian, found.newton.jacobian)
@@ -153,7 +153,7 @@ def settled(
     shapes = eqx.filter_eval_shape(once, counts.last, guess, False)[1]
     nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
     start = jnp.zeros((), int), guess, nothing, jnp.array(False)
-    _, u, found, _ = jax.lax.while_loop(lambda carry: carry[0] < counts.rungs, turn, start)
+    _, u, found, _ = jax.lax.while_loop(lambda carry: carry[0] < counts.tries, turn, start)
     return u, found
 
 

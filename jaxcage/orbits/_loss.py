@@ -12,7 +12,6 @@ carry an edge far from the stretch it belongs to, to a bifurcation that every so
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ class LossZones:
     """Ascending; an edge is None where the zone runs past the range."""
     edges: dict[str, Point]
     """Edges by name: `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ..."""
-    coexisting: dict[str, list[Any]]
+    coexisting: dict[str, list[tuple[int, bool, np.ndarray, np.ndarray]]]
     """Orbits at each edge: branch, whether stable, state [SI], multipliers."""
     principal: Stretch | None
     """The stretch on which most simulations from the conventional start settled."""

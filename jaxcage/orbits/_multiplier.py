@@ -6,7 +6,7 @@ eigenvalue mu with left and right vectors l, r moves by l dM r / l r. One expans
 the same as for edges, gives all of it.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,7 +16,8 @@ from .._checks import require_x64
 from .._parameters import get, parameter_paths
 from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
-from ._lens import SPEED
+from ._by_name import SPEED
+from ._orbit import StateLike
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._sensitivity import _expand, _Expansion, _pull_back
 from ._steps import GIVEN_UP, SLOPE, by_steps, counted
@@ -68,7 +69,7 @@ def _vectors(m: Float[Array, "n n"]) -> tuple[Array, Array]:
 def leading_multiplier(
     system: AbstractForcedSystem,
     speed: float,
-    guess: Any,
+    guess: StateLike,
     *,
     periods: int = 1,
     method: AbstractMethod | None = None,

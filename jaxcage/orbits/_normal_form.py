@@ -12,7 +12,7 @@ from each place.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -108,7 +108,7 @@ def with_half(fine: Coefficient, coarse: Coefficient) -> Coefficient:
     return Coefficient(fine.value, fine.error + abs(fine.value - coarse.value))
 
 
-def criticality(kind: str, value: Any, error: Any) -> str:
+def criticality(kind: str, value: float | np.floating, error: float | np.floating) -> str:
     """`supercritical` or `subcritical`; `unknown` where the coefficient is not known from zero, and nothing for a kind
     that is neither or where there is no coefficient."""
     if kind not in KINDS_WITH_ONE or not abs(value) >= 0:

@@ -1,18 +1,20 @@
 """Periodic orbits: fixed points of powers of the strobe map, with their Floquet multipliers."""
 
 import dataclasses
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
+import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._arguments import shown
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
-from .._types import Scalar
+from .._types import Scalar, State
 from ..integrate import AbstractMethod, FixedSteps, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
@@ -20,6 +22,9 @@ from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
 from ._steps import ENOUGH, IMAGE, SLOPE, Counts, by_steps, from_steps, that_serves
 
+
+if TYPE_CHECKING:
+    from ._point import Point
 
 Period = Literal["driven", "free"]
 ROUNDING = 1e-13
@@ -81,7 +86,7 @@ class Orbit(eqx.Module):
     """Largest component of P(z) - z, in units of the system's scale."""
     liouville: Float[Array, ""]
     """log|det M| less the integral of the field's divergence over the orbit, which it must equal; both not below what
-    rounding resolves of the smallest multiplier, so that orbits with strong damping are judged by the others."""
+    rounding resolves of the smallest multiplier, so that orbits with strong damping are checked by the others."""
     steps: Int[Array, ""]
     """Steps per revolution; 1 where the method has no such number."""
     error: Float[Array, ""]
@@ -91,7 +96,7 @@ class Orbit(eqx.Module):
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
     self_excited: bool = eqx.field(static=True)
-    solver: Any = eqx.field(static=True)
+    solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
     """What takes these steps, or the whole method where it chooses them itself."""
 
     @property
@@ -135,6 +140,19 @@ class Orbit(eqx.Module):
     _repr_html_ = notebook_html
 
 
+if TYPE_CHECKING:
+    StateLike: TypeAlias = State | Float[Array, " dim"] | Float[np.ndarray, " dim"]
+    """A state [SI]."""
+    Guess: TypeAlias = StateLike | Orbit
+    """A state near an orbit, or an orbit."""
+    NearOrbit: TypeAlias = Orbit | Point | tuple[StateLike, Scalar]
+    """An orbit, a bifurcation of one, or a state near one with the value of the parameter."""
+    PointGuess: TypeAlias = Scalar | NearOrbit
+    """A value of the parameter, or what is near the bifurcation."""
+else:  # those who are given something else say themselves what it must be
+    StateLike = Guess = NearOrbit = PointGuess = object
+
+
 @jax.custom_jvp
 def sorted_multipliers(monodromy: Float[Array, "dim dim"]) -> Complex[Array, " dim"]:
     """Eigenvalues, the largest first; differentiable to any order where they are distinct."""
@@ -165,14 +183,14 @@ def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, 
 
     def turn(i: Array, carry: tuple) -> tuple:
         y, done = carry
-        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.rung(i)).method)
+        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.steps(i)).method)
         begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
         row = tuple(begin[k] for k in range(start.size))
         spin = jnp.where(done, 0, revolutions)
         z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
         return z, done | (jnp.max(jnp.abs(z - y) / scale) < AT_REST * counts.tolerance)
 
-    return jax.lax.fori_loop(0, counts.rungs, turn, (start, jnp.array(False)))[0]
+    return jax.lax.fori_loop(0, counts.tries, turn, (start, jnp.array(False)))[0]
 
 
 @compiled
@@ -233,7 +251,7 @@ def periodic_orbit(
     speed: Scalar,
     periods: int = 1,
     *,
-    guess: Any = None,
+    guess: Guess | None = None,
     revolutions: int | None = None,
     period: str = "driven",
     method: AbstractMethod | None = None,
@@ -267,7 +285,7 @@ def periodic_orbit(
 
     def find(method: AbstractMethod, counts: Counts) -> Orbit:
         problem = OrbitProblem(method, system.dimension, free, ())
-        counts = from_steps(counts, getattr(guess, "steps", None))
+        counts = from_steps(counts, guess.steps if isinstance(guess, Orbit) else None)
         enough = jnp.minimum(counts.last, ENOUGH)
         spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
         frozen_ones = frozen((given, start, first))
@@ -288,7 +306,7 @@ def is_free(period: str) -> bool:
     return period == "free"
 
 
-def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Any) -> Float[Array, " dim"]:
+def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
     """A guess as an array, without derivative."""
     if guess is None:
         guess = system.starts(speed)[0]

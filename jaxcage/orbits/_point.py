@@ -7,7 +7,7 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..analysis import Edge
-from ._lens import SPEED
+from ._by_name import SPEED
 from ._normal_form import criticality
 
 

@@ -22,7 +22,7 @@ from jaxtyping import Array, Float, Int
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, pushed, strobe_map
 from ..models import AbstractForcedSystem
-from ._lens import Parameter, with_value
+from ._by_name import Parameter, with_value
 
 
 def depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:

@@ -20,8 +20,8 @@ from ..models import AbstractForcedSystem
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
+from ._by_name import SPEED
 from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
-from ._lens import SPEED
 from ._point import Point
 
 
@@ -222,7 +222,7 @@ def synchronous_orbits(
 
     **Arguments:** system and range; number of speeds that are simulated from each of the system's starts, and
     revolutions left out; or a sweep that was made before; steps of the continuation, in units of 1/20 of the range.
-    From the opposites of the starts as many speeds are simulated besides: these tell no more than where orbits are.
+    The same speeds are simulated from the opposites of the starts too, which serve only to locate orbits.
 
     **Returns:** `SynchronousOrbits`. Stable orbits with a small basin can escape the simulations: `missed` counts those
     that were met but not followed; those that were not met cannot be counted.

@@ -25,9 +25,9 @@ from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
 from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
+from ._by_name import SPEED
 from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import Push, Slopes, by_columns, numbers_of
-from ._lens import SPEED
 from ._point import Point
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
@@ -226,14 +226,14 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
-    The point is located by Newton's method first, and again by twice the steps until it stays where it is. One
-    expansion of the return map to second order serves that, every kind of bifurcation and all parameters; `bifurcation`
+    The point is located by Newton's method first, and again with twice the steps until it no longer moves. One
+    expansion of the return map to second order serves this, every kind of bifurcation and all parameters; `bifurcation`
     gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
-    **Returns:** `Sensitivity`; NaN where Newton's method did not find the point again, or elsewhere by half the steps,
-    and for a branch point.
+    **Returns:** `Sensitivity`; NaN where Newton's method does not find the point again, or finds it elsewhere with half
+    the steps, and for a branch point.
     """
     require_x64()
     if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design

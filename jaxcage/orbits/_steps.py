@@ -42,11 +42,11 @@ class Counts(NamedTuple):
     """How far apart two results may be, in units of what is allowed; 0 where the last number was asked for."""
 
     @property
-    def rungs(self) -> Int[Array, ""]:
+    def tries(self) -> Int[Array, ""]:
         """How many numbers there are."""
         return 1 + jnp.ceil(jnp.log2(self.last.astype(float) / self.first.astype(float)) - 1e-9).astype(int)
 
-    def rung(self, i: Any) -> Int[Array, ""]:
+    def steps(self, i: Any) -> Int[Array, ""]:
         """The i-th of them."""
         return jnp.minimum(self.first * 2**i, self.last)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ._arclength import Corrected, Steps, follow, take
 from ._branch import describe, joined
+from ._by_name import SPEED
 from ._follower import Follower, Start, seeds, stable_steps, turned
-from ._lens import SPEED
 from ._located import brackets, count_of
 from ._point import Point
 

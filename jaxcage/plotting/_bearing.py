@@ -1,6 +1,7 @@
 """The whole bearing: drawn to scale with pocket forces, slips around it, whirl of the cage, spectra, an animation."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -415,7 +416,9 @@ def over_shaft_speed(
     return ax
 
 
-def bearing_animation(model: BearingModel, run: BearingRun, history: BearingHistory, path: Any, fps: int = 16) -> None:
+def bearing_animation(
+    model: BearingModel, run: BearingRun, history: BearingHistory, path: str | Path, fps: int = 16
+) -> None:
     """Write the last revolution of a run as an animated GIF: the drawing at every sample of it, at most 96 of them."""
     from matplotlib.animation import FuncAnimation, PillowWriter
 

@@ -113,7 +113,7 @@ from ._orbit_tables import (
     stretch_table as stretch_table,
     unsettled_notes as unsettled_notes,
 )
-from ._page import Judged as Judged, calmest as calmest, judge as judge, page as page
+from ._page import Assessed as Assessed, assess as assess, calmest as calmest, page as page
 from ._paper_tables import (
     compared_table as compared_table,
     ranges_table as ranges_table,

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..design import SobolIndices
 from ..io import Range
-from ..studies import Band, Ensemble, verdict_of
+from ..studies import Band, Clue, Ensemble, verdict_of
 from ._operating import Operating
 from ._table import Table, number
 
@@ -150,7 +150,7 @@ def chances_notes(found: Ensemble) -> list[str]:
     return notes
 
 
-def measures(clues: Sequence[Any]) -> str:
+def measures(clues: Sequence[Clue]) -> str:
     """What to measure, the most telling first."""
     telling = [c for c in clues if c.share > 0][:MOST]
     if not telling:

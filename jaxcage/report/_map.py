@@ -4,7 +4,7 @@ import concurrent.futures
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ BELOW, ABOVE = 0.8, 1.25
 """Range of a parameter over its value, unless told otherwise."""
 Exponents: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Speeds [rpm], values of y [SI], largest exponent at each."""
+Values = TypeVar("Values", float, np.ndarray)
 Say: TypeAlias = Callable[[str, int, int], None]
 """Told what is done, how much of it, of how much."""
 
@@ -44,7 +45,7 @@ class Axis:
         """For programs: a speed in rpm, all else in SI units."""
         return [self.told(self.lower), self.told(self.upper)]
 
-    def told(self, value: Any) -> Any:
+    def told(self, value: Values) -> Values:
         """A value for programs."""
         return value * RPM if self.name == SPEED else value
 

@@ -33,18 +33,18 @@ TEMPLATES = Path(__file__).parent
 
 
 @dataclasses.dataclass(frozen=True)
-class Judged:
+class Assessed:
     """An operating speed with what each kind of zone says of it."""
 
     at: Operating
     verdicts: dict[str, Verdict]
 
 
-def judge(findings: Findings, operating: Sequence[Operating]) -> list[Judged]:
+def assess(findings: Findings, operating: Sequence[Operating]) -> list[Assessed]:
     """Both verdicts on each operating speed."""
     found, loss = findings.found, findings.loss
     return [
-        Judged(
+        Assessed(
             at,
             {
                 "synchronous-loss": loss_verdict(
@@ -76,15 +76,15 @@ def page(
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
-    judged = judge(findings, operating)
+    assessed = assess(findings, operating)
     return environment.get_template("page.html.j2").render(
-        _context(findings, judged, table, command, chances, left, units or ShownUnits())
+        _context(findings, assessed, table, command, chances, left, units or ShownUnits())
     )
 
 
 def _context(
     findings: Findings,
-    judged: list[Judged],
+    assessed: list[Assessed],
     table: Mapping[str, Any] | None,
     command: str,
     chances: Ensemble | None,
@@ -94,7 +94,7 @@ def _context(
     name, model, swept, found = findings.name, findings.model, findings.sweep, findings.found
     span = float(swept.rpm[0]), float(swept.rpm[-1])
     what = f"Case {name}" if findings.published is not None else name
-    drawn = pictures(findings, [j.at for j in judged], chances, units)
+    drawn = pictures(findings, [j.at for j in assessed], chances, units)
     ratio = float(model.bearing.cage_speed_ratio)
     both = lambda table: in_units(with_shaft(table, ratio), units)
     slopes, statics, at_rest = slope_tables(findings), findings.statics, f"At rest under {float(model.load):g} N"
@@ -103,14 +103,14 @@ def _context(
         "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage "
         f"({span[0] / ratio:.0f} to {span[1] / ratio:.0f} rpm of the shaft)"
         + (", quick report: no gradients, a coarser sweep" if findings.quick else ""),
-        "summary": [*_summary(findings, judged), *_of_the_unknown(findings, chances, left)],
-        "known_tables": [both(t) for t in _known_tables(findings, judged, chances)],
+        "summary": [*_summary(findings, assessed), *_of_the_unknown(findings, chances, left)],
+        "known_tables": [both(t) for t in _known_tables(findings, assessed, chances)],
         "known_notes": [] if chances is None else chances_notes(chances),
         "key_figures": [(name, units.in_text(value)) for name, value in _key_figures(findings)],
         "pictures": drawn,
-        "operating": [_operating_rows(findings, j) for j in judged],
+        "operating": [_operating_rows(findings, j) for j in assessed],
         "close_percent": f"{100 * CLOSE:g}",
-        "at_speeds": both(at_speeds_table(findings, [j.at for j in judged])) if judged else None,
+        "at_speeds": both(at_speeds_table(findings, [j.at for j in assessed])) if assessed else None,
         "resolution": number(swept.resolution_rpm),
         "loss_table": both(loss_table(name, found, findings.loss, findings.published)),
         "zones_table": both(zones_table(name, findings.zones, findings.published, span)),
@@ -135,7 +135,7 @@ def _context(
         "command": command,
         "date": datetime.date.today().isoformat(),
     }
-    there = {"operating": bool(judged), "map": "map" in drawn, "gradients": bool(slopes)}
+    there = {"operating": bool(assessed), "map": "map" in drawn, "gradients": bool(slopes)}
     there |= {"statics": statics is not None, "known": chances is not None}
     return context | {"sections": [(k, text) for k, text in _SECTIONS.items() if there.get(k, True)]}
 
@@ -155,7 +155,7 @@ _SECTIONS = {
 }
 
 
-def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
+def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     swept = findings.sweep
     chaotic, loss = len(findings.zones.zones), len(findings.loss.zones)
     share = float(np.mean(swept.restless))
@@ -167,7 +167,7 @@ def _summary(findings: Findings, judged: list[Judged]) -> list[str]:
     calm = calmest(findings)
     if calm is not None:
         said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
-    for j in judged:
+    for j in assessed:
         states = [f"{v.state} of {'chaotic' if k == 'chaotic' else k} zones" for k, v in j.verdicts.items()]
         words = {"inside of": "inside", "close of": "close to", "clear of": "clear of", "unknown of": "not known for"}
         for old, new in words.items():
@@ -192,11 +192,11 @@ def _of_the_unknown(findings: Findings, chances: Ensemble | None, left: Sequence
     return said
 
 
-def _known_tables(findings: Findings, judged: list[Judged], chances: Ensemble | None) -> list[Table]:
+def _known_tables(findings: Findings, assessed: list[Assessed], chances: Ensemble | None) -> list[Table]:
     if chances is None:
         return []
     ratio = float(findings.model.bearing.cage_speed_ratio)
-    at = [operating_chances(chances, [j.at for j in judged], ratio)] if judged else []
+    at = [operating_chances(chances, [j.at for j in assessed], ratio)] if assessed else []
     return [*at, *chances_tables(findings.name, chances)]
 
 
@@ -250,7 +250,7 @@ def _with_shaft(findings: Findings, at: Operating) -> str:
     return f"{at} (shaft {at.of_shaft(ratio)})"
 
 
-def _operating_rows(findings: Findings, judged: Judged) -> dict[str, Any]:
+def _operating_rows(findings: Findings, assessed: Assessed) -> dict[str, Any]:
     rows = [
         {
             "kind": kind,
@@ -260,6 +260,6 @@ def _operating_rows(findings: Findings, judged: Judged) -> dict[str, Any]:
             "distance": number(v.distance_rpm),
             "percent": number(v.percent, 1),
         }
-        for kind, v in judged.verdicts.items()
+        for kind, v in assessed.verdicts.items()
     ]
-    return {"text": _with_shaft(findings, judged.at), "verdicts": rows}
+    return {"text": _with_shaft(findings, assessed.at), "verdicts": rows}

@@ -4,9 +4,12 @@ import dataclasses
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from ..io import ShownUnits
+
+
+Row = TypeVar("Row")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,8 +26,8 @@ class Table:
     def of(
         cls,
         title: str,
-        columns: Mapping[str, str | Callable[[Any], str]],
-        found: Iterable[Any],
+        columns: Mapping[str, str | Callable[[Row], str]],
+        found: Iterable[Row],
         speeds: Sequence[str] = (),
     ) -> "Table":
         """A row for each thing `found`; a column says how its texts are made of it, by a format or a function."""
@@ -63,7 +66,7 @@ def in_units(table: Table, units: ShownUnits) -> Table:
     return Table(units.in_text(table.title), columns, rows, table.speeds)
 
 
-def chosen(found: Any, names: str) -> dict[str, Any]:
+def chosen(found: object, names: str) -> dict[str, Any]:
     """Some attributes of a result by name."""
     return {name: getattr(found, name) for name in names.split()}
 

@@ -72,7 +72,7 @@ def _relative_cubic(model: CageModel) -> CageModel:
 
 
 def _plain() -> AbstractMethod:
-    """For laws that have no kernel or a large one: no rungs to compile."""
+    """For laws that have no kernel or a large one: no levels to compile."""
     return method("rk4", steps=512)
 
 

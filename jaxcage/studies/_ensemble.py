@@ -6,7 +6,7 @@ the draws are independent, so that their chaotic share has the error bar of a bi
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -17,7 +17,7 @@ from ..analysis import Sweep, zones
 from ..integrate import AbstractMethod, controlled
 from ..io import Unknown, check_together
 from ..models import CageModel
-from ..sweeps import sweep_designs
+from ..sweeps import Progress, sweep_designs
 
 
 DRAWS, ENSEMBLE_SPEEDS = 64, 40
@@ -26,7 +26,7 @@ REVOLUTIONS = 100
 SETTLED = 64
 """A draw that is periodic by then is left where it is: as it is at the end of what is left out: three in five are."""
 ERROR = 1e-2
-"""Of a revolution [clearances]: with fewer rungs than the default method has, a quarter of the draws fail."""
+"""Of a revolution [clearances]: with fewer levels than the default method has, a quarter of the draws fail."""
 RARE = 0.05
 """Chance below which a speed is called calm, and above one less which it is called chaotic."""
 FEWEST = 29
@@ -150,7 +150,9 @@ def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
     return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
 
 
-def binomial_interval(hits: Any, of: Any) -> tuple[np.ndarray, np.ndarray]:
+def binomial_interval(
+    hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
+) -> tuple[np.ndarray, np.ndarray]:
     """Clopper and Pearson's bounds of a share of which `hits` of `of` were seen."""
     from scipy.stats import beta  # takes half a second to load
 
@@ -193,7 +195,7 @@ def ensemble(
     revolutions: int = REVOLUTIONS,
     blocks: int = 20,
     method: AbstractMethod | None = None,
-    progress: Any = None,
+    progress: Progress | None = None,
 ) -> Ensemble:
     """Run `draws` designs, spread evenly over the ranges, over speed.
 
@@ -230,7 +232,7 @@ def _run(
     revolutions: int,
     blocks: int,
     method: AbstractMethod | None,
-    progress: Any,
+    progress: Progress | None,
 ) -> list[Sweep]:
     """Every design once at every speed, from its own conventional start: where the cage of one rests on its rib, that
     of another with an earlier contact would be pressed into it, and be shot off."""
@@ -257,7 +259,7 @@ def chaotic_shares(
     place: np.ndarray,
     *,
     method: AbstractMethod | None = None,
-    progress: Any = None,
+    progress: Progress | None = None,
 ) -> np.ndarray:
     """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
     flat = place.reshape(len(unknowns), -1)

@@ -10,7 +10,6 @@ held the truth; how often is counted on planted bearings by `python -m benchmark
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -19,7 +18,7 @@ from .._errors import ArgumentError
 from ..integrate import AbstractMethod, controlled
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
-from ..sweeps import motions, sweep_designs
+from ..sweeps import Progress, motions, sweep_designs
 from ._ensemble import ERROR, REVOLUTIONS, SETTLED, draw, sobol
 
 
@@ -145,15 +144,15 @@ def identify(
     stages: int = STAGES,
     seed: int = 0,
     method: AbstractMethod | None = None,
-    progress: Any = None,
+    progress: Progress | None = None,
 ) -> Narrowed:
     """Narrow the ranges of a file by what was measured on the machine.
 
     **Arguments:** design; what is unknown of it; measurements; draws of each stage; stages at most; seed of the draws;
     method and progress as in `sweep`.
     """
-    judge = lambda place: misses(model, unknowns, measured, place, method=method, progress=progress)
-    return narrow(unknowns, judge, draws=draws, stages=stages, seed=seed)
+    missed_by = lambda place: misses(model, unknowns, measured, place, method=method, progress=progress)
+    return narrow(unknowns, missed_by, draws=draws, stages=stages, seed=seed)
 
 
 def misses(
@@ -163,7 +162,7 @@ def misses(
     place: Float[np.ndarray, "draws unknowns"],
     *,
     method: AbstractMethod | None = None,
-    progress: Any = None,
+    progress: Progress | None = None,
 ) -> Float[np.ndarray, "draws measurements"]:
     """How far each draw is from each measurement, in tolerances; NaN where it failed. What is chaotic rattles: it is
     right (0) or wrong (as far as anything counts)."""

@@ -127,16 +127,16 @@ def label_map(
     - `speed`: the speed [rad/s], if it is neither of them.
     - `refine_by`: where points are spent.
     - `most`, `first`: as for `refine`: points at most, stride of the coarse picture.
-    - `starts`: of the system's own, how many are run at each point.
+    - `starts`: how many of the system's own initial states are run at each point.
     - `discard`, `revolutions`, `blocks`, `method`: as for `sweep`.
     - `persist`: revolutions that chaos must outlast to count: starts found chaotic are run again with so many
-        discarded, and what has died out by then was a transient. With 0 it is not asked.
+        discarded, and what has died out by then was a transient. 0 turns this off.
     - `report`: called with the coarse picture and after each refinement.
     - `stage`: called as lanes are done.
 
     **Returns:** `LabelMap`.
 
-    **Raises:** `ValueError` for what makes no sense.
+    **Raises:** `ValueError` for arguments that do not fit together.
     """
     require_x64()
     (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())

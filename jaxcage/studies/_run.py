@@ -54,7 +54,7 @@ def study(
 ) -> "xr.Dataset":
     """Run a system over any grid or sample of its parameters, and keep what each lane does in a zarr folder.
 
-    What is stored already is not computed again: after a kill the same call goes on where it stopped, and the store
+    What is stored already is not computed again: after a kill the same call continues where it stopped, and the store
     ends up with the same bits as that of an unbroken run, whichever processes computed it.
 
     **Arguments:**
@@ -77,7 +77,8 @@ def study(
 
     **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `start`.
 
-    **Raises:** `ValueError` for what makes no sense, and for a store of another study; `ImportError` without dask.
+    **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study; `ImportError`
+    without dask.
     """
     require_x64()
     plan = make_study_plan(system, vary, samples, seed, starts, lanes)

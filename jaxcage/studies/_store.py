@@ -91,7 +91,7 @@ class Store:
 
 
 def open_study(path: str | Path) -> "xr.Dataset":
-    """The results of a study so far, read from disk when they are used, each chunk compared with what was written.
+    """The results of a study so far, read from disk when they are used; each chunk is compared with what was written.
 
     Lanes that have not been run are NaN with the label and outcome -1; so are those of chunks that are damaged.
 

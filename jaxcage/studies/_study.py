@@ -27,7 +27,7 @@ from ._stored import SPEED, AbstractStudy, Results, Variable
 OIL = "oil"
 """Name of the ISO VG grade of a mineral oil beside those of the system's parameters."""
 CLOSING = 16
-"""Strobe states by which a lane's period is judged: twice the longest period that is looked for."""
+"""Strobe states by which a lane's period is labelled: twice the longest period that is looked for."""
 FEW, SOME = 256, 1024
 """Lanes to which fewer ones are filled up: each number of lanes may take a program of its own."""
 
@@ -174,11 +174,11 @@ class Study(AbstractStudy):
             np.asarray(begin)[lanes],
             which=lanes,
         )
-        return self._judged(
+        return self._labelled(
             Observation(*(np.moveaxis(np.asarray(x), -1, 0)[:count] for x in seen)), np.asarray(scale)[:count]
         )
 
-    def _judged(self, seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Results:
+    def _labelled(self, seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Results:
         """What is stored of lanes; here they are the first axis of an observation."""
         strobe, growth, _, peak, outcome, largest, doubt = (np.asarray(x) for x in seen)
         failed = outcome != 0

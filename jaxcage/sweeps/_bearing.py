@@ -66,7 +66,7 @@ def sweep_bearing(
 
     - `model`: bearing, with an inner ring that is `dynamic`.
     - `speeds`: ascending shaft speeds [rad/s].
-    - `starts`: how many of the model's own starts (`rolling_start`), places of the cage as it takes them, or states
+    - `starts`: how many of the model's own starts (`rolling_start`), positions of the cage as it takes them, or states
         with which every speed begins.
     - `discard`, `revolutions`: revolutions of the cage left out at the beginning, and observed after that.
     - `blocks`: of the observed revolutions, from whose scatter standard errors come.

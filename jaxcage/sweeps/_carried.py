@@ -43,10 +43,9 @@ def run_up_down(
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> Hysteresis:
-    """Sweep up and down in speed, each speed beginning with the state in which the last one ended.
+    """Sweep up and down in speed, each speed starting from the final state of the one before.
 
-    Where the carried state has failed, the next speed begins from the start again, so that one failure does not spoil
-    the rest.
+    After a failure the next speed begins from the initial state again, so that one failure does not spoil the rest.
 
     **Arguments:** as for `sweep`, with a single start.
 

@@ -23,16 +23,16 @@ SHARE = 0.1
 SEED = 0
 
 
-class Judged(NamedTuple):
+class Labelled(NamedTuple):
     """What lanes are called, with the largest exponent and its standard error."""
 
     label: Shaped[np.ndarray, " lanes"]
     exponent: np.ndarray
     error: np.ndarray
 
-    def at(self, lanes: np.ndarray) -> "Judged":
+    def at(self, lanes: np.ndarray) -> "Labelled":
         """Some of them."""
-        return Judged(*(x[lanes] for x in self))
+        return Labelled(*(x[lanes] for x in self))
 
 
 def doubtful(label: Shaped[np.ndarray, "*systems speeds starts"]) -> Int[np.ndarray, " lanes"]:
@@ -49,8 +49,8 @@ def doubtful(label: Shaped[np.ndarray, "*systems speeds starts"]) -> Int[np.ndar
 
 def confirm(
     lanes: Int[np.ndarray, " some"],
-    judged: Judged,
-    again: Callable[[Int[np.ndarray, " some"], int], Judged],
+    labelled: Labelled,
+    again: Callable[[Int[np.ndarray, " some"], int], Labelled],
 ) -> tuple[Confirmation, ...]:
     """Run `lanes` again with finer and finer steps, as long as what they are called changes.
 
@@ -58,7 +58,7 @@ def confirm(
     times, puts what it finds in place of what was there, and returns it.
     """
     rounds = []
-    before = judged.at(lanes)
+    before = labelled.at(lanes)
     for times in range(1, CONFIRMATIONS + 1):
         if not lanes.size:
             break
@@ -71,7 +71,7 @@ def confirm(
     return tuple(rounds)
 
 
-def _agree(a: Judged, b: Judged) -> Bool[np.ndarray, " lanes"]:
+def _agree(a: Labelled, b: Labelled) -> Bool[np.ndarray, " lanes"]:
     """Exponents within three standard errors; a failed lane has none, and agrees."""
     apart = np.abs(a.exponent - b.exponent)
     return ~(apart > np.maximum(3 * np.hypot(a.error, b.error), 0.01))

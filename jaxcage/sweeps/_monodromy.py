@@ -1,11 +1,10 @@
 """Monodromy matrices of many lanes at once: the strobe map and its derivative, by the kernels of the sweeps."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
 from .._errors import ArgumentError
@@ -29,7 +28,7 @@ def monodromy(
     speeds: Float[Array, " lanes"] | Float[np.ndarray, " lanes"],
     states: Float[Array, "lanes dim"] | Float[np.ndarray, "lanes dim"],
     *,
-    which: Any = None,
+    which: Int[np.ndarray, " lanes"] | Sequence[int] | None = None,
     method: AbstractMethod | None = None,
 ) -> tuple[Float[np.ndarray, "lanes dim"], Float[np.ndarray, "lanes dim dim"]]:
     """One revolution from each state, and the derivative of where it ends with respect to where it began.

@@ -5,7 +5,7 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -20,15 +20,19 @@ from .._types import State
 from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
 from ..integrate import AbstractMethod, controlled, finer
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
-from ._confirm import Judged, confirm as confirm_lanes, doubtful
+from ._confirm import Labelled, confirm as confirm_lanes, doubtful
 from ._engine import Progress, chunk_size, run_lanes
 from ._lasting import follow
 
 
-def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> Any:
+@overload
+def rpm(first: float | int) -> float: ...
+@overload
+def rpm(first: float | int, last: float | int, count: int = 2) -> Float[np.ndarray, " count"]: ...
+def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> float | Float[np.ndarray, " count"]:
     """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`.
 
-    **Raises:** `ValueError` for what is no finite number, and for a count below 1.
+    **Raises:** `ValueError` for anything but finite numbers, and for a count below 1.
     """
     for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
         if wrong("", float, value) or not math.isfinite(value):
@@ -106,7 +110,7 @@ def sweep(
     - `confirm`: run what is not periodic, its neighbours in speed and a tenth of the rest again with steps at most half
         as long, and what changes with finer ones still (`Sweep.confirmed`).
     - `horizon`: revolutions of the whole run to which lanes that have not settled are followed, to tell how long their
-        chaos lasts (`Sweep.survival`); with 0 that is not asked.
+        chaos lasts (`Sweep.survival`); 0 turns this off.
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
     - `keep`: number of strobe states kept, the last ones.
@@ -149,8 +153,8 @@ def sweep_designs(
     """`sweep` for several designs or cases at once, all lanes in one batch: one program, full chunks.
 
     **Arguments:** systems that differ in their numbers only; speeds of all of them, or a row for each; `settled`,
-    revolutions after which a lane whose kept strobe states close is left where it is, periodic, its exponents NaN (0
-    runs all lanes to the end); the rest as for `sweep`.
+    revolutions after which a lane whose kept strobe states repeat is stopped as periodic, its exponents NaN (0 runs all
+    lanes to the end); the rest as for `sweep`.
 
     **Returns:** a `Sweep` for each system, the same as one by one to rounding (which chaos makes large).
     """
@@ -190,18 +194,18 @@ def sweep_designs(
         return found
     rounds: tuple[Confirmation, ...] = ()
     if confirm:
-        judged = _judged(found)
+        labelled = _labelled(found)
 
-        def again(lanes: np.ndarray, times: int) -> Judged:
+        def again(lanes: np.ndarray, times: int) -> Labelled:
             _put(seen, lanes, run(plan, lanes, finer(chosen, times)))
-            return _judged(each_system(seen)).at(lanes)
+            return _labelled(each_system(seen)).at(lanes)
 
-        wanted = doubtful(judged.label.reshape(len(systems), *shape))
-        rounds = confirm_lanes(wanted, judged, again)
+        wanted = doubtful(labelled.label.reshape(len(systems), *shape))
+        rounds = confirm_lanes(wanted, labelled, again)
         found = each_system(seen)
     if horizon <= discard + revolutions:
         return [dataclasses.replace(s, confirmed=rounds) for s in found]
-    label = _judged(found).label
+    label = _labelled(found).label
     scale = np.concatenate([np.repeat(s.scale, shape[1], axis=0) for s in found])
     lasting = follow(label, seen, plan, scale, horizon, lambda plan, lanes, y: run(plan, lanes, chosen, y))
     escapes = np.split(lasting.escape, len(systems))
@@ -263,10 +267,10 @@ def _speeds_of_each(speeds: Any, systems: int) -> Float[np.ndarray, "systems spe
     return np.stack([checked_speeds(row) for row in speeds])
 
 
-def _judged(found: Sequence[Sweep]) -> Judged:
+def _labelled(found: Sequence[Sweep]) -> Labelled:
     """What the lanes of several sweeps are called, in a row."""
     rows = [(s.observed_label, s.exponents[..., 0], s.standard_error[..., 0]) for s in found]
-    return Judged(*(np.concatenate([x.ravel() for x in column]) for column in zip(*rows, strict=True)))
+    return Labelled(*(np.concatenate([x.ravel() for x in column]) for column in zip(*rows, strict=True)))
 
 
 def _put(seen: Observation, lanes: np.ndarray, new: Observation) -> None:

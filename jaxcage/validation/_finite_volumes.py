@@ -9,10 +9,10 @@ A. A. Raimondi and J. Boyd, ASLE Transactions 1 (1958) 194; their printed number
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_matrix, diags_array, kron
+from scipy.sparse import csc_matrix, csr_array, diags_array, kron
 from scipy.sparse.linalg import spsolve
 
 
@@ -75,7 +75,7 @@ def film_pressure(
     return p.reshape(around - 1, across), on.reshape(around - 1, across)
 
 
-def film_equations(slenderness: float, eps: float, around: int, across: int) -> tuple[Any, np.ndarray]:
+def film_equations(slenderness: float, eps: float, around: int, across: int) -> tuple[csr_array, np.ndarray]:
     """Matrix and right-hand side over the inner nodes: flow out of a cell, and what the wedge brings in."""
     h, k = 2 * math.pi / around, 1 / across
     theta = h * np.arange(1, around)

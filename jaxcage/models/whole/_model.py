@@ -36,9 +36,9 @@ class InnerRing(eqx.Module):
 class BearingModel(eqx.Module):
     """A cylindrical roller bearing in its plane: Z rollers, a cage with pockets, its guiding land, the inner ring.
 
-    Only what a designer knows is given, and the shaft's speed; slip, pocket forces and whirl are results. y up,
-    counter-clockwise positive; the load acts on the inner ring along -y. Cage and rollers turn freely between rings at
-    prescribed speeds; the outer ring's centre rests.
+    The input is what a designer knows, and the shaft's speed; slip, pocket forces and whirl are results. y points up,
+    counter-clockwise is positive, and the load acts on the inner ring along -y. Cage and rollers turn freely between
+    rings at prescribed speeds; the centre of the outer ring is fixed.
     """
 
     bearing: Bearing
