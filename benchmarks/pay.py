@@ -247,7 +247,7 @@ def by_warm_gradient(space: DesignSpace, asked: Counted, seed: int) -> np.ndarra
 
 def _scouted(space: DesignSpace, asked: Counted, seed: int) -> np.ndarray:
     """The best of some designs all over the bounds, one of them the design itself."""
-    scouts = qmc.Sobol(len(space.names), rng=seed).random(SCOUTS)
+    scouts = qmc.Sobol(len(space.names), rng=seed).random_base2(6)[:SCOUTS]
     scouts[0] = space.place.clip(0.02, 0.98)
     return scouts[int(np.argmin(asked.values(space, scouts)))]
 

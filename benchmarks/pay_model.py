@@ -86,7 +86,7 @@ class ModelSearch:
     def __init__(self, n: int, begin: np.ndarray, seed: int):
         self.rng, self.n = np.random.default_rng(seed), n
         self.x, self.y, self.total = np.empty((0, n)), np.empty(0), np.empty(0)
-        self.first = qmc.Sobol(n, rng=seed).random(FIRST)
+        self.first = qmc.Sobol(n, rng=seed).random_base2(5)[:FIRST]
         self.first[0] = begin
         self.size, self.better, self.worse, self.hyper = FIRST_SIZE, 0, 0, None
 

@@ -26,10 +26,10 @@ def tents(seed: int, lanes: int = 240, bend: float = 0.0):
     return speed, x, times
 
 
-def logistic(seed: int, lanes: int = 400, horizon: int = 1000):
+def logistic(seed: int, lanes: int = 600, horizon: int = 1000):
     """r and escape times of the logistic map beyond r = 4: kappa is sqrt(r - 4) / pi to leading order."""
     rng = np.random.default_rng(seed)
-    r, y, times = rng.uniform(4.0, 4.02, lanes), rng.uniform(0.1, 0.9, lanes), np.full(lanes, np.inf)
+    r, y, times = rng.uniform(4.0, 4.01, lanes), rng.uniform(0.1, 0.9, lanes), np.full(lanes, np.inf)
     for n in range(1, horizon + 1):
         y = np.where(np.isfinite(times), 0.5, r * y * (1 - y))
         times[(y > 1) & np.isinf(times)] = n
@@ -37,24 +37,26 @@ def logistic(seed: int, lanes: int = 400, horizon: int = 1000):
 
 
 def test_place_power_and_slope_of_a_planted_crisis_are_within_their_errors():
-    inside, fits = np.zeros(3), 0
-    for seed in range(10):
+    inside, held, fits = np.zeros(3), 0, 0
+    for seed in range(8):
         speed, x, times = tents(seed)
-        found = crisis(times, HORIZON, speed, x, block=5, beyond="above", draws=30, seed=seed)
+        found = crisis(times, HORIZON, speed, x, block=5, beyond="above", draws=15, seed=seed)
         off = np.array([found.speed - PLACE, found.power - POWER, found.slope[0] - SLOPE])
         error = np.array([found.speed_error, found.power_error, found.slope_error[0]])
         inside += np.abs(off) < 2 * error
+        held += found.interval[0] < PLACE < found.interval[1]
         fits += found.p_value > 0.02
         assert np.all(error < [1.0, 0.4, 0.3])
-    assert np.all(inside >= 8) and fits >= 9
+    assert np.all(inside >= 6) and held >= 6 and fits >= 7
 
 
 def test_the_logistic_map_ends_at_four_with_the_power_of_one_half():
     r, times = logistic(0)
     found = crisis(times, 1000, r, block=1, beyond="above", t0=20, draws=30)
     assert abs(found.speed - 4) < 3 * found.speed_error < 1e-3
+    assert found.interval[0] < 4 < found.interval[1] and np.ptp(found.interval) < 2e-3
     assert abs(found.power - 0.5) < 3 * found.power_error < 0.3
-    assert found.mean_life(4.01) == pytest.approx(np.pi / np.sqrt(0.01), rel=0.2)
+    assert found.mean_life(4.005) == pytest.approx(np.pi / np.sqrt(0.005), rel=0.2)
     assert found.mean_life(3.99) == np.inf and found.slope.size == 0
     assert "mean life ~ distance^-(0." in str(found)
 
@@ -64,7 +66,9 @@ def test_a_crisis_below_is_one_above_in_the_mirror():
     above = crisis(times, HORIZON, speed, x, block=5, beyond="above", draws=2)
     below = crisis(times, HORIZON, -speed, x, block=5, beyond="below", draws=2)
     assert below.speed == pytest.approx(-above.speed) and below.slope == pytest.approx(-above.slope)
-    assert below.power == pytest.approx(above.power) and below.mean_life(-110.0) == pytest.approx(above.mean_life(110))
+    assert below.power == pytest.approx(above.power) and below.mean_life(-110.0) == pytest.approx(
+        above.mean_life(110.0)
+    )
 
 
 def test_a_law_that_is_no_power_is_found_out():
