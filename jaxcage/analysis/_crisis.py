@@ -180,7 +180,7 @@ class _Lanes:
         near = 0.0
         for far in step * 2.0 ** np.arange(DOUBLINGS):
             if rise(far) > 0:
-                return float(best[2] + brentq(rise, near, far, rtol=1e-3, xtol=abs(step) * 1e-3))
+                return float(best[2] + brentq(rise, near, far, xtol=abs(step) * 1e-3))
             near = far
         return math.copysign(math.inf, step)
 
