@@ -34,6 +34,8 @@ def table(ledger: Sequence[dict[str, Any]]) -> str:
     for bearing in dict.fromkeys(r["bearing"] for r in ledger):
         of = [r for r in ledger if r["bearing"] == bearing]
         runs, own = [r for r in of if r["search"] != "none"], next(r for r in of if r["search"] == "none")
+        if not runs:
+            continue
         goal = to_be_reached(runs)
         rows = [_head()]
         for name in dict.fromkeys(r["search"] for r in runs):

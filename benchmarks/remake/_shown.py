@@ -69,9 +69,6 @@ PAPER = "python -m benchmarks.bearing_paper"
 PAPER_PARTS = (("force", ""), ("support", " --revolutions 12 --discard 8"), ("cases", ""))
 CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
 SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
-SPINDLE = (
-    "python -m jaxcage design benchmarks/spindle.toml --quick --starts 1 --scouts 0 --steps 6 --cloud 8 --speeds 16"
-)
 SPEED = "python -m benchmarks"
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 FIT = "python experiments/identify_nu2310.py --check --cases {0} --begin experiments/case_fits/{0}.json"
@@ -91,7 +88,6 @@ SHOWN = (
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
-    Shown("design-spindle", DESIGNS, [SPINDLE], ex.tables("Design of")),
     Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
     OPTIMISE,
     Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
