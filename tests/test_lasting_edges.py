@@ -187,3 +187,14 @@ def test_gradient_command_of_lasting_zones(
     assert "--zone must be at most 1" in capsys.readouterr().err
     assert main([*asked, "--by", "gap"]) == 2
     assert main(["gradient", "1a", "--zone", "1"]) == 2
+
+
+def test_lanes_of_an_edge_tell_a_crisis_too(planted):
+    """The law is exponential in speed, not a power: near the edge both fit, and the crisis lies on the lasting side."""
+    planted(0)
+    found = lasting_edge(CASE, 12100.0, 150.0, names=NAMES)
+    crisis = found.crisis()
+    assert crisis.beyond == "above" and crisis.speed < found.speed_rpm and crisis.lanes == found.fit.lanes
+    assert crisis.mean_life(found.speed_rpm) == pytest.approx(found.horizon, rel=0.3)
+    relative = crisis.slope / found.speed_rpm
+    assert np.all(np.abs(relative - ELASTICITY) < 0.1)

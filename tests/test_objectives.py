@@ -1,6 +1,7 @@
 """Objectives: every slope against differences of values or a closed form, statistical ones within their own errors."""
 
 import dataclasses
+import types
 
 import jax
 import jax.numpy as jnp
@@ -332,3 +333,25 @@ def test_designs_that_no_other_beats_are_found_among_all():
 def test_a_trade_off_of_nothing_is_refused():
     with pytest.raises(ValueError, match="`objectives` must hold at least one"):
         trade_off(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, {})
+
+
+def test_loads_that_two_terms_ask_for_are_read_once(monkeypatch: pytest.MonkeyPatch):
+    """Whatever the terms; another run or another number of revolutions is another reading."""
+    space, width = cage_at_speeds(discard=1, revolutions=2)
+    ran = iter([types.SimpleNamespace(last=None) for _ in range(2)])
+    now, read = [next(ran)], []
+
+    def loads(models, speeds, last, revolutions):
+        read.append(revolutions)
+        return {what: np.full((len(models), speeds.size), 7.0) for what in ("wear load", "peak land force")}
+
+    monkeypatch.setattr("jaxcage.design._land._loads", loads)
+    monkeypatch.setattr("jaxcage.design._chaos.ChaosMeasure.run", lambda *_: now[0])
+    place = np.array([[0.5, 0.5]])
+    wear, peak = (jc.design.LandMeasure(width, what, revolutions=2) for what in ("wear load", "peak land force"))
+    assert wear.values(space, place) == pytest.approx([7.0]) and peak.values(space, place) == pytest.approx([7.0])
+    assert read == [2]
+    jc.design.LandMeasure(width, "wear load", revolutions=3).values(space, place)
+    now[0] = next(ran)
+    peak.values(space, place)
+    assert read == [2, 3, 2]

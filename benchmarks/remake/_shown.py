@@ -88,6 +88,7 @@ SHOWN = (
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
+    Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
     OPTIMISE,
     Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
     Shown("studies-text", STUDIES, ["python -m benchmarks.study"]),

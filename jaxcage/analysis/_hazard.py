@@ -64,9 +64,8 @@ def hazard(
     guess = np.zeros(design.shape[1])
     guess[0] = np.log(np.sum(escaped) / np.sum(survived + escaped) / block)
     from scipy.optimize import minimize  # takes half a second to load
-    from scipy.stats import chi2
 
-    lanes = lambda beta: _of_lanes(beta, design, survived, escaped, block)
+    lanes = lambda beta: costs_of_lanes(design @ beta, survived, escaped, block)
     curvature = lambda beta: design.T @ (lanes(beta)[2][:, None] * design)
     best = minimize(
         lambda beta: np.sum(lanes(beta)[0]),
@@ -77,35 +76,44 @@ def hazard(
         tol=1e-8,
     ).x
     inverse, each = np.linalg.pinv(curvature(best)), lanes(best)[1][:, None] * design
-    seen, expected = _in_bins(best, design, survived, escaped, block)
-    misfit = np.sum((seen - expected) ** 2 / np.maximum(expected, 1e-9))
+    fits = probability_of_fit(design @ best, survived, escaped, block, along=design[:, 1], fitted=2)
     return Hazard(
         best,
         inverse @ (each.T @ each) @ inverse,
         int(np.sum(escaped)),
         late.size,
-        float(chi2.sf(misfit, max(seen.size - 2, 1))),
+        fits,
     )
 
 
-def _of_lanes(
-    beta: np.ndarray, design: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int
+def costs_of_lanes(
+    log_rate: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minus the logarithm of what each lane did, so many blocks survived and then an escape or the end, with its first
     and second derivatives by log kappa."""
-    rate = block * np.exp(np.clip(design @ beta, -60.0, 60.0))
+    rate = block * np.exp(np.clip(log_rate, -500.0, 60.0))
     gone = -np.expm1(-rate)
     left = rate * np.exp(-rate) / gone
     cost = rate * survived - escaped * np.log(gone)
     return cost, rate * survived - escaped * left, rate * survived + escaped * left * (left + rate - 1)
 
 
-def _in_bins(
-    beta: np.ndarray, design: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Escapes seen and expected in parts along the first of `x`, with about as many escapes expected in each."""
-    expected = -np.expm1(-block * np.exp(design @ beta)) * (survived + escaped)
-    order = np.argsort(design[:, 1])
+def probability_of_fit(
+    log_rate: np.ndarray,
+    survived: np.ndarray,
+    escaped: np.ndarray,
+    block: float | int,
+    *,
+    along: np.ndarray,
+    fitted: int,
+) -> float:
+    """That escapes seen are at least as unlike those expected, in parts of the lanes along some number, with about as
+    many escapes expected in each, after so many numbers were fitted."""
+    expected = -np.expm1(-block * np.exp(log_rate)) * (survived + escaped)
+    order = np.argsort(along)
     part = np.minimum((np.cumsum(expected[order]) / np.sum(expected) * BINS).astype(int), BINS - 1)
     of = lambda y: np.bincount(part, weights=y[order], minlength=BINS)
-    return of(escaped.astype(float)), of(expected)
+    misfit = np.sum((of(escaped.astype(float)) - of(expected)) ** 2 / np.maximum(of(expected), 1e-9))
+    from scipy.stats import chi2  # takes half a second to load
+
+    return float(chi2.sf(misfit, max(BINS - fitted, 1)))

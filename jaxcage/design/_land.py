@@ -53,9 +53,9 @@ class LandMeasure(AbstractObjective):
 
     def at_speeds(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
         """At each speed; NaN where every start of a design failed."""
-        last = self.chaos.run(space, places).last
         models: list[Any] = [space.model(place) for place in places]
-        return _loads(models, self.chaos.speeds, last, self.revolutions)[self.what]
+        read = lambda ran: _loads(models, self.chaos.speeds, ran.last, self.revolutions)
+        return self.chaos.read_off(space, places, ("land", self.revolutions), read)[self.what]
 
     def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
         weights = self.chaos.weights / np.sum(self.chaos.weights)

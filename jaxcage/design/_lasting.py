@@ -16,7 +16,7 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
-from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
+from ..analysis import LIFE_BLOCK, Crisis, Hazard, Zone, crisis, hazard
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..sweeps import Progress, sweep_designs
@@ -57,6 +57,18 @@ class LastingEdge:
     steepness: float
     """Change of the logarithm of the escape rate with speed [1/rpm]."""
     fit: Hazard
+    lanes: tuple[np.ndarray, np.ndarray, np.ndarray] = dataclasses.field(repr=False)
+    """Speed of each lane [rpm], relative changes of its parameters, and after how many revolutions it was calm."""
+
+    def crisis(self, seed: int = 0) -> Crisis:
+        """Where the mean life diverges, if a crisis does it: by a power law of the same lanes, without the horizon. Its
+        slopes are in rpm by relative change of each parameter.
+
+        **Raises:** `ValueError` where fewer than ten lanes escaped.
+        """
+        rpm, change, times = self.lanes
+        beyond = "above" if self.steepness > 0 else "below"
+        return crisis(times, self.horizon, rpm, change, block=LIFE_BLOCK, t0=DISCARD, beyond=beyond, seed=seed)
 
     @property
     def standard_error_rpm(self) -> float:
@@ -246,7 +258,8 @@ def _fitted(
     jacobian = np.vstack([window * of_at, (of_slope - np.outer(slope / speed, window * of_at)) / speed])
     covariance = jacobian @ fit.covariance @ jacobian.T
     return LastingEdge(
-        speed, tuple(names), slope / speed, slope / base, covariance, horizon, edge, window, steep / window, fit
+        *(speed, tuple(names), slope / speed, slope / base, covariance, horizon, edge, window, steep / window, fit),
+        lanes=(rpm, change, times),
     )
 
 
