@@ -30,7 +30,7 @@ def zone_strip(
     if operating:
         rows.append(("operating", PURPLE, list(operating)))
     rows += [
-        ("no stable\nsynchronous orbit", BLUE, _spans(loss, limits_rpm)),
+        ("synchronous loss", BLUE, _spans(loss, limits_rpm)),
         ("chaotic", VERMILION, _spans(chaotic, limits_rpm)),
     ]
     if published is not None:
