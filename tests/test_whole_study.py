@@ -87,6 +87,11 @@ def test_samples_and_what_is_stored_already(told_apart: list[int], tmp_path: pat
         jc.study(heavier, vary, **options)
 
 
+def test_a_tolerance_is_not_ignored(tmp_path: pathlib.Path):
+    with pytest.raises(ValueError, match="`tolerance` goes with a whole bearing"):
+        jc.study(jc.case("1a"), {"speed": np.array([900.0])}, store=tmp_path / "store", tolerance=1e-5)
+
+
 @pytest.mark.parametrize(
     "vary, options, said",
     [

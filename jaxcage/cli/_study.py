@@ -15,6 +15,7 @@ from ..models.whole import CAGE_STARTS
 from ..report import require_some, shares_table
 from ..studies import (
     LABELS,
+    WHOLE_TOLERANCE,
     AbstractStudy,
     BearingStudy,
     DamagedStore,
@@ -52,7 +53,7 @@ def study(job: Job[StudyOptions]) -> Report:
         return _verify(job)
     length: dict[str, Any] = job.given("discard revolutions exponents") | {"blocks": blocks_of(options.revolutions)}
     if job.whole is not None:
-        given = 1e-4 if options.tolerance is None else options.tolerance
+        given = WHOLE_TOLERANCE if options.tolerance is None else options.tolerance
         work = BearingStudy(job.whole, _plan(job, job.whole, len(CAGE_STARTS)), **length, tolerance=given)
         job.require(_demand(work))
     else:

@@ -63,7 +63,7 @@ from ._study import (
     with_values as with_values,
 )
 from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance
-from ._whole_study import BearingStudy as BearingStudy
+from ._whole_study import WHOLE_TOLERANCE as WHOLE_TOLERANCE, BearingStudy as BearingStudy
 
 
 check_layer(

@@ -18,7 +18,7 @@ from ._store import Store, open_study
 from ._stored import AbstractStudy, Results
 from ._study import Study
 from ._vary import Spread
-from ._whole_study import WHOLE_LANES, BearingStudy
+from ._whole_study import WHOLE_LANES, WHOLE_TOLERANCE, BearingStudy
 
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def study(
     exponents: int = 1,
     strobe: int = 0,
     method: AbstractMethod | None = None,
-    tolerance: float = 1e-4,
+    tolerance: float | None = None,
     lanes: int | None = None,
     shard: Shard = (1, 1),
     executor: Literal["local", "dask"] = "local",
@@ -68,7 +68,7 @@ def study(
     - `starts`: how many of the system's own starts are run at each point, by default all.
     - `discard`, `revolutions`, `blocks`, `exponents`, `method`: as for `sweep`.
     - `strobe`: strobe states stored of each lane of a cage, by default none.
-    - `tolerance`: of a whole bearing, as for `sweep_bearing`.
+    - `tolerance`: of a whole bearing, as for `sweep_bearing`, 1e-4 if left out; a cage has it in its `method`.
     - `lanes`: lanes of a chunk, at most; 2048 if left out, 48 of a whole bearing.
     - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
     - `executor`: `"local"` runs on all cores of this process, `"dask"` on a dask.distributed cluster.
@@ -85,8 +85,11 @@ def study(
     if isinstance(system, BearingModel):
         if strobe or method is not None:
             raise ArgumentError("strobe", "method", said="must be left out for a whole bearing.")
-        about = BearingStudy(system, plan, discard, revolutions, blocks, exponents, tolerance)
+        error = WHOLE_TOLERANCE if tolerance is None else tolerance
+        about = BearingStudy(system, plan, discard, revolutions, blocks, exponents, error)
     else:
+        if tolerance is not None:
+            raise ArgumentError("tolerance", said="goes with a whole bearing; of other systems the `method` has it.")
         chosen = controlled() if method is None else method
         about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)
     run_study(about, store, shard, executor, scheduler, workers, progress)

@@ -19,6 +19,8 @@ from ._stored import SPEED, AbstractStudy, Results, Variable
 
 WHOLE_LANES = 48
 """Lanes of a chunk, at most: some minutes of work."""
+WHOLE_TOLERANCE = 1e-4
+"""Of a step, if nothing else is asked for, as for `sweep_bearing`."""
 ERROR = "_standard_error"
 """Ends the name of the standard error of a mean."""
 _KEPT = {field.name: field.metadata for field in dataclasses.fields(BearingSweep) if field.type is OfLanes}
