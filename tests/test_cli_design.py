@@ -34,17 +34,20 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     swept: list[jc.CageModel] = []
 
     def search(model: Any, vary: Any, width: Any, **given: Any) -> Any:
-        steps = 4 if swept else 200  # of the first it is seen that it is found
-        return jc.optimise(model, vary, jc.design.Smooth(bowl), **given | dict(steps=steps, scouts=0))
+        generations = 4 if swept else 60  # of the first it is seen that it is found
+        small = dict(generations=generations, population=8, scouts=0)
+        return jc.design.evolve(model, vary, jc.design.Smooth(bowl), **given | small)
 
-    monkeypatch.setattr(_design, "optimise", search)
+    monkeypatch.setattr(_design, "evolve", search)
+    monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(bowl)))
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: (swept.append(model), report_example.swept())[1])
-    monkeypatch.setattr(_design, "_objective", lambda job, width, vary: width)
+    monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
     loads = lambda model, found, error: {"wear load": [1e9 * model.eccentricity], "peak land force": [2.0, np.nan]}
     monkeypatch.setattr(_design, "land_loads", loads)
     said = document(capsys, *DESIGN, "--out", str(tmp_path))
     assert said["optimum"] == pytest.approx({"guidance_gap": 0.5e-3, "eccentricity": 20e-6}, rel=0.02)
     assert said["objective"] == pytest.approx(1.0, abs=0.01) and said["at_bound"] == []
+    assert said["objective_before"] == pytest.approx(bowl(jc.case("1b")))
     assert [float(m.guidance_gap) for m in swept] == [0.6e-3, said["optimum"]["guidance_gap"]]
     assert said["cost"] == pytest.approx({n: float(jc.design.cost().function(m)) for n, m in zip(AFTER, swept)})
     assert said["vary"]["eccentricity"] == pytest.approx([5e-6, 23e-6])  # no worse balanced than it is
@@ -60,6 +63,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     text = capsys.readouterr().out
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
     assert "Balance may only get better: eccentricity of at most 23 um" in text
+    assert "2 rpm before, 1 rpm after" in text and "stays as it is" not in text
     worse = document(capsys, *DESIGN, "--worse-balance", "--out", str(tmp_path))
     assert worse["vary"]["eccentricity"] == pytest.approx([5e-6, 60e-6]) and worse["trade_offs"] is None
     terms = [lambda m: m.guidance_gap, lambda m: m.eccentricity, bowl, bowl]
@@ -73,6 +77,27 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert front["trade_offs"][-1]["guidance_gap"] == pytest.approx(front["optimum"]["guidance_gap"])
     assert front["trade_offs"][-2]["wear load [N m/s]"] == pytest.approx(23e-6)
     assert Path(front["figure"]).stat().st_size > 10_000 and Path(front["front"]).stat().st_size > 10_000
+
+
+def test_a_design_that_no_other_beats_stays(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """What the search sees as better, by gradient, the finer look does not."""
+    away = lambda model: -1e4 * model.guidance_gap
+    finer = lambda model: (1e4 * (model.guidance_gap - 0.6e-3)) ** 2
+    search = lambda model, vary, width, **given: jc.optimise(model, vary, jc.design.Smooth(lambda m: -away(m)), **given)
+    monkeypatch.setattr(_design, "optimise", search)
+    monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(finer)))
+    monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: report_example.swept())
+    monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
+    monkeypatch.setattr(_design, "land_loads", lambda *_: {"wear load": [1.0], "peak land force": [2.0]})
+    given = [*DESIGN, "--search", "gradient", "--starts", "1", "--steps", "9", "--out", str(tmp_path)]
+    said = document(capsys, *given)
+    own = jc.parameters(jc.case("1b"))
+    assert said["optimum"] == pytest.approx({n: float(own[n]) for n in ("guidance_gap", "eccentricity")})
+    assert said["status"] == "nothing better found" and said["objective"] == said["objective_before"]
+    assert main(given) == 0
+    assert "No design that was looked at is better than the given one, which stays as it is." in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -139,6 +164,7 @@ def test_sensitivity_of_a_known_objective(
         ("design 1a --cloud 5", "--cloud must be an even number from 4 up, but 5 was given"),
         ("design 1a --cost nan", "--cost must be at least 0, but nan was given"),
         ("design 1a --last 3000", "the range is 4000 to 3000 rpm"),
+        ("design 1a --search newton", "--search"),
         ("design 1a --vary gap=0.3mm:0.6mm", "gap"),
         ("design 1a --vary guidance_gap=0.6mm:0.3mm", "must ascend"),
         ("design 1a --vary guidance_gap=0.3kg:0.6kg", "guidance_gap"),

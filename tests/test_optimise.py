@@ -63,6 +63,79 @@ def test_a_walk_has_steps_of_given_length_between_the_bounds():
     assert 1 / (1 + np.exp(-float(z[1] + update[1]))) == pytest.approx(0.49)  # the last step
 
 
+@pytest.mark.parametrize("vary", [VARY, {"cubic": VARY["cubic"]}])
+def test_an_evolution_finds_a_known_optimum(vary: dict[str, tuple[float, float]]):
+    found = jc.design.evolve(double_well(), vary, bowl(damping=TRUTH["damping"]), generations=30).best
+    assert found.objective == pytest.approx(1.0, abs=1e-4)
+    assert found.values == pytest.approx({n: {"damping": TRUTH["damping"], "cubic": 1.5}[n] for n in vary}, rel=0.01)
+    assert np.isnan(found.error) and "+-" not in str(found)
+
+
+def test_an_evolution_goes_on_where_it_stopped(tmp_path):
+    class Stopped(Exception):
+        pass
+
+    def stop(generation, values):
+        assert values.shape == (2, 12)
+        if generation == 3:
+            raise Stopped
+
+    asked = []
+
+    def counted(space, places):
+        asked.append(len(places))
+        return bowl().values(space, places)
+
+    class Counted(type(bowl())):
+        values = staticmethod(counted)
+
+    search = lambda **options: jc.design.evolve(
+        double_well(), VARY, Counted(bowl().function), starts=2, generations=8, **options
+    )
+    whole = search()
+    with pytest.raises(Stopped):
+        search(keep=tmp_path / "search", report=stop)
+    asked.clear()
+    assert search(keep=tmp_path / "search").optima[0].history == whole.optima[0].history
+    assert asked == [24] * 4
+    with pytest.raises(ValueError, match="but is of another one"):
+        search(keep=tmp_path / "search", seed=1)
+    with pytest.raises(ValueError, match="`population` and `generations` must be at least 4 and 1, but 3"):
+        jc.design.evolve(double_well(), VARY, bowl(), population=3)
+
+
+def test_designs_without_a_value_are_the_worst():
+    """Beyond damping 0.5 there is none, just past its smallest value; where there is none anywhere, that is said."""
+    height = lambda s: jnp.where(s.acceleration.damping < 0.5, 1.0 - s.acceleration.damping, jnp.nan)
+    found = jc.design.evolve(double_well(), {"damping": (0.1, 1.0)}, jc.design.Smooth(height)).best
+    assert found.values["damping"] == pytest.approx(0.5, abs=0.01) and found.values["damping"] < 0.5
+    nowhere = jc.design.Smooth(lambda s: s.acceleration.damping * jnp.nan)
+    found = jc.design.evolve(double_well(), {"damping": (0.1, 1.0)}, nowhere, generations=3).best
+    assert found.status == "no design has a value"
+
+
+def test_the_best_of_many_with_noise_is_chosen_anew():
+    """Noise of 0.5 hides a bowl; by the bowl itself the design chosen is better than what the search took for best, and
+    one that is the best from the beginning stays."""
+    rng = np.random.default_rng(0)
+
+    class Noisy(type(bowl())):
+        def values(self, space, places):
+            return super().values(space, places) + 0.5 * rng.normal(size=len(places))
+
+    exact = bowl(damping=0.7)
+    found = jc.design.evolve(double_well(), VARY, Noisy(exact.function), starts=2, generations=10)
+    worth = lambda o: float(exact.function(o.model))
+    chosen, itself = jc.design.judged(found, exact)
+    assert itself == pytest.approx(float(exact.function(double_well())))
+    assert chosen.best.objective == pytest.approx(worth(chosen.best)) and found.best.objective < 1.0
+    assert chosen.best.objective < min(worth(found.best), itself)
+    at_best = bowl(damping=TRUTH["damping"], cubic=TRUTH["cubic"])
+    stays, itself = jc.design.judged(found, at_best)
+    assert stays.best.status == "nothing better found" and stays.best.objective == itself == pytest.approx(1.0)
+    assert stays.best.values == pytest.approx({n: TRUTH[n] for n in VARY})
+
+
 def test_starts_that_lead_to_one_optimum_are_one():
     found = jc.optimise(double_well(), VARY, bowl(), starts=6, steps=200)
     assert [n for _, n in found.distinct] == [6]

@@ -3,6 +3,7 @@
 import concurrent.futures
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,19 @@ from ..design import (
     LandMeasure,
     Optimised,
     Robust,
+    Scatter,
     TradeOff,
     chaotic_width,
     cost,
+    evolve,
     global_sensitivity,
+    judged,
     land_loads,
     optimise,
     tolerance_budget,
     trade_off,
 )
-from ..integrate import DEFAULT_ERROR
+from ..integrate import DEFAULT_ERROR, controlled
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
 from ..plotting import design_figure, elasticity_bars, trade_off_diagram
@@ -43,6 +47,8 @@ from ._whole_design import design_bearing
 VARY = ("guidance_gap=0.3mm:0.6mm", "eccentricity=5um:60um")
 CHECKED_SPEEDS = 118
 """Every 200 rpm of the usual range."""
+FINER, STARTS = 2, 3
+"""How many times as many speeds judge the designs that a search saw as its best, and from how many starts."""
 
 
 def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
@@ -59,21 +65,13 @@ def design(job: Job[DesignOptions]) -> Report:
     vary = read_bounds(options.vary or VARY, job.model)
     balance = None if options.worse_balance else no_worse_balance(job.model, vary)
     scatter = read_scatter(options.scatter, list(vary))
-    range_ = options.first, options.last, options.speeds
-    width = chaotic_width(*range_, **job.given("cloud spread seed"))
+    width = chaotic_width(options.first, options.last, options.speeds, **job.given("cloud spread seed"))
+    finer = _finer(options)
     kept = kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
-        objective = _objective(job, width, vary)
-        if scatter:
-            objective = Robust(objective, scatter, **job.given("worst seed"))
-        found = optimise(
-            job.model,
-            vary,
-            objective + options.cost * cost() if options.cost else objective,
-            **job.given("starts scouts steps seed"),
-            keep=kept,
-            report=lambda step, _: say("search", step, options.steps),
-        )
+        seen = _searched(job, vary, _objective(job, width, vary, scatter), kept, say)
+        say("finer look", 0, 1)
+        found, itself = judged(seen, _objective(job, finer, vary, scatter))
         searched = job.seconds
         front = _front(job, width, vary, found, say) if options.front else None
         models = {"before": job.model, "after": found.best.model}
@@ -91,10 +89,11 @@ def design(job: Job[DesignOptions]) -> Report:
     chaotic = {name: zones(swept) for name, swept in checked.items()}
     document = {
         "vary": vary,
-        **report.chosen(found.best, "objective error at_bound status"),
+        **report.chosen(found.best, "objective at_bound status"),
+        "objective_before": itself,
         "optimum": found.best.values,
-        "optima": [report.chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
-        "designs_swept": _swept(found, options, objective),
+        "optima": [report.chosen(o, "values objective at_bound") | {"starts": n} for o, n in found.distinct],
+        "designs_swept": _swept(found, options, Robust.draws if scatter else 1),
         **_loads(models, checked),
         "balance_grade_mm_per_s": {name: _balance_grade(model, options.last) for name, model in models.items()},
         "cost": {name: float(cost().function(model)) for name, model in models.items()},
@@ -113,12 +112,42 @@ def design(job: Job[DesignOptions]) -> Report:
     return Report(document, tables, [*_notes(document, found), *([balance] if balance else [])])
 
 
-def _objective(job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tuple[float, float]]) -> AbstractObjective:
-    """Chaotic speeds, and what the land feels beside what it feels now."""
+def _searched(
+    job: Job[DesignOptions],
+    vary: dict[str, tuple[float, float]],
+    objective: AbstractObjective,
+    kept: Path,
+    say: Say,
+) -> Optimised[CageModel]:
+    """What the search that was asked for saw as its best."""
+    options = job.options
+    shared = job.given("starts scouts seed") | {"keep": kept}
+    tell = lambda step, _: say("search", step, options.steps)
+    if options.search == "gradient":
+        return optimise(job.model, vary, objective, steps=options.steps, report=tell, **shared)
+    size = {"generations": options.steps, "population": vars(options)["cloud"]}
+    return evolve(job.model, vary, objective, report=tell, **size, **shared)
+
+
+def _finer(options: DesignOptions) -> ChaosMeasure:
+    """Judges what a search saw as its best: speeds between those of the search and twice as many, three starts, finer
+    steps."""
+    between = (options.last - options.first) / (8 * options.speeds)
+    range_ = options.first + between, options.last - between, FINER * options.speeds
+    return chaotic_width(*range_, starts=STARTS, seed=options.seed, method=controlled(DEFAULT_ERROR / 4))
+
+
+def _objective(
+    job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tuple[float, float]], scatter: Mapping[str, Scatter]
+) -> AbstractObjective:
+    """Chaotic speeds, what the land feels beside what it feels now, and cost."""
     options, space = job.options, DesignSpace.of(job.model, vary)
     prices = {"wear load": options.wear, "peak land force": options.force}
     terms = [LandMeasure(width, what).relative(space, price) for what, price in prices.items() if price]
-    return sum(terms, start=width)
+    objective = sum(terms, start=width)
+    if scatter:
+        objective = Robust(objective, scatter, **job.given("worst seed"))
+    return objective + options.cost * cost() if options.cost else objective
 
 
 def _front(
@@ -164,9 +193,8 @@ def _chaotic_rpm(found: Sweep) -> float:
     return float(np.mean(found.restless) * (found.rpm[-1] - found.rpm[0]))
 
 
-def _swept(found: Optimised, options: DesignOptions, width: AbstractObjective) -> int:
+def _swept(found: Optimised, options: DesignOptions, draws: int) -> int:
     """Designs whose speeds were swept in the search."""
-    draws = width.draws if isinstance(width, Robust) else 1
     given = vars(options)  # filled
     clouds = given["cloud"] * sum(len(o.history) for o in found.optima)
     return (clouds + (given["scouts"] if given["starts"] > 1 else 0)) * draws
@@ -178,8 +206,15 @@ def _ends(zone: Any) -> dict[str, Any]:
 
 
 def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
-    best = found.best
+    best, before = found.best, document["objective_before"]
+    verdict = (
+        f"Objective, by {FINER} times the speeds, {STARTS} starts and finer steps: {before:.0f} rpm before, "
+        f"{best.objective:.0f} rpm after."
+    )
+    if best.objective >= before:
+        verdict = f"No design that was looked at is better than the given one, which stays as it is. {verdict}"
     return [
+        verdict,
         f"Search: {best.status}, {len(best.history)} steps, {document['designs_swept']} designs swept in "
         f"{document['search_seconds']:.0f} s",
         f"At a bound: {', '.join(best.at_bound)}." if best.at_bound else "No parameter ended at a bound.",

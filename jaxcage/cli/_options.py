@@ -387,8 +387,8 @@ class VaryOptions(_Range):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DesignOptions(VaryOptions):
-    """Change the design so that fewer speeds are chaotic: gradient search, checked by a fresh sweep. Of a whole bearing
-    (nu2310), make wear, forces, impulses, friction power, slip and unbalance small at one speed."""
+    """Change the design so that fewer speeds are chaotic, checked by a fresh sweep. Of a whole bearing (nu2310), make
+    wear, forces, impulses, friction power, slip and unbalance small at one speed, by gradient."""
 
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
         "wear": (1000.0, 1.0),
@@ -404,7 +404,17 @@ class DesignOptions(VaryOptions):
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[tuple[str, ...]] = ("first", "last", "speeds", "quick", "cost", "front", "scatter", "worst")
+    of_cage: ClassVar[tuple[str, ...]] = (
+        "first",
+        "last",
+        "speeds",
+        "quick",
+        "cost",
+        "front",
+        "scatter",
+        "worst",
+        "search",
+    )
     of_whole: ClassVar[tuple[str, ...]] = (
         "speed",
         "load",
@@ -448,6 +458,9 @@ class DesignOptions(VaryOptions):
     The mean over it is then minimised."""
     worst: Share = 1.0
     """With --scatter: mean over this share of the manufactured cages, the worst ones."""
+    search: Literal["evolution", "gradient"] = "evolution"
+    """How to search: by evolution (CMA-ES), whose every step is a generation of --cloud designs; or down the gradient,
+    which is that of the cloud."""
     starts: Annotated[int | None, whole(1)] = None
     """Searches: one from the design itself, others from the best of the scouts; 3 if left out, 1 of a whole bearing."""
     scouts: Annotated[int | None, whole(0)] = None
@@ -455,7 +468,8 @@ class DesignOptions(VaryOptions):
     steps: FromOne = 12
     """Steps of each search at most."""
     cloud: Annotated[int | None, whole(4)] = None
-    """Designs around each one from which its gradient is taken; 12 if left out, 16 of a whole bearing."""
+    """Designs around each one from which its gradient is taken, or of a generation; 12 if left out, 16 of a whole
+    bearing."""
     spread: Share = 0.1
     """Their scatter, as a part of the distance between the bounds: structure that is finer is smoothed away."""
     ensemble: Annotated[int | None, whole(1)] = None

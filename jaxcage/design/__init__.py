@@ -18,6 +18,8 @@
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
 | `_optimise` | designs made better by gradient                                               |
+| `_evolve`   | designs made better without slopes, by CMA-ES; the best chosen anew by a finer objective |
+| `_kept`     | the state of a search in a file                                              |
 | `_trade_off`| several objectives at once: designs that no other beats in everything        |
 | `_scatter`  | Sobol indices, tolerance budgets, Pareto fronts                               |
 """
@@ -50,6 +52,7 @@ from ._edges import (
     FollowedEdges as FollowedEdges,
     zone_width as zone_width,
 )
+from ._evolve import evolve as evolve, judged as judged
 from ._fit import (
     Combination as Combination,
     Fit as Fit,

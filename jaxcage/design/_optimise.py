@@ -7,8 +7,6 @@ value is undone by half. The search ends when the slope is small, or no larger t
 
 import dataclasses
 import json
-import os
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic
@@ -21,7 +19,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
-from .._parameters import parameters
+from ._kept import KeptSearch
 from ._objective import AbstractObjective, DesignSpace, Measured
 from ._unknowns import Design
 
@@ -66,7 +64,7 @@ class Step:
     error: float
     slope: tuple[float, ...]
     slope_error: tuple[float, ...]
-    status: str
+    status: str = "ok"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +75,7 @@ class Optimum(Generic[Design]):
     """[SI]."""
     objective: float
     error: float
+    """Standard error; NaN of a single value."""
     at_bound: tuple[str, ...]
     """Parameters that ended at a bound: there the bound chose, not the objective."""
     history: tuple[Step, ...]
@@ -86,9 +85,8 @@ class Optimum(Generic[Design]):
     """The design itself, of the kind that the search began with."""
 
     def __str__(self) -> str:
-        rows = [
-            f"Optimum after {len(self.history) - 1} steps ({self.status}): {self.objective:.6g} +- {self.error:.2g}"
-        ]
+        error = f" +- {self.error:.2g}" if np.isfinite(self.error) else ""
+        rows = [f"Optimum after {len(self.history) - 1} steps ({self.status}): {self.objective:.6g}{error}"]
         rows += [f"  {n:<24} {v:.6g}{' at bound' if n in self.at_bound else ''}" for n, v in self.values.items()]
         return "\n".join(rows)
 
@@ -99,6 +97,11 @@ class Optimised(Generic[Design]):
 
     optima: tuple[Optimum[Design], ...]
     space: DesignSpace[Design]
+
+    @classmethod
+    def of(cls, space: DesignSpace[Design], optima: Sequence[Optimum[Design]]) -> "Optimised[Design]":
+        """From optima in any order."""
+        return cls(tuple(sorted(optima, key=lambda o: np.nan_to_num(o.objective, nan=np.inf))), space)
 
     @property
     def best(self) -> Optimum[Design]:
@@ -161,14 +164,14 @@ def optimise(
     require_x64()
     space = DesignSpace.of(system, vary)
     chosen = optax.adam(optax.cosine_decay_schedule(0.5, max(steps, 1), 0.1)) if optimiser is None else optimiser
-    first = _first_places(space, objective, starts, scouts, seed)
+    first = first_places(space, objective, starts, scouts, seed)
     z = _unbounded(first)
     with jax.numpy_dtype_promotion("standard"):  # optax mixes steps and numbers
         state = jax.vmap(chosen.init)(jnp.asarray(z))
     history: list[list[Step]] = [[] for _ in first]
-    kept = None if keep is None else _Kept(Path(keep), space, steps, first)
+    kept = None if keep is None else KeptSearch(keep, space, steps=steps, first=first.tolist())
     if kept is not None:
-        z, state, history = kept.load(z, state, history)
+        z, state, history = _loaded(kept, z, state, history)
     before = z.copy()
     while (step := max(map(len, history))) <= steps:
         places = 1 / (1 + np.exp(-z))
@@ -193,14 +196,14 @@ def optimise(
         before = np.where(fine[:, None], z, before)
         z = np.where(np.isin(np.arange(len(z)), live)[:, None], stepped, z)
         if kept is not None:
-            kept.save(z, state, history)
-    optima = [_optimum(space, h, _ended(h, tolerance) or "step limit") for h in history]
-    return Optimised(tuple(sorted(optima, key=lambda o: np.nan_to_num(o.objective, nan=np.inf))), space)
+            _save(kept, z, state, history)
+    return Optimised.of(space, [optimum_of(space, h, _ended(h, tolerance) or "step limit") for h in history])
 
 
-def _first_places(
+def first_places(
     space: DesignSpace, objective: AbstractObjective, starts: int | np.ndarray, scouts: int, seed: int
 ) -> Float[np.ndarray, "starts n"]:
+    """Where searches start."""
     if isinstance(starts, np.ndarray):
         if starts.ndim != 2 or starts.shape[1] != len(space.unknowns) or not np.all((starts >= 0) & (starts <= 1)):
             raise ArgumentError("starts", said="must hold places between 0 and 1, one column for each parameter.")
@@ -249,53 +252,36 @@ def _ended(history: Sequence[Step], tolerance: float) -> str | None:
     return None
 
 
-def _optimum(space: DesignSpace[Design], history: Sequence[Step], status: str) -> Optimum[Design]:
+def optimum_of(space: DesignSpace[Design], history: Sequence[Step], status: str) -> Optimum[Design]:
+    """The best step of a search."""
     known = [s for s in history if s.status == "ok"] or [history[-1]]
     best = min(known, key=lambda s: s.value)
+    return ended_at(space, best, history, status if best.status == "ok" else best.status)
+
+
+def ended_at(space: DesignSpace[Design], best: Step, history: Sequence[Step], status: str) -> Optimum[Design]:
+    """The optimum at a step."""
     place = np.array(best.place)
     edge = [n for n, p in zip(space.names, place, strict=True) if min(p, 1 - p) < AT_BOUND]
-    why = status if best.status == "ok" else best.status
-    return Optimum(space.values(place), best.value, best.error, tuple(edge), tuple(history), why, space.model(place))
+    return Optimum(space.values(place), best.value, best.error, tuple(edge), tuple(history), status, space.model(place))
 
 
-class _Kept:
-    """The state of a search in a file: numbers only, put in place whole."""
+def _save(kept: KeptSearch, z: np.ndarray, state: Any, history: Sequence[Sequence[Step]]) -> None:
+    leaves = {f"leaf_{i}": np.asarray(x) for i, x in enumerate(jax.tree.leaves(state))}
+    rows = json.dumps([[dataclasses.asdict(s) for s in h] for h in history])
+    kept.save(z=z, history=np.asarray(rows), **leaves)
 
-    def __init__(self, path: Path, space: DesignSpace, steps: int, first: np.ndarray):
-        design = {name: np.asarray(value).tolist() for name, value in parameters(space.system).items()}
-        bounds = {u.name: [u.lower, u.upper] for u in space.unknowns}
-        search = {"design": design, "bounds": bounds, "steps": steps, "first": first.tolist()}
-        self.path, self.what = path, json.dumps(search, sort_keys=True)
 
-    def save(self, z: np.ndarray, state: Any, history: Sequence[Sequence[Step]]) -> None:
-        leaves: dict[str, Any] = {f"leaf_{i}": np.asarray(x) for i, x in enumerate(jax.tree.leaves(state))}
-        rows = json.dumps([[dataclasses.asdict(s) for s in h] for h in history])
-        beside = self.path.with_name(self.path.name + ".part")
-        try:
-            with beside.open("wb") as file:
-                np.savez(file, z=z, what=self.what, history=rows, **leaves)
-            os.replace(beside, self.path)
-        except OSError as error:
-            beside.unlink(missing_ok=True)
-            raise OSError(
-                f"'{self.path}' could not be written ({error.strerror or error}): what was there before stays as it "
-                "was, and once there is room the same call goes on from there."
-            ) from error
-
-    def load(self, z: np.ndarray, state: Any, history: list[list[Step]]) -> tuple[np.ndarray, Any, list[list[Step]]]:
-        if not self.path.exists():
-            return z, state, history
-        try:
-            with self.path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-                kept = dict(file)
-        except (ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise InputError(f"'{self.path}' must be a file of this search, but is none: remove it.") from error
-        if str(kept.get("what")) != self.what:
-            raise InputError(f"'{self.path}' must be a file of this search, but is of another one: remove it.")
-        leaves, tree = jax.tree.flatten(state)
-        state = jax.tree.unflatten(tree, [jnp.asarray(kept[f"leaf_{i}"]) for i in range(len(leaves))])
-        rows = [[_read(row) for row in h] for h in json.loads(str(kept["history"]))]
-        return kept["z"], state, rows
+def _loaded(
+    kept: KeptSearch, z: np.ndarray, state: Any, history: list[list[Step]]
+) -> tuple[np.ndarray, Any, list[list[Step]]]:
+    """What was saved; what is given if nothing was."""
+    found = kept.load()
+    if found is None:
+        return z, state, history
+    leaves, tree = jax.tree.flatten(state)
+    state = jax.tree.unflatten(tree, [jnp.asarray(found[f"leaf_{i}"]) for i in range(len(leaves))])
+    return found["z"], state, [[_read(row) for row in h] for h in json.loads(str(found["history"]))]
 
 
 def _read(row: dict[str, Any]) -> Step:

@@ -37,7 +37,7 @@ def optima_table(found: Optimised) -> Table:
     """The distinct optima, the best first."""
     columns = {
         **{name: f"{{0[0].values[{name}]:.4g}}" for name in found.best.values},
-        "objective [rpm]": "{0[0].objective:.0f} ± {0[0].error:.0f}",
+        "objective [rpm]": "{0[0].objective:.0f}",
         "starts": "{[1]}",
         "at a bound": lambda item: ", ".join(item[0].at_bound) or "none",
     }
