@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import report
+from .._parameters import parameters
 from ..analysis import Sweep, zones
 from ..design import (
     MEASURES,
@@ -44,11 +45,18 @@ from ._vary import read_bounds, read_scatter
 from ._whole_design import design_bearing
 
 
-VARY = ("guidance_gap=0.3mm:0.6mm", "eccentricity=5um:60um")
+USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
+"""What is varied if nothing is said, and between which parts of what it is."""
 CHECKED_SPEEDS = 118
 """Every 200 rpm of the usual range."""
 FINER, STARTS = 2, 3
 """How many times as many speeds judge the designs that a search saw as its best, and from how many starts."""
+
+
+def _usual(model: CageModel) -> list[str]:
+    """`USUAL`, as --vary would have it."""
+    now = {name: float(value) for name, value in parameters(model).items() if name in USUAL and float(value) > 0}
+    return [f"{name}={USUAL[name][0] * value:.6g}:{USUAL[name][1] * value:.6g}" for name, value in now.items()]
 
 
 def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
@@ -62,7 +70,7 @@ def design(job: Job[DesignOptions]) -> Report:
     if job.whole is not None:
         return design_bearing(job, job.whole)
     options = job.options
-    vary = read_bounds(options.vary or VARY, job.model)
+    vary = read_bounds(options.vary or _usual(job.model), job.model)
     balance = None if options.worse_balance else no_worse_balance(job.model, vary)
     scatter = read_scatter(options.scatter, list(vary))
     width = chaotic_width(options.first, options.last, options.speeds, **job.given("cloud spread seed"))
@@ -225,7 +233,7 @@ def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
 def sensitivity(job: Job[SensitivityOptions]) -> Report:
     """`jaxcage sensitivity`: shares of the chaotic width's variance, and tolerance budgets of the edges."""
     options = job.options
-    vary = read_bounds(options.vary or VARY, job.model)
+    vary = read_bounds(options.vary or _usual(job.model), job.model)
     width = chaotic_width(options.first, options.last, options.speeds)
     edges, budgets = {}, []
     with job.computing() as say:

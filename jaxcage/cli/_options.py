@@ -372,7 +372,7 @@ class VaryOptions(_Range):
 
     vary: Annotated[Texts, tyro.conf.arg(metavar="NAME=LOWER:UPPER")] = ()
     """What may be changed and between which values, once for each parameter, e.g. guidance_gap=0.3mm:0.6mm; the
-    guidance gap from 0.3 to 0.6 mm and the eccentricity from 5 to 60 um if left out."""
+    guidance gap from 0.7 to 1.4 of what it is and the eccentricity from 0.2 to 2.5 if left out."""
     first: Speed = 4000.0
     """First cage speed that matters [rpm], or with a unit or of the shaft."""
     last: Speed = 27500.0
