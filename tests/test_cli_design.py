@@ -42,7 +42,8 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(bowl)))
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: (swept.append(model), report_example.swept())[1])
     monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
-    loads = lambda model, found, error: {"wear load": [1e9 * model.eccentricity], "peak land force": [2.0, np.nan]}
+    rest = {"peak land force": [2.0, np.nan], "film drag power": [3.0, 5.0]}
+    loads = lambda model, found, error: {"wear load": [1e9 * model.eccentricity], **rest}
     monkeypatch.setattr(_design, "land_loads", loads)
     said = document(capsys, *DESIGN, "--out", str(tmp_path))
     assert said["optimum"] == pytest.approx({"guidance_gap": 0.5e-3, "eccentricity": 20e-6}, rel=0.02)
@@ -53,6 +54,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert said["vary"]["eccentricity"] == pytest.approx([4.6e-6, 23e-6])  # no worse balanced than it is
     assert said["wear_load_N_m_per_s"] == pytest.approx({"before": 23e3, "after": 20e3}, rel=0.02)
     assert said["peak_land_force_N"] == {"before": 2.0, "after": 2.0}
+    assert said["film_drag_power_W"] == {"before": 4.0, "after": 4.0}
     grade = 23e-6 * 14000 * np.pi / 30 * 1e3  # [mm/s]
     assert said["balance_grade_mm_per_s"] == pytest.approx({"before": grade, "after": grade * 20 / 23}, rel=0.02)
     zones = [(z["onset_rpm"], z["exit_rpm"]) for z in said["chaotic_zones"]["after"]]
@@ -66,7 +68,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "2 rpm before, 1 rpm after" in text and "stays as it is" not in text
     worse = document(capsys, *DESIGN, "--worse-balance", "--out", str(tmp_path))
     assert worse["vary"]["eccentricity"] == pytest.approx([4.6e-6, 57.5e-6]) and worse["trade_offs"] is None
-    terms = [lambda m: m.guidance_gap, lambda m: m.eccentricity, bowl, bowl]
+    terms = [lambda m: m.guidance_gap, lambda m: m.eccentricity, bowl, bowl, bowl]
 
     def trade_off(model: Any, vary: Any, asked: Any, **given: Any) -> Any:
         return jc.design.trade_off(model, vary, dict(zip(asked, map(jc.design.Smooth, terms), strict=True)), **given)
@@ -90,7 +92,7 @@ def test_a_design_that_no_other_beats_stays(
     monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(finer)))
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: report_example.swept())
     monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
-    monkeypatch.setattr(_design, "land_loads", lambda *_: {"wear load": [1.0], "peak land force": [2.0]})
+    monkeypatch.setattr(_design, "land_loads", lambda *_: dict.fromkeys(jc.design.MEASURES, [1.0]))
     given = [*DESIGN, "--search", "gradient", "--starts", "1", "--steps", "9", "--out", str(tmp_path)]
     said = document(capsys, *given)
     own = jc.parameters(jc.case("1b"))
@@ -160,7 +162,7 @@ def test_sensitivity_of_a_known_objective(
     "arguments, said",
     [
         ("design 1a --starts 0", "--starts must be at least 1, but 0 was given"),
-        ("design 1a --scouts 1", "--scouts must be at least 2, but 1 was given"),
+        ("design 1a --starts 3 --scouts 1", "--scouts must be 0 or at least 2, but 1 was given"),
         ("design 1a --cloud 5", "--cloud must be an even number from 4 up, but 5 was given"),
         ("design 1a --cost nan", "--cost must be at least 0, but nan was given"),
         ("design 1a --last 3000", "the range is 4000 to 3000 rpm"),

@@ -278,8 +278,8 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     fine = jc.method("rk4", steps=2048)
     places = np.array([[1.0, 0.33], [0.0, 0.98]])
     # Where motion is chaotic two integrations part: they are compared over two revolutions.
-    wear, peak = (jc.design.LandMeasure(width, what, revolutions=2) for what in ("wear load", "peak land force"))
-    got = wear.at_speeds(space, places), peak.at_speeds(space, places)
+    wear, peak, film = (jc.design.LandMeasure(width, what, revolutions=2) for what in jc.design.MEASURES)
+    got = [measure.at_speeds(space, places) for measure in (wear, peak, film)]
     last = width.run(space, places).last
     touched = 0
     for k, place in enumerate(places):
@@ -291,6 +291,7 @@ def test_loads_of_the_land_are_those_of_a_time_history():
             load = np.mean([o.mean_contact_force for o in seen]) * speed * float(model.land_radius)
             assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
             assert got[1][k, i] == pytest.approx(np.mean([o.peak_contact_force for o in seen]), rel=0.06, abs=1e-6)
+            assert got[2][k, i] == pytest.approx(np.mean([o.drag_power for o in seen]), rel=0.02)
             touched += load > 1.0
     assert touched >= 2
     own = wear.values(space, space.place[None])

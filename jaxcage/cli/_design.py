@@ -130,10 +130,11 @@ def _searched(
     """What the search that was asked for saw as its best."""
     options = job.options
     shared = job.given("starts scouts seed") | {"keep": kept}
-    tell = lambda step, _: say("search", step, options.steps)
+    steps = vars(options)["steps"]
+    tell = lambda step, _: say("search", step, steps)
     if options.search == "gradient":
-        return optimise(job.model, vary, objective, steps=options.steps, report=tell, **shared)
-    size = {"generations": options.steps, "population": vars(options)["cloud"]}
+        return optimise(job.model, vary, objective, steps=steps, report=tell, **shared)
+    size = {"generations": steps, "population": vars(options)["cloud"]}
     return evolve(job.model, vary, objective, report=tell, **size, **shared)
 
 
@@ -150,7 +151,7 @@ def _objective(
 ) -> AbstractObjective:
     """Chaotic speeds, what the land feels beside what it feels now, and cost."""
     options, space = job.options, DesignSpace.of(job.model, vary)
-    prices = {"wear load": options.wear, "peak land force": options.force}
+    prices = {"wear load": options.wear, "peak land force": options.force, "film drag power": options.power}
     terms = [LandMeasure(width, what).relative(space, price) for what, price in prices.items() if price]
     objective = sum(terms, start=width)
     if scatter:
@@ -177,7 +178,11 @@ def _front(
 def _loads(models: Mapping[str, CageModel], checked: Mapping[str, Sweep]) -> dict[str, dict[str, float]]:
     """Means over the speeds that were checked, by steps at 1/16 of the usual error."""
     found = {name: land_loads(models[name], swept, DEFAULT_ERROR / 16) for name, swept in checked.items()}
-    keys = {"wear_load_N_m_per_s": "wear load", "peak_land_force_N": "peak land force"}
+    keys = {
+        "wear_load_N_m_per_s": "wear load",
+        "peak_land_force_N": "peak land force",
+        "film_drag_power_W": "film drag power",
+    }
     return {key: {name: float(np.nanmean(f[what])) for name, f in found.items()} for key, what in keys.items()}
 
 
@@ -203,9 +208,8 @@ def _chaotic_rpm(found: Sweep) -> float:
 
 def _swept(found: Optimised, options: DesignOptions, draws: int) -> int:
     """Designs whose speeds were swept in the search."""
-    given = vars(options)  # filled
-    clouds = given["cloud"] * sum(len(o.history) for o in found.optima)
-    return (clouds + (given["scouts"] if given["starts"] > 1 else 0)) * draws
+    clouds = vars(options)["cloud"] * sum(len(o.history) for o in found.optima)
+    return (clouds + (options.scouts if options.starts > 1 else 0)) * draws
 
 
 def _ends(zone: Any) -> dict[str, Any]:

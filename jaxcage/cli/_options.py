@@ -394,11 +394,10 @@ class DesignOptions(VaryOptions):
         "wear": (1000.0, 1.0),
         "force": (1000.0, 1.0),
         "impulse": (None, 1.0),
-        "power": (None, 1.0),
+        "power": (0.0, 1.0),
         "slip": (None, 1.0),
         "balance": (None, 1.0),
-        "starts": (3, 1),
-        "scouts": (32, 0),
+        "steps": (16, 12),
         "cloud": (12, 16),
         "ensemble": (None, 4),
         "discard": (None, 10),
@@ -419,7 +418,6 @@ class DesignOptions(VaryOptions):
         "speed",
         "load",
         "impulse",
-        "power",
         "slip",
         "balance",
         "ensemble",
@@ -443,7 +441,8 @@ class DesignOptions(VaryOptions):
     impulse: Price = None
     """Of a whole bearing: what the impulses of pockets and land in a revolution count; 1 if left out."""
     power: Price = None
-    """Of a whole bearing: what the friction power counts; 1 if left out."""
+    """What the power to shear the film of the land as it is now is worth, in rpm of chaotic speeds; 0 if left out. Of a
+    whole bearing: what its friction power counts; 1 if left out."""
     slip: Price = None
     """Of a whole bearing: what the slip of its cage counts; 1 if left out."""
     balance: Price = None
@@ -461,12 +460,12 @@ class DesignOptions(VaryOptions):
     search: Literal["evolution", "gradient"] = "evolution"
     """How to search: by evolution (CMA-ES), whose every step is a generation of --cloud designs; or down the gradient,
     which is that of the cloud."""
-    starts: Annotated[int | None, whole(1)] = None
-    """Searches: one from the design itself, others from the best of the scouts; 3 if left out, 1 of a whole bearing."""
-    scouts: Annotated[int | None, whole(0)] = None
-    """Designs all over the bounds that are looked at beforehand; 32 if left out, none of a whole bearing."""
-    steps: FromOne = 12
-    """Steps of each search at most."""
+    starts: FromOne = 1
+    """Searches: one from the design itself, others from the best of the scouts."""
+    scouts: FromZero = 0
+    """Designs all over the bounds that are looked at beforehand; without any, further searches start anywhere."""
+    steps: Annotated[int | None, whole(1)] = None
+    """Steps of each search at most; 16 if left out, 12 of a whole bearing."""
     cloud: Annotated[int | None, whole(4)] = None
     """Designs around each one from which its gradient is taken, or of a generation; 12 if left out, 16 of a whole
     bearing."""
@@ -481,11 +480,8 @@ class DesignOptions(VaryOptions):
 
     def check(self) -> None:
         super().check()
-        usual = {name: pair[self.speed is not None] for name, pair in self.usual.items()}
-        starts = usual["starts"] if self.starts is None else self.starts
-        scouts = usual["scouts"] if self.scouts is None else self.scouts
-        if scouts < starts - 1 and (scouts or self.speed is None):
-            raise InputError(f"Option --scouts must be at least {starts - 1}, but {scouts} was given.")
+        if 0 < self.scouts < self.starts - 1:
+            raise InputError(f"Option --scouts must be 0 or at least {self.starts - 1}, but {self.scouts} was given.")
         if self.worst != DesignOptions.worst and not self.scatter:
             raise InputError("Option --worst goes with --scatter.")
 

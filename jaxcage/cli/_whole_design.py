@@ -53,8 +53,8 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
     )
     runs.require_designs(len(vary))
     fresh = runs.fresh(starts=CHECKED, longer=LONGER)
-    lanes = runs.designs * runs.starts * filled["starts"]
-    length = (runs.discard + runs.revolutions) * (options.steps + 1)
+    lanes = runs.designs * runs.starts * options.starts
+    length = (runs.discard + runs.revolutions) * (filled["steps"] + 1)
     job.require(Demand(lanes, length, 2e4 * lanes, rate=2 * SWEEPING))
     kept = kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
@@ -62,9 +62,9 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
             model,
             vary,
             bearing_objective(model, vary, runs, prices),
-            optimiser=walk(steps=options.steps),
+            optimiser=walk(steps=filled["steps"]),
             keep=kept,
-            report=lambda step, _: say("search", step, options.steps),
+            report=lambda step, _: say("search", step, filled["steps"]),
             **job.given("starts scouts steps seed"),
         )
         searched = job.seconds
@@ -84,7 +84,7 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
         "optima": [report.chosen(o, "values objective error at_bound") | {"starts": n} for o, n in found.distinct],
         "before_and_after": {row.name: dataclasses.asdict(row) | {"known": row.known} for row in rows},
         "check": report.chosen(fresh, "starts discard revolutions tolerance seed") | {"failed": failed},
-        "designs_run": runs.designs * sum(len(o.history) for o in found.optima) + filled["scouts"] + 1,
+        "designs_run": runs.designs * sum(len(o.history) for o in found.optima) + options.scouts + 1,
         "search_seconds": round(searched, 1),
     }
     tables = [

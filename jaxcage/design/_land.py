@@ -1,4 +1,4 @@
-"""What running costs the guiding land: the force with which the cage meets it, and the load that wears it.
+"""What running costs the guiding land: the force with which the cage meets it, the load that wears it, the film's drag.
 
 Archard's law (J. F. Archard, J. Appl. Phys. 24 (1953) 981): the volume worn off is k N s, with the normal force N, the
 way s slid and a specific wear rate k of the two surfaces and their oil. k is a shop's own number and the same before
@@ -21,17 +21,18 @@ from ._chaos import ChaosMeasure
 from ._objective import AbstractObjective, DesignSpace, Measured
 
 
-MEASURES = {"wear load": "N m/s", "peak land force": "N"}
+MEASURES = {"wear load": "N m/s", "peak land force": "N", "film drag power": "W"}
 
 
-def land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array]:
-    """Size of the land's contact force on the cage [N]."""
+def land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array, Array]:
+    """Size of the land's contact force on the cage [N], and the power to shear the film [W]."""
     n = len(state) // 2
     q, v = state[:n], state[n:]
     if n == 4:  # an elastic rib moves too
         q, v = (q[0] - q[2], q[1] - q[3]), (v[0] - v[2], v[1] - v[3])
-    fx, fy, _ = model.cage_at(speed).forces(tau, *q, *v)["contact"]
-    return (jnp.sqrt(fx * fx + fy * fy),)
+    forces = model.cage_at(speed).forces(tau, *q, *v)
+    fx, fy, _ = forces["contact"]
+    return jnp.sqrt(fx * fx + fy * fy), -forces["film"][2] * speed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,8 +40,8 @@ class LandMeasure(AbstractObjective):
     """The mean over speeds, weighted as in `chaos`, of what its designs' land feels; the mean over their starts.
 
     `wear load` [N m/s]: mean contact force times the speed at which the cage's land slides on the rib's; `peak land
-    force` [N]: its largest value over some revolutions. Slopes come from the same cloud of designs, and the same
-    simulations, as those of `chaos`.
+    force` [N]: its largest value over some revolutions; `film drag power` [W]: what shearing the film takes. Slopes
+    come from the same cloud of designs, and the same simulations, as those of `chaos`.
     """
 
     chaos: ChaosMeasure
@@ -66,19 +67,18 @@ class LandMeasure(AbstractObjective):
 
     def relative(self, space: DesignSpace, price: float) -> AbstractObjective:
         """`price` times this over what the design itself has; where that is next to nothing, over what its weight would
-        do: as a peak the whole of it, as a mean force a hundredth."""
+        do: as a peak the whole of it, as a mean force a hundredth, and so its power."""
         model: Any = space.system
-        weight = float(model.cage_mass * model.gravity)
-        least = weight
-        if self.what == "wear load":
+        least = float(model.cage_mass * model.gravity)
+        if MEASURES[self.what] != "N":
             least *= 0.01 * float(np.average(self.chaos.speeds, weights=self.chaos.weights) * model.land_radius)
         own = float(self.values(space, space.place[None])[0])
         return price / (max(own, least) if np.isfinite(own) else least) * self
 
 
 def land_loads(model: CageModel, found: Sweep, error: float | None = None) -> dict[str, Float[np.ndarray, " speeds"]]:
-    """Wear load [N m/s] and peak land force [N] at each speed of a sweep, the mean of its starts, over revolutions that
-    begin where it ended.
+    """What `MEASURES` names at each speed of a sweep, the mean of its starts, over revolutions that begin where it
+    ended.
 
     **Arguments:** model and its sweep; error of a revolution, by default that of `jaxcage.controlled`.
     """
@@ -107,4 +107,5 @@ def _loads(
     return {
         "wear load": mean_of_starts(mean[:, 0] * speed * radius),
         "peak land force": mean_of_starts(largest[:, 0]),
+        "film drag power": mean_of_starts(mean[:, 1]),
     }
