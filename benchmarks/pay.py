@@ -192,7 +192,7 @@ def by_evolution(space: DesignSpace, asked: Counted, seed: int) -> None:
 
 
 def by_gradient(space: DesignSpace, asked: Counted, seed: int) -> np.ndarray:
-    """As `jaxcage design` does: scouts, then steps of Adam down the slopes of clouds, from the best scout."""
+    """As `jaxcage design --search gradient`: scouts, then steps of Adam down the slopes of clouds, from the best."""
     first = _scouted(space, asked, seed)[None]
     steps = (BUDGET - SCOUTS) // (2 * TOGETHER) - 1
     vary = {u.name: (u.lower, u.upper) for u in space.unknowns}

@@ -4,7 +4,7 @@ import concurrent.futures
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -45,6 +45,7 @@ from ._vary import read_bounds, read_scatter
 from ._whole_design import design_bearing
 
 
+Found = TypeVar("Found")
 USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
 """What is varied if nothing is said, and between which parts of what it is."""
 CHECKED_SPEEDS = 118
@@ -83,13 +84,14 @@ def design(job: Job[DesignOptions]) -> Report:
         searched = job.seconds
         front = _front(job, width, vary, found, say) if options.front else None
         models = {"before": job.model, "after": found.best.model}
+        differ = [job.model] if found.best.objective >= itself else [*models.values()]
         say("fresh sweeps", 0, 1)
-        checked = {name: _check(model, options) for name, model in models.items()}
+        checked = _twice([_check(model, options) for model in differ])
         loss: dict[str, LossZones] = {}
         if not options.quick:
             search = lambda model: _loss_zones(model, options, say)
             with concurrent.futures.ThreadPoolExecutor() as pool:  # a search keeps one core busy
-                loss = dict(zip(models, pool.map(search, models.values()), strict=True))
+                loss = _twice(list(pool.map(search, differ)))
     job.figure(design_figure(found, checked["before"], checked["after"]))
     if front is not None:
         job.draw(lambda ax: trade_off_diagram(front, ax), (9.0, 6.0), f"{job.name}: trade-offs", "front", "_front")
@@ -120,6 +122,11 @@ def design(job: Job[DesignOptions]) -> Report:
     return Report(document, tables, [*_notes(document, found), *([balance] if balance else [])])
 
 
+def _twice(found: list[Found]) -> dict[str, Found]:
+    """Before and after: the same where the design stays as it is."""
+    return {"before": found[0], "after": found[-1]}
+
+
 def _searched(
     job: Job[DesignOptions],
     vary: dict[str, tuple[float, float]],
@@ -129,7 +136,7 @@ def _searched(
 ) -> Optimised[CageModel]:
     """What the search that was asked for saw as its best."""
     options = job.options
-    shared = job.given("starts scouts seed") | {"keep": kept}
+    shared: dict[str, Any] = job.given("starts scouts seed") | {"keep": kept}
     steps = vars(options)["steps"]
     tell = lambda step, _: say("search", step, steps)
     if options.search == "gradient":

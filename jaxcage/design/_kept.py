@@ -23,7 +23,7 @@ class KeptSearch:
         self.path = Path(path)
         self.what = json.dumps({"design": design, "bounds": bounds, **search}, sort_keys=True)
 
-    def save(self, **arrays: np.ndarray) -> None:
+    def save(self, **arrays: Any) -> None:
         """Put these in the file, in place of what was there."""
         beside = self.path.with_name(self.path.name + ".part")
         try:
