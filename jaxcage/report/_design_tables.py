@@ -55,7 +55,7 @@ def before_and_after_tables(document: Mapping[str, Any]) -> list[Table]:
             for when, listed in found.items()
             for i, zone in enumerate(listed, start=1)
         ]
-        if found:
+        if rows:
             title = f"{kind.replace('_', '-').capitalize()} zones before and after [rpm]"
             tables.append(Table(title, ("design", "zone", "onset", "exit", "width"), rows, ("onset", "exit", "width")))
     return tables
