@@ -81,7 +81,7 @@ class ZoneWidth:
 
     def __str__(self) -> str:
         wide = "" if self.width_rpm is None else f"{self.width_rpm:.0f} +- {self.standard_error_rpm:.0f} rpm, "
-        asked = {name: (name,) for name in TOGETHER if name in self.names}
+        asked: dict[str, tuple[str, ...]] = {name: (name,) for name in TOGETHER if name in self.names}
         if len(asked) == len(TOGETHER):
             asked["both, at a fixed ratio"] = TOGETHER
         found = [(name, self.change(*of)) for name, of in asked.items()]

@@ -130,6 +130,7 @@ from ._readings import (
 )
 from ._slopes import (
     EXIT as EXIT,
+    FIRST as FIRST,
     ONSET as ONSET,
     edge_slopes as edge_slopes,
     elasticities_table as elasticities_table,

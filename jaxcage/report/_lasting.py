@@ -15,7 +15,10 @@ def _elasticities(edge: AbstractStatisticalEdge) -> dict[str, tuple[float, float
 
 def _asked(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     """Parameters alone, and gap and eccentricity together."""
-    return {n: (n,) for n in names} | ({FIXED_RHO: FIRST} if set(FIRST) <= set(names) else {})
+    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
+    if set(FIRST) <= set(names):
+        asked[FIXED_RHO] = FIRST
+    return asked
 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> Table:
