@@ -13,7 +13,7 @@ import jaxcage as jc
 from jaxcage import analysis
 from jaxcage.analysis import Edge, Zone, hazard
 from jaxcage.cli import main
-from jaxcage.design import LastingWidth, lasting_edge, lasting_edges
+from jaxcage.design import LastingEdge, lasting_edge, lasting_edges, zone_width
 
 
 CASE = jc.case("1a")
@@ -82,15 +82,27 @@ ELASTICITY = np.array([-0.3, 0.5])
 
 
 class Planted:
-    """In place of the sweeps: three lanes of each design, which leave chaos at a known rate."""
+    """In place of the sweeps: three lanes of each design, which leave chaos at a known rate; with a power at one that
+    is 0 at the edge and one escape in a horizon 100 rpm beyond it."""
 
-    def __init__(self, seed: int, rate_at_edge: float = 1.0, steep: float = STEEP, curvature: float = 0.0):
+    def __init__(
+        self,
+        seed: int,
+        rate_at_edge: float = 1.0,
+        steep: float = STEEP,
+        curvature: float = 0.0,
+        power: float | None = None,
+    ):
         self.rng, self.rate, self.steep, self.curvature = np.random.default_rng(seed), rate_at_edge, steep, curvature
+        self.power = power
 
     def __call__(self, model: Any, names: Any, values: np.ndarray, rpm: np.ndarray, horizon: int, *_: Any) -> Any:
         base = np.array([float(jc.parameters(model)[n]) for n in names])
-        beyond = self.steep * (rpm - EDGE * np.prod((values / base) ** ELASTICITY, axis=1))
+        away = rpm - EDGE * np.prod((values / base) ** ELASTICITY, axis=1)
+        beyond = self.steep * away
         rate = self.rate * np.exp(beyond + self.curvature * beyond**2) / horizon
+        if self.power is not None:
+            rate = np.maximum(away / 100.0, 1e-6) ** self.power / horizon
         block = analysis.LIFE_BLOCK
         times = block * np.ceil(self.rng.exponential(1 / rate[:, None], (rpm.size, 3)) / block) + 100
         return np.where(times <= horizon, times, np.inf), horizon
@@ -98,10 +110,15 @@ class Planted:
 
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch):
-    def plant(seed: int, **law: float) -> None:
+    def plant(seed: int, **law: float | None) -> None:
         monkeypatch.setattr("jaxcage.design._lasting._escapes", Planted(seed, **law))
 
     return plant
+
+
+@pytest.fixture
+def few_draws(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("jaxcage.design._lasting.DRAWS", 6)
 
 
 @pytest.mark.parametrize("curvature, errors, most", [(0.0, 2, 34), (0.15, 3, 38)])
@@ -150,21 +167,56 @@ def test_a_window_and_a_horizon_that_are_none_are_refused():
         lasting_edge(CASE, 12000.0, 100.0, horizon=300)
 
 
+def halved(edge: LastingEdge) -> LastingEdge:
+    """An edge at half the speed, with the elasticities of this one."""
+    return dataclasses.replace(edge, speed_rpm=edge.speed_rpm / 2, middle_rpm=edge.middle_rpm / 2)
+
+
 def test_an_open_zone_has_one_edge_and_a_closed_one_a_width(planted):
     planted(3)
     leaves = Edge(EDGE, 100.0, "chaotic")
     assert list(lasting_edges(CASE, Zone("chaotic", None, leaves, 1.0))) == ["exit"]
     found = lasting_edges(CASE, Zone("chaotic", None, leaves, 1.0))["exit"]
-    onset = dataclasses.replace(found, speed_rpm=found.speed_rpm / 2)
-    width = LastingWidth(onset, found)
-    assert width.width_rpm == pytest.approx(found.speed_rpm / 2)
-    assert width.change("eccentricity")[0] == pytest.approx(width.width_rpm * found.elasticity[1])
-    assert width.change(*NAMES)[0] == pytest.approx(width.width_rpm * found.sum_of(*NAMES)[0])
+    onset = halved(found)
+    width = zone_width({"onset": onset, "exit": found})
+    assert width.width_rpm == pytest.approx(found.speed_rpm / 2) and width.status == "converged"
+    assert width.change("eccentricity")[0] == pytest.approx(found.speed_rpm / 2 * found.elasticity[1])
+    assert width.change(*NAMES)[0] == pytest.approx(found.speed_rpm / 2 * found.sum_of(*NAMES)[0])
     assert width.standard_error_rpm == pytest.approx(np.sqrt(2) * found.standard_error_rpm)
+    assert "both, at a fixed ratio" in str(width)
+
+
+def test_an_open_zone_has_no_width_and_the_gradient_of_its_one_edge(planted):
+    planted(3)
+    found = lasting_edge(CASE, EDGE, 100.0)
+    for end, sign, missing in (("exit", 1.0, "onset"), ("onset", -1.0, "exit")):
+        width = zone_width({f"zone 2 {end}": found}, 2)
+        assert width.open and width.trusted and width.status == f"open: no {missing} within the range"
+        assert width.width_rpm is None and width.standard_error_rpm is None
+        by, error = width.change(*NAMES)
+        assert by == pytest.approx(sign * found.speed_rpm * found.sum_of(*NAMES)[0])
+        assert error == pytest.approx(found.speed_rpm * found.sum_of(*NAMES)[1])
+    with pytest.raises(ValueError, match="`zone` must be one with an edge among zone 2 exit, but is 1"):
+        zone_width({"zone 2 exit": found})
+    with pytest.raises(ValueError, match="`names` must be among guidance_gap, eccentricity, but has 'gap'"):
+        width.change("gap")
+
+
+def test_change_of_a_width_is_that_of_the_planted_edges(planted):
+    """An onset at half the speed of the exit, with the same elasticities, each from lanes of its own."""
+    z = []
+    for seed in range(12):
+        planted(seed)
+        ends = {end: lasting_edge(CASE, EDGE, 100.0, designs=32, seed=seed) for end in ("onset", "exit")}
+        width = zone_width(ends | {"onset": halved(ends["onset"])})
+        of = [width.change(name) for name in NAMES] + [width.change(*NAMES)]
+        true = [EDGE / 2 * e for e in (*ELASTICITY, 0.2)]
+        z.append([(value - t) / error for (value, error), t in zip(of, true, strict=True)])
+    assert np.mean(np.abs(z) < 2) > 0.85 and np.all(np.sqrt(np.mean(np.square(z), axis=0)) < 1.6)
 
 
 def test_gradient_command_of_lasting_zones(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted, few_draws
 ):
     planted(5)
     zone = Zone("chaotic", Edge(EDGE, 100.0, "chaotic"), Edge(EDGE, 100.0, "chaotic"), 1.0)
@@ -182,19 +234,80 @@ def test_gradient_command_of_lasting_zones(
     assert abs(got["widths"][0]["width_rpm"]) < 4 * got["widths"][0]["standard_error_rpm"]
     assert main(asked) == 0
     out = capsys.readouterr().out
-    assert "mean life of chaos passes 3000 revolutions" in out and "what 1 % more of a parameter adds" in out
+    assert (
+        "mean life of chaos passes 3000 revolutions" in out
+        and "95 % interval [rpm]" in out
+        and "what 1 % more of a parameter adds" in out
+    )
     assert main([*asked, "--zone", "2"]) == 2
     assert "--zone must be at most 1" in capsys.readouterr().err
     assert main([*asked, "--by", "gap"]) == 2
     assert main(["gradient", "1a", "--zone", "1"]) == 2
 
 
-def test_lanes_of_an_edge_tell_a_crisis_too(planted):
-    """The law is exponential in speed, not a power: near the edge both fit, and the crisis lies on the lasting side."""
+def test_a_planted_crisis_and_its_elasticities_lie_within_their_errors(planted, few_draws):
+    held, z = 0, []
+    for seed in range(4):
+        planted(seed, power=1.5)
+        found = lasting_edge(CASE, 12150.0, 150.0, designs=32, seed=seed).crisis()
+        assert found.status == "converged" and found.fit.beyond == "above"
+        held += found.interval_rpm[0] <= EDGE <= found.interval_rpm[1]
+        off = np.array([*(found.elasticity - ELASTICITY), found.sum_of(*NAMES)[0] - 0.2])
+        z.append(off / [*found.elasticity_error, found.sum_of(*NAMES)[1]])
+        assert np.all(found.elasticity_error < 0.2)
+        np.testing.assert_allclose(found.slope * found.values / found.speed_rpm, found.elasticity)
+    assert held >= 3 and np.mean(np.abs(z) < 2) > 0.9
+
+
+def test_a_life_that_grows_as_an_exponential_is_no_crisis(planted, few_draws):
+    """It diverges nowhere: whatever power is fitted, the crisis is not to be used, and says why."""
     planted(0)
-    found = lasting_edge(CASE, 12100.0, 150.0, names=NAMES)
-    crisis = found.crisis()
-    assert crisis.beyond == "above" and crisis.speed < found.speed_rpm and crisis.lanes == found.fit.lanes
-    assert crisis.mean_life(found.speed_rpm) == pytest.approx(found.horizon, rel=0.3)
-    relative = crisis.slope / found.speed_rpm
-    assert np.all(np.abs(relative - ELASTICITY) < 0.1)
+    found = lasting_edge(CASE, 12100.0, 150.0, designs=32)
+    assert found.status == "converged"
+    assert found.crisis().status.startswith(("no power law", "not told"))
+
+
+def test_a_crisis_that_the_power_law_does_not_fit_is_not_used(planted, few_draws):
+    """Lanes that leave chaos ever later with the distance."""
+    planted(1, power=-1.5)
+    found = lasting_edge(CASE, 12150.0, 150.0, designs=16, rounds=2)
+    backwards = dataclasses.replace(found, steepness=-found.steepness)
+    assert backwards.crisis().status.startswith("no power law")
+
+
+def test_the_command_prints_crises_and_an_open_zone(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted, few_draws
+):
+    zone = Zone("chaotic", None, Edge(EDGE + 100, 100.0, "chaotic"), 1.0)
+    swept = types.SimpleNamespace(outcome=np.zeros((1, 3), int), horizon=3000)
+    monkeypatch.setattr("jaxcage.cli._lasting.sweep", lambda *_, **__: swept)
+    monkeypatch.setattr("jaxcage.cli._lasting.zones", lambda _: types.SimpleNamespace(zones=(zone,)))
+    asked = ["gradient", "1a", "--lasting", "--designs", "32", "--out", str(tmp_path)]
+    planted(1, power=1.5)
+    assert main([*asked, "--json"]) == 0
+    got = json.loads(capsys.readouterr().out)
+    crisis = got["edges"][0]["crisis"]
+    assert crisis["status"] == "converged" and crisis["beyond"] == "above"
+    low, high = crisis["interval_rpm"]
+    assert low < crisis["speed_rpm"] < high and high - low < 300 and low < EDGE < high
+    for name, true in zip((*NAMES, "gap at fixed rho"), (*ELASTICITY, 0.2), strict=True):
+        found = crisis["elasticity"][name]
+        assert abs(found["value"] - true) < 3 * found["error"] < 0.5
+    for widths, edge in (("widths", got["edges"][0]), ("widths_to_crises", crisis)):
+        (width,) = got[widths]
+        assert width["open"] and width["status"] == "open: no onset within the range" and width["width_rpm"] is None
+        by = width["rpm_by_1_percent"]["eccentricity"]["value"]
+        assert by == pytest.approx(0.01 * edge["speed_rpm"] * edge["elasticity"]["eccentricity"]["value"])
+    planted(1, power=1.5)
+    assert main(asked) == 0
+    out = capsys.readouterr().out
+    assert f"{crisis['speed_rpm']:.0f}" in out and "Widths of 1a between crises" in out
+    assert "open: no onset within the range" in out
+    planted(0, steep=0.03)  # an exponential law
+    assert main([*asked, "--json"]) == 0
+    refused = json.loads(capsys.readouterr().out)
+    said = refused["edges"][0]["crisis"]
+    assert said["speed_rpm"] is None and said["elasticity"] is None
+    assert said["status"].startswith(("no power law", "not told"))
+    assert refused["widths_to_crises"][0]["rpm_by_1_percent"] is None
+    assert said["status"] in refused["widths_to_crises"][0]["status"]

@@ -44,10 +44,10 @@ class Crisis:
     """gamma."""
     amplitude: float
     """kappa at a distance of 1."""
-    speed_error: float
-    slope_error: Float[np.ndarray, " n"]
+    covariance: Float[np.ndarray, "1+n 1+n"]
+    """Of the speed, then of its slopes: mean squares about what was fitted, what is systematic included."""
     power_error: float
-    """Standard errors: root mean squares, what is systematic included."""
+    """Standard error, likewise."""
     interval: tuple[float, float]
     """Of 95 %, for the speed: where the likelihood, the rest fitted anew, has fallen by e^1.92. It is not symmetric."""
     beyond: str
@@ -56,6 +56,16 @@ class Crisis:
     lanes: int
     p_value: float
     """Probability of escapes at least as unlike the fitted ones, in parts of the lanes along their distance."""
+
+    @property
+    def speed_error(self) -> float:
+        """Standard error of the speed."""
+        return math.sqrt(self.covariance[0, 0])
+
+    @property
+    def slope_error(self) -> Float[np.ndarray, " n"]:
+        """Standard error of each slope."""
+        return np.sqrt(np.diag(self.covariance)[1:])
 
     def mean_life(self, speed: float) -> float:
         """At a speed, for the design with x = 0 [revolutions]; infinite on the other side."""
@@ -115,16 +125,18 @@ def crisis(
     ]
     rng, most = np.random.default_rng(seed), round((horizon - t0) / block)
     drawn = np.array([lanes.fit(best, *lanes.drawn(best, most, rng))[1] for _ in range(draws)])
-    off = np.sqrt(np.mean((drawn - best) ** 2, axis=0))
-    ends = [side * (low + span * lanes.end(best, survived, escaped, step)) for step in (-off[2], off[2])]
+    unit = side * span / np.append(1.0, scale)
+    off = (drawn - best)[:, 2:] * unit
+    covariance = off.T @ off / draws
+    step = math.sqrt(covariance[0, 0]) / span
+    ends = [side * (low + span * lanes.end(best, survived, escaped, far)) for far in (-step, step)]
     power = float(np.exp(best[1]))
     return Crisis(
         side * (low + span * float(best[2])),
-        side * span * best[3:] / scale,
+        best[3:] * unit[1:],
         power,
         float(np.exp(best[0]) / span**power),
-        span * float(off[2]),
-        span * off[3:] / scale,
+        covariance,
         float(np.sqrt(np.mean((np.exp(drawn[:, 1]) - power) ** 2))),
         (min(ends), max(ends)),
         beyond,
@@ -180,7 +192,7 @@ class _Lanes:
         near = 0.0
         for far in step * 2.0 ** np.arange(DOUBLINGS):
             if rise(far) > 0:
-                return float(best[2] + brentq(rise, near, far, xtol=abs(step) * 1e-3))
+                return float(best[2] + brentq(rise, near, far, xtol=abs(step) * 0.02))
             near = far
         return math.copysign(math.inf, step)
 

@@ -89,6 +89,8 @@ def gradient(job: Job[GradientOptions]) -> Report:
     shown = [*([wide] if wide else []), *trusted.values()]
     title, size = f"{job.name}: elasticities of the synchronous-loss edges", (9.0, 2.2 + 1.2 * len(shown))
     job.draw(lambda ax: elasticity_bars(report.to_be_turned(job.model, shown), ax), size, title)
-    document = report.gradient_document(edges, wide)
+    widths = report.widths_of(edges)
+    document = report.gradient_document(edges, wide) | {"widths": report.width_documents(widths, report.FIRST)}
     tables = [report.gradient_table(job.name, job.model, s) for s in shown]
+    tables.append(report.width_table(f"Widths of the synchronous-loss zones of {job.name}", widths, report.FIRST))
     return Report(document, tables, [*report.missing_notes(edges), *report.homogeneity_notes(document)])

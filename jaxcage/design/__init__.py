@@ -11,6 +11,8 @@
 | `_smooth`   | manufacturing cost, measures of regular motion                                |
 | `_margin`   | how far the synchronous orbit is from losing its stability                    |
 | `_edges`    | widths of zones and distances from edges, exact                               |
+| `_width`    | widths between edges of any kind, and how they answer to the design           |
+| `_crisis_edge` | what all edges told by lanes have in common; those that a crisis makes     |
 | `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
 | `_bearing_gradient` | slip, impulses, wear and power of the whole bearing by its parameters |
@@ -46,6 +48,7 @@ from ._bearing_gradient import (
     gradient_of_pairs as gradient_of_pairs,
 )
 from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
+from ._crisis_edge import AbstractStatisticalEdge as AbstractStatisticalEdge, CrisisEdge as CrisisEdge
 from ._edges import (
     EdgeClearance as EdgeClearance,
     EdgeSum as EdgeSum,
@@ -63,7 +66,6 @@ from ._fit import (
 from ._land import MEASURES as MEASURES, LandMeasure as LandMeasure, land_loads as land_loads
 from ._lasting import (
     LastingEdge as LastingEdge,
-    LastingWidth as LastingWidth,
     lasting_edge as lasting_edge,
     lasting_edges as lasting_edges,
 )
@@ -91,6 +93,7 @@ from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motio
 from ._tracked import TrackedEdges as TrackedEdges
 from ._trade_off import TradeOff as TradeOff, trade_off as trade_off
 from ._unknowns import Unknown as Unknown
+from ._width import SolvedEdge as SolvedEdge, ZoneWidth as ZoneWidth
 
 
 check_layer(

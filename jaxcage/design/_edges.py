@@ -1,7 +1,8 @@
-"""Objectives made of synchronous-loss edges: exact, with exact slopes, as long as the edges are there."""
+"""Widths of zones, and objectives made of synchronous-loss edges: exact, as long as the edges are there."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import overload
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,7 @@ from ..models import AbstractForcedSystem
 from ..orbits import Point
 from ._objective import AbstractObjective, DesignSpace, Measured
 from ._tracked import TrackedEdges
+from ._width import SolvedEdge, ZoneWidth
 
 
 CASE = "the design"
@@ -85,20 +87,36 @@ class EdgeSum(AbstractObjective):
         return np.array([m.value for m in self.measure(space, places)])
 
 
-def zone_width(edges: FollowedEdges, zone: int = 1, range_rpm: tuple[float, float] | None = None) -> EdgeSum:
-    """Width of a synchronous-loss zone, exit less onset [rpm].
+@overload
+def zone_width(edges: FollowedEdges, zone: int = 1, range_rpm: tuple[float, float] | None = None) -> EdgeSum: ...
+@overload
+def zone_width(edges: Mapping[str, SolvedEdge], zone: int = 1) -> ZoneWidth: ...
+def zone_width(
+    edges: FollowedEdges | Mapping[str, SolvedEdge], zone: int = 1, range_rpm: tuple[float, float] | None = None
+) -> EdgeSum | ZoneWidth:
+    """Width of a zone, exit less onset [rpm], and how it answers to the design.
 
-    A zone that is open, its onset or exit beyond the speeds that were looked at, counts to the end of that range, and
-    has the slope of its other edge alone.
+    **Arguments:** edges by name, `zone 1 onset` and the like, or `onset` and `exit`; number of the zone; first and last
+    speed that were looked at, for an open zone of followed edges.
 
-    **Arguments:** edges by name; number of the zone; first and last speed that were looked at, for an open zone.
+    **Returns:** of edges that are solved for, `ZoneWidth`: the width and its change by any parameters, with standard
+    errors. They may be `lasting_edges`, the `crisis()` of each, or `jaxcage.sensitivities` of synchronous-loss edges,
+    and one of a kind with one of another. Of `FollowedEdges`, an objective for searches.
 
-    **Raises:** `ValueError` for a zone of which no edge is known, or an open one without a range.
+    A zone that is open, its onset or exit beyond the speeds that were looked at, has the slope of its other edge alone.
+    As an objective it counts to the end of that range; a `ZoneWidth` has no width then and says that it is open.
+
+    **Raises:** `ValueError` for a zone of which no edge is known, or an open one of followed edges without a range.
     """
     names = {end: f"zone {zone} {end}" for end in ("onset", "exit")}
+    if not isinstance(edges, FollowedEdges):
+        solved = {end: edges.get(name, edges.get(end)) for end, name in names.items()}
+        if not any(solved.values()):
+            raise _no_edge(edges, zone)
+        return ZoneWidth(solved["onset"], solved["exit"])
     known = [end for end, name in names.items() if name in edges.names]
     if not known:
-        raise ArgumentError("zone", said=f"must be one with an edge among {', '.join(edges.names)}, but is {zone}.")
+        raise _no_edge(edges.names, zone)
     if len(known) == 1 and range_rpm is None:
         raise ArgumentError(
             "range_rpm", said=f"must be given for zone {zone}, which is open: its {known[0]} alone is known."
@@ -107,6 +125,10 @@ def zone_width(edges: FollowedEdges, zone: int = 1, range_rpm: tuple[float, floa
     ends = {"onset": (-1.0, -first), "exit": (1.0, last)}
     weights = {names[end]: ends[end][0] for end in known}
     return EdgeSum(edges, weights, sum((ends[end][1] for end in names if end not in known), start=0.0))
+
+
+def _no_edge(known: Iterable[str], zone: int) -> ArgumentError:
+    return ArgumentError("zone", said=f"must be one with an edge among {', '.join(known)}, but is {zone}.")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

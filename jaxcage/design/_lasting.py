@@ -16,10 +16,11 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
-from ..analysis import LIFE_BLOCK, Crisis, Hazard, Zone, crisis, hazard
+from ..analysis import LIFE_BLOCK, Hazard, Zone, crisis, hazard
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..sweeps import Progress, sweep_designs
+from ._crisis_edge import LIKELY, AbstractStatisticalEdge, CrisisEdge, crisis_edge
 
 
 NAMES = ("guidance_gap", "eccentricity")
@@ -32,24 +33,16 @@ REACH = 2.0
 """Lanes are spread over speeds with mean lives of e^-REACH to e^REACH horizons, as far as the last round tells."""
 DISCARD, OBSERVED = 100, 300
 """Revolutions left out, and those after which lanes that are calm are not followed."""
+DRAWS = 30
+"""Data sets drawn from the law of a crisis, for its errors."""
 CERTAIN = 3.0
 """Standard errors of an edge that must fit into the window."""
-LIKELY = 0.001
-"""Probability below which the law does not fit."""
 
 
 @dataclasses.dataclass(frozen=True)
-class LastingEdge:
+class LastingEdge(AbstractStatisticalEdge):
     """Where the mean life of chaos passes the horizon, and how that moves with parameters."""
 
-    speed_rpm: float
-    names: tuple[str, ...]
-    elasticity: Float[np.ndarray, " n"]
-    """Relative change of the edge by that of each parameter."""
-    slope: Float[np.ndarray, " n"]
-    """[rpm per unit of the parameter]."""
-    covariance: Float[np.ndarray, "1+n 1+n"]
-    """Of the speed [rpm], then of the elasticities."""
     horizon: int
     middle_rpm: float
     window_rpm: float
@@ -60,25 +53,20 @@ class LastingEdge:
     lanes: tuple[np.ndarray, np.ndarray, np.ndarray] = dataclasses.field(repr=False)
     """Speed of each lane [rpm], relative changes of its parameters, and after how many revolutions it was calm."""
 
-    def crisis(self, seed: int = 0) -> Crisis:
-        """Where the mean life diverges, if a crisis does it: by a power law of the same lanes, without the horizon. Its
-        slopes are in rpm by relative change of each parameter.
+    def crisis(self, seed: int = 0) -> CrisisEdge:
+        """Where the mean life diverges, if a crisis does it: by a power law of the same lanes, without the horizon.
+
+        **Returns:** `CrisisEdge`; its `status` says where the numbers should not be used.
 
         **Raises:** `ValueError` where fewer than ten lanes escaped.
         """
         rpm, change, times = self.lanes
-        beyond = "above" if self.steepness > 0 else "below"
-        return crisis(times, self.horizon, rpm, change, block=LIFE_BLOCK, t0=DISCARD, beyond=beyond, seed=seed)
-
-    @property
-    def standard_error_rpm(self) -> float:
-        """Of the speed."""
-        return math.sqrt(self.covariance[0, 0])
-
-    @property
-    def elasticity_error(self) -> Float[np.ndarray, " n"]:
-        """Standard error of each elasticity."""
-        return np.sqrt(np.diag(self.covariance)[1:])
+        beyond, side = ("above", 1) if self.steepness > 0 else ("below", -1)
+        options = {"block": LIFE_BLOCK, "t0": DISCARD, "beyond": beyond, "draws": DRAWS, "seed": seed}
+        fit = lambda some: crisis(times[some], self.horizon, rpm[some], change[some], **options)
+        away = side * (rpm * (1 - change @ self.elasticity) - self.speed_rpm)
+        escaped = (times > DISCARD) & (times <= self.horizon)
+        return crisis_edge(fit, away, escaped, self.names, self.values, float(np.ptp(rpm)) / 2)
 
     @property
     def status(self) -> str:
@@ -88,43 +76,12 @@ class LastingEdge:
             return "no edge: the mean life does not pass the horizon among these speeds"
         return "converged" if self.fit.p_value >= LIKELY else "the rate of escapes is not log-linear here"
 
-    def sum_of(self, *names: str) -> tuple[float, float]:
-        """Elasticity by several parameters that change together, such as gap and eccentricity at a fixed ratio, with
-        its standard error."""
-        weight = np.array([0.0, *(float(n in names) for n in self.names)])
-        return float(weight[1:] @ self.elasticity), math.sqrt(weight @ self.covariance @ weight)
-
     def __str__(self) -> str:
-        each = zip(self.names, self.elasticity, self.elasticity_error, strict=True)
-        rows = [f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in each]
         lanes = f"{self.fit.escapes} of {self.fit.lanes} chaotic lanes escaped by revolution {self.horizon}"
         head = f"{self.speed_rpm:.0f} +- {self.standard_error_rpm:.0f} rpm, elasticities ({lanes}; {self.status})"
-        return "\n".join([head, *rows])
+        return "\n".join([head, *self._rows()])
 
     _repr_html_ = notebook_html
-
-
-@dataclasses.dataclass(frozen=True)
-class LastingWidth:
-    """Width of a zone of lasting chaos; its edges come from lanes of their own, and so do their errors."""
-
-    onset: LastingEdge
-    exit: LastingEdge
-
-    @property
-    def width_rpm(self) -> float:
-        """Exit less onset."""
-        return self.exit.speed_rpm - self.onset.speed_rpm
-
-    @property
-    def standard_error_rpm(self) -> float:
-        """Of the width."""
-        return math.hypot(self.onset.standard_error_rpm, self.exit.standard_error_rpm)
-
-    def change(self, *names: str) -> tuple[float, float]:
-        """Change of the width when parameters grow together [rpm by their relative change], with its standard error."""
-        ends = [edge.speed_rpm * np.array(edge.sum_of(*names)) for edge in (self.exit, self.onset)]
-        return float(ends[0][0] - ends[1][0]), math.hypot(ends[0][1], ends[1][1])
 
 
 def lasting_edge(
@@ -258,7 +215,7 @@ def _fitted(
     jacobian = np.vstack([window * of_at, (of_slope - np.outer(slope / speed, window * of_at)) / speed])
     covariance = jacobian @ fit.covariance @ jacobian.T
     return LastingEdge(
-        *(speed, tuple(names), slope / speed, slope / base, covariance, horizon, edge, window, steep / window, fit),
+        *(speed, tuple(names), slope / speed, covariance, base, horizon, edge, window, steep / window, fit),
         lanes=(rpm, change, times),
     )
 

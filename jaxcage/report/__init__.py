@@ -76,9 +76,12 @@ from ._findings import (
     require_some as require_some,
 )
 from ._lasting import (
+    crisis_table as crisis_table,
     lasting_document as lasting_document,
     lasting_table as lasting_table,
-    lasting_width_table as lasting_width_table,
+    width_documents as width_documents,
+    width_table as width_table,
+    widths_of as widths_of,
 )
 from ._map import (
     RPM as RPM,
@@ -127,6 +130,7 @@ from ._readings import (
 )
 from ._slopes import (
     EXIT as EXIT,
+    FIRST as FIRST,
     ONSET as ONSET,
     edge_slopes as edge_slopes,
     elasticities_table as elasticities_table,

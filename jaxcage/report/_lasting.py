@@ -1,31 +1,32 @@
-"""How edges and widths of zones of lasting chaos answer to the design, with standard errors."""
+"""How edges and widths of zones answer to the design, with standard errors: lasting chaos, its crises, exact edges."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..design import LastingEdge, LastingWidth
+from ..design import AbstractStatisticalEdge, CrisisEdge, LastingEdge, SolvedEdge, ZoneWidth, zone_width
 from ._slopes import FIRST, FIXED_RHO
 from ._table import Table, chosen
 
 
-def _lasting_rows(edges: Mapping[str, LastingEdge]) -> dict[str, dict[str, tuple[float, float]]]:
-    """Elasticities of each edge by parameter, and by gap and eccentricity together, each with its standard error."""
-    found = {}
-    for name, edge in edges.items():
-        pairs = dict(zip(edge.names, zip(edge.elasticity, edge.elasticity_error, strict=True), strict=True))
-        if set(FIRST) <= set(edge.names):
-            pairs[FIXED_RHO] = edge.sum_of(*FIRST)
-        found[name] = {n: (float(value), float(error)) for n, (value, error) in pairs.items()}
-    return found
+def _elasticities(edge: AbstractStatisticalEdge) -> dict[str, tuple[float, float]]:
+    """By parameter, and by gap and eccentricity together, each with its standard error."""
+    return {name: edge.sum_of(*of) for name, of in _asked(edge.names).items()}
+
+
+def _asked(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Parameters alone, and gap and eccentricity together."""
+    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
+    if set(FIRST) <= set(names):
+        asked[FIXED_RHO] = FIRST
+    return asked
 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> Table:
     """Edges of lasting chaos, and their elasticities."""
-    rows = _lasting_rows(edges)
     columns = {
         "edge": lambda item: item[0],
         "speed [rpm]": lambda item: f"{item[1].speed_rpm:.0f} ± {item[1].standard_error_rpm:.0f}",
-        **{n.replace("_", " "): lambda item, n=n: _with_error(*rows[item[0]][n]) for n in next(iter(rows.values()))},
+        **_elasticity_columns(edges),
         "escapes": lambda item: f"{item[1].fit.escapes} of {item[1].fit.lanes}",
         "status": lambda item: item[1].status,
     }
@@ -33,54 +34,117 @@ def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> 
     return Table.of(title, columns, edges.items(), ("speed [rpm]",))
 
 
-def _lasting_widths(edges: Mapping[str, LastingEdge]) -> dict[str, LastingWidth]:
-    """Widths of the zones that have both edges."""
+def crisis_table(name: str, crises: Mapping[str, CrisisEdge]) -> Table:
+    """Where the mean life of chaos diverges beyond each edge, and elasticities; nothing where that is not told."""
+    columns = {
+        "edge": lambda item: item[0],
+        "crisis [rpm]": lambda item: f"{item[1].speed_rpm:.0f}" if _shown(item[1]) else "-",
+        "95 % interval [rpm]": lambda item: (
+            "{:.0f} to {:.0f}".format(*item[1].interval_rpm) if _shown(item[1]) else "-"
+        ),
+        "power": lambda item: f"{item[1].fit.power:.2f} ± {item[1].fit.power_error:.2f}" if _shown(item[1]) else "-",
+        **_elasticity_columns(crises),
+        "p": lambda item: f"{item[1].fit.p_value:.2g}",
+        "status": lambda item: item[1].status,
+    }
+    title = f"Crises of {name}, where the mean life of chaos diverges, and their elasticities"
+    return Table.of(title, columns, crises.items(), ("crisis [rpm]", "95 % interval [rpm]"))
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low:.0f} to {high:.0f}"
+
+
+def _elasticity_columns(edges: Mapping[str, AbstractStatisticalEdge]) -> dict[str, Any]:
+    rows = {name: _elasticities(edge) for name, edge in edges.items()}
+    of = lambda n: lambda item: _with_error(*rows[item[0]][n]) if _shown(item[1]) else "-"
+    return {n.replace("_", " "): of(n) for n in next(iter(rows.values()))}
+
+
+def _shown(edge: AbstractStatisticalEdge) -> bool:
+    """Numbers at the horizon are, beside their status; what is extrapolated only where it may be used."""
+    return isinstance(edge, LastingEdge) or edge.status == "converged"
+
+
+def widths_of(edges: Mapping[str, SolvedEdge]) -> dict[str, ZoneWidth]:
+    """Widths of all zones of which an edge is known, by `zone 1` and the like."""
     zones = dict.fromkeys(name.rpartition(" ")[0] for name in edges)
-    ends = {zone: [edges.get(f"{zone} {end}") for end in ("onset", "exit")] for zone in zones}
-    return {zone: LastingWidth(a, b) for zone, (a, b) in ends.items() if a is not None and b is not None}
+    return {zone: zone_width(edges, int(zone.rpartition(" ")[2])) for zone in zones}
 
 
-def _by_1_percent(width: LastingWidth) -> dict[str, tuple[float, float]]:
+def _by_1_percent(width: ZoneWidth, names: Iterable[str]) -> dict[str, tuple[float, float]]:
     """What 1 % more of each parameter adds to a width [rpm], and of gap and eccentricity together."""
-    together: dict[str, tuple[str, ...]] = {n: (n,) for n in width.onset.names}
-    if set(FIRST) <= set(together):
-        together[FIXED_RHO] = FIRST
-    return {n: tuple(0.01 * x for x in width.change(*of)) for n, of in together.items()}  # pyright: ignore
+    found = {name: width.change(*of) for name, of in _asked(tuple(names)).items()}
+    return {name: (0.01 * value, 0.01 * error) for name, (value, error) in found.items()}
 
 
-def lasting_width_table(name: str, edges: Mapping[str, LastingEdge]) -> Table | None:
-    """Widths of the zones that have both edges; None if there are none."""
-    widths = _lasting_widths(edges)
-    if not widths:
-        return None
-    changes = {zone: _by_1_percent(width) for zone, width in widths.items()}
+def width_table(title: str, widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> Table:
+    """Widths, and what 1 % more of a parameter adds; nothing where an edge is not to be used."""
+    changes = {name: _by_1_percent(width, names) for name, width in widths.items()}
+    of = lambda n: lambda item: _with_error(*changes[item[0]][n], 1) if item[1].trusted else "-"
     columns = {
         "zone": lambda item: item[0],
-        "width [rpm]": lambda item: f"{item[1].width_rpm:.0f} ± {item[1].standard_error_rpm:.0f}",
-        **{
-            n.replace("_", " "): lambda item, n=n: _with_error(*changes[item[0]][n], 1)
-            for n in next(iter(changes.values()))
-        },
+        "width [rpm]": lambda item: _width_cell(item[1]),
+        **{n.replace("_", " "): of(n) for n in _asked(tuple(names))},
+        "status": lambda item: item[1].status,
     }
-    return Table.of(f"Widths of {name}, and what 1 % more of a parameter adds [rpm]", columns, widths.items())
+    return Table.of(f"{title}, and what 1 % more of a parameter adds [rpm]", columns, widths.items(), ("width [rpm]",))
 
 
-def lasting_document(edges: Mapping[str, LastingEdge]) -> dict[str, Any]:
+def _width_cell(width: ZoneWidth) -> str:
+    if width.open:
+        return "open"
+    return f"{width.width_rpm:.0f} ± {width.standard_error_rpm:.0f}" if width.trusted else "-"
+
+
+def width_documents(widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> list[dict[str, Any]]:
+    """Widths for programs; null where an edge is not to be used."""
+    return [
+        {
+            "name": name,
+            "width_rpm": width.width_rpm if width.trusted else None,
+            "standard_error_rpm": width.standard_error_rpm if width.trusted else None,
+            "rpm_by_1_percent": _pairs(_by_1_percent(width, names)) if width.trusted else None,
+            "open": width.open,
+            "status": width.status,
+        }
+        for name, width in widths.items()
+    ]
+
+
+def lasting_document(edges: Mapping[str, LastingEdge], crises: Mapping[str, CrisisEdge]) -> dict[str, Any]:
     """Edges and widths for programs."""
-    rows = _lasting_rows(edges)
-    pairs = lambda found: {n: {"value": v, "error": e} for n, (v, e) in found.items()}
+    names = next(iter(edges.values())).names
     return {
         "edges": [
-            {"name": name, "elasticity": pairs(rows[name]), "escapes": edge.fit.escapes, "lanes": edge.fit.lanes}
+            {"name": name, "elasticity": _pairs(_elasticities(edge)), "escapes": edge.fit.escapes}
+            | {"lanes": edge.fit.lanes, "crisis": _crisis_document(crises[name])}
             | chosen(edge, "speed_rpm standard_error_rpm horizon status")
             for name, edge in edges.items()
         ],
-        "widths": [
-            {"name": name, "rpm_by_1_percent": pairs(_by_1_percent(width))}
-            | chosen(width, "width_rpm standard_error_rpm")
-            for name, width in _lasting_widths(edges).items()
-        ],
+        "widths": width_documents(widths_of(edges), names),
+        "widths_to_crises": width_documents(widths_of(crises), names),
     }
+
+
+def _crisis_document(edge: CrisisEdge) -> dict[str, Any]:
+    """Of one edge; null what is not told."""
+    told = edge.status == "converged"
+    found = {
+        **chosen(edge, "speed_rpm standard_error_rpm interval_rpm"),
+        "power": edge.fit.power,
+        "power_error": edge.fit.power_error,
+        "elasticity": _pairs(_elasticities(edge)),
+    }
+    return {n: value if told else None for n, value in found.items()} | {
+        "p_value": edge.fit.p_value,
+        "beyond": edge.fit.beyond,
+        "status": edge.status,
+    }
+
+
+def _pairs(found: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
+    return {n: {"value": value, "error": error} for n, (value, error) in found.items()}
 
 
 def _with_error(value: float, error: float, digits: int = 3) -> str:
