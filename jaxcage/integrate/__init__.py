@@ -37,6 +37,7 @@ from ._bearing_blocks import (
     comparable as comparable,
     lanes_apart as lanes_apart,
     run_block as run_block,
+    slowness as slowness,
 )
 from ._bearing_step import FOLLOWED as FOLLOWED, INTEGRATED as INTEGRATED
 from ._controlled import (

@@ -28,14 +28,15 @@ a number. At low speeds and light loads it grows by 1e16."""
 SPACING = TURN / SAMPLES
 FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
 """First, longest and shortest step [rad] of the cage's angle."""
-COMPARED, LEAST_PART = 50 * TURN, SPACING / 1000
-"""Longest part of a run that is comparable with the same by longer steps, in radians of a loaded roller's vibration on
-its raceway, 50 periods; and the least such part [rad of the cage]. Rollers strike their bars at a rate that hardly
-depends on the speed: neighbouring motions diverge over time, not over revolutions. From 4000 rpm of the shaft of NU2310
-on, a sixteenth of a revolution is shorter."""
+PERIODS, COMPARED = 50, 10
+"""Of a loaded roller's vibration on its raceway. A shaft is slow if more of them than the first go from sample to
+sample, for NU2310 one below 4000 rpm: only so many as the second are then compared with the same by longer steps. What
+rollers do to their bars depends little on the speed: neighbouring motions diverge over time, not over revolutions."""
+SLOWEST = 1000.0
+"""At most so many times as many periods count."""
 MOST_ATTEMPTS = 20_000
-"""In a revolution, in the mean over a block: a lane that needs more has failed. As many times more at low speeds as the
-`comparable` part is shorter than from sample to sample."""
+"""In a revolution, in the mean over a block: a lane that needs more has failed. As many times more
+as the shaft is slow."""
 STALLED = 0.05
 """Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
 
@@ -143,13 +144,23 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
 
-def comparable(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
-    """How far each lane may go before it is compared with the same by longer steps [rad]: at most to the next sample.
+def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
+    """How many times as many periods of a roller go from sample to sample as in a shaft that is not slow: at least 1.
 
     **Arguments:** laws and magnitudes as in `begin_lanes`.
     """
-    period = scale.rollers[2] / scale.rollers[3]
-    return jnp.clip(COMPARED * period * jnp.abs(jnp.asarray(at.rolling_cage_speed)), LEAST_PART, SPACING)
+    period = TURN * scale.rollers[2] / scale.rollers[3]
+    turned = PERIODS * period * jnp.abs(jnp.asarray(at.rolling_cage_speed))
+    return jnp.clip(SPACING / turned, 1.0, SLOWEST)
+
+
+def comparable(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
+    """How far each lane goes before it is compared with the same by longer steps [rad]: to the next sample, or less.
+
+    **Arguments:** laws and magnitudes as in `begin_lanes`.
+    """
+    slow = slowness(at, scale)
+    return jnp.where(slow > 1, COMPARED / PERIODS * SPACING / slow, SPACING)
 
 
 @compiled
@@ -180,8 +191,8 @@ def run_block(
     )
     slowest = jnp.broadcast_to(STALLED * jnp.abs(jnp.asarray(at.rolling_cage_speed)), (count,))
     sense = jnp.broadcast_to(law.sense, (count,))
-    slower = jnp.ceil(jnp.max(SPACING / comparable(at, scale))).astype(samples.dtype)
-    most = MOST_ATTEMPTS * slower * (1 + samples // SAMPLES)
+    slow = jnp.ceil(jnp.max(slowness(at, scale))).astype(samples.dtype)
+    most = MOST_ATTEMPTS * slow * (1 + samples // SAMPLES)
     each = jnp.full((count,), SPACING) if spacing is None else spacing
     per_clearance = jnp.asarray(at.guide.land.per_clearance)
     number = jnp.arange(LONGEST_BLOCK * SAMPLES, dtype=float)[:, None, None]

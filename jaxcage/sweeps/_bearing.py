@@ -28,6 +28,7 @@ from ..integrate import (
     comparable,
     lanes_apart,
     run_block,
+    slowness,
 )
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
@@ -76,13 +77,14 @@ def sweep_bearing(
     - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
     - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution, of slow shafts a shorter
         one, is run a second time with about half the steps; a lane in which that moves the state by more is
-        `inaccurate`. The stretch is no longer than 50 periods of a loaded roller's vibration on its raceway, as
-        neighbouring motions diverge at a rate that hardly depends on the speed.
+        `inaccurate`. Slow is a shaft with which that stretch would be more than 50 periods of a loaded roller's
+        vibration on its raceway (NU2310 below 4000 rpm): it is 10 of them then, as neighbouring motions diverge over
+        time, not over revolutions.
     - `progress`: called with lanes done and lanes in all.
 
     **Returns:** `BearingSweep`. A lane that fails is NaN with an outcome, and its neighbours go on: `outside` if the
     cage comes nearly to rest (below 5 % of the speed of pure rolling) or leaves its land, `max_steps_reached` if it
-    needs more than 20,000 steps a revolution (of slow shafts as many times more as that stretch is shorter).
+    needs more than 20,000 steps a revolution (of slow shafts as many times more as more periods go to one).
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, impossible counts, a quasi-static
     ring or a film of finite length; `RuntimeError` without double precision.
@@ -318,9 +320,8 @@ def _followed(
     direction = _direction(begin) if exponents else None
     lead = min(discard, LEAD) if exponents else 0
     spacing = jnp.full((begin.bodies.shape[-1],), SPACING)
-    compared = comparable(at, scale)
-    shorter = float(jnp.max(spacing / compared))
-    freely, tangent = LONGEST_BLOCK * SAMPLES, max(1, int(WITH_TANGENT * SAMPLES / shorter))
+    compared, slow = comparable(at, scale), float(jnp.max(slowness(at, scale)))
+    freely, tangent = LONGEST_BLOCK * SAMPLES, max(1, int(WITH_TANGENT * SAMPLES / slow**2))
     go = lambda lanes, samples, spacing=spacing: run_block(at, scale, lanes, jnp.asarray(samples), tight, spacing)
     lanes = begin_lanes(at, scale, begin, None if lead < discard else direction)
     for count in _in_parts(discard - lead, freely):
@@ -338,7 +339,7 @@ def _followed(
         lanes, found = go(lanes, 1, compared)
         errors.append(np.asarray(lanes_apart(scale, trial.point, lanes.point)))
         gathered = [jax.tree.map(np.asarray, found)]
-        if shorter > 1:  # on to the first sample
+        if slow > 1:  # on to the first sample
             lanes, found = go(lanes, 1, spacing - compared)
             gathered.append(jax.tree.map(np.asarray, found))
         places.append(gathered[-1].place[:1])
