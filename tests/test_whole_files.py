@@ -144,9 +144,8 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["init", str(path), "--model", "bearing"]) == 0
     assert f'jaxcage simulate {path} --speed "10000 rpm shaft"' in capsys.readouterr().out
     assert subject_of(path) == "bearing"
-    for command in ("bifurcations", "statics", "sensitivity"):
+    for command in ("bifurcations", "statics"):
         assert main([command, str(path)]) == 2
         said = capsys.readouterr().err
         assert f"is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with simulate" in said
-        assert ("`jaxcage gradient` has slopes" in said) == (command == "sensitivity")
         assert said.count("\n") == 1

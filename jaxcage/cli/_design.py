@@ -43,6 +43,7 @@ from ._search import kept_search, no_worse_balance
 from ._show import Report
 from ._vary import read_bounds, read_scatter
 from ._whole_design import design_bearing
+from ._whole_sensitivity import bearing_shares
 
 
 Found = TypeVar("Found")
@@ -242,7 +243,10 @@ def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
 
 
 def sensitivity(job: Job[SensitivityOptions]) -> Report:
-    """`jaxcage sensitivity`: shares of the chaotic width's variance, and tolerance budgets of the edges."""
+    """`jaxcage sensitivity`: shares of the chaotic width's variance, and tolerance budgets of the edges; of a measure
+    of a whole bearing both."""
+    if job.whole is not None:
+        return bearing_shares(job, job.whole)
     options = job.options
     vary = read_bounds(options.vary or _usual(job.model), job.model)
     width = chaotic_width(options.first, options.last, options.speeds)
@@ -263,8 +267,7 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
         job.draw(lambda ax: elasticity_bars(turned, ax), size, title)
     document = {
         "vary": vary,
-        "sobol": report.chosen(shares, "first total first_interval total_interval samples_wanted")
-        | {"designs": shares.evaluations, "doubtful": list(shares.doubtful)},
+        "sobol": report.sobol_document(shares),
         "tolerance_percent": options.tolerance,
         "edges": [
             {

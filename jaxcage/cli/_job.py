@@ -40,9 +40,20 @@ from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = ("simulate", "sweep", "zones", "map", "runup", "gradient", "compare", "report", "design", "study")
+WHOLE_COMMANDS = (
+    "simulate",
+    "sweep",
+    "zones",
+    "map",
+    "runup",
+    "gradient",
+    "compare",
+    "report",
+    "design",
+    "study",
+    "sensitivity",
+)
 """What takes a whole bearing."""
-INSTEAD = {"sensitivity": "; `jaxcage gradient` has slopes"}
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
 
@@ -262,7 +273,7 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     if command not in WHOLE_COMMANDS:
         raise InputError(
             f"Case '{given}' is a whole bearing, but `jaxcage {command}` takes a cage: whole bearings go with "
-            f"{', '.join(WHOLE_COMMANDS)}{INSTEAD.get(command, '')}."
+            f"{', '.join(WHOLE_COMMANDS)}."
         )
     if not _is_file(given):
         return given.lower(), whole_bearing(given), None

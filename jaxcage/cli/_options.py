@@ -488,16 +488,40 @@ class DesignOptions(VaryOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SensitivityOptions(VaryOptions):
-    """What each parameter does to the chaotic speeds over its range, and what tolerances do to the exact edges."""
+    """What each parameter does to the chaotic speeds over its range, and what tolerances do to the exact edges; the
+    same of a measure of a whole bearing (nu2310), such as its wear."""
 
-    samples: FromTwo = 64
-    """Base samples of the Sobol indices, a power of 2."""
+    usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
+        "samples": (64, 32),
+        "of": (None, "wear"),
+        "ensemble": (None, 4),
+        "discard": (None, 10),
+        "revolutions": (None, 20),
+    }
+    of_cage: ClassVar[tuple[str, ...]] = ("first", "last", "speeds")
+    of_whole: ClassVar[tuple[str, ...]] = ("speed", "load", "of", "ensemble", "discard", "revolutions")
+
+    speed: OptionalSpeed = None
+    """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
+    of: OptionalText = None
+    """Of a whole bearing: what is looked at: wear, power, slip, or a statistic such as pocket_force_peak_N; wear if
+    left out."""
+    samples: Annotated[int | None, whole(2)] = None
+    """Base samples of the Sobol indices, a power of 2; 64 if left out, 32 of a whole bearing."""
+    ensemble: Annotated[int | None, whole(1)] = None
+    """Of a whole bearing: drawn starts of each design; 4 if left out."""
+    discard: Annotated[int | None, whole(0)] = None
+    """Of a whole bearing: revolutions of the cage left out at the beginning; 10 if left out."""
+    revolutions: Annotated[int | None, whole(2, of=2)] = None
+    """Of a whole bearing: revolutions of the cage observed, an even number; 20 if left out."""
     tolerance: Annotated[float, number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0
     """Tolerance of every parameter, +- so many percent, evenly used."""
 
     def check(self) -> None:
         super().check()
-        if self.samples & (self.samples - 1):
+        if self.samples is not None and self.samples & (self.samples - 1):
             raise InputError(f"Option --samples must be a power of 2, but {self.samples} was given.")
 
 
@@ -603,7 +627,7 @@ class UnknownsOptions(_Range, IntegrationOptions):
 
     def check(self) -> None:
         super().check()
-        if self.samples & (self.samples - 1):
+        if self.samples is not None and self.samples & (self.samples - 1):
             raise InputError(f"Option --samples must be a power of 2, but {self.samples} was given.")
 
 

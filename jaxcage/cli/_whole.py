@@ -30,7 +30,7 @@ from ..report import Table, chosen, number
 from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
-from ._options import DesignOptions, GradientOptions, SimulateOptions
+from ._options import DesignOptions, GradientOptions, SensitivityOptions, SimulateOptions
 from ._readers import flag
 from ._show import Report
 
@@ -163,7 +163,9 @@ def examined(name: str, at: AtShaftSpeed, revolutions: int, discard: int, tolera
     )
 
 
-def at_shaft_speed(job: Job[SimulateOptions | GradientOptions | DesignOptions], model: BearingModel) -> AtShaftSpeed:
+def at_shaft_speed(
+    job: Job[SimulateOptions | GradientOptions | DesignOptions | SensitivityOptions], model: BearingModel
+) -> AtShaftSpeed:
     """The bearing under the load, and at the speed, of a command's options.
 
     **Raises:** `InputError` for no speed, or one at which no cage runs.

@@ -16,6 +16,7 @@
 | `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
 | `_bearing_gradient` | slip, impulses, wear and power of the whole bearing by its parameters |
+| `_bearing_sensitivity` | Sobol indices and tolerance budgets of its measures               |
 | `_bearing_design` | the whole bearing's wear, forces, power and slip as an objective, before and after |
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
@@ -46,6 +47,13 @@ from ._bearing_gradient import (
     StatisticGradient as StatisticGradient,
     bearing_gradient as bearing_gradient,
     gradient_of_pairs as gradient_of_pairs,
+)
+from ._bearing_sensitivity import (
+    BEARING_MEASURES as BEARING_MEASURES,
+    BearingBudget as BearingBudget,
+    bearing_budget as bearing_budget,
+    bearing_measure as bearing_measure,
+    bearing_sensitivity as bearing_sensitivity,
 )
 from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
 from ._crisis_edge import AbstractStatisticalEdge as AbstractStatisticalEdge, CrisisEdge as CrisisEdge

@@ -141,13 +141,13 @@ class BearingObjective(AbstractObjective):
         moved = self.runs.spread * moves(pairs, n, self.runs.seed)
         centres = np.clip(places, self.runs.spread, 1 - self.runs.spread)
         around = centres[:, None, None] + np.stack([moved, -moved])
-        found = self._totals(space, around.reshape(-1, n)).reshape(len(places), 2, pairs, 2)
+        found = self.halves(space, around.reshape(-1, n)).reshape(len(places), 2, pairs, 2)
         return [_fitted(space.names, moved, *each) for each in zip(found, places - centres, strict=True)]
 
     def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
-        return self._totals(space, np.asarray(places)).mean(axis=-1)
+        return self.halves(space, np.asarray(places)).mean(axis=-1)
 
-    def _totals(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k 2"]:
+    def halves(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k 2"]:
         """The sum of each design in both halves of the run; NaN where one of its lanes failed."""
         models = [space.model(place) for place in places]
         rows = []

@@ -47,7 +47,7 @@ class SobolIndices:
         """Base samples, a power of 2, by which all intervals should be no wider than `NARROW`: widths fall with the
         root of their number. Where one has no interval, it is taken as 1 wide."""
         widths = [b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values()]
-        widest = max(1.0 if math.isnan(w) else w for w in widths)
+        widest = max(NARROW, *(1.0 if math.isnan(w) else w for w in widths))
         return max(self.samples, 1 << math.ceil(math.log2(self.samples * (widest / NARROW) ** 2)))
 
     @property

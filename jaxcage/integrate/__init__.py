@@ -28,13 +28,16 @@ from ._bearing import (
 from ._bearing_blocks import (
     LONGEST_BLOCK as LONGEST_BLOCK,
     SAMPLES as SAMPLES,
+    SPACING as SPACING,
     WITH_TANGENT as WITH_TANGENT,
     BearingBlock as BearingBlock,
     BearingLanes as BearingLanes,
     bearing_states as bearing_states,
     begin_lanes as begin_lanes,
+    comparable as comparable,
     lanes_apart as lanes_apart,
     run_block as run_block,
+    slowness as slowness,
 )
 from ._bearing_step import FOLLOWED as FOLLOWED, INTEGRATED as INTEGRATED
 from ._controlled import (

@@ -28,8 +28,15 @@ a number. At low speeds and light loads it grows by 1e16."""
 SPACING = TURN / SAMPLES
 FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
 """First, longest and shortest step [rad] of the cage's angle."""
+PERIODS, COMPARED = 50, 10
+"""Of a loaded roller's vibration on its raceway. A shaft is slow if more of them than the first go from sample to
+sample, for NU2310 one below 4000 rpm: only so many as the second are then compared with the same by longer steps. What
+rollers do to their bars depends little on the speed: neighbouring motions diverge over time, not over revolutions."""
+SLOWEST = 1000.0
+"""At most so many times as many periods count."""
 MOST_ATTEMPTS = 20_000
-"""In a revolution, in the mean over a block: a lane that needs more has failed."""
+"""In a revolution, in the mean over a block: a lane that needs more has failed. As many times more
+as the shaft is slow."""
 STALLED = 0.05
 """Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
 
@@ -137,6 +144,25 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
 
+def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
+    """How many times as many periods of a roller go from sample to sample as in a shaft that is not slow: at least 1.
+
+    **Arguments:** laws and magnitudes as in `begin_lanes`.
+    """
+    period = TURN * scale.rollers[2] / scale.rollers[3]
+    turned = PERIODS * period * jnp.abs(jnp.asarray(at.rolling_cage_speed))
+    return jnp.clip(SPACING / turned, 1.0, SLOWEST)
+
+
+def comparable(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
+    """How far each lane goes before it is compared with the same by longer steps [rad]: to the next sample, or less.
+
+    **Arguments:** laws and magnitudes as in `begin_lanes`.
+    """
+    slow = slowness(at, scale)
+    return jnp.where(slow > 1, COMPARED / PERIODS * SPACING / slow, SPACING)
+
+
 @compiled
 def run_block(
     at: BearingAtSpeed,
@@ -144,10 +170,12 @@ def run_block(
     lanes: BearingLanes,
     samples: Int[Array, ""],
     tolerance: Scalar,
+    spacing: Float[Array, " lanes"] | None = None,
 ) -> tuple[BearingLanes, BearingBlock]:
     """Lanes over a number of samples, at most those of `LONGEST_BLOCK` revolutions.
 
-    **Arguments:** laws and magnitudes as in `begin_lanes`; lanes; how many samples; largest estimated error of a step.
+    **Arguments:** laws and magnitudes as in `begin_lanes`; lanes; how many samples; largest estimated error of a step;
+    angle from sample to sample, else that of `SAMPLES` a revolution. Where it is 0, a lane stays.
     """
     units = _inverse(scale)
     count = lanes.angle.shape[0]
@@ -163,7 +191,9 @@ def run_block(
     )
     slowest = jnp.broadcast_to(STALLED * jnp.abs(jnp.asarray(at.rolling_cage_speed)), (count,))
     sense = jnp.broadcast_to(law.sense, (count,))
-    most = MOST_ATTEMPTS * (1 + samples // SAMPLES)
+    slow = jnp.ceil(jnp.max(slowness(at, scale))).astype(samples.dtype)
+    most = MOST_ATTEMPTS * slow * (1 + samples // SAMPLES)
+    each = jnp.full((count,), SPACING) if spacing is None else spacing
     per_clearance = jnp.asarray(at.guide.land.per_clearance)
     number = jnp.arange(LONGEST_BLOCK * SAMPLES, dtype=float)[:, None, None]
 
@@ -175,11 +205,13 @@ def run_block(
 
     def attempt(going: _Going) -> _Going:
         course, old = going.course, going.point
-        h, angle = lanewise(lambda _, lane: _to_try(*lane), 2, (), (course.base, course.within, course.step, sense))
+        h, angle = lanewise(
+            lambda _, lane: _to_try(*lane), 2, (), (course.base, course.within, course.step, sense, each)
+        )
         new, error = step(law, angle, h, old)
         limits = _Limits(tolerance, samples.astype(float), (going.attempts + 1 >= most).astype(float))
         leaves, tree = jax.tree.flatten(course)
-        own = (error, h, new.y.bodies[4], slowest, sense, *old.integrand, *new.integrand, *new.watched)
+        own = (error, h, new.y.bodies[4], slowest, sense, each, *old.integrand, *new.integrand, *new.watched)
 
         def accept(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> list[Any]:
             course, own = jax.tree.unflatten(tree, lane[: len(leaves)]), lane[len(leaves) :]
@@ -218,19 +250,19 @@ def _active(course: _Course, samples: Any) -> Any:
     return alive & (course.reached < samples)
 
 
-def _to_try(base: Any, within: Any, step: Any, sense: Any) -> tuple[Any, Any]:
+def _to_try(base: Any, within: Any, step: Any, sense: Any, spacing: Any) -> tuple[Any, Any]:
     """The step to try, which ends at the next sample or before it, and the angle where it begins."""
-    left = SPACING - within
+    left = spacing - within
     h = jnp.where(left <= step, left, jnp.where(left < 2 * step, left / 2, step))
     return h, base + sense * within
 
 
 def _accepted(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_Course, Any, Any]:
     """Take the step of a lane or refuse it, and choose the next one."""
-    error, h, cage_speed, slowest, sense, *rest = own
+    error, h, cage_speed, slowest, sense, spacing, *rest = own
     size = len(course.integrals)
     before, after, watched = rest[:size], rest[size : 2 * size], rest[2 * size :]
-    goes, left = _active(course, limits.samples), SPACING - course.within
+    goes, left = _active(course, limits.samples), spacing - course.within
     finite, shortest = jnp.isfinite(error), course.step <= SHORTEST
     good = (error <= limits.tolerance) & finite
     taken = goes & finite & (good | shortest)
@@ -248,12 +280,12 @@ def _accepted(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_
     add = lambda total, a, b: total + jnp.where(taken, h / 2 * (a + b), 0.0)
     follow = lambda p, w: jnp.where(taken, jnp.maximum(p, w), p)
     new = _Course(
-        base=jnp.where(hit, course.base + sense * SPACING, course.base),
+        base=jnp.where(hit, course.base + sense * spacing, course.base),
         within=jnp.where(hit, 0.0, jnp.where(taken, course.within + h, course.within)),
         reached=jnp.where(hit, course.reached + 1, course.reached),
         step=tried,
         outcome=jnp.where(worse, code, course.outcome),
-        steps=jnp.where(taken, course.steps + 1, course.steps),
+        steps=jnp.where(taken & (h > 0), course.steps + 1, course.steps),
         integrals=tuple(map(add, course.integrals, before, after)),
         peaks=tuple(map(follow, course.peaks, watched)),
     )

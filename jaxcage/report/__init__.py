@@ -60,10 +60,12 @@ from ._compare import (
 )
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (
+    bearing_budget_table as bearing_budget_table,
     before_and_after_tables as before_and_after_tables,
     budget_table as budget_table,
     optima_table as optima_table,
     parameters_table as parameters_table,
+    sobol_document as sobol_document,
     sobol_table as sobol_table,
     trade_off_document as trade_off_document,
     trade_off_table as trade_off_table,

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from .._parameters import parameter_info, parameters
-from ..design import Optimised, SobolIndices, ToleranceBudget, TradeOff
+from ..design import BearingBudget, Optimised, SobolIndices, ToleranceBudget, TradeOff
 from ..models import CageModel
-from ._table import Table, number
+from ._table import Table, chosen, number
 
 
 MOST = 8
@@ -80,16 +80,44 @@ def trade_off_document(found: TradeOff) -> list[dict[str, Any]]:
     ]
 
 
-def sobol_table(name: str, shares: SobolIndices) -> Table:
-    """What each parameter does to the chaotic speeds, alone and with the others."""
+def sobol_document(shares: SobolIndices) -> dict[str, Any]:
+    """Sobol indices as JSON has them."""
+    return {
+        **chosen(shares, "first total first_interval total_interval samples_wanted"),
+        "designs": shares.evaluations,
+        "doubtful": list(shares.doubtful),
+    }
+
+
+def sobol_table(name: str, shares: SobolIndices, what: str = "chaotic speeds") -> Table:
+    """What each parameter does to the chaotic speeds, or something else, alone and with the others."""
     cell = lambda value, pair: f"{value:+.2f} ({pair[0]:+.2f} to {pair[1]:+.2f})"
     columns = {
         "parameter": str,
         "alone": lambda n: cell(shares.first[n], shares.first_interval[n]),
         "with interactions": lambda n: cell(shares.total[n], shares.total_interval[n]),
     }
-    title = f"Chaotic speeds of {name}: shares of the variance over {shares.evaluations} designs (95 % interval)"
+    over = f"shares of the variance over {shares.evaluations} designs (95 % interval)"
+    title = f"{what[0].upper()}{what[1:]} of {name}: {over}"
     return Table.of(title, columns, sorted(shares.total, key=lambda n: -shares.total[n]))
+
+
+def bearing_budget_table(budget: BearingBudget, tolerance: float) -> Table:
+    """Which tolerances [%] move a measure of a whole bearing most, with standard errors."""
+    unit = "" if budget.unit == "1" else f" {budget.unit}"
+    share = lambda n: f"{100 * (budget.deviation[n] / budget.total) ** 2 if budget.total else 0:.0f} %"
+    columns = {
+        "parameter": str,
+        f"standard deviation{unit and f' [{budget.unit}]'}": lambda n: (
+            f"{budget.deviation[n]:.3g} ± {budget.error[n]:.1g}"
+        ),
+        "share of variance": share,
+    }
+    title = (
+        f"{budget.measure.replace('_', ' ').capitalize()} of {budget.value:.4g}{unit} under +-{tolerance:g} % of "
+        f"everything: standard deviation {budget.total:.3g}{unit}"
+    )
+    return Table.of(title, columns, sorted(budget.deviation, key=lambda n: -budget.deviation[n]))
 
 
 def budget_table(budget: ToleranceBudget, tolerance: float) -> Table:

@@ -20,12 +20,15 @@ from ..integrate import (
     LONGEST_BLOCK,
     OUTCOMES,
     SAMPLES,
+    SPACING,
     WITH_TANGENT,
     BearingLanes,
     bearing_states,
     begin_lanes,
+    comparable,
     lanes_apart,
     run_block,
+    slowness,
 )
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
@@ -72,13 +75,16 @@ def sweep_bearing(
     - `blocks`: of the observed revolutions, from whose scatter standard errors come.
     - `exponents`: 1 for the largest Lyapunov exponent, 0 for none.
     - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
-    - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution is run a second time with
-        about half the steps; a lane in which that moves the state by more is `inaccurate`.
+    - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution, of slow shafts a shorter
+        one, is run a second time with about half the steps; a lane in which that moves the state by more is
+        `inaccurate`. Slow is a shaft with which that stretch would be more than 50 periods of a loaded roller's
+        vibration on its raceway (NU2310 below 4000 rpm): it is 10 of them then, as neighbouring motions diverge over
+        time, not over revolutions.
     - `progress`: called with lanes done and lanes in all.
 
     **Returns:** `BearingSweep`. A lane that fails is NaN with an outcome, and its neighbours go on: `outside` if the
     cage comes nearly to rest (below 5 % of the speed of pure rolling) or leaves its land, `max_steps_reached` if it
-    needs more than 20,000 steps a revolution.
+    needs more than 20,000 steps a revolution (of slow shafts as many times more as more periods go to one).
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, impossible counts, a quasi-static
     ring or a film of finite length; `RuntimeError` without double precision.
@@ -197,18 +203,18 @@ def require_bearings(
 
 
 class _Counted:
-    """Revolutions done, told as lanes."""
+    """Samples done, told as lanes."""
 
     def __init__(self, progress: Progress | None, lanes: int, revolutions: int):
-        self.progress, self.lanes, self.whole = progress, lanes, lanes * revolutions
+        self.progress, self.lanes, self.whole = progress, lanes, lanes * revolutions * SAMPLES
         self.done, self.lock = 0, threading.Lock()
 
     def of(self, lanes: int) -> Callable[[int], None]:
-        """To be called with revolutions done of so many lanes."""
+        """To be called with samples done of so many lanes."""
 
-        def add(revolutions: int) -> None:
+        def add(samples: int) -> None:
             with self.lock:
-                self.done += lanes * revolutions
+                self.done += lanes * samples
                 if self.progress is not None:
                     self.progress(self.lanes * self.done // self.whole, self.lanes)
 
@@ -293,10 +299,9 @@ def _direction(begin: BearingState) -> BearingState:
     return jax.tree.map(each, begin)
 
 
-def _in_parts(revolutions: int, tangent: bool) -> list[int]:
-    """Stretches as long as they may be, with a tangent vector or without."""
-    longest = WITH_TANGENT if tangent else LONGEST_BLOCK
-    whole, rest = divmod(revolutions, longest)
+def _in_parts(revolutions: int, longest: int) -> list[int]:
+    """Stretches of so many samples and a rest."""
+    whole, rest = divmod(revolutions * SAMPLES, longest)
     return [longest] * whole + [rest] * (rest > 0)
 
 
@@ -314,33 +319,40 @@ def _followed(
     tight, loose = jnp.asarray(tolerance), jnp.asarray(COARSER * tolerance)
     direction = _direction(begin) if exponents else None
     lead = min(discard, LEAD) if exponents else 0
-    go = lambda lanes, samples: run_block(at, scale, lanes, jnp.asarray(samples), tight)
+    spacing = jnp.full((begin.bodies.shape[-1],), SPACING)
+    compared, slow = comparable(at, scale), float(jnp.max(slowness(at, scale)))
+    freely, tangent = LONGEST_BLOCK * SAMPLES, max(1, int(WITH_TANGENT * SAMPLES / slow**2))
+    go = lambda lanes, samples, spacing=spacing: run_block(at, scale, lanes, jnp.asarray(samples), tight, spacing)
     lanes = begin_lanes(at, scale, begin, None if lead < discard else direction)
-    for part in _in_parts(discard - lead, False):
-        lanes, _ = go(lanes, part * SAMPLES)
-        done(part)
+    for count in _in_parts(discard - lead, freely):
+        lanes, _ = go(lanes, count)
+        done(count)
     if exponents and lead < discard:
         lanes = _with_direction(at, scale, lanes, direction)
-    for part in _in_parts(lead, True):
-        lanes, _ = go(lanes, part * SAMPLES)
-        done(part)
+    for count in _in_parts(lead, tangent):
+        lanes, _ = go(lanes, count)
+        done(count)
 
     integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
     for block in blocks:
-        trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose)
-        samples, gathered = [1, *(part * SAMPLES for part in _in_parts(block, exponents > 0))], []
-        samples[-1] -= 1
-        for k, count in enumerate(samples):
+        trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose, compared)
+        lanes, found = go(lanes, 1, compared)
+        errors.append(np.asarray(lanes_apart(scale, trial.point, lanes.point)))
+        gathered = [jax.tree.map(np.asarray, found)]
+        if slow > 1:  # on to the first sample
+            lanes, found = go(lanes, 1, spacing - compared)
+            gathered.append(jax.tree.map(np.asarray, found))
+        places.append(gathered[-1].place[:1])
+        *counts, last = _in_parts(block, tangent if exponents else freely)
+        for count in (*counts, last - 1) if last > 1 else counts:
             lanes, found = go(lanes, count)
-            if k == 0:
-                errors.append(np.asarray(lanes_apart(scale, trial.point, lanes.point)))
             gathered.append(jax.tree.map(np.asarray, found))
             places.append(gathered[-1].place[:count])
         integrals.append(sum(part.integrals for part in gathered))
         growths.append(sum(part.growth for part in gathered))
         peaks.append(np.max([part.peaks for part in gathered], axis=0))
         steps.append(sum(part.steps for part in gathered))
-        done(block)
+        done(block * SAMPLES)
     rollers, bodies = bearing_states(lanes)
     total = np.stack(integrals, axis=-1)  # quantities, lanes, blocks
     return {

@@ -1,0 +1,427 @@
+"""`python -m benchmarks.bearing_stiffness`: whether the whole bearing wants implicit steps.
+
+From settled states of NU2310, arcs of 2 ms are run by explicit steps (those of the package, again in NumPy, and SciPy's
+DOP853) and by implicit ones (RODAS4 with an exact Jacobian, SciPy's Radau, BDF and LSODA with the same), each at the
+loosest tolerance that reaches the error wanted. Steps are counted, not timed. Beside them stands how far the explicit
+steps are from their stability limit, by the eigenvalues of the Jacobian along the arcs. Then the parts of a step are
+timed: rates, Jacobian, factors and solutions of the arrow, in which rollers meet cage and ring only.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import jaxcage as jc
+from benchmarks.bearing_speed import flat
+from benchmarks.bearing_trends import table
+from benchmarks.tableaux import RODAS4
+from jaxcage.models.whole import MOVING, Bodies, Passed, Rollers, state_scale
+
+
+SPAN, SETTLING, BETWEEN = 2e-3, 40e-3, 5e-3
+"""Time of an arc, before the first one, and from one to the next [s]."""
+ARCS = 4
+WANTED = (1e-2, 1e-3)
+"""Errors at the end of an arc that half of the arcs reach, in units of the state's scale: as a run allows, and less."""
+LADDER = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+"""Tolerances, loosest first."""
+HALVED = 2
+"""So many times the decade in which the loosest tolerance lies is halved."""
+TIGHT = 1e-10
+"""Tolerance of the reference."""
+SETTLED = 1e-4
+"""Tolerance of the run to the arcs: the usual one of sweeps."""
+MOST = 20_000
+"""Steps tried in an arc."""
+LANES, REPEATS = 64, 40
+"""How many at once parts of a step are timed for, and how often."""
+
+
+class Condition(NamedTuple):
+    """A bearing at a speed."""
+
+    name: str
+    shaft_rpm: float
+    changes: dict[str, float]
+
+
+CONDITIONS = (
+    Condition("10000 rpm", 10000.0, {}),
+    Condition("3000 rpm", 3000.0, {}),
+    Condition("1000 rpm", 1000.0, {}),
+    Condition("10000 rpm, pocket clearance 0.2 mm", 10000.0, {"pocket_clearance": 0.2e-3}),
+    Condition("10000 rpm, pocket stiffness 2e8 N/m", 10000.0, {"pocket_stiffness": 2e8}),
+    Condition("10000 rpm, oil at 0 °C", 10000.0, {"temperature": 273.15}),
+    Condition("1000 rpm, oil at 0 °C", 1000.0, {"temperature": 273.15}),
+)
+
+
+# Rates and their Jacobian, in the parts of an arrow: `w` is a roller, `b` cage, ring and the cage's angle.
+
+
+def roller(at: Any, w: jax.Array, b: jax.Array, place: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Rates of one roller over time, and what moves cage and ring."""
+    rollers, cage = Rollers(*w), Bodies(*b[:9])
+    forces = at.on_roller(rollers, cage, jnp.cos(b[9] + place), jnp.sin(b[9] + place))
+    rates, passed = at.roller_rates(rollers, cage, forces)
+    return jnp.stack(rates), jnp.stack(passed[:MOVING])
+
+
+def bodies(at: Any, b: jax.Array, sums: jax.Array) -> jax.Array:
+    """Rates of cage, ring and angle."""
+    cage = Bodies(*b[:9])
+    passed = Passed(*sums, *[0.0] * (len(Passed._fields) - MOVING))
+    rates, *_ = at.body_rates(cage, (jnp.cos(b[9]), jnp.sin(b[9])), passed, at.on_land(cage))
+    return jnp.stack([*rates, cage.cage_speed])
+
+
+def rates(at: Any, w: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Of all rollers, an axis of `w`, and of the bodies."""
+    each, passed = jax.vmap(roller, (None, 0, None, 0))(at, w, b, jnp.asarray(at.places))
+    return each, bodies(at, b, passed.sum(axis=0))
+
+
+class Arrow(NamedTuple):
+    """Blocks of the Jacobian: of each roller by itself, and by the bodies; of the bodies by each roller, and by all."""
+
+    own: jax.Array
+    by_bodies: jax.Array
+    on_bodies: jax.Array
+    bodies: jax.Array
+
+
+def arrow(at: Any, w: jax.Array, b: jax.Array) -> Arrow:
+    """The Jacobian: 15 directional derivatives of each roller, and 17 of cage and ring."""
+    places = jnp.asarray(at.places)
+    (own, passing), (by_bodies, passed) = jax.vmap(jax.jacfwd(roller, (1, 2)), (None, 0, None, 0))(at, w, b, places)
+    sums = jax.vmap(roller, (None, 0, None, 0))(at, w, b, places)[1].sum(axis=0)
+    by_b, by_sums = jax.jacfwd(bodies, (1, 2))(at, b, sums)
+    return Arrow(own, by_bodies, by_sums @ passing, by_b + by_sums @ passed.sum(axis=0))
+
+
+def inverse(m: jax.Array) -> jax.Array:
+    """Of matrices with their columns in the last axis, by Gauss and Jordan's method without a search of pivots."""
+    n = m.shape[-1]
+    both = jnp.concatenate([m, jnp.broadcast_to(jnp.eye(n), m.shape)], axis=-1)
+    for i in range(n):
+        row = both[..., i, :] / both[..., i, i, None]
+        both = (both - both[..., :, i, None] * row[..., None, :]).at[..., i, :].set(row)
+    return both[..., n:]
+
+
+class Factors(NamedTuple):
+    """Of shift - J."""
+
+    own: jax.Array
+    """Inverse of each roller's block."""
+    by_bodies: jax.Array
+    """It times minus the block beside it."""
+    on_bodies: jax.Array
+    bodies: jax.Array
+    """Inverse of what is left of cage and ring when the rollers are eliminated."""
+
+
+def factors(blocks: Arrow, shift: float) -> Factors:
+    """Eliminate the rollers."""
+    own = inverse(shift * jnp.eye(5) - blocks.own)
+    by_bodies = own @ -blocks.by_bodies
+    left = shift * jnp.eye(10) - blocks.bodies + jnp.sum(blocks.on_bodies @ by_bodies, axis=0)
+    return Factors(own, by_bodies, -blocks.on_bodies, inverse(left))
+
+
+def solution(held: Factors, f: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+    """(shift - J) u = f."""
+    alone = jnp.einsum("jik,jk->ji", held.own, f[0])
+    b = held.bodies @ (f[1] - jnp.einsum("jik,jk->i", held.on_bodies, alone))
+    return alone - held.by_bodies @ b, b
+
+
+def dense(blocks: Arrow) -> np.ndarray:
+    """The Jacobian as one matrix, numbers in the order of the package: all lags, all spins and so on."""
+    own, by_bodies, on_bodies, few = map(np.asarray, blocks)
+    n = len(own)
+    found = np.zeros((5 * n + 10, 5 * n + 10))
+    for j in range(n):
+        found[j : 5 * n : n, j : 5 * n : n] = own[j]
+        found[j : 5 * n : n, 5 * n :] = by_bodies[j]
+        found[5 * n :, j : 5 * n : n] = on_bodies[j]
+    found[5 * n :, 5 * n :] = few
+    return found
+
+
+# Arcs, in units of the state's scale.
+
+
+class Arcs:
+    """A condition's rates and Jacobian over time, and settled states, all as flat numbers in units of the scale."""
+
+    def __init__(self, condition: Condition, count: int):
+        self.model = jc.replace(jc.whole_bearing("nu2310"), **condition.changes)
+        speed, n = float(jc.rpm(condition.shaft_rpm)), self.model.bearing.n_rollers
+        self.at, scale = self.model.at_speed(speed), state_scale(self.model, speed)
+        self.size = np.append(flat(np.asarray(scale.rollers), np.asarray(scale.bodies)), 1.0)
+        at, size = self.at, jnp.asarray(self.size)
+
+        def rate(y: jax.Array) -> jax.Array:
+            z = y * size
+            each, few = rates(at, z[: 5 * n].reshape(5, n).T, z[5 * n :])
+            return jnp.concatenate([each.T.ravel(), few]) / size
+
+        one, slopes = jax.jit(rate), jax.jit(jax.jacfwd(rate))
+        self.rate: Callable[[np.ndarray], np.ndarray] = lambda y: np.asarray(one(y))
+        self.jacobian: Callable[[np.ndarray], np.ndarray] = lambda y: np.asarray(slopes(y))
+        begin, times = jc.models.rolling_start(self.model, speed), SETTLING + BETWEEN * np.arange(count)
+        run = jc.bearing_over_time(self.model, speed, np.append(0.0, times), start=begin, tolerance=SETTLED)
+        states = np.concatenate([flat(run.rollers, run.bodies), run.angle[:, None]], axis=-1)[1:] / self.size
+        self.begin = states
+        self.exact = np.array([self.scipy("DOP853", y, TIGHT).end for y in self.begin])
+
+    def scipy(self, method: str, y: np.ndarray, tolerance: float) -> "Reached":
+        """An arc by SciPy."""
+        jacobian: Any = {} if method == "DOP853" else {"jac": lambda _, y: self.jacobian(y)}
+        rate = lambda _, y: self.rate(y)
+        done = solve_ivp(rate, (0.0, SPAN), y, method, rtol=tolerance, atol=tolerance, **jacobian)
+        return Reached(done.y[:, -1], len(done.t) - 1, done.nfev, done.njev, [])
+
+
+class Reached(NamedTuple):
+    """What came of an arc."""
+
+    end: np.ndarray
+    steps: int
+    evaluations: int
+    jacobians: int
+    taken: list[tuple[np.ndarray, float]]
+    """Where each step began, and its length [s]; nothing from SciPy."""
+
+
+Step = Callable[[Arcs, np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""(arcs, state, its rate, length) -> state, its rate, estimated error."""
+
+
+def explicit(arcs: Arcs, y: np.ndarray, k1: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The package's: Runge and Kutta's classical step, its error the last slope less that at its end."""
+    k2 = arcs.rate(y + h / 2 * k1)
+    k3 = arcs.rate(y + h / 2 * k2)
+    k4 = arcs.rate(y + h * k3)
+    end = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    k5 = arcs.rate(end)
+    return end, k5, h / 6 * (k4 - k5)
+
+
+def implicit(arcs: Arcs, y: np.ndarray, k1: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """RODAS4, of which each step solves with one matrix."""
+    solve = np.linalg.inv(np.eye(y.size) / (RODAS4.gamma * h) - arcs.jacobian(y))
+    stages = np.zeros((6, y.size))
+    for i in range(6):
+        f = arcs.rate(y + RODAS4.a[i] @ stages) if i else k1
+        stages[i] = solve @ (f + RODAS4.c[i] @ stages / h)
+    end = y + RODAS4.m @ stages
+    return end, arcs.rate(end), stages[-1]
+
+
+def controlled(step: Step, arcs: Arcs, y: np.ndarray, tolerance: float, jacobians: int) -> Reached:
+    """An arc by steps of the tolerance, as the package chooses them; both estimates are of fourth order."""
+    done, h, tried, taken = 0.0, SPAN / 300, 0, []
+    rate = arcs.rate(y)
+    while done < SPAN and tried < MOST:
+        left = SPAN - done
+        length = left if left <= h else left / 2 if left < 2 * h else h
+        end, after, estimate = step(arcs, y, rate, length)
+        tried += 1
+        error = float(np.max(np.abs(estimate)))
+        good = error <= tolerance
+        wish = length * (min(max(0.9 * (tolerance / max(error, 1e-30)) ** 0.25, 0.2), 3.0) if error < np.inf else 0.2)
+        if good:
+            taken.append((y, length))
+            y, rate, done = end, after, SPAN if length == left else done + length
+        h = max(h, wish) if good and length < h else wish
+    each = 6 if jacobians else 4
+    return Reached(y, len(taken), each * tried + 1, jacobians * tried, taken)
+
+
+METHODS: dict[str, Callable[[Arcs, np.ndarray, float], Reached]] = {
+    "explicit, as in the package": lambda arcs, y, tolerance: controlled(explicit, arcs, y, tolerance, 0),
+    "explicit, DOP853": lambda arcs, y, tolerance: arcs.scipy("DOP853", y, tolerance),
+    "implicit, RODAS4": lambda arcs, y, tolerance: controlled(implicit, arcs, y, tolerance, 1),
+    "implicit, Radau": lambda arcs, y, tolerance: arcs.scipy("Radau", y, tolerance),
+    "implicit, BDF": lambda arcs, y, tolerance: arcs.scipy("BDF", y, tolerance),
+    "both, LSODA": lambda arcs, y, tolerance: arcs.scipy("LSODA", y, tolerance),
+}
+OURS, OTHER = list(METHODS)[:2]
+NEAR = 0.8
+"""Of the longest stable step: beyond that it is said to be near."""
+
+
+class Tried:
+    """A method on all arcs, each tolerance run once."""
+
+    def __init__(self, arcs: Arcs, method: Callable[[Arcs, np.ndarray, float], Reached]):
+        self.arcs, self.method = arcs, method
+        self.known: dict[float, list[Reached]] = {}
+
+    def runs(self, tolerance: float) -> list[Reached]:
+        """All arcs at a tolerance."""
+        if tolerance not in self.known:
+            self.known[tolerance] = [self.method(self.arcs, y, tolerance) for y in self.arcs.begin]
+        return self.known[tolerance]
+
+    def error(self, tolerance: float) -> float:
+        """Reached by half of the arcs; of one that did not come to its end, infinite."""
+        apart = [np.max(np.abs(r.end - exact)) for r, exact in zip(self.runs(tolerance), self.arcs.exact, strict=True)]
+        return float(np.median(np.nan_to_num(apart, nan=np.inf)))
+
+    def loosest(self, wanted: float) -> float | None:
+        """The loosest tolerance that reaches an error; None if none does."""
+        tight = next((x for x in LADDER if self.error(x) <= wanted), None)
+        if tight is None or tight == LADDER[0]:
+            return tight
+        loose = 10 * tight
+        for _ in range(HALVED):
+            middle = float(np.sqrt(loose * tight))
+            loose, tight = (loose, middle) if self.error(middle) <= wanted else (middle, tight)
+        return tight
+
+
+def limit(direction: np.ndarray) -> np.ndarray:
+    """How far Runge and Kutta's stability region reaches along directions of the left half plane."""
+    far = np.linspace(0.0, 3.5, 1401)[1:]
+    z = far[:, None] * direction
+    grows = np.abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
+    return np.where(grows.any(axis=0), far[np.argmax(grows, axis=0)], far[-1])
+
+
+def nearness(arcs: Arcs, runs: Sequence[Reached]) -> tuple[np.ndarray, complex]:
+    """Steps over the longest stable ones, from every fourth step on, and the fastest eigenvalue of all [1/s]."""
+    shares, fastest = [], 0j
+    for y, h in [each for run in runs for each in run.taken[::4]]:
+        values = np.linalg.eigvals(arcs.jacobian(y))
+        fast = values[(np.abs(values) > 1e3) & (values.real < 0)]
+        shares.append(float(np.max(np.abs(fast) * h / limit(fast / np.abs(fast)))))
+        fastest = max(fastest, *fast, key=abs)
+    return np.array(shares), fastest
+
+
+def parts(arcs: Arcs) -> dict[str, float]:
+    """Processor time of the parts of a step of one bearing [us], in a batch of `LANES`."""
+    n, y = arcs.model.bearing.n_rollers, arcs.begin[0] * arcs.size
+    many = lambda x: jnp.asarray(np.repeat(x[None], LANES, axis=0))
+    w, b = many(y[: 5 * n].reshape(5, n).T), many(y[5 * n :])
+    each = lambda f: jax.jit(jax.vmap(f))
+    blocks = each(lambda w, b: arrow(arcs.at, w, b))(w, b)
+    shift = 1 / (RODAS4.gamma * 1e-5)
+    held = each(lambda blocks: factors(blocks, shift))(blocks)
+    f = each(lambda w, b: rates(arcs.at, w, b))(w, b)
+    got = each(solution)(held, f)
+    size, units = jnp.asarray(arcs.size), np.diag(1 / arcs.size)
+    whole = units @ dense(jax.tree.map(lambda x: x[0], blocks)) @ np.diag(arcs.size)
+    np.testing.assert_allclose(whole, arcs.jacobian(arcs.begin[0]), rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+    flat_f = np.concatenate([np.asarray(f[0][0]).T.ravel(), np.asarray(f[1][0])]) / size
+    want = np.linalg.solve(shift * np.eye(whole.shape[0]) - whole, flat_f)
+    have = np.concatenate([np.asarray(got[0][0]).T.ravel(), np.asarray(got[1][0])]) / size
+    np.testing.assert_allclose(have, want, rtol=1e-6, atol=1e-8 * np.abs(want).max())
+    return {
+        "rates": timed(each(lambda w, b: rates(arcs.at, w, b)), w, b),
+        "Jacobian": timed(each(lambda w, b: arrow(arcs.at, w, b)), w, b),
+        "factors": timed(each(lambda blocks: factors(blocks, shift)), blocks),
+        "solution": timed(each(solution), held, f),
+    }
+
+
+def timed(f: Callable[..., Any], *given: Any) -> float:
+    """Processor time of a call for each lane [us]: the least of several."""
+    jax.block_until_ready(f(*given))
+    found = []
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        jax.block_until_ready([f(*given) for _ in range(REPEATS)])
+        found.append((time.process_time() - begun) / REPEATS)
+    return 1e6 * min(found) / LANES
+
+
+class Count(NamedTuple):
+    """Means over the arcs; NaN where no tolerance reached the error."""
+
+    steps: float
+    evaluations: float
+    jacobians: float
+
+    @classmethod
+    def of(cls, runs: Sequence[Reached] | None) -> "Count":
+        """Of one method at one error."""
+        if runs is None:
+            return cls(np.nan, np.nan, np.nan)
+        return cls(*(float(np.mean([getattr(run, name) for run in runs])) for name in cls._fields))
+
+    def time(self, cost: dict[str, float]) -> float:
+        """Of an arc [us]; of a method that solves as often as it evaluates rates, with one factorisation a Jacobian."""
+        solves = self.evaluations * cost["solution"] if self.jacobians else 0.0
+        return self.evaluations * cost["rates"] + solves + self.jacobians * (cost["Jacobian"] + cost["factors"])
+
+
+def counted(arcs: Arcs) -> tuple[dict[str, list[Count]], list[tuple[str, ...]]]:
+    """What each method takes for each of the errors wanted; how near the explicit steps are to their limit."""
+    found, near = {}, []
+    for name, method in METHODS.items():
+        tried = Tried(arcs, method)
+        tolerances = [tried.loosest(error) for error in WANTED]
+        runs = [None if tolerance is None else tried.runs(tolerance) for tolerance in tolerances]
+        found[name] = [Count.of(each) for each in runs]
+        for error, each in zip(WANTED, runs, strict=True):
+            if each is not None and name == OURS:
+                shares, fastest = nearness(arcs, each)
+                few = f"{np.median(shares):.2f}", f"{shares.max():.2f}", f"{100 * np.mean(shares > NEAR):.0f} %"
+                near.append((f"{error:.0e}", *few, f"{fastest.real:.0f} {fastest.imag:+.0f}i"))
+    return found, near
+
+
+def main() -> None:
+    """Run all conditions, print what they take and the cost of a step."""
+    about, _ = (__doc__ or "").split("\n\n")
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--conditions", type=int, nargs="*", default=range(len(CONDITIONS)), help="by number, from 0")
+    parser.add_argument("--arcs", type=int, default=ARCS)
+    given = parser.parse_args()
+    jc.enable_x64()
+    heads = [f"{error:.0e}" for error in WANTED]
+    steps = [("error", *heads, *heads)]
+    near = [("steps over the longest stable", "error", "half", "largest", f"above {NEAR:g}", "fastest [1/s]")]
+    gains = [("error", *heads, *heads)]
+    cost: dict[str, float] = {}
+    for condition in (CONDITIONS[i] for i in given.conditions):
+        arcs = Arcs(condition, given.arcs)
+        cost = cost or parts(arcs)
+        found, limits = counted(arcs)
+        near += [(condition.name, *row) for row in limits]
+        steps.append((condition.name, "steps", "", "rates, Jacobians", ""))
+        for name, each in found.items():
+            work = [f"{x.evaluations:.0f}, {x.jacobians:.0f}" for x in each]
+            steps.append((f"  {name}", *(f"{x.steps:.0f}" for x in each), *work))
+        row = []
+        for size in (lambda x: x.steps, lambda x: x.time(cost)):
+            best = np.nanmin(
+                [[size(x) for x in each] for name, each in found.items() if name != OURS and name != OTHER], axis=0
+            )
+            row += [f"{size(x) / b:.2f}" for x, b in zip(found[OURS], best, strict=True)]
+        gains.append((condition.name, *row))
+    print(f"What an arc of {1e3 * SPAN:g} ms takes, means of {given.arcs} arcs, at the loosest tolerance to an error")
+    table(steps)
+    print("\nIs the explicit step limited by stability?")
+    table(near)
+    usual = 4 * cost["rates"]
+    arrowed = 6 * (cost["rates"] + cost["solution"]) + cost["Jacobian"] + cost["factors"]
+    named = ", ".join(f"{name} {x:.1f}" for name, x in cost.items())
+    print(f"\nProcessor time of the parts of a step, one of {LANES} bearings at a time [us]: {named}")
+    print(f"An explicit step {usual:.0f}, one of RODAS4 {arrowed:.0f}: {arrowed / usual:.1f} times as much")
+    print("\nThe explicit steps over those of the implicit method with the fewest, and the same of time by these parts")
+    table(gains)
+
+
+if __name__ == "__main__":
+    main()
