@@ -72,6 +72,7 @@ SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxca
 SPEED = "python -m benchmarks"
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 FIT = "python experiments/identify_nu2310.py --check --cases {0} --begin experiments/case_fits/{0}.json"
+CRISES = "jaxcage gradient 1a --lasting --first 9000 --last 12900 --count 40 --designs 32"
 CHECK = "python experiments/identify_nu2310.py --check"
 OPTIMISE = _notebook("optimise_gap_and_balance", "gradient_or_not")
 
@@ -85,6 +86,7 @@ SHOWN = (
     Shown("speed", README, [SPEED], ex.speed),
     Shown("speed-text", README, [SPEED]),
     Shown("guide-zones-1a", EDGES, [ZONES], ex.tables("Synchronous-loss", "Elasticities", *CHAOS)),
+    Shown("guide-crises-1a", EDGES, [CRISES], ex.tables("Elasticities", "Widths", "Crises")),
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
