@@ -4,7 +4,7 @@ import pathlib
 
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the processes of a run: their threads would wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of several processes wait for each other
 # Both processes of a run, the commands they start and the next run share what has been compiled.
 PROGRAMS = os.environ.setdefault(
     "JAXCAGE_CACHE", str(pathlib.Path(__file__).parent.parent / ".pytest_cache" / "programs")

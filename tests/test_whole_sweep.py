@@ -9,7 +9,16 @@ import pytest
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES, SAMPLES, BearingLanes, begin_lanes, run_block
+from jaxcage.integrate import (
+    OUTCOMES,
+    SAMPLES,
+    SPACING,
+    BearingLanes,
+    begin_lanes,
+    comparable,
+    run_block,
+    slowness,
+)
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
 
 
@@ -110,6 +119,49 @@ def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     assert [OUTCOMES[k] for k in np.asarray(after.outcome)] == ["successful", "outside", "not_finite"]
     np.testing.assert_array_equal(in_units(model, end_of(after, 0, 13)), in_units(model, end_of(alone, 0, 13)))
     assert float(block.growth[0]) == float(block_alone.growth[0]) and np.isfinite(float(block.growth[0]))
+
+
+def test_a_way_in_two_parts_is_the_same_way(start):
+    """To a sample by way of a third of it; a lane whose way is 0 stays, and takes no step."""
+    model = bearing()
+    at, scale, lanes = lanes_of(model, [start, start, start], along())
+    go = lambda lanes, share: run_block(
+        at, scale, lanes, jnp.asarray(1), jnp.asarray(1e-7), SPACING * jnp.asarray(share)
+    )
+    whole, all_ = go(lanes, [1.0, 1.0, 1.0])
+    middle, first = go(lanes, [1 / 3, 0.0, 1.0])
+    after, rest = go(middle, [2 / 3, 1.0, 0.0])
+    for k in range(3):
+        apart = np.abs(in_units(model, end_of(after, k, 13)) - in_units(model, end_of(whole, k, 13))).max()
+        assert apart < 1e-5 and float(after.angle[k]) == pytest.approx(float(whole.angle[k]), abs=1e-12)
+    np.testing.assert_allclose(first.integrals + rest.integrals, all_.integrals, rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(first.growth + rest.growth, all_.growth, atol=1e-4)
+    assert first.steps[1] == 0 == rest.steps[2] and first.steps[2] == all_.steps[2] > 10
+    np.testing.assert_array_equal(in_units(model, end_of(middle, 1, 13)), in_units(model, start))
+
+
+def test_what_is_compared_takes_no_longer_at_low_speed():
+    """A sixteenth of a revolution at usual speeds; where that is long, ten periods of a roller, at any speed."""
+    model, taken = bearing(), {}
+    for shaft_rpm in (500.0, 1000.0, 4000.0, 16000.0):
+        speed = jc.rpm(shaft_rpm)
+        at, scale = model.at_speed(speed), state_scale(model, speed)
+        scale = scale._replace(rollers=scale.rollers[:, 0])
+        compared, slow = float(comparable(at, scale)), float(slowness(at, scale))
+        turning = float(model.rolling_cage_speed(speed))
+        taken[shaft_rpm] = compared / turning
+        assert (compared == SPACING and slow == 1) == (shaft_rpm >= 4000)
+    period = 2 * np.pi * float(scale.rollers[2] / scale.rollers[3])
+    assert taken[500.0] == pytest.approx(10 * period, rel=0.05) == taken[1000.0]
+    assert taken[1000.0] < taken[16000.0] < taken[4000.0]
+
+
+@pytest.mark.wide
+def test_slow_shafts_run_through():
+    """At 1000 rpm a sixteenth of a revolution takes 9 ms, in which neighbouring motions diverge by a factor of 100."""
+    how = dict(starts=1, discard=1, revolutions=1, blocks=1)
+    found = jc.sweep_bearing(bearing(), jc.rpm(1000.0), **how)
+    assert found.outcome[0, 0] == "successful" and found.error[0, 0] < 0.05 and found.exponent[0, 0] > 50
 
 
 def test_rollers_have_no_names():

@@ -1,6 +1,7 @@
 """Time histories of the whole bearing: over the cage's angle, with slips, forces and losses; or over time."""
 
 import dataclasses
+import math
 from typing import Any
 
 import jax
@@ -13,6 +14,7 @@ from .._errors import ArgumentError
 from .._recent import jitted
 from .._types import Scalar
 from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
+from ._bearing_blocks import slowness
 from ._lanes import By, Controls, Lanes, advance, begin
 from ._results import INACCURATE, OUTCOMES
 
@@ -26,6 +28,10 @@ MOST_STEPS = 200_000
 """In a part of a revolution between two samples."""
 IMBALANCE = 1e-6
 """Of the load, by which a quasi-static ring may be out of balance."""
+SHORT = 3
+"""Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
+MOST_PARTS = 1000
+"""From sample to sample."""
 HALF = 16.0
 """A tolerance so many times smaller makes steps of fourth order about half as long."""
 
@@ -50,9 +56,10 @@ class BearingRun:
     """`successful`, or the name of what went wrong."""
     error: float
     """How far the state at a sample moves if it is reached from the one before it by about half as many steps, in units
-    of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples."""
+    of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples. Of slow shafts, where
+    motions diverge from sample to sample, the same from place to place between them."""
     estimate: float
-    """Sum of the embedded error estimates of the steps between two samples, the largest of them."""
+    """Sum of the embedded error estimates of the steps between two samples, or places, the largest of them."""
     steps: float
     """Mean number of steps of a revolution (or of the whole stretch of time)."""
 
@@ -138,8 +145,9 @@ def simulate_bearing(
     **Returns:** `BearingRun`. Steps are as short as the tolerance requires. From sample to sample the run is made a
     second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
     enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions diverge within a revolution
-    or two: longer stretches cannot be compared. A cage that comes to rest, or leaves its land, is `outside`: follow it
-    over time, with `bearing_over_time`.
+    or two: longer stretches cannot be compared. Of slow shafts (NU2310 below 4000 rpm) it is made from place to place
+    between samples, three periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land,
+    is `outside`: follow it over time, with `bearing_over_time`.
 
     **Raises:** `ValueError` for a speed that is zero or not a number, or impossible counts.
     """
@@ -155,10 +163,28 @@ def simulate_bearing(
             said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
         )
     state = rolling_start(model, value) if start is None else start
-    span = np.full(samples * (discard + revolutions), TURN / samples)
-    return _recorded(
-        model, value, state, span, (FIRST, LONGEST, SHORTEST), tolerance, allowed, "angle", samples, discard
-    )
+    parts = _parts(model, value, samples)
+    places = samples * parts
+    span = np.full(places * (discard + revolutions), TURN / places)
+    run = _recorded(model, value, state, span, (FIRST, LONGEST, SHORTEST), tolerance, allowed, "angle", places, discard)
+    return run if parts == 1 else _thinned(run, parts)
+
+
+def _parts(model: BearingModel, speed: float, samples: int) -> int:
+    """From sample to sample: 1 but for slow shafts."""
+    scale = state_scale(model, speed)
+    scale = scale._replace(rollers=scale.rollers[:, 0])
+    if float(slowness(model.at_speed(speed), scale)) == 1:
+        return 1
+    short = SHORT * TURN * float(scale.rollers[2] / scale.rollers[3] * abs(model.rolling_cage_speed(speed)))
+    return min(math.ceil(TURN / samples / short), MOST_PARTS) if short > 0 else 1
+
+
+def _thinned(run: BearingRun, parts: int) -> BearingRun:
+    """A run with every so many of its samples."""
+    arrays = {name: getattr(run, name)[::parts] for name in ("time", "angle", "rollers", "bodies", "integrals")}
+    peaks = run.peaks.reshape(-1, parts, run.peaks.shape[1]).max(axis=1)
+    return dataclasses.replace(run, **arrays, peaks=peaks)
 
 
 def bearing_over_time(

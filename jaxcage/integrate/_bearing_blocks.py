@@ -144,7 +144,7 @@ def _length(units: Moving, tangent: Moving, rollers: int) -> Array:
     return jnp.where((length > 0) & jnp.isfinite(length), length, 1.0)
 
 
-def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
+def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, "*lanes"]:
     """How many times as many periods of a roller go from sample to sample as in a shaft that is not slow: at least 1.
 
     **Arguments:** laws and magnitudes as in `begin_lanes`.
@@ -154,7 +154,7 @@ def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
     return jnp.clip(SPACING / turned, 1.0, SLOWEST)
 
 
-def comparable(at: BearingAtSpeed, scale: BearingState) -> Float[Array, " lanes"]:
+def comparable(at: BearingAtSpeed, scale: BearingState) -> Float[Array, "*lanes"]:
     """How far each lane goes before it is compared with the same by longer steps [rad]: to the next sample, or less.
 
     **Arguments:** laws and magnitudes as in `begin_lanes`.
@@ -191,7 +191,7 @@ def run_block(
     )
     slowest = jnp.broadcast_to(STALLED * jnp.abs(jnp.asarray(at.rolling_cage_speed)), (count,))
     sense = jnp.broadcast_to(law.sense, (count,))
-    slow = jnp.ceil(jnp.max(slowness(at, scale))).astype(samples.dtype)
+    slow = jnp.ceil(jnp.max(slowness(at, scale))).astype(jnp.int32)
     most = MOST_ATTEMPTS * slow * (1 + samples // SAMPLES)
     each = jnp.full((count,), SPACING) if spacing is None else spacing
     per_clearance = jnp.asarray(at.guide.land.per_clearance)
