@@ -467,8 +467,9 @@ def test_every_file_is_put_in_place_whole():
     assert found == {
         ("studies/_empty.py", "to_zarr"),  # the empty store, made aside
         ("io/_files.py", "open"),  # aside, in place by `os.replace`
-        ("design/_optimise.py", "open"),  # a kept search, moved into place
-        ("design/_optimise.py", "savez"),
+        ("design/_kept.py", "open"),  # a kept search, moved into place
+        ("design/_kept.py", "savez"),
+        ("design/_evolve.py", "save"),  # of a kept search
         ("design/_optimise.py", "save"),
         ("io/_template.py", "open"),  # a new file only
         ("report/_figures.py", "savefig"),  # into memory

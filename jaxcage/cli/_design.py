@@ -76,12 +76,11 @@ def design(job: Job[DesignOptions]) -> Report:
     balance = None if options.worse_balance else no_worse_balance(job.model, vary)
     scatter = read_scatter(options.scatter, list(vary))
     width = chaotic_width(options.first, options.last, options.speeds, **job.given("cloud spread seed"))
-    finer = _finer(options)
     kept = kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
         seen = _searched(job, vary, _objective(job, width, vary, scatter), kept, say)
         say("finer look", 0, 1)
-        found, itself = judged(seen, _objective(job, finer, vary, scatter))
+        found, itself = judged(seen, _objective(job, _finer(options), vary, scatter))
         searched = job.seconds
         front = _front(job, width, vary, found, say) if options.front else None
         models = {"before": job.model, "after": found.best.model}
