@@ -24,9 +24,9 @@ from benchmarks.tableaux import RODAS4
 from jaxcage.models.whole import MOVING, Bodies, Passed, Rollers, state_scale
 
 
-SPAN, SETTLING, BETWEEN = 2e-3, 40e-3, 5e-3
+SPAN, SETTLING, BETWEEN = 2e-3, 20e-3, 5e-3
 """Time of an arc, before the first one, and from one to the next [s]."""
-ARCS = 4
+ARCS = 3
 WANTED = (1e-2, 1e-3)
 """Errors at the end of an arc that half of the arcs reach, in units of the state's scale: as a run allows, and less."""
 LADDER = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -158,24 +158,27 @@ def dense(blocks: Arrow) -> np.ndarray:
 # Arcs, in units of the state's scale.
 
 
+def _flat_rates(at: Any, size: jax.Array, y: jax.Array) -> jax.Array:
+    """Rates over time of a state in one row, both in units of `size`."""
+    n, z = at.n_rollers, y * size
+    each, few = rates(at, z[: 5 * n].reshape(5, n).T, z[5 * n :])
+    return jnp.concatenate([each.T.ravel(), few]) / size
+
+
+flat_rates, flat_slopes = jax.jit(_flat_rates), jax.jit(jax.jacfwd(_flat_rates, 2))
+
+
 class Arcs:
     """A condition's rates and Jacobian over time, and settled states, all as flat numbers in units of the scale."""
 
     def __init__(self, condition: Condition, count: int):
         self.model = jc.replace(jc.whole_bearing("nu2310"), **condition.changes)
-        speed, n = float(jc.rpm(condition.shaft_rpm)), self.model.bearing.n_rollers
-        self.at, scale = self.model.at_speed(speed), state_scale(self.model, speed)
+        speed = float(jc.rpm(condition.shaft_rpm))
+        self.at = jax.tree.map(lambda x: jnp.asarray(x, dtype=float), self.model.at_speed(speed))
+        scale = state_scale(self.model, speed)
         self.size = np.append(flat(np.asarray(scale.rollers), np.asarray(scale.bodies)), 1.0)
-        at, size = self.at, jnp.asarray(self.size)
-
-        def rate(y: jax.Array) -> jax.Array:
-            z = y * size
-            each, few = rates(at, z[: 5 * n].reshape(5, n).T, z[5 * n :])
-            return jnp.concatenate([each.T.ravel(), few]) / size
-
-        one, slopes = jax.jit(rate), jax.jit(jax.jacfwd(rate))
-        self.rate: Callable[[np.ndarray], np.ndarray] = lambda y: np.asarray(one(y))
-        self.jacobian: Callable[[np.ndarray], np.ndarray] = lambda y: np.asarray(slopes(y))
+        self.rate: Callable[[np.ndarray], np.ndarray] = lambda y: np.asarray(flat_rates(self.at, self.size, y))
+        self.jacobian: Callable[[np.ndarray], np.ndarray] = lambda y: np.asarray(flat_slopes(self.at, self.size, y))
         begin, times = jc.models.rolling_start(self.model, speed), SETTLING + BETWEEN * np.arange(count)
         run = jc.bearing_over_time(self.model, speed, np.append(0.0, times), start=begin, tolerance=SETTLED)
         states = np.concatenate([flat(run.rollers, run.bodies), run.angle[:, None]], axis=-1)[1:] / self.size

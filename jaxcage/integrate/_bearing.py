@@ -145,9 +145,9 @@ def simulate_bearing(
     **Returns:** `BearingRun`. Steps are as short as the tolerance requires. From sample to sample the run is made a
     second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
     enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions diverge within a revolution
-    or two: longer stretches cannot be compared. Of slow shafts (NU2310 below 4000 rpm) it is made from place to
-    place between samples, three periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land, is `outside`: follow it
-    over time, with `bearing_over_time`.
+    or two: longer stretches cannot be compared. Of slow shafts (NU2310 below 4000 rpm) it is made from place to place
+    between samples, three periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land,
+    is `outside`: follow it over time, with `bearing_over_time`.
 
     **Raises:** `ValueError` for a speed that is zero or not a number, or impossible counts.
     """
