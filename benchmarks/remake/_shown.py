@@ -108,6 +108,7 @@ SHOWN = (
     Shown("bearing-gradients-elsewhere", WHOLE, [f"{SLOPES} --cases 3 4 {SMALL}"], ex.printed),
     Shown("bearing-design", WHOLE, [BETTER], ex.tables("Design of", "Before and after")),
     *(Shown(f"bearing-paper-{what}", WHOLE, [f"{PAPER} {what}{more}"], ex.printed) for what, more in PAPER_PARTS),
+    Shown("bearing-stiffness", WHOLE, ["python -m benchmarks.bearing_stiffness"], ex.printed),
     Shown("transcript", "docs/transcript.md", ["python -m benchmarks.transcript"], ex.printed),
     _whole("convergence-page", "benchmarks/convergence.md", "python -m benchmarks.convergence", "convergence.md"),
     _whole("solvers-page", "benchmarks/solvers.md", "python -m benchmarks.solvers", "solvers.md"),

@@ -28,7 +28,7 @@ MOST_STEPS = 200_000
 """In a part of a revolution between two samples."""
 IMBALANCE = 1e-6
 """Of the load, by which a quasi-static ring may be out of balance."""
-SHORT = 3
+SHORT = 2
 """Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
 MOST_PARTS = 1000
 """From sample to sample."""
@@ -146,7 +146,7 @@ def simulate_bearing(
     second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
     enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions diverge within a revolution
     or two: longer stretches cannot be compared. Of slow shafts (NU2310 below 4000 rpm) it is made from place to place
-    between samples, three periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land,
+    between samples, two periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land,
     is `outside`: follow it over time, with `bearing_over_time`.
 
     **Raises:** `ValueError` for a speed that is zero or not a number, or impossible counts.
