@@ -127,7 +127,7 @@ def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], 
     assert main([*DESIGN, *small, *scatter]) == 0
     text = capsys.readouterr().out
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
-    assert "128 designs swept" in text  # two steps x four of a cloud x sixteen made cages
+    assert "64 designs swept" in text  # a generation of four x sixteen made cages
 
 
 @pytest.mark.wide
