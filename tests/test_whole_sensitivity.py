@@ -104,11 +104,11 @@ def test_the_command(by_law, capsys: pytest.CaptureFixture[str], tmp_path: pathl
 @pytest.mark.wide
 def test_in_earnest(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     """The power over a wide range of gap and a narrow one of the pockets: Petroff's drag is the gap's."""
-    asked = [*COMMAND, "--of", "power", "--samples", "4", "--ensemble", "1", "--discard", "1", "--revolutions", "2"]
+    asked = [*COMMAND, "--of", "power", "--samples", "8", "--ensemble", "1", "--discard", "1", "--revolutions", "2"]
     asked += ["--vary", "guidance_gap=0.4mm:0.6mm", "--vary", "pocket_clearance=0.29mm:0.31mm", "--quick", "--json"]
     assert main([*asked, "--out", str(tmp_path)]) == 0
-    found = json.loads(capsys.readouterr().out)["sobol"]
-    assert found["total"]["guidance_gap"] > 0.7 > 0.3 > abs(found["first"]["pocket_clearance"])
+    total = json.loads(capsys.readouterr().out)["sobol"]["total"]
+    assert total["guidance_gap"] > 3 * total["pocket_clearance"] > 0  # 0.86 and 0.10, with bars of some 0.5 and 0.07
 
 
 @pytest.mark.parametrize(
