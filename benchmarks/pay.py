@@ -25,7 +25,6 @@ from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 import jaxcage as jc
-from benchmarks.pay_model import ModelSearch
 from benchmarks.pay_table import table
 from jaxcage.design import (
     AbstractObjective,
@@ -33,6 +32,7 @@ from jaxcage.design import (
     DesignSpace,
     LandMeasure,
     Measured,
+    SurrogateSearch,
     chaotic_width,
     cost,
 )
@@ -200,13 +200,12 @@ def by_gradient(space: DesignSpace, asked: Counted, seed: int) -> np.ndarray:
     return np.array([u.place(found.best.values[u.name]) for u in space.unknowns])
 
 
-def by_model(space: DesignSpace, asked: Counted, seed: int) -> None:
-    """A Gaussian process of what was found, asked for ten designs at a time in a region about the best."""
-    search = ModelSearch(len(space.names), space.place.clip(0.02, 0.98), seed)
-    known = lambda x: PRICE * COST.values(space, x)
+def by_surrogate(space: DesignSpace, asked: Counted, seed: int) -> None:
+    """As `jaxcage design`: a Gaussian process of what was found chooses ten designs at a time."""
+    search = SurrogateSearch(space.place.clip(0.02, 0.98), TOGETHER, (seed, 0))
     while True:
-        places = search.ask(TOGETHER, known)
-        search.tell(places, asked.values(space, places) - known(places), known)
+        places = search.ask()
+        search.tell(places, asked.values(space, places))
 
 
 def by_warm_gradient(space: DesignSpace, asked: Counted, seed: int) -> np.ndarray:
@@ -257,7 +256,7 @@ SEARCHES: Mapping[str, Search] = {
     "differential evolution": by_evolution,
     "gradient, Adam": by_gradient,
     "gradient, warm": by_warm_gradient,
-    "model": by_model,
+    "surrogate": by_surrogate,
 }
 
 

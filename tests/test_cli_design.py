@@ -34,11 +34,11 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     swept: list[jc.CageModel] = []
 
     def search(model: Any, vary: Any, width: Any, **given: Any) -> Any:
-        generations = 4 if swept else 60  # of the first it is seen that it is found
-        small = dict(generations=generations, population=8, scouts=0)
-        return jc.design.evolve(model, vary, jc.design.Smooth(bowl), **given | small)
+        batches = 3 if swept else 10  # of the first it is seen that it is found
+        small = dict(batches=batches, batch=8, scouts=0)
+        return jc.design.surrogate_search(model, vary, jc.design.Smooth(bowl), **given | small)
 
-    monkeypatch.setattr(_design, "evolve", search)
+    monkeypatch.setattr(_design, "surrogate_search", search)
     monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(bowl)))
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: (swept.append(model), report_example.swept())[1])
     monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
@@ -127,7 +127,7 @@ def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], 
     assert main([*DESIGN, *small, *scatter]) == 0
     text = capsys.readouterr().out
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
-    assert "64 designs swept" in text  # a generation of four x sixteen made cages
+    assert "64 designs swept" in text  # a batch of four x sixteen made cages
 
 
 @pytest.mark.wide

@@ -469,7 +469,7 @@ def test_every_file_is_put_in_place_whole():
         ("io/_files.py", "open"),  # aside, in place by `os.replace`
         ("design/_kept.py", "open"),  # a kept search, moved into place
         ("design/_kept.py", "savez"),
-        ("design/_evolve.py", "save"),  # of a kept search
+        ("design/_surrogate.py", "save"),  # of a kept search
         ("design/_optimise.py", "save"),
         ("io/_template.py", "open"),  # a new file only
         ("report/_figures.py", "savefig"),  # into memory

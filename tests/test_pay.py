@@ -1,9 +1,8 @@
-"""The comparison of searches: what its table counts, and the search that guesses from what was found."""
+"""The comparison of searches: what its table counts."""
 
 import numpy as np
 import pytest
 
-from benchmarks.pay_model import ModelSearch, Process
 from benchmarks.pay_table import best_after, designs_until, table, to_be_reached
 
 
@@ -35,29 +34,3 @@ def test_the_better_rival_is_to_be_reached_and_failures_are_said():
     row = next(line for line in text.splitlines() if line.startswith("gradient"))
     assert row.split()[-5:] == ["1", "of", "2", "0.22", "30"]
     assert "5500 (4000 to 7000)" in row and "5600 (4100 to 7100)" in row
-
-
-def test_a_process_knows_the_slope_of_its_likelihood_and_what_it_was_told():
-    x = np.random.default_rng(0).random((40, 3))
-    process = Process(x, np.sin(4 * x[:, 0]) + x[:, 1])
-    at, step = process.hyper + 0.1, 1e-5 * np.eye(4)
-    value = lambda hyper: process._likelihood(hyper)[0]
-    differences = [(value(at + d) - value(at - d)) / 2e-5 for d in step]
-    assert process._likelihood(at)[1] == pytest.approx(differences, abs=1e-6)
-    new = np.random.default_rng(1).random((20, 3))
-    drawn = process.draw(new, 50, np.random.default_rng(2)).mean(axis=0)
-    assert drawn == pytest.approx(np.sin(4 * new[:, 0]) + new[:, 1], abs=0.1)
-    assert process.lengths[2] > 2 * process.lengths[0]
-
-
-def test_the_model_finds_the_bottom_of_a_bowl_and_uses_what_is_known():
-    middle = np.array([0.3, 0.6, 0.2, 0.8])
-    bowl = lambda x: 3000 * np.sum((x - middle) ** 2, axis=1)
-    known = lambda x: 1000 * x[:, 3]
-    search = ModelSearch(4, np.full(4, 0.5), seed=0)
-    for _ in range(10):
-        places = search.ask(10, known)
-        assert places.shape == (10, 4) and np.all((places >= 0) & (places <= 1))
-        search.tell(places, bowl(places), known)
-    lowest = 1000 * 0.8 - 1000**2 / 12000
-    assert lowest <= np.min(search.total) < lowest + 30

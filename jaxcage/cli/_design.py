@@ -23,11 +23,11 @@ from ..design import (
     TradeOff,
     chaotic_width,
     cost,
-    evolve,
     global_sensitivity,
     judged,
     land_loads,
     optimise,
+    surrogate_search,
     tolerance_budget,
     trade_off,
 )
@@ -141,8 +141,8 @@ def _searched(
     tell = lambda step, _: say("search", step, steps)
     if options.search == "gradient":
         return optimise(job.model, vary, objective, steps=steps, report=tell, **shared)
-    size = {"generations": steps, "population": vars(options)["cloud"]}
-    return evolve(job.model, vary, objective, report=tell, **size, **shared)
+    size = {"batches": steps, "batch": vars(options)["cloud"]}
+    return surrogate_search(job.model, vary, objective, report=tell, **size, **shared)
 
 
 def _finer(options: DesignOptions) -> ChaosMeasure:

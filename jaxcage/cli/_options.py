@@ -397,7 +397,7 @@ class DesignOptions(VaryOptions):
         "power": (0.0, 1.0),
         "slip": (None, 1.0),
         "balance": (None, 1.0),
-        "steps": (16, 12),
+        "steps": (10, 12),
         "cloud": (12, 16),
         "ensemble": (None, 4),
         "discard": (None, 10),
@@ -457,17 +457,17 @@ class DesignOptions(VaryOptions):
     The mean over it is then minimised."""
     worst: Share = 1.0
     """With --scatter: mean over this share of the manufactured cages, the worst ones."""
-    search: Literal["evolution", "gradient"] = "evolution"
-    """How to search: by evolution (CMA-ES), whose every step is a generation of --cloud designs; or down the gradient,
-    which is that of the cloud."""
+    search: Literal["surrogate", "gradient"] = "surrogate"
+    """How to search: by a surrogate, a Gaussian process that chooses --cloud designs at every step from what was found
+    before; or down the gradient, which is that of a cloud of designs."""
     starts: FromOne = 1
     """Searches: one from the design itself, others from the best of the scouts."""
     scouts: FromZero = 0
     """Designs all over the bounds that are looked at beforehand; without any, further searches start anywhere."""
     steps: Annotated[int | None, whole(1)] = None
-    """Steps of each search at most; 16 if left out, 12 of a whole bearing."""
+    """Steps of each search at most; 10 if left out, 12 of a whole bearing."""
     cloud: Annotated[int | None, whole(4)] = None
-    """Designs around each one from which its gradient is taken, or of a generation; 12 if left out, 16 of a whole
+    """Designs of a step: chosen together, or around the one whose gradient is taken; 12 if left out, 16 of a whole
     bearing."""
     spread: Share = 0.1
     """Their scatter, as a part of the distance between the bounds: structure that is finer is smoothed away."""

@@ -21,7 +21,8 @@
 | `_land`     | wear load and peak force of the guiding land, statistical                     |
 | `_robust`   | the mean or the worst over manufacturing scatter                              |
 | `_optimise` | designs made better by gradient                                               |
-| `_evolve`   | designs made better without slopes, by CMA-ES; the best chosen anew by a finer objective |
+| `_surrogate` | designs made better without slopes, by a Gaussian process of what was found |
+| `_judged`   | what a search saw as its best, chosen anew by a finer objective              |
 | `_kept`     | the state of a search in a file                                              |
 | `_trade_off`| several objectives at once: designs that no other beats in everything        |
 | `_scatter`  | Sobol indices, tolerance budgets, Pareto fronts                               |
@@ -63,7 +64,6 @@ from ._edges import (
     FollowedEdges as FollowedEdges,
     zone_width as zone_width,
 )
-from ._evolve import evolve as evolve, judged as judged
 from ._fit import (
     Combination as Combination,
     Fit as Fit,
@@ -71,6 +71,7 @@ from ._fit import (
     determined as determined,
     fit_edges as fit_edges,
 )
+from ._judged import judged as judged
 from ._land import MEASURES as MEASURES, LandMeasure as LandMeasure, land_loads as land_loads
 from ._lasting import (
     LastingEdge as LastingEdge,
@@ -98,6 +99,7 @@ from ._scatter import (
 )
 from ._screen import Candidate as Candidate, screen as screen
 from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motion as regular_motion
+from ._surrogate import SurrogateSearch as SurrogateSearch, surrogate_search as surrogate_search
 from ._tracked import TrackedEdges as TrackedEdges
 from ._trade_off import TradeOff as TradeOff, trade_off as trade_off
 from ._unknowns import Unknown as Unknown
