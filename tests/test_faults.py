@@ -269,7 +269,7 @@ def half_written(self, path, **_):
         ctrl_c()
 
 for module, name in ((_sweep, "sweep"), (_orbits, "synchronous_orbits"), (_label_map, "label_map"),
-        (_design, "optimise"), (_study, "run_study"), (_page.report, "examine")):
+        (_design, "surrogate_search"), (_study, "run_study"), (_page.report, "examine")):
     setattr(module, name, ctrl_c)
 _design._objective = lambda job, width, vary: width
 matplotlib.figure.Figure.savefig = half_written

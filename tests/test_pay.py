@@ -1,7 +1,6 @@
 """The comparison of searches: what its table counts."""
 
 import numpy as np
-import pytest
 
 from benchmarks.pay_table import best_after, designs_until, table, to_be_reached
 

@@ -70,9 +70,7 @@ def surrogate_search(
     """
     require_x64()
     if batch < 2 or batches < 1:
-        raise ArgumentError(
-            "batch", "batches", said=f"must be at least 2 and 1, but {batch} and {batches} were given."
-        )
+        raise ArgumentError("batch", "batches", said=f"must be at least 2 and 1, but {batch} and {batches} were given.")
     space = DesignSpace.of(system, vary)
     first = first_places(space, objective, starts, scouts, seed)
     searches = [SurrogateSearch(place, batch, (seed, i)) for i, place in enumerate(first)]
@@ -196,5 +194,3 @@ def _fitted(places: np.ndarray, worth: np.ndarray):
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: the parameter does nothing
         process.fit(places, worth)
     return process, process.kernel_.k2.noise_level
-
-
