@@ -42,7 +42,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(bowl)))
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: (swept.append(model), report_example.swept())[1])
     monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
-    rest = {"peak land force": [2.0, np.nan], "film drag power": [3.0, 5.0]}
+    rest = {"peak land force": [2.0, np.nan], "film drag power": [3.0, 5.0], "least film": [4e-6, 3e-6]}
     loads = lambda model, found, error: {"wear load": [1e9 * model.eccentricity], **rest}
     monkeypatch.setattr(_design, "land_loads", loads)
     said = document(capsys, *DESIGN, "--out", str(tmp_path))
@@ -55,6 +55,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert said["wear_load_N_m_per_s"] == pytest.approx({"before": 23e3, "after": 20e3}, rel=0.02)
     assert said["peak_land_force_N"] == {"before": 2.0, "after": 2.0}
     assert said["film_drag_power_W"] == {"before": 4.0, "after": 4.0}
+    assert said["least_film_um"] == pytest.approx({"before": 3.0, "after": 3.0})
     grade = 23e-6 * 14000 * np.pi / 30 * 1e3  # [mm/s]
     assert said["balance_grade_mm_per_s"] == pytest.approx({"before": grade, "after": grade * 20 / 23}, rel=0.02)
     zones = [(z["onset_rpm"], z["exit_rpm"]) for z in said["chaotic_zones"]["after"]]
@@ -92,7 +93,7 @@ def test_a_design_that_no_other_beats_stays(
     monkeypatch.setattr(_design, "judged", lambda found, width: jc.design.judged(found, jc.design.Smooth(finer)))
     monkeypatch.setattr(_design, "sweep", lambda model, *_, **__: report_example.swept())
     monkeypatch.setattr(_design, "_objective", lambda job, width, vary, scatter: width)
-    monkeypatch.setattr(_design, "land_loads", lambda *_: dict.fromkeys(jc.design.MEASURES, [1.0]))
+    monkeypatch.setattr(_design, "land_loads", lambda *_: dict.fromkeys([*jc.design.MEASURES, "least film"], [1.0]))
     given = [*DESIGN, "--search", "gradient", "--starts", "1", "--steps", "9", "--out", str(tmp_path)]
     said = document(capsys, *given)
     own = jc.parameters(jc.case("1b"))

@@ -271,7 +271,7 @@ def half_written(self, path, **_):
 for module, name in ((_sweep, "sweep"), (_orbits, "synchronous_orbits"), (_label_map, "label_map"),
         (_design, "surrogate_search"), (_study, "run_study"), (_page.report, "examine")):
     setattr(module, name, ctrl_c)
-_design._objective = lambda job, width, vary: width
+_design._objective = lambda job, width, vary, scatter: width
 matplotlib.figure.Figure.savefig = half_written
 found = {}
 for name, arguments in json.loads(sys.argv[1]).items():

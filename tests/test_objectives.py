@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.design import COSTS, Smooth, trade_off
+from jaxcage.design import COSTS, Smooth, _land, trade_off
 from tests.test_identification import DOUBLING, FOLD, METHOD, TRUTH, DoubleWell
 
 
@@ -284,6 +284,7 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     touched = 0
     for k, place in enumerate(places):
         model = space.model(place)
+        least = _land._loads([model], width.speeds, last[k][None], revolutions=2)["least film"][0]
         for i, speed in enumerate(width.speeds):
             length = dict(revolutions=2, samples=1024, method=fine)
             runs = [jc.simulate(model, speed, start=tuple(y), **length) for y in last[k, i]]
@@ -292,6 +293,8 @@ def test_loads_of_the_land_are_those_of_a_time_history():
             assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
             assert got[1][k, i] == pytest.approx(np.mean([o.peak_contact_force for o in seen]), rel=0.06, abs=1e-6)
             assert got[2][k, i] == pytest.approx(np.mean([o.drag_power for o in seen]), rel=0.02)
+            thinnest = np.mean([o.minimum_film_thickness for o in seen])
+            assert least[i] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
             touched += load > 1.0
     assert touched >= 2
     own = wear.values(space, space.place[None])

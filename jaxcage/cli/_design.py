@@ -183,14 +183,15 @@ def _front(
 
 
 def _loads(models: Mapping[str, CageModel], checked: Mapping[str, Sweep]) -> dict[str, dict[str, float]]:
-    """Means over the speeds that were checked, by steps at 1/16 of the usual error."""
+    """Means over the speeds that were checked, and the least film of all, by steps at 1/16 of the usual error."""
     found = {name: land_loads(models[name], swept, DEFAULT_ERROR / 16) for name, swept in checked.items()}
     keys = {
         "wear_load_N_m_per_s": "wear load",
         "peak_land_force_N": "peak land force",
         "film_drag_power_W": "film drag power",
     }
-    return {key: {name: float(np.nanmean(f[what])) for name, f in found.items()} for key, what in keys.items()}
+    means = {key: {name: float(np.nanmean(f[what])) for name, f in found.items()} for key, what in keys.items()}
+    return means | {"least_film_um": {name: 1e6 * float(np.nanmin(f["least film"])) for name, f in found.items()}}
 
 
 def _balance_grade(model: CageModel, last_rpm: float) -> float:

@@ -24,15 +24,16 @@ from ._objective import AbstractObjective, DesignSpace, Measured
 MEASURES = {"wear load": "N m/s", "peak land force": "N", "film drag power": "W"}
 
 
-def land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array, Array]:
-    """Size of the land's contact force on the cage [N], and the power to shear the film [W]."""
+def land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array, Array, Array]:
+    """Size of the land's contact force on the cage [N], the power to shear the film [W], and how far the cage is out of
+    the middle of its guide [m]."""
     n = len(state) // 2
     q, v = state[:n], state[n:]
     if n == 4:  # an elastic rib moves too
         q, v = (q[0] - q[2], q[1] - q[3]), (v[0] - v[2], v[1] - v[3])
     forces = model.cage_at(speed).forces(tau, *q, *v)
     fx, fy, _ = forces["contact"]
-    return jnp.sqrt(fx * fx + fy * fy), -forces["film"][2] * speed
+    return jnp.sqrt(fx * fx + fy * fy), -forces["film"][2] * speed, jnp.sqrt(q[0] * q[0] + q[1] * q[1])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -77,8 +78,8 @@ class LandMeasure(AbstractObjective):
 
 
 def land_loads(model: CageModel, found: Sweep, error: float | None = None) -> dict[str, Float[np.ndarray, " speeds"]]:
-    """What `MEASURES` names at each speed of a sweep, the mean of its starts, over revolutions that begin where it
-    ended.
+    """What `MEASURES` names at each speed of a sweep, and the `least film` [m], the smallest distance of cage and rib,
+    0 where they touch; the mean of its starts, over revolutions that begin where it ended.
 
     **Arguments:** model and its sweep; error of a revolution, by default that of `jaxcage.controlled`.
     """
@@ -97,7 +98,7 @@ def _loads(
     speed = np.tile(np.repeat(speeds, starts), len(models))
     states = last.reshape(-1, last.shape[-1])
     mean, largest = averages(models, speed, states, which, land_force, revolutions, error)
-    radius = np.array([float(m.land_radius) for m in models])[which]
+    radius, clearance = np.array([(float(m.land_radius), float(m.clearance)) for m in models])[which].T
 
     def mean_of_starts(found: np.ndarray) -> np.ndarray:
         rows = found.reshape(len(models), speeds.size, starts)
@@ -108,4 +109,5 @@ def _loads(
         "wear load": mean_of_starts(mean[:, 0] * speed * radius),
         "peak land force": mean_of_starts(largest[:, 0]),
         "film drag power": mean_of_starts(mean[:, 1]),
+        "least film": mean_of_starts(np.maximum(clearance - largest[:, 2], 0.0)),
     }

@@ -25,6 +25,7 @@ def parameters_table(name: str, model: CageModel, found: Optimised, document: Ma
         ("chaotic_rpm", "chaotic", "rpm", ".0f"),
         ("wear_load_N_m_per_s", "wear load of the land", "N m/s", ".4g"),
         ("peak_land_force_N", "peak land force", "N", ".4g"),
+        ("least_film_um", "least film of the land", "um", ".3g"),
         ("film_drag_power_W", "film drag power", "W", ".4g"),
         ("balance_grade_mm_per_s", "balance grade G", "mm/s", ".3g"),
     )
