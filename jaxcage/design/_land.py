@@ -78,8 +78,8 @@ class LandMeasure(AbstractObjective):
 
 
 def land_loads(model: CageModel, found: Sweep, error: float | None = None) -> dict[str, Float[np.ndarray, " speeds"]]:
-    """What `MEASURES` names at each speed of a sweep, and the `least film` [m], the smallest distance of cage and rib,
-    0 where they touch; the mean of its starts, over revolutions that begin where it ended.
+    """What `MEASURES` names at each speed of a sweep, the mean of its starts, and their `least film` [m], the smallest
+    distance of cage and rib, 0 where they touch; over revolutions that begin where the sweep ended.
 
     **Arguments:** model and its sweep; error of a revolution, by default that of `jaxcage.controlled`.
     """
@@ -109,5 +109,7 @@ def _loads(
         "wear load": mean_of_starts(mean[:, 0] * speed * radius),
         "peak land force": mean_of_starts(largest[:, 0]),
         "film drag power": mean_of_starts(mean[:, 1]),
-        "least film": mean_of_starts(np.maximum(clearance - largest[:, 2], 0.0)),
+        "least film": np.fmin.reduce(
+            np.maximum(clearance - largest[:, 2], 0.0).reshape(len(models), -1, starts), axis=2
+        ),
     }
