@@ -88,7 +88,7 @@ SHOWN = (
     Shown("guide-zones-1a", EDGES, [ZONES], ex.tables("Synchronous-loss", "Elasticities", *CHAOS)),
     Shown("guide-crises-1a", EDGES, [CRISES], ex.tables("Elasticities", "Widths", "Crises")),
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
-    Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Synchronous-loss")),
+    Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Chaotic zones", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
     Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
     OPTIMISE,
