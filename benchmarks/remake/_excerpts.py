@@ -29,12 +29,13 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def tables(*titles: str) -> Excerpt:
-    """Of one command's output the tables whose titles begin so; the first of them must be there."""
+    """Of what commands printed the tables whose titles begin so; each must have the first of them."""
 
     def made(runs: Sequence[Run]) -> str:
-        found = [part for part in runs[0].text.split("\n\n") if part.startswith(titles)]
-        if not any(part.startswith(titles[0]) for part in found):
+        of = lambda run: [part for part in run.text.split("\n\n") if part.startswith(titles)]
+        if not all(any(part.startswith(titles[0]) for part in of(run)) for run in runs):
             raise ValueError(f"there is no table '{titles[0]}'")
+        found = [part for run in runs for part in of(run)]
         return fenced("\n\n".join(found))
 
     return made
