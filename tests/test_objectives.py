@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.design import COSTS, Smooth, _land, trade_off
+from jaxcage.design import COSTS, Smooth, trade_off
 from tests.test_identification import DOUBLING, FOLD, METHOD, TRUTH, DoubleWell
 
 
@@ -279,12 +279,12 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     places = np.array([[1.0, 0.33], [0.0, 0.98]])
     # Where motion is chaotic two integrations part: they are compared over two revolutions.
     wear, peak, film = (jc.design.LandMeasure(width, what, revolutions=2) for what in jc.design.MEASURES)
-    got = [measure.at_speeds(space, places) for measure in (wear, peak, film)]
+    least = jc.design.LandMeasure(width, "least film", revolutions=2)
+    got = [measure.at_speeds(space, places) for measure in (wear, peak, film, least)]
     last = width.run(space, places).last
     touched = 0
     for k, place in enumerate(places):
         model = space.model(place)
-        least = _land._loads([model], width.speeds, last[k][None], revolutions=2)["least film"][0]
         for i, speed in enumerate(width.speeds):
             length = dict(revolutions=2, samples=1024, method=fine)
             runs = [jc.simulate(model, speed, start=tuple(y), **length) for y in last[k, i]]
@@ -294,11 +294,13 @@ def test_loads_of_the_land_are_those_of_a_time_history():
             assert got[1][k, i] == pytest.approx(np.mean([o.peak_contact_force for o in seen]), rel=0.06, abs=1e-6)
             assert got[2][k, i] == pytest.approx(np.mean([o.drag_power for o in seen]), rel=0.02)
             thinnest = np.min([o.minimum_film_thickness for o in seen])
-            assert least[i] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
+            assert got[3][k, i] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
             touched += load > 1.0
     assert touched >= 2
     own = wear.values(space, space.place[None])
     assert own[0] > 100.0 and wear.relative(space, 1000.0).values(space, space.place[None]) == pytest.approx([1000.0])
+    with pytest.raises(ValueError, match="`what` must be one of wear load, .* but 'least film' was given"):
+        least.relative(space, 1000.0)
 
 
 def test_sobol_indices_say_when_they_are_not_to_be_believed():

@@ -91,7 +91,10 @@ SHOWN = (
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Chaotic zones", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
     Shown(
-        "designs-elsewhere", DESIGNS, ["jaxcage design 1a", "jaxcage design benchmarks/spindle.toml"], ex.tables("Design")
+        "designs-elsewhere",
+        DESIGNS,
+        ["jaxcage design 1a", "jaxcage design benchmarks/spindle.toml"],
+        ex.tables("Design"),
     ),
     Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
     OPTIMISE,

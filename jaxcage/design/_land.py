@@ -22,6 +22,9 @@ from ._objective import AbstractObjective, DesignSpace, Measured
 
 
 MEASURES = {"wear load": "N m/s", "peak land force": "N", "film drag power": "W"}
+"""What is to be made small, with its unit."""
+FILM = "least film"
+"""[m]. Where nothing touches it tells designs apart, which wear and force do not."""
 
 
 def land_force(model: CageModel, speed: Array, tau: Array, state: Any) -> tuple[Array, Array, Array]:
@@ -41,8 +44,9 @@ class LandMeasure(AbstractObjective):
     """The mean over speeds, weighted as in `chaos`, of what its designs' land feels; the mean over their starts.
 
     `wear load` [N m/s]: mean contact force times the speed at which the cage's land slides on the rib's; `peak land
-    force` [N]: its largest value over some revolutions; `film drag power` [W]: what shearing the film takes. Slopes
-    come from the same cloud of designs, and the same simulations, as those of `chaos`.
+    force` [N]: its largest value over some revolutions; `film drag power` [W]: what shearing the film takes; `least
+    film` [m]: the smallest distance of cage and rib, of the starts the least, 0 where they touch: it is to be made
+    large. Slopes come from the same cloud of designs, and the same simulations, as those of `chaos`.
     """
 
     chaos: ChaosMeasure
@@ -50,8 +54,10 @@ class LandMeasure(AbstractObjective):
     revolutions: int = 4
 
     def __post_init__(self):
-        if self.what not in MEASURES:
-            raise ArgumentError("what", said=f"must be one of {', '.join(MEASURES)}, but '{self.what}' was given.")
+        if self.what not in (*MEASURES, FILM):
+            raise ArgumentError(
+                "what", said=f"must be one of {', '.join((*MEASURES, FILM))}, but '{self.what}' was given."
+            )
 
     def at_speeds(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
         """At each speed; NaN where every start of a design failed."""
@@ -68,7 +74,9 @@ class LandMeasure(AbstractObjective):
 
     def relative(self, space: DesignSpace, price: float) -> AbstractObjective:
         """`price` times this over what the design itself has; where that is next to nothing, over what its weight would
-        do: as a peak the whole of it, as a mean force a hundredth, and so its power."""
+        do: as a peak the whole of it, as a mean force a hundredth, and so its power. Not of the least film."""
+        if self.what == FILM:
+            raise ArgumentError("what", said=f"must be one of {', '.join(MEASURES)}, but '{FILM}' was given.")
         model: Any = space.system
         least = float(model.cage_mass * model.gravity)
         if MEASURES[self.what] != "N":
@@ -109,7 +117,5 @@ def _loads(
         "wear load": mean_of_starts(mean[:, 0] * speed * radius),
         "peak land force": mean_of_starts(largest[:, 0]),
         "film drag power": mean_of_starts(mean[:, 1]),
-        "least film": np.fmin.reduce(
-            np.maximum(clearance - largest[:, 2], 0.0).reshape(len(models), -1, starts), axis=2
-        ),
+        FILM: np.fmin.reduce(np.maximum(clearance - largest[:, 2], 0.0).reshape(len(models), -1, starts), axis=2),
     }

@@ -9,6 +9,7 @@ shrinks while they do not (D. Eriksson et al., Scalable Global Optimization via 
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -171,7 +172,7 @@ def _worth(values: np.ndarray) -> np.ndarray:
     return (known - np.mean(known)) / (np.std(known) or 1.0)
 
 
-def _fitted(places: np.ndarray, worth: np.ndarray):
+def _fitted(places: np.ndarray, worth: np.ndarray) -> tuple[Any, float]:
     """The process with a length for each parameter, most probable after mild priors; and the variance of its noise."""
     from scipy.optimize import minimize
     from sklearn.exceptions import ConvergenceWarning
@@ -179,7 +180,8 @@ def _fitted(places: np.ndarray, worth: np.ndarray):
     from threadpoolctl import threadpool_limits
 
     n = places.shape[1]
-    kernel = kernels.Matern(np.full(n, LENGTH), (0.05, 10.0), nu=2.5) + kernels.WhiteKernel(NOISE, (1e-4, 1.0))
+    lengths: Any = np.full(n, LENGTH)
+    kernel = kernels.Matern(lengths, (0.05, 10.0), nu=2.5) + kernels.WhiteKernel(NOISE, (1e-4, 1.0))
 
     def most_probable(minus: Callable, begin: np.ndarray, bounds: np.ndarray) -> tuple[np.ndarray, float]:
         def with_priors(theta: np.ndarray) -> tuple[float, np.ndarray]:
@@ -189,7 +191,7 @@ def _fitted(places: np.ndarray, worth: np.ndarray):
         found = minimize(with_priors, begin, jac=True, method="L-BFGS-B", bounds=bounds)
         return found.x, found.fun
 
-    process = GaussianProcessRegressor(kernel, alpha=1e-10, optimizer=most_probable)
+    process: Any = GaussianProcessRegressor(kernel, alpha=1e-10, optimizer=most_probable)  # pyright: ignore[reportArgumentType]
     with threadpool_limits(1, "blas"), warnings.catch_warnings():  # its threads would wait for one another
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: the parameter does nothing
         process.fit(places, worth)
