@@ -90,12 +90,6 @@ SHOWN = (
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Chaotic zones", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
-    Shown(
-        "designs-elsewhere",
-        DESIGNS,
-        ["jaxcage design 1a", "jaxcage design benchmarks/spindle.toml"],
-        ex.tables("Design"),
-    ),
     Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
     OPTIMISE,
     Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
