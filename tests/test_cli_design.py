@@ -45,7 +45,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     rest = {"peak land force": [2.0, np.nan], "film drag power": [3.0, 5.0], "least film": [4e-6, 3e-6]}
     loads = lambda model, found, error: {"wear load": [1e9 * model.eccentricity], **rest}
     monkeypatch.setattr(_design, "land_loads", loads)
-    said = document(capsys, *DESIGN, "--out", str(tmp_path))
+    said = document(capsys, *DESIGN, "--cost", "0", "--out", str(tmp_path))
     assert said["optimum"] == pytest.approx({"guidance_gap": 0.5e-3, "eccentricity": 20e-6}, rel=0.02)
     assert said["objective"] == pytest.approx(1.0, abs=0.01) and said["at_bound"] == []
     assert said["objective_before"] == pytest.approx(bowl(jc.case("1b")))
@@ -62,12 +62,24 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert zones == [(9050, 12050), (20050, None)]
     assert said["chaotic_rpm"]["before"] == pytest.approx(np.mean(report_example.swept().restless) * 25000)
     assert Path(said["figure"]).stat().st_size > 10_000 and not any(tmp_path.glob(".design*"))
-    assert main([*DESIGN, "--out", str(tmp_path)]) == 0
+    assert main([*DESIGN, "--cost", "0", "--out", str(tmp_path)]) == 0
     text = capsys.readouterr().out
     assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
     assert "Balance may only get better: eccentricity of at most 23 um" in text
     assert "2 rpm before, 1 rpm after" in text and "stays as it is" not in text
-    worse = document(capsys, *DESIGN, "--worse-balance", "--out", str(tmp_path))
+    monkeypatch.setattr(_design, "land_loads", lambda m, *_: {"wear load": [1e-3 / m.eccentricity], **rest})
+    stays = document(capsys, *DESIGN, "--cost", "0", "--out", str(tmp_path))
+    assert stays["status"] == "not confirmed" and stays["optimum"]["guidance_gap"] == pytest.approx(0.6e-3)
+    assert stays["objective"] == stays["objective_before"] > 1.5 * min(o["objective"] for o in stays["optima"])
+    fresh = stays["objective_by_fresh_sweeps"]
+    assert fresh["after"] - fresh["before"] == pytest.approx(
+        1000 * (23e-6 / stays["optima"][1]["values"]["eccentricity"] - 1)
+    )
+    assert stays["wear_load_N_m_per_s"]["after"] == stays["wear_load_N_m_per_s"]["before"]
+    assert main([*DESIGN, "--cost", "0", "--out", str(tmp_path)]) == 0
+    assert "is no better by fresh sweeps from other starts (" in capsys.readouterr().out
+    monkeypatch.setattr(_design, "land_loads", loads)
+    worse = document(capsys, *DESIGN, "--cost", "0", "--worse-balance", "--out", str(tmp_path))
     assert worse["vary"]["eccentricity"] == pytest.approx([4.6e-6, 57.5e-6]) and worse["trade_offs"] is None
     terms = [lambda m: m.guidance_gap, lambda m: m.eccentricity, bowl, bowl, bowl]
 
@@ -75,7 +87,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
         return jc.design.trade_off(model, vary, dict(zip(asked, map(jc.design.Smooth, terms), strict=True)), **given)
 
     monkeypatch.setattr(_design, "trade_off", trade_off)
-    front = document(capsys, *DESIGN, "--front", "8", "--out", str(tmp_path))
+    front = document(capsys, *DESIGN, "--cost", "0", "--front", "8", "--out", str(tmp_path))
     assert len(front["trade_offs"]) == 10 and front["trade_offs"][-1]["efficient"]  # no other has as little of the bowl
     assert front["trade_offs"][-1]["guidance_gap"] == pytest.approx(front["optimum"]["guidance_gap"])
     assert front["trade_offs"][-2]["wear load [N m/s]"] == pytest.approx(23e-6)

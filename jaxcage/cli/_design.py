@@ -13,6 +13,7 @@ from .._parameters import parameters
 from ..analysis import Sweep, zones
 from ..design import (
     MEASURES,
+    UNCONFIRMED,
     AbstractObjective,
     ChaosMeasure,
     DesignSpace,
@@ -26,10 +27,12 @@ from ..design import (
     global_sensitivity,
     judged,
     land_loads,
+    negligible_load,
     optimise,
     surrogate_search,
     tolerance_budget,
     trade_off,
+    unchanged,
 )
 from ..integrate import DEFAULT_ERROR, controlled
 from ..models import CageModel
@@ -49,6 +52,12 @@ from ._whole_sensitivity import bearing_shares
 Found = TypeVar("Found")
 USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
 """What is varied if nothing is said, and between which parts of what it is."""
+LOADS = {
+    "wear_load_N_m_per_s": "wear load",
+    "peak_land_force_N": "peak land force",
+    "film_drag_power_W": "film drag power",
+}
+"""What the land feels, by key of the document."""
 CHECKED_SPEEDS = 118
 """Every 200 rpm of the usual range."""
 FINER, STARTS = 2, 3
@@ -83,10 +92,14 @@ def design(job: Job[DesignOptions]) -> Report:
         found, itself = judged(seen, _objective(job, _finer(options), vary, scatter))
         searched = job.seconds
         front = _front(job, width, vary, found, say) if options.front else None
-        models = {"before": job.model, "after": found.best.model}
-        differ = [job.model] if found.best.objective >= itself else [*models.values()]
+        differ = [job.model] if found.best.objective >= itself else [job.model, found.best.model]
         say("fresh sweeps", 0, 1)
-        checked = _twice([_check(model, options) for model in differ])
+        swept = [_check(model, options) for model in differ]
+        loads = [_loads(*each) for each in zip(differ, swept, strict=True)]
+        worth = [_worth(options, *each, loads[0]) for each in zip(differ, swept, loads, strict=True)]
+        if worth[-1] > worth[0] and not scatter:  # a check of nominal designs says nothing of made ones
+            found, differ, swept, loads = unchanged(found, itself), differ[:1], swept[:1], loads[:1]
+        models, checked = _twice(differ), _twice(swept)
         loss: dict[str, LossZones] = {}
         if not options.quick:
             search = lambda model: _loss_zones(model, options, say)
@@ -103,8 +116,9 @@ def design(job: Job[DesignOptions]) -> Report:
         "objective_before": itself,
         "optimum": found.best.values,
         "optima": [report.chosen(o, "values objective at_bound") | {"starts": n} for o, n in found.distinct],
-        "designs_swept": _swept(found, options, Robust.draws if scatter else 1),
-        **_loads(models, checked),
+        "designs_swept": _swept(seen, options, Robust.draws if scatter else 1),
+        "objective_by_fresh_sweeps": {"before": worth[0], "after": worth[-1]},
+        **{key: {name: load[key] for name, load in _twice(loads).items()} for key in loads[0]},
         "balance_grade_mm_per_s": {name: _balance_grade(model, options.last) for name, model in models.items()},
         "cost": {name: float(cost().function(model)) for name, model in models.items()},
         "chaotic_rpm": {name: _chaotic_rpm(swept) for name, swept in checked.items()},
@@ -182,16 +196,21 @@ def _front(
     )
 
 
-def _loads(models: Mapping[str, CageModel], checked: Mapping[str, Sweep]) -> dict[str, dict[str, float]]:
+def _loads(model: CageModel, swept: Sweep) -> dict[str, float]:
     """Means over the speeds that were checked, and the least film of all, by steps at 1/16 of the usual error."""
-    found = {name: land_loads(models[name], swept, DEFAULT_ERROR / 16) for name, swept in checked.items()}
-    keys = {
-        "wear_load_N_m_per_s": "wear load",
-        "peak_land_force_N": "peak land force",
-        "film_drag_power_W": "film drag power",
-    }
-    means = {key: {name: float(np.nanmean(f[what])) for name, f in found.items()} for key, what in keys.items()}
-    return means | {"least_film_um": {name: 1e6 * float(np.nanmin(f["least film"])) for name, f in found.items()}}
+    found = land_loads(model, swept, DEFAULT_ERROR / 16)
+    means = {key: float(np.nanmean(found[what])) for key, what in LOADS.items()}
+    return means | {"least_film_um": 1e6 * float(np.nanmin(found["least film"]))}
+
+
+def _worth(
+    options: DesignOptions, model: CageModel, swept: Sweep, loads: Mapping[str, float], before: Mapping[str, float]
+) -> float:
+    """The objective by the fresh sweep, its loads beside those before."""
+    total, speed = _chaotic_rpm(swept) + options.cost * float(cost().function(model)), float(np.mean(swept.speed))
+    for key, price in zip(LOADS, (options.wear, options.force, options.power), strict=True):
+        total += (price or 0.0) * loads[key] / max(before[key], negligible_load(model, LOADS[key], speed))
+    return total
 
 
 def _balance_grade(model: CageModel, last_rpm: float) -> float:
@@ -231,7 +250,13 @@ def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
         f"Objective, by {FINER} times the speeds, {STARTS} starts and finer steps: {before:.0f} rpm before, "
         f"{best.objective:.0f} rpm after."
     )
-    if best.objective >= before:
+    fresh = "{before:.0f} rpm before, {after:.0f} after".format_map(document["objective_by_fresh_sweeps"])
+    if best.status == UNCONFIRMED:
+        verdict = f"The design that the search advises is no better by fresh sweeps from other starts ({fresh}): the "
+        verdict += "given one stays as it is."
+    elif best.objective < before:
+        verdict += f" By fresh sweeps from other starts: {fresh}."
+    else:
         verdict = f"No design that was looked at is better than the given one, which stays as it is. {verdict}"
     return [
         verdict,

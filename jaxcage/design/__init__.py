@@ -71,8 +71,13 @@ from ._fit import (
     determined as determined,
     fit_edges as fit_edges,
 )
-from ._judged import judged as judged
-from ._land import MEASURES as MEASURES, LandMeasure as LandMeasure, land_loads as land_loads
+from ._judged import UNCONFIRMED as UNCONFIRMED, judged as judged, unchanged as unchanged
+from ._land import (
+    MEASURES as MEASURES,
+    LandMeasure as LandMeasure,
+    land_loads as land_loads,
+    negligible_load as negligible_load,
+)
 from ._lasting import (
     LastingEdge as LastingEdge,
     lasting_edge as lasting_edge,

@@ -7,6 +7,10 @@ from ._optimise import Optimised, Step, ended_at
 from ._unknowns import Design
 
 
+UNCONFIRMED = "not confirmed"
+"""How a search ended whose best is no better than the design as it is."""
+
+
 def judged(found: Optimised[Design], objective: AbstractObjective, among: int = 4) -> tuple[Optimised[Design], float]:
     """The same searches, with the best of each chosen anew by a finer objective.
 
@@ -36,3 +40,11 @@ def judged(found: Optimised[Design], objective: AbstractObjective, among: int = 
         best = min(of, key=lambda s: np.nan_to_num(s.value, nan=np.inf))
         optima.append(ended_at(space, best, o.history, "nothing better found" if best is itself else o.status))
     return Optimised.of(space, optima), float(values[0])
+
+
+def unchanged(found: Optimised[Design], value: float) -> Optimised[Design]:
+    """The same searches with the design as it is, and what it is worth, in front: what they found is no better."""
+    place = tuple(np.clip(found.space.place, 0.0, 1.0).tolist())
+    nothing = (np.nan,) * len(place)
+    own = ended_at(found.space, Step(place, value, np.nan, nothing, nothing), found.best.history, UNCONFIRMED)
+    return Optimised((own, *found.optima), found.space)

@@ -78,11 +78,17 @@ class LandMeasure(AbstractObjective):
         if self.what == FILM:
             raise ArgumentError("what", said=f"must be one of {', '.join(MEASURES)}, but '{FILM}' was given.")
         model: Any = space.system
-        least = float(model.cage_mass * model.gravity)
-        if MEASURES[self.what] != "N":
-            least *= 0.01 * float(np.average(self.chaos.speeds, weights=self.chaos.weights) * model.land_radius)
+        speed = float(np.average(self.chaos.speeds, weights=self.chaos.weights))
+        least = negligible_load(model, self.what, speed)
         own = float(self.values(space, space.place[None])[0])
         return price / (max(own, least) if np.isfinite(own) else least) * self
+
+
+def negligible_load(model: CageModel, what: str, speed: float) -> float:
+    """What is next to nothing of what `MEASURES` names, at a cage speed [rad/s]: as a peak the cage's weight, as a mean
+    force a hundredth of it, and so its power."""
+    weight = float(model.cage_mass * model.gravity)
+    return weight if MEASURES[what] == "N" else 0.01 * weight * speed * float(model.land_radius)
 
 
 def land_loads(model: CageModel, found: Sweep, error: float | None = None) -> dict[str, Float[np.ndarray, " speeds"]]:
