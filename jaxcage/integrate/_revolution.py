@@ -137,22 +137,22 @@ def _packed(
 ) -> Moved:
     """`one` in the lanes that are `mine`, packed into blocks; what becomes of the others is of no account."""
     lanes = mine.shape[0]
-    block = min(lanes, BLOCK if jax.default_backend() == "cpu" else BLOCK_ON_GPU)
-    order = jnp.argsort(~mine, stable=True) if lanes > block else jnp.arange(lanes)
-    packed = jax.tree.map(lambda x: x[order], ([x for x, o in zip(row, own, strict=True) if o], y, tangents))
+    block, search = (BLOCK, "compare_all") if jax.default_backend() == "cpu" else (BLOCK_ON_GPU, "scan")
+    block = min(lanes, block)
+    place = jnp.cumsum(mine) - 1  # of each lane that is mine, among them
+    count = place[-1] + 1
+    given = ([x for x, o in zip(row, own, strict=True) if o], y, tangents)
     over = jax.vmap(one, in_axes=([0 if o else None for o in own], 0, 0))
-
-    def of(cut: Callable[[Array], Array]) -> Moved:
-        mine, y, tangents = jax.tree.map(cut, packed)
-        each = iter(mine)
-        return over([next(each) if o else x for x, o in zip(row, own, strict=True)], y, tangents)
 
     def run_block(i: Array, done: Moved) -> Moved:
         first = jnp.minimum(i * block, lanes - block)  # the last block begins earlier where it must
-        moved = of(lambda x: jax.lax.dynamic_slice_in_dim(x, first, block))
+        places = jnp.minimum(first + jnp.arange(block), count - 1)  # and is filled up with its last lane
+        which = jnp.searchsorted(place, places, method=search)
+        each, y, tangents = jax.tree.map(lambda x: x[which], given)
+        each = iter(each)
+        moved = over([next(each) if o else x for x, o in zip(row, own, strict=True)], y, tangents)
         return jax.tree.map(lambda x, new: jax.lax.dynamic_update_slice_in_dim(x, new, first, 0), done, moved)
 
-    nothing = nowhere(packed[1], packed[2])._replace(half=())
-    done = jax.lax.fori_loop(0, (jnp.sum(mine) + block - 1) // block, run_block, nothing)
-    back = jnp.argsort(order)
-    return jax.tree.map(lambda x: x[back], done)
+    nothing = nowhere(y, tangents)._replace(half=())
+    done = jax.lax.fori_loop(0, (count + block - 1) // block, run_block, nothing)
+    return jax.tree.map(lambda x: x[jnp.maximum(place, 0)], done)
