@@ -15,11 +15,14 @@
 | `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |
 | `_simulate`    | time histories, speed ramps                                                        |
 | `_lanes`       | the whole bearing over a stretch of angle or time, many lanes at once              |
+| `_arrow`       | the whole bearing's Jacobian, and its solution                                     |
+| `_implicit`    | an implicit step of the whole bearing                                              |
 | `_bearing`     | time histories of the whole bearing                                                |
 | `_results`     | how an integration ended                                                           |
 """
 
 from .._arguments import check_layer
+from ._arrow import Arrow as Arrow, Factors as Factors, Parts as Parts, arrow as arrow, factors as factors
 from ._bearing import (
     BearingRun as BearingRun,
     bearing_over_time as bearing_over_time,
@@ -48,6 +51,7 @@ from ._controlled import (
     stated as stated,
 )
 from ._explicit import ClassicalRK4 as ClassicalRK4
+from ._implicit import implicit_step as implicit_step
 from ._march import compiled as compiled, march as march, march_with_tangents as march_with_tangents
 from ._method import (
     REVOLUTION as REVOLUTION,

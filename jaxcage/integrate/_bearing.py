@@ -15,6 +15,7 @@ from .._recent import jitted
 from .._types import Scalar
 from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
 from ._bearing_blocks import slowness
+from ._implicit import film_rate
 from ._lanes import By, Controls, Lanes, advance, begin
 from ._results import INACCURATE, OUTCOMES
 
@@ -32,6 +33,11 @@ SHORT = 2
 """Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
 MOST_PARTS = 1000
 """From sample to sample."""
+STIFF = 20.0
+"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. Below,
+they cost more than they save: one takes as long as three explicit ones."""
+CHOICES = 16
+"""In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
 """A tolerance so many times smaller makes steps of fourth order about half as long."""
 
@@ -62,6 +68,8 @@ class BearingRun:
     """Sum of the embedded error estimates of the steps between two samples, or places, the largest of them."""
     steps: float
     """Mean number of steps of a revolution (or of the whole stretch of time)."""
+    implicit: float
+    """Share of the run that was made by implicit steps."""
 
     @property
     def last(self) -> BearingState:
@@ -100,6 +108,7 @@ def _run(
     limits: tuple[Scalar, Scalar, Scalar],
     tolerance: Scalar,
     by: By,
+    implicit: bool,
 ) -> tuple[Lanes, tuple[Array, ...]]:
     """One span after the other; what there was at each end, peaks, errors and steps between."""
     at, scale = _twice((model.at_speed(speed), state_scale(model, speed)))
@@ -117,12 +126,19 @@ def _run(
             outcome=together(lanes.outcome),
         )
         failed = (fresh.outcome != 0) & (fresh.outcome != INACCURATE)
-        after = advance(at, scale, fresh, jnp.where(failed, 0.0, span), controls, by)
+        after = advance(at, scale, fresh, jnp.where(failed, 0.0, span), controls, by, implicit)
         apart = jax.tree.map(lambda x, s: jnp.max(jnp.abs(x[..., 0] - x[..., 1]) / s[..., 0]), after.state, scale)
         error = jnp.maximum(apart.rollers, apart.bodies)
         return after, (after.packed[:, 0], after.peaks[:, 0], error, after.error[0], after.steps[0])
 
     return jax.lax.scan(part, lanes, spans)
+
+
+@jitted
+def _stiff(model: BearingModel, speed: Scalar, lanes: Lanes) -> Array:
+    """Whether implicit steps pay from here on."""
+    here, scale = jax.tree.map(lambda x: x[..., 0], lanes.state), state_scale(model, speed)
+    return film_rate(model.at_speed(speed), here) > STIFF * jnp.max(scale.rollers[3] / scale.rollers[2])
 
 
 def simulate_bearing(
@@ -135,12 +151,14 @@ def simulate_bearing(
     start: BearingState | None = None,
     tolerance: float = 1e-5,
     allowed: float = 1e-2,
+    implicit: bool | None = None,
 ) -> BearingRun:
     """Time history of the whole bearing at one shaft speed, over revolutions of the cage.
 
     **Arguments:** model; shaft speed [rad/s], of either sign; revolutions of the cage recorded, and discarded before;
     samples per revolution; initial state, by default `rolling_start(model, speed)`; largest estimated error of a step
-    and largest measured error between two samples, in units of `state_scale`.
+    and largest measured error between two samples, in units of `state_scale`; whether steps are implicit, by default
+    where a slow shaft's thick oil makes the cage stiff (not for a quasi-static ring, which moves with all rollers).
 
     **Returns:** `BearingRun`. Steps are as short as the tolerance requires. From sample to sample the run is made a
     second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
@@ -166,7 +184,8 @@ def simulate_bearing(
     parts = _parts(model, value, samples)
     places = samples * parts
     span = np.full(places * (discard + revolutions), TURN / places)
-    run = _recorded(model, value, state, span, (FIRST, LONGEST, SHORTEST), tolerance, allowed, "angle", places, discard)
+    limits = (FIRST, LONGEST, SHORTEST)
+    run = _recorded(model, value, state, span, limits, tolerance, allowed, "angle", places, discard, implicit)
     return run if parts == 1 else _thinned(run, parts)
 
 
@@ -195,6 +214,7 @@ def bearing_over_time(
     start: BearingState,
     tolerance: float = 1e-5,
     allowed: float = 1e-2,
+    implicit: bool | None = None,
 ) -> BearingRun:
     """Time history with time as independent variable: for starting, coasting and free flight.
 
@@ -209,7 +229,7 @@ def bearing_over_time(
         raise ArgumentError("times", said="must be two or more that grow.")
     whole = float(np.sum(spans))
     limits = (whole * 1e-5, whole, whole * 1e-10)
-    return _recorded(model, float(speed), start, spans, limits, tolerance, allowed, "time", spans.size, 0)
+    return _recorded(model, float(speed), start, spans, limits, tolerance, allowed, "time", spans.size, 0, implicit)
 
 
 def _recorded(
@@ -223,14 +243,22 @@ def _recorded(
     by: By,
     samples: int,
     discard: int,
+    implicit: bool | None,
 ) -> BearingRun:
     """The run, and its last revolution again."""
     omega, (first_step, longest, shortest) = jnp.asarray(speed), limits
     bounds = (jnp.asarray(first_step), jnp.asarray(longest), jnp.asarray(shortest))
     lanes = _begun(model, omega, state, bounds[0])
     parts, first = [], np.asarray(lanes.packed).T[:1]
-    for turn in np.split(spans, len(spans) // samples):
-        lanes, found = _run(model, omega, lanes, jnp.asarray(turn), bounds, jnp.asarray(tolerance), by)
+    if implicit is None and model.ring.ring_motion == "quasi_static":
+        implicit = False
+    if implicit and model.ring.ring_motion == "quasi_static":
+        raise ArgumentError("implicit", said="must be False or None for a quasi-static inner ring, but is True.")
+    pieces = np.split(spans, len(spans) // samples * (CHOICES if samples % CHOICES == 0 else 1))
+    stiff = []
+    for piece in pieces:
+        stiff.append(bool(_stiff(model, omega, lanes)) if implicit is None else implicit)
+        lanes, found = _run(model, omega, lanes, jnp.asarray(piece), bounds, jnp.asarray(tolerance), by, stiff[-1])
         parts.append(tuple(map(np.asarray, found)))
     numbers, peaks, errors, estimates, steps = (np.concatenate(part) for part in zip(*parts, strict=True))
     numbers = np.concatenate([first, numbers])[discard * samples :]
@@ -252,5 +280,6 @@ def _recorded(
         outcome=OUTCOMES[code],
         error=error,
         estimate=float(estimates.max()),
-        steps=float(steps.sum() / len(parts)),
+        steps=float(steps.sum() * samples / len(spans)),
+        implicit=float(np.mean(stiff)),
     )

@@ -1,8 +1,8 @@
 """The whole bearing over a stretch of cage angle or of time, many lanes at once, by steps that are controlled.
 
-The classical method of Runge and Kutta with the embedded estimate of `_explicit`: a step is refused whose estimated
-error is above the tolerance in any part of the state. Lanes are the last axis of every array, and the stages a loop, so
-that a step is compiled once however many rollers and lanes there are.
+The classical method of Runge and Kutta with the embedded estimate of `_explicit`, or an implicit one: a step is refused
+whose estimated error is above the tolerance in any part of the state. Lanes are the last axis of every array, and the
+stages a loop, so that a step is compiled once however many rollers and lanes there are.
 """
 
 from typing import Any, Literal, NamedTuple
@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, Int
 
 from .._types import Scalar
 from ..models.whole import LEDGER, MEANS, BearingAtSpeed, BearingState
+from ._implicit import implicit_step
 from ._results import INACCURATE, OUTCOMES
 
 
@@ -20,6 +21,7 @@ By = Literal["angle", "time"]
 """What is integrated over: the cage's angle, with time as a quadrature, or time."""
 
 ORDER = 4.0
+"""Of the estimates of both methods."""
 SAFETY, LEAST, MOST = 0.9, 0.2, 3.0
 """Of the step that the estimate asks for, and how far a step may be from the one before it."""
 FAR = 2.0
@@ -108,35 +110,29 @@ def begin(at: BearingAtSpeed, state: BearingState, step: Scalar) -> Lanes:
 
 
 def advance(
-    at: BearingAtSpeed, scale: BearingState, lanes: Lanes, span: Float[Array, " lanes"], controls: Controls, by: By
+    at: BearingAtSpeed,
+    scale: BearingState,
+    lanes: Lanes,
+    span: Float[Array, " lanes"],
+    controls: Controls,
+    by: By,
+    implicit: bool = False,
 ) -> Lanes:
     """Every lane over its `span`, in as many steps as it needs.
 
-    **Arguments:** laws and scale of each lane, with lanes last; lanes; how far [rad or s]; controls.
+    **Arguments:** laws and scale of each lane, with lanes last; lanes; how far [rad or s]; controls; whether steps are
+    implicit (not with a quasi-static inner ring).
     """
     n_state = lanes.packed.shape[0] - INTEGRALS
     units = 1 / packed(scale, jnp.ones((INTEGRALS, span.size)))[: n_state - 2]
-    pace = lambda rates: rates / jnp.abs(rates[n_state - 2]) if by == "angle" else rates
-    slope = lambda rates: _over(pace, rates)
-    move = lambda y, h, k: _over(lambda y, h, k: y + h * k, y, h, k)
+    step = _implicit_step if implicit else _explicit_step
 
     def attempt(carry: tuple[Lanes, Array]) -> tuple[Lanes, Array]:
         lanes, done = carry
         left = span - done
         h = jnp.where(left <= lanes.step, left, jnp.where(left < 2 * lanes.step, left / 2, lanes.step))
-        y, k1 = lanes.packed, slope(lanes.rates)
-
-        def stage(i: Array, c: tuple) -> tuple:
-            _, _, k, total = c
-            share, weight = jnp.asarray((0.5, 0.5, 1.0, 0.0))[i], jnp.asarray((2.0, 2.0, 1.0, 0.0))[i]
-            way = jnp.where(i == 3, total / 6, share * k)  # the last stage is the first of the next step
-            moved, rates, peaks = _over(_field, at, move(y, h, way))
-            new = slope(rates)
-            return (moved, rates, peaks), k, new, total + weight * new
-
-        found, k4, k5, _ = jax.lax.fori_loop(0, 4, stage, ((y, lanes.rates, lanes.peaks), k1, k1, k1))
-        difference = (k4 - k5)[: n_state - 2]
-        error = _over(lambda h, d, u: jnp.max(jnp.abs(h / 6 * d) * u), h, difference, units)
+        found, estimate = step(at, lanes, h, by)
+        error = _over(lambda e, u: jnp.max(jnp.abs(e) * u), estimate[: n_state - 2], units)
         error = jax.lax.stop_gradient(error)
         new, done = _accepted(lanes, found, h, left, error, done, span, controls)
         lost = (jnp.abs(new.rates[n_state - 2]) < controls.slowest) | (new.peaks[-1] > FAR)
@@ -146,6 +142,40 @@ def advance(
     going = lambda carry: jnp.any(span - carry[1] > 0)
     lanes, _ = jax.lax.while_loop(going, attempt, (lanes, jnp.zeros_like(span)))
     return lanes
+
+
+Found = tuple[Array, Array, Array]
+"""Packed numbers, their rates over time, and peaks."""
+
+
+def _explicit_step(at: BearingAtSpeed, lanes: Lanes, h: Array, by: By) -> tuple[Found, Array]:
+    """Where a step of each lane leads, and the estimated error of its numbers."""
+    clock = lanes.packed.shape[0] - INTEGRALS - 2
+    pace = lambda rates: rates / jnp.abs(rates[clock]) if by == "angle" else rates
+    slope = lambda rates: _over(pace, rates)
+    move = lambda y, h, k: _over(lambda y, h, k: y + h * k, y, h, k)
+    y, k1 = lanes.packed, slope(lanes.rates)
+
+    def stage(i: Array, c: tuple) -> tuple:
+        _, _, k, total = c
+        share, weight = jnp.asarray((0.5, 0.5, 1.0, 0.0))[i], jnp.asarray((2.0, 2.0, 1.0, 0.0))[i]
+        way = jnp.where(i == 3, total / 6, share * k)  # the last stage is the first of the next step
+        moved, rates, peaks = _over(_field, at, move(y, h, way))
+        new = slope(rates)
+        return (moved, rates, peaks), k, new, total + weight * new
+
+    found, k4, k5, _ = jax.lax.fori_loop(0, 4, stage, ((y, lanes.rates, lanes.peaks), k1, k1, k1))
+    return found, _over(lambda h, a, b: h / 6 * (a - b), h, k4, k5)
+
+
+def _implicit_step(at: BearingAtSpeed, lanes: Lanes, h: Array, by: By) -> tuple[Found, Array]:
+    """The same by an implicit method."""
+
+    def lane(at: BearingAtSpeed, numbers: Array, rates: Array, h: Array) -> tuple[Found, Array]:
+        end, after, error, peaks = implicit_step(at, unpacked(numbers), unpacked(rates), h, by == "angle")
+        return (packed(*end), packed(*after), peaks), jnp.append(error.rollers.T.ravel(), error.bodies[:-1])
+
+    return _over(lane, at, lanes.packed, lanes.rates, jnp.where(h > 0, h, 1.0))
 
 
 def _accepted(
