@@ -56,6 +56,8 @@ def beside(model: jc.CageModel, rpm: float, state: np.ndarray, method: Any = Non
     speed = float(jc.rpm(rpm))
     options = dict(discard=0, revolutions=REVOLUTIONS, blocks=REVOLUTIONS, method=method, confirm=False, horizon=0)
     ours = jc.sweep(model, speed, starts=state[None, None], **options)  # pyright: ignore[reportArgumentType]
+    if ours.failed[0, 0]:  # as a start beyond the clearance is
+        return None
     along = [float(c) for c in start_tangents(state.size, 1)[0]]
     try:
         theirs = reference.growth(reference.field(model, speed), state, REVOLUTIONS, direction=along, budget=BUDGET)

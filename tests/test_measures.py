@@ -213,9 +213,22 @@ def test_elastic_rib_motion_is_taken_out():
 def test_winding_counts_turns(turns):
     a = np.linspace(0, 2 * np.pi * turns, 100)
     circle = np.stack([3 + np.cos(a), 1 + np.sin(a)], axis=1)
-    assert winding(circle, np.array([3.2, 1.1])) == pytest.approx(2 * np.pi * turns, abs=1.0)
-    assert winding(circle, np.array([3.0, 1.0])) == pytest.approx(2 * np.pi * turns)
-    assert abs(winding(circle, np.array([5.0, 1.0]))) < np.pi
+    assert winding(circle, np.array([3.2, 1.1]))[0] == pytest.approx(2 * np.pi * turns, abs=1.0)
+    assert winding(circle, np.array([3.0, 1.0])) == (pytest.approx(2 * np.pi * turns), 0)
+    assert abs(winding(circle, np.array([5.0, 1.0]))[0]) < np.pi
+
+
+def test_whirl_that_cannot_be_told_is_none():
+    """To and fro through the mean centre, or by less than the run's error; a hundred circles with one such pass can."""
+    model, circle = case("1a", "preliminary"), orbit(samples=64)
+    for error, samples in ((np.nan, 63), (1e-8, 64)):
+        line = dataclasses.replace(orbit(flatten=1e-9, samples=samples), error=error)
+        assert np.isnan(orbit_measures(model, line).whirl_ratio)
+    assert np.isnan(orbit_measures(model, dataclasses.replace(circle, error=2e-4 / GAP)).whirl_ratio)
+    assert orbit_measures(model, dataclasses.replace(circle, error=0.5e-4 / GAP)).whirl_ratio == pytest.approx(1.0)
+    once, whole = (np.array([[1.0, 0.0], [-1.0, 1e-12]]), np.linspace(0, 200 * np.pi, 6400)[:, None])
+    passed = np.concatenate([np.hstack([np.cos(whole), np.sin(whole)]), once])
+    assert winding(passed, np.zeros(2))[1] == 1
 
 
 def test_table_names_every_measure_with_its_unit():

@@ -28,6 +28,10 @@ Histories = dict[str, tuple[Array, Array, Array]]
 
 STILL = 1e-9
 """A centre that moves by less than this part of the clearance, or per radian, stands still."""
+AMBIGUOUS = 0.75 * np.pi
+"""Angle about a centre from sample to sample that may as well be the other way around."""
+DOUBT = 0.02
+"""Of a whirl ratio, at most: an orbit may run through its centre once in fifty revolutions."""
 
 
 def relative_state(
@@ -121,15 +125,18 @@ def film_drag_power(
     return film.n_lands * torque * speed
 
 
-def winding(position: Float[np.ndarray, "n 2"], centre: Float[np.ndarray, " 2"]) -> float:
-    """Angle [rad] by which the motion has gone around `centre`, counter-clockwise.
+def winding(
+    position: Float[np.ndarray, "n 2"], centre: Float[np.ndarray, " 2"], resolution: float = 0.0
+) -> tuple[float, int]:
+    """Angle [rad] by which the motion has gone around `centre`, counter-clockwise, and how many steps are in doubt.
 
-    Steps of half a turn and more between samples are ambiguous: the samples must be dense, and an
-    orbit that runs through the centre has no winding.
+    A step of about half a turn from sample to sample may as well be the other way around, and so may one that begins
+    nearer to the centre than `resolution` [m]: the orbit runs through the centre, or its samples are too far apart.
     """
     x, y = (position - centre).T
     turned = np.unwrap(np.arctan2(y, x))
-    return float(turned[-1] - turned[0])
+    doubted = (np.abs(np.diff(turned)) > AMBIGUOUS) | (np.hypot(x, y)[:-1] < resolution)
+    return float(turned[-1] - turned[0]), int(np.sum(doubted))
 
 
 def _measure(unit: str, text: str) -> Any:
@@ -142,9 +149,10 @@ class OrbitMeasures:
 
     whirl_ratio: float = _measure("1", "whirl speed about the mean centre / cage speed")
     """Mean angular velocity about the mean centre over the mean cage speed, positive in the sense
-    of rotation; NaN where the centre stands still. 1 is synchronous, near 0.5 oil whirl."""
+    of rotation; NaN where the centre moves by less than the run's error, or runs through its mean. 1 is synchronous,
+    near 0.5 oil whirl."""
     rib_whirl_ratio: float = _measure("1", "whirl speed about the rib centre / cage speed")
-    """The same about the rib centre: 0 for an orbit that does not go around it."""
+    """The same about the rib centre: 0 for an orbit that does not go around it, NaN for one that runs through it."""
     rms: float = _measure("m", "rms displacement about the mean")
     """Root of the mean square distance from the mean centre [m]."""
     peak_displacement: float = _measure("m", "largest displacement about the mean")
@@ -206,22 +214,25 @@ def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
     def mean(f: Float[np.ndarray, " n"]) -> float:
         return float(np.sum(weights * f))
 
+    def whirl(centre: Float[np.ndarray, " 2"]) -> float:
+        angle, doubted = winding(position, centre, float(np.fmax(STILL, trajectory.error)) * c)
+        return angle / phase if 2 * np.pi * doubted <= DOUBT * phase else float("nan")
+
     def impulse(f: Float[np.ndarray, " n"]) -> float:
         return float(2 * np.pi * np.mean(f / speed))
 
     centre = np.sum(weights[:, None] * position, axis=0)
     away = _magnitude(position - centre)
     pace = _magnitude(velocity)
-    phase = trajectory.tau[-1] - trajectory.tau[0]
-    moves = np.max(away) > STILL * c
+    phase = float(trajectory.tau[-1] - trajectory.tau[0])
     paced = np.mean(pace) > STILL * c * np.mean(speed)
     eps = _magnitude(position) / c
     largest = max(float(np.max(eps)), trajectory.peak)
     forces = cage_forces(model, trajectory)
     contact, impact = _magnitude(forces["contact"]), _magnitude(forces["impact"])
     return OrbitMeasures(
-        whirl_ratio=winding(position, centre) / float(phase) if moves else float("nan"),
-        rib_whirl_ratio=winding(position, np.zeros(2)) / float(phase),
+        whirl_ratio=whirl(centre),
+        rib_whirl_ratio=whirl(np.zeros(2)),
         rms=float(np.sqrt(mean(away**2))),
         peak_displacement=float(np.max(away)),
         largest_eps=largest,
