@@ -21,7 +21,8 @@ import jaxcage as jc
 from benchmarks.bearing_speed import flat
 from benchmarks.bearing_trends import table
 from benchmarks.tableaux import RODAS4
-from jaxcage.models.whole import MOVING, Bodies, Passed, Rollers, state_scale
+from jaxcage.integrate import Arrow, Parts, arrow, factors
+from jaxcage.models.whole import BearingState, state_scale
 
 
 SPAN, SETTLING, BETWEEN = 1e-3, 20e-3, 5e-3
@@ -31,6 +32,8 @@ WANTED = (1e-2, 1e-3)
 """Errors at the end of an arc that half of the arcs reach, in units of the state's scale: as a run allows, and less."""
 LADDER = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 """Tolerances, loosest first."""
+SLOW = ((1000.0, 273.15, 4450.0), (1000.0, 273.15, 300.0), (2000.0, 273.15, 4450.0), (1000.0, 293.15, 4450.0))
+"""Shafts [rpm], oils [K] and loads [N] for whole revolutions."""
 HALVED = 1
 """So many times the decade in which the loosest tolerance lies is halved."""
 TIGHT = 1e-10
@@ -62,90 +65,10 @@ CONDITIONS = (
 )
 
 
-# Rates and their Jacobian, in the parts of an arrow: `w` is a roller, `b` cage, ring and the cage's angle.
-
-
-def roller(at: Any, w: jax.Array, b: jax.Array, place: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Rates of one roller over time, and what moves cage and ring."""
-    rollers, cage = Rollers(*w), Bodies(*b[:9])
-    forces = at.on_roller(rollers, cage, jnp.cos(b[9] + place), jnp.sin(b[9] + place))
-    rates, passed = at.roller_rates(rollers, cage, forces)
-    return jnp.stack(rates), jnp.stack(passed[:MOVING])
-
-
-def bodies(at: Any, b: jax.Array, sums: jax.Array) -> jax.Array:
-    """Rates of cage, ring and angle."""
-    cage = Bodies(*b[:9])
-    passed = Passed(*sums, *[0.0] * (len(Passed._fields) - MOVING))
-    rates, *_ = at.body_rates(cage, (jnp.cos(b[9]), jnp.sin(b[9])), passed, at.on_land(cage))
-    return jnp.stack([*rates, cage.cage_speed])
-
-
-def rates(at: Any, w: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Of all rollers, an axis of `w`, and of the bodies."""
-    each, passed = jax.vmap(roller, (None, 0, None, 0))(at, w, b, jnp.asarray(at.places))
-    return each, bodies(at, b, passed.sum(axis=0))
-
-
-class Arrow(NamedTuple):
-    """Blocks of the Jacobian: of each roller by itself, and by the bodies; of the bodies by each roller, and by all."""
-
-    own: jax.Array
-    by_bodies: jax.Array
-    on_bodies: jax.Array
-    bodies: jax.Array
-
-
-def arrow(at: Any, w: jax.Array, b: jax.Array) -> Arrow:
-    """The Jacobian: 15 directional derivatives of each roller, and 17 of cage and ring."""
-    places = jnp.asarray(at.places)
-    (own, by_bodies), (passing, passed) = jax.vmap(jax.jacfwd(roller, (1, 2)), (None, 0, None, 0))(at, w, b, places)
-    sums = jax.vmap(roller, (None, 0, None, 0))(at, w, b, places)[1].sum(axis=0)
-    by_b, by_sums = jax.jacfwd(bodies, (1, 2))(at, b, sums)
-    return Arrow(own, by_bodies, by_sums @ passing, by_b + by_sums @ passed.sum(axis=0))
-
-
-def inverse(m: jax.Array) -> jax.Array:
-    """Of matrices with their columns in the last axis, by Gauss and Jordan's method without a search of pivots."""
-    n = m.shape[-1]
-    both = jnp.concatenate([m, jnp.broadcast_to(jnp.eye(n), m.shape)], axis=-1)
-    for i in range(n):
-        row = both[..., i, :] / both[..., i, i, None]
-        both = (both - both[..., :, i, None] * row[..., None, :]).at[..., i, :].set(row)
-    return both[..., n:]
-
-
-class Factors(NamedTuple):
-    """Of shift - J."""
-
-    own: jax.Array
-    """Inverse of each roller's block."""
-    by_bodies: jax.Array
-    """It times minus the block beside it."""
-    on_bodies: jax.Array
-    bodies: jax.Array
-    """Inverse of what is left of cage and ring when the rollers are eliminated."""
-
-
-def factors(blocks: Arrow, shift: float) -> Factors:
-    """Eliminate the rollers."""
-    own = inverse(shift * jnp.eye(5) - blocks.own)
-    by_bodies = own @ -blocks.by_bodies
-    left = shift * jnp.eye(10) - blocks.bodies + jnp.sum(blocks.on_bodies @ by_bodies, axis=0)
-    return Factors(own, by_bodies, -blocks.on_bodies, inverse(left))
-
-
-def solution(held: Factors, f: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-    """(shift - J) u = f."""
-    alone = jnp.einsum("jik,jk->ji", held.own, f[0])
-    b = held.bodies @ (f[1] - jnp.einsum("jik,jk->i", held.on_bodies, alone))
-    return alone - held.by_bodies @ b, b
-
-
 def dense(blocks: Arrow) -> np.ndarray:
     """The Jacobian as one matrix, numbers in the order of the package: all lags, all spins and so on."""
     own, by_bodies, on_bodies, few = map(np.asarray, blocks)
-    n = len(own)
+    n, on_bodies, few = len(own), on_bodies[:, :10], few[:10]
     found = np.zeros((5 * n + 10, 5 * n + 10))
     for j in range(n):
         found[j : 5 * n : n, j : 5 * n : n] = own[j]
@@ -158,12 +81,26 @@ def dense(blocks: Arrow) -> np.ndarray:
 # Arcs, in units of the state's scale.
 
 
+def parts_of(y: jax.Array, n_rollers: int) -> Parts:
+    """A state in one row, as an arrow takes it."""
+    return Parts(y[: 5 * n_rollers].reshape(5, n_rollers).T, y[5 * n_rollers :])
+
+
+def flat_of(y: Parts) -> jax.Array:
+    """The same in one row again."""
+    return jnp.concatenate([y.rollers.T.ravel(), y.bodies])
+
+
+def rates(at: Any, y: Parts) -> Parts:
+    """Over time."""
+    moved = at(BearingState(y.rollers.T, y.bodies[:-1], jnp.stack([y.bodies[-1], jnp.zeros(())]))).state
+    return Parts(moved.rollers.T, jnp.append(moved.bodies, moved.clock[0]))
+
+
 def _flat_rates(tree: Any, numbers: jax.Array, size: jax.Array, y: jax.Array) -> jax.Array:
     """Rates over time of a state in one row, both in units of `size`, by the laws' numbers in a row: few arguments."""
     at = jax.tree.unflatten(tree, list(numbers))
-    n, z = at.n_rollers, y * size
-    each, few = rates(at, z[: 5 * n].reshape(5, n).T, z[5 * n :])
-    return jnp.concatenate([each.T.ravel(), few]) / size
+    return flat_of(rates(at, parts_of(y * size, at.n_rollers))) / size
 
 
 flat_rates = jax.jit(_flat_rates, static_argnums=0)
@@ -318,27 +255,25 @@ def nearness(arcs: Arcs, runs: Sequence[Reached]) -> tuple[np.ndarray, complex]:
 
 def parts(arcs: Arcs) -> dict[str, float]:
     """Processor time of the parts of a step of one bearing [us], in a batch of `LANES`."""
-    n, y = arcs.model.bearing.n_rollers, arcs.begin[0] * arcs.size
-    many = lambda x: jnp.asarray(np.repeat(x[None], LANES, axis=0))
-    w, b = many(y[: 5 * n].reshape(5, n).T), many(y[5 * n :])
+    n, begin = arcs.model.bearing.n_rollers, jnp.asarray(arcs.begin[0] * arcs.size)
+    y = jax.tree.map(lambda x: jnp.repeat(x[None], LANES, axis=0), parts_of(begin, n))
     each = lambda f: jax.jit(jax.vmap(f))
-    blocks = each(lambda w, b: arrow(arcs.at, w, b))(w, b)
     shift = 1 / (RODAS4.gamma * 1e-5)
-    held = each(lambda blocks: factors(blocks, shift))(blocks)
-    f = each(lambda w, b: rates(arcs.at, w, b))(w, b)
-    got = each(solution)(held, f)
-    size, units = jnp.asarray(arcs.size), np.diag(1 / arcs.size)
-    whole = units @ dense(jax.tree.map(lambda x: x[0], blocks)) @ np.diag(arcs.size)
+    jacobian, eliminated = each(lambda y: arrow(arcs.at, y, False)), each(lambda blocks: factors(blocks, shift))
+    rated, solved = each(lambda y: rates(arcs.at, y)), each(lambda held, f: held.solve(f))
+    blocks, f = jacobian(y), rated(y)
+    held = eliminated(blocks)
+    got, one = solved(held, f), lambda tree: jax.tree.map(lambda x: x[0], tree)
+    whole = np.diag(1 / arcs.size) @ dense(one(blocks)) @ np.diag(arcs.size)
     np.testing.assert_allclose(whole, arcs.jacobian(arcs.begin[0]), rtol=1e-9, atol=1e-9 * np.abs(whole).max())
-    flat_f = np.concatenate([np.asarray(f[0][0]).T.ravel(), np.asarray(f[1][0])]) / size
-    want = np.linalg.solve(shift * np.eye(whole.shape[0]) - whole, flat_f)
-    have = np.concatenate([np.asarray(got[0][0]).T.ravel(), np.asarray(got[1][0])]) / size
+    want = np.linalg.solve(shift * np.eye(whole.shape[0]) - whole, np.asarray(flat_of(one(f))) / arcs.size)
+    have = np.asarray(flat_of(one(got))) / arcs.size
     np.testing.assert_allclose(have, want, rtol=1e-6, atol=1e-8 * np.abs(want).max())
     return {
-        "rates": timed(each(lambda w, b: rates(arcs.at, w, b)), w, b),
-        "Jacobian": timed(each(lambda w, b: arrow(arcs.at, w, b)), w, b),
-        "factors": timed(each(lambda blocks: factors(blocks, shift)), blocks),
-        "solution": timed(each(solution), held, f),
+        "rates": timed(rated, y),
+        "Jacobian": timed(jacobian, y),
+        "factors": timed(eliminated, blocks),
+        "solution": timed(solved, held, f),
     }
 
 
@@ -392,14 +327,39 @@ def counted(arcs: Arcs) -> tuple[dict[str, list[Count]], list[tuple[str, ...]]]:
     return found, near
 
 
+def revolutions() -> None:
+    """One revolution by the package's explicit steps, and with implicit ones where it chooses them."""
+    rows: list[tuple[str, ...]] = [
+        ("shaft, oil, load", "steps", "steps, chosen", "time of a step", "chosen", "time", "implicit", "")
+    ]
+    for shaft, kelvin, load in SLOW:
+        model = jc.replace(jc.whole_bearing("nu2310"), temperature=kelvin, load=load)
+        took, runs = [], []
+        for implicit in (False, None):
+            run = lambda count: jc.simulate_bearing(model, jc.rpm(shaft), revolutions=count, implicit=implicit)
+            run(1)  # compiles
+            begun = time.process_time()
+            runs.append(run(1))
+            took.append(time.process_time() - begun)
+        each = [1e6 * t / run.steps for t, run in zip(took, runs, strict=True)]
+        named = f"{shaft:g} rpm, {kelvin - 273.15:.0f} °C, {load:g} N"
+        few = f"{took[0] / took[1]:.2f} times", f"{100 * runs[1].implicit:.0f} %", runs[1].outcome
+        rows.append((named, *(f"{r.steps:.0f}" for r in runs), *(f"{x:.0f} us" for x in each), *few))
+    print("\nA revolution by explicit steps, and by the steps that the package chooses: processor time of both lanes")
+    table(rows)
+
+
 def main() -> None:
     """Run all conditions, print what they take and the cost of a step."""
     about, _ = (__doc__ or "").split("\n\n")
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--conditions", type=int, nargs="*", default=range(len(CONDITIONS)), help="by number, from 0")
+    parser.add_argument("--revolutions", action="store_true", help="whole revolutions only")
     parser.add_argument("--arcs", type=int, default=ARCS, help="of each condition")
     given = parser.parse_args()
     jc.enable_x64()
+    if given.revolutions:
+        return revolutions()
     heads = [f"{error:.0e}" for error in WANTED]
     near = [("steps over the longest stable", "error", "half", "largest", f"above {NEAR:g}", "fastest [1/s]")]
     gains = [("", "steps", "", "time", "", "time, free Jacobians", ""), ("error", *heads, *heads, *heads)]
@@ -430,6 +390,7 @@ def main() -> None:
     print(f"An explicit step {usual:.0f}, one of RODAS4 {arrowed:.0f}: {arrowed / usual:.1f} times as much")
     print("\nThe package's explicit steps over those of the best method with Jacobians, and their time, by these parts")
     table(gains)
+    revolutions()
 
 
 if __name__ == "__main__":

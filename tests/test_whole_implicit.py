@@ -1,6 +1,8 @@
 """Implicit steps of the whole bearing: the arrow against dense matrices, order, stiff arcs beside SciPy's."""
 
 import dataclasses
+import time
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -159,6 +161,22 @@ def test_energy_of_implicit_steps(stiff):
     lost = sum(run.total(name) for name in LEDGER[1:])
     assert run.outcome == "successful"
     assert abs(run.total("input") - lost - gain) < 1e-8 * abs(lost)
+
+
+@pytest.mark.wide
+def test_twice_the_rollers_cost_twice_as_much():
+    """Operations of an implicit step, as the compiler counts them; it is compiled within 30 s."""
+    flops = []
+    for n in (13, 26):
+        model = jc.replace(jc.whole_bearing("nu2310"), **{"roller_diameter": 6e-3, "bearing.n_rollers": n})
+        state = BearingState(jnp.ones((5, n)), jnp.ones(9), jnp.ones(2))
+        numbers, at = (state, jnp.ones(INTEGRALS)), jax.eval_shape(lambda m=model: m.at_speed(jnp.asarray(SPEED)))
+        step = jax.jit(lambda at, numbers, h: implicit_step(at, numbers, numbers, h, over_angle=True))
+        begun = time.process_time()
+        cost: Any = step.lower(at, numbers, jnp.asarray(1e-3)).compile().cost_analysis()
+        assert time.process_time() - begun < 30
+        flops.append(cost["flops"])
+    assert 1.2 < flops[1] / flops[0] < 2.2
 
 
 @pytest.mark.wide
