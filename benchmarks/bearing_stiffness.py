@@ -343,7 +343,7 @@ def revolutions() -> None:
             took.append(time.process_time() - begun)
         each = [1e6 * t / run.steps for t, run in zip(took, runs, strict=True)]
         named = f"{shaft:g} rpm, {kelvin - 273.15:.0f} °C, {load:g} N"
-        few = f"{took[0] / took[1]:.2f} times", f"{100 * runs[1].implicit:.0f} %", runs[1].outcome
+        few = f"{took[0] / took[1]:.2f} times", f"{100 * runs[1].implicit_share:.0f} %", runs[1].outcome
         rows.append((named, *(f"{r.steps:.0f}" for r in runs), *(f"{x:.0f} us" for x in each), *few))
     print("\nA revolution by explicit steps, and by the steps that the package chooses: processor time of both lanes")
     table(rows)

@@ -135,7 +135,7 @@ def test_a_stiff_arc(stiff):
     times = np.array([0.0, 2e-4])
     runs = [jc.bearing_over_time(model, SLOW, times, start=start, implicit=i, tolerance=1e-6) for i in (True, False)]
     few, many = runs
-    assert few.implicit == 1 and many.implicit == 0 and few.steps < many.steps / 3
+    assert few.implicit_share == 1 and many.implicit_share == 0 and few.steps < many.steps / 3
     assert all(run.outcome == "successful" for run in runs)
     theirs = WholeBearing(model, SLOW)
     n = model.bearing.n_rollers
@@ -184,9 +184,9 @@ def test_implicit_steps_are_taken_where_they_pay(stiff):
     """At the land in cold oil at low speed, and nowhere at the usual ones; a quasi-static ring has none."""
     model, start = stiff
     slow = jc.simulate_bearing(model, SLOW, revolutions=1, tolerance=1e-5, samples=32)
-    assert 0.2 < slow.implicit < 1 and slow.outcome == "successful"
+    assert 0.2 < slow.implicit_share < 1 and slow.outcome == "successful"
     usual = jc.simulate_bearing(jc.whole_bearing("nu2310"), SPEED, revolutions=1, samples=32)
-    assert usual.implicit == 0
+    assert usual.implicit_share == 0
     ring = dataclasses.replace(model.ring, ring_motion="quasi_static")
     with pytest.raises(ValueError, match="quasi-static"):
         jc.simulate_bearing(dataclasses.replace(model, ring=ring), SLOW, revolutions=1, implicit=True)

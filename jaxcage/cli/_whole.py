@@ -90,7 +90,7 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     document = {
         **at.document,
         **chosen(options, "revolutions discard"),
-        **chosen(run, "outcome error estimate steps"),
+        **chosen(run, "outcome error estimate steps implicit_share"),
         **dataclasses.asdict(found.measures),
         "pocket_force_distribution_N": pocket_force_distribution(history),
         "around": {"angle_deg": np.degrees(found.circumference.angle), **_without_angle(found.circumference)},
@@ -98,7 +98,8 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
         "spectra": _lines(found.spectra, found.orders),
     }
     said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
-    return Report(document, found.tables, [said])
+    stiff = f"; {100 * run.implicit_share:.0f} % by implicit steps" if run.implicit_share else ""
+    return Report(document, found.tables, [said + stiff])
 
 
 @dataclasses.dataclass(frozen=True)

@@ -85,6 +85,7 @@ from ._reynolds import (
 from ._rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
 from ._ring import solve_ring as solve_ring
 from ._smooth import (
+    inverse_root as inverse_root,
     power_10_9 as power_10_9,
     root_9 as root_9,
     smooth_norm as smooth_norm,

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .._types import Scalar
-from ._smooth import smooth_norm
+from ._smooth import inverse_root, smooth_norm
 
 
 Vector = tuple[Scalar, Scalar]
@@ -146,7 +146,7 @@ def film_resistance(
         return fixed_half_resistance(x, y, direction)
     if model == "full":
         return full_resistance(x, y)
-    per_norm = 1 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)  # 1e-300: no 0/0 at rest
+    per_norm = inverse_root(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)  # 1e-300: no 0/0 at rest
     return half_circle_resistance(x, y, px * per_norm, py * per_norm)
 
 
@@ -162,7 +162,7 @@ def supply_force(
         return jnp.zeros_like(jnp.asarray(nx)), jnp.zeros_like(jnp.asarray(nx))
     if model == "fixed_half":
         return jnp.asarray(-2 * ny), jnp.asarray(2 * nx)
-    factor = -2 / jnp.sqrt(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)
+    factor = -2 * inverse_root(px * px + py * py + (smoothing * omega) ** 2 + 1e-300)
     return factor * px, factor * py
 
 

@@ -15,6 +15,7 @@ from ._film import FilmModel, ShortFilm, film_drive, film_resistance, film_scale
 from ._finite_film import finite_film_force
 from ._land import Place
 from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows, turned
+from ._smooth import inverse_root
 
 
 class RibFilm(eqx.Module):
@@ -76,7 +77,7 @@ class FilmForce(AbstractForce):
         arc = "positive_pressure" if self.model == "finite_length" else self.model
         thrust = supply_force(arc, (place.nx, place.ny), px, py, omega, blur)
         eps = place.eps - place.excess
-        torque = self.drag / jnp.sqrt(1 - eps * eps) * (motion.cage_speed - motion.land_speed)
+        torque = self.drag * inverse_root(1 - eps * eps) * (motion.cage_speed - motion.land_speed)
         return fx + self.supply_scale * thrust[0], fy + self.supply_scale * thrust[1], -torque
 
     def _pressed(

@@ -68,8 +68,8 @@ class BearingRun:
     """Sum of the embedded error estimates of the steps between two samples, or places, the largest of them."""
     steps: float
     """Mean number of steps of a revolution (or of the whole stretch of time)."""
-    implicit: float
-    """Share of the run that was made by implicit steps."""
+    implicit_share: float
+    """Part of the run that was made by implicit steps."""
 
     @property
     def last(self) -> BearingState:
@@ -281,5 +281,5 @@ def _recorded(
         error=error,
         estimate=float(estimates.max()),
         steps=float(steps.sum() * samples / len(spans)),
-        implicit=float(np.mean(stiff)),
+        implicit_share=float(np.mean(stiff)),
     )

@@ -6,7 +6,7 @@ from jaxtyping import Array
 
 from ..._parameters import choice, parameter
 from ..._types import Scalar
-from ...forces import smooth_plus
+from ...forces import inverse_root, smooth_plus
 
 
 class Pockets(eqx.Module):
@@ -43,7 +43,7 @@ class Pockets(eqx.Module):
 
 def saturated(sliding: Scalar, speed: Scalar) -> Array:
     """Odd and smooth stand-in for the sign of a sliding speed [m/s]: its slope at rest is 1/`speed`."""
-    return jnp.asarray(sliding / jnp.sqrt(sliding * sliding + speed * speed))
+    return sliding * inverse_root(sliding * sliding + speed * speed)
 
 
 def bar_stiffness(
