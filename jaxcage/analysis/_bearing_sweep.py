@@ -67,7 +67,7 @@ class BearingSweep:
     exponent: OfLanes = measure("1", "largest Lyapunov exponent per revolution of the cage; NaN if not asked for")
     exponent_error: OfLanes = measure("1", "its standard error, from the scatter of the blocks")
     state: Shaped[np.ndarray, "speeds starts"] = measure("", "what the cage's centre does, as in `cage_state`")
-    block_means: dict[str, Float[np.ndarray, "speeds starts blocks"]] = measure("", "means of blocks of revolutions")
+    block_means: dict[str, Float[np.ndarray, "speeds starts _"]] = measure("", "means of blocks of revolutions")
     error: OfLanes = measure("1", "largest change of a state over a sample with about half the steps, in its scale")
     steps: OfLanes = measure("1", "mean steps of a revolution")
     outcome: Shaped[np.ndarray, "speeds starts"] = measure("", "how the lane ended, `successful` if well")
@@ -121,7 +121,7 @@ class BearingRecord:
     integrals: dict[str, Float[np.ndarray, "lanes blocks"]]
     """`time`, and the names of `jaxcage.integrate.INTEGRATED`."""
     peaks: dict[str, Float[np.ndarray, "lanes blocks"]]
-    growth: Float[np.ndarray, "lanes blocks"]
+    growth: Float[np.ndarray, "lanes followed"]
     place: Float[np.ndarray, "lanes samples 2"]
     """Of the cage's centre from the land's, in clearances."""
     error: Float[np.ndarray, " lanes"]
@@ -152,7 +152,7 @@ def summed_up(
     """
     names = np.array(OUTCOMES)[record.outcome]
     lost = ~np.isin(names, ("successful", "inaccurate"))
-    blocks = record.growth.shape[1]
+    blocks = record.integrals["time"].shape[1]
     shaped = lambda x: np.where(lost.reshape(-1, *[1] * (x.ndim - 1)), np.nan, x).reshape(speed.size, -1, *x.shape[1:])
     time = np.where(lost[:, None], np.nan, record.integrals["time"])
     whole = lambda name: record.integrals[name].sum(axis=1)

@@ -44,7 +44,8 @@ def bearing_dataset(sweep: BearingSweep, model: BearingModel | None = None) -> "
             parts = np.stack([np.broadcast_to(x, sweep.cage_slip.shape) for x in value.values()], axis=-1)
             variables[field.name] = ((*LANES, "part"), parts, about)
         elif field.name == "block_means":
-            variables |= {f"{name}_blocks": ((*LANES, "block"), x, about) for name, x in value.items()}
+            of = lambda name: "exponent_block" if name == "exponent" else "block"
+            variables |= {f"{name}_blocks": ((*LANES, of(name)), x, about) for name, x in value.items()}
         elif isinstance(value, np.ndarray) and field.name != "speed":
             variables[field.name] = (_LAST.get(field.name, LANES), value, about)
     configured = {} if model is None else {"configuration": json.dumps(configuration(model))}

@@ -43,7 +43,9 @@ CALL = 12
 PER_HOUR = 1e9 * 3600
 """mm^3 an hour in 1 m^3 a second."""
 LEAD = 10
-"""Revolutions before those observed in which a tangent vector turns to the direction of fastest growth."""
+"""Revolutions in which a tangent vector turns to the direction of fastest growth, before its growth counts."""
+EXPONENT = 80
+"""Revolutions over which the exponent is followed, if there are as many: the others take half the time."""
 COARSER = 16.0
 """A tolerance so many times larger makes steps of fourth order about twice as long."""
 Starts = int | Sequence[BearingState] | Sequence[CagePlace]
@@ -59,6 +61,7 @@ def sweep_bearing(
     revolutions: int = 200,
     blocks: int = 20,
     exponents: int = 1,
+    exponent_revolutions: int = EXPONENT,
     tolerance: float = 1e-4,
     allowed: float = 5e-2,
     progress: Progress | None = None,
@@ -74,6 +77,8 @@ def sweep_bearing(
     - `discard`, `revolutions`: revolutions of the cage left out at the beginning, and observed after that.
     - `blocks`: of the observed revolutions, from whose scatter standard errors come.
     - `exponents`: 1 for the largest Lyapunov exponent, 0 for none.
+    - `exponent_revolutions`: it is followed over the last of the observed revolutions, over at least so many if there
+        are, in whole blocks (two or more).
     - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
     - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution, of slow shafts a shorter
         one, is run a second time with about half the steps; a lane in which that moves the state by more is
@@ -90,7 +95,12 @@ def sweep_bearing(
     ring or a film of finite length; `RuntimeError` without double precision.
     """
     options: dict[str, Any] = dict(
-        starts=starts, discard=discard, revolutions=revolutions, blocks=blocks, exponents=exponents
+        starts=starts,
+        discard=discard,
+        revolutions=revolutions,
+        blocks=blocks,
+        exponents=exponents,
+        exponent_revolutions=exponent_revolutions,
     )
     return sweep_bearings([model], speeds, **options, tolerance=tolerance, allowed=allowed, progress=progress)[0]
 
@@ -104,6 +114,7 @@ def sweep_bearings(
     revolutions: int = 200,
     blocks: int = 20,
     exponents: int = 1,
+    exponent_revolutions: int = EXPONENT,
     tolerance: float = 1e-4,
     allowed: float = 5e-2,
     progress: Progress | None = None,
@@ -125,10 +136,13 @@ def sweep_bearings(
         np.arange(lanes)[np.argsort(table.lane_speed, kind="stable")][i : i + size] for i in range(0, lanes, size)
     ]
     counted = _Counted(progress, lanes, discard + revolutions)
+    if exponent_revolutions < 1:
+        raise ArgumentError("exponent_revolutions", said=f"must be at least 1, but {exponent_revolutions} was given.")
+    followed = min(blocks, max(2, -(-exponent_revolutions // block))) if exponents else 0
 
     def run(chunk: np.ndarray) -> dict[str, Any]:
         padded = np.concatenate([chunk, np.repeat(chunk[-1:], size - chunk.size)])
-        found = _followed(*table.taken(padded), discard, [block] * blocks, exponents, tolerance, counted.of(chunk.size))
+        found = _followed(*table.taken(padded), discard, [block] * blocks, followed, tolerance, counted.of(chunk.size))
         return jax.tree.map(lambda x: x[: chunk.size], found)
 
     with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
@@ -156,7 +170,7 @@ def sweep_bearings(
                 BearingRecord(**mine),
                 block=block,
                 samples=SAMPLES,
-                exponents=exponents > 0,
+                exponents=followed > 0,
                 discard=discard,
                 settings=settings,
             )
@@ -311,30 +325,38 @@ def _followed(
     begin: BearingState,
     discard: int,
     blocks: list[int],
-    exponents: int,
+    followed: int,
     tolerance: float,
     done: Callable[[int], None],
 ) -> dict[str, Any]:
-    """Lanes from their beginning to the end, as the fields of a `BearingRecord` with lanes first."""
+    """Lanes from their beginning to the end, as the fields of a `BearingRecord` with lanes first.
+
+    Tangent vectors are followed over so many of the last blocks, and for `LEAD` revolutions before.
+    """
     tight, loose = jnp.asarray(tolerance), jnp.asarray(COARSER * tolerance)
-    direction = _direction(begin) if exponents else None
-    lead = min(discard, LEAD) if exponents else 0
+    first = len(blocks) - followed
+    early = max(0, first - -(-LEAD // blocks[0])) if followed else len(blocks)
+    direction = _direction(begin) if followed else None
+    lead = min(discard, LEAD) if early == 0 else 0
     spacing = jnp.full((begin.bodies.shape[-1],), SPACING)
     compared, slow = comparable(at, scale), float(jnp.max(slowness(at, scale)))
     freely, tangent = LONGEST_BLOCK * SAMPLES, max(1, int(WITH_TANGENT * SAMPLES / slow**2))
     go = lambda lanes, samples, spacing=spacing: run_block(at, scale, lanes, jnp.asarray(samples), tight, spacing)
-    lanes = begin_lanes(at, scale, begin, None if lead < discard else direction)
+    at_once = early == 0 and lead == discard
+    lanes = begin_lanes(at, scale, begin, direction if at_once else None)
     for count in _in_parts(discard - lead, freely):
         lanes, _ = go(lanes, count)
         done(count)
-    if exponents and lead < discard:
+    if early == 0 and not at_once:
         lanes = _with_direction(at, scale, lanes, direction)
     for count in _in_parts(lead, tangent):
         lanes, _ = go(lanes, count)
         done(count)
 
     integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
-    for block in blocks:
+    for i, block in enumerate(blocks):
+        if 0 < early == i:
+            lanes = _with_direction(at, scale, lanes, direction)
         trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose, compared)
         lanes, found = go(lanes, 1, compared)
         errors.append(np.asarray(lanes_apart(scale, trial.point, lanes.point)))
@@ -343,13 +365,14 @@ def _followed(
             lanes, found = go(lanes, 1, spacing - compared)
             gathered.append(jax.tree.map(np.asarray, found))
         places.append(gathered[-1].place[:1])
-        *counts, last = _in_parts(block, tangent if exponents else freely)
+        *counts, last = _in_parts(block, tangent if i >= early else freely)
         for count in (*counts, last - 1) if last > 1 else counts:
             lanes, found = go(lanes, count)
             gathered.append(jax.tree.map(np.asarray, found))
             places.append(gathered[-1].place[:count])
         integrals.append(sum(part.integrals for part in gathered))
-        growths.append(sum(part.growth for part in gathered))
+        if i >= first:
+            growths.append(sum(part.growth for part in gathered))
         peaks.append(np.max([part.peaks for part in gathered], axis=0))
         steps.append(sum(part.steps for part in gathered))
         done(block * SAMPLES)
@@ -358,7 +381,7 @@ def _followed(
     return {
         "integrals": dict(zip(("time", *INTEGRATED), total, strict=True)),
         "peaks": dict(zip(FOLLOWED, np.stack(peaks, axis=-1), strict=True)),
-        "growth": np.stack(growths, axis=-1),
+        "growth": np.stack(growths, axis=-1) if growths else np.zeros((lanes.angle.size, 1)),
         "place": np.moveaxis(np.concatenate(places), -1, 0),
         "error": np.max(errors, axis=0),
         "steps": np.sum(steps, axis=0) / sum(blocks),
