@@ -184,7 +184,7 @@ def test_implicit_steps_are_taken_where_they_pay(stiff):
     """At the land in cold oil at low speed, and nowhere at the usual ones; a quasi-static ring has none."""
     model, start = stiff
     slow = jc.simulate_bearing(model, SLOW, revolutions=1, tolerance=1e-5, samples=32)
-    assert 0.2 < slow.implicit_share < 1 and slow.outcome == "successful"
+    assert 0.1 < slow.implicit_share < 1 and slow.outcome == "successful"
     usual = jc.simulate_bearing(jc.whole_bearing("nu2310"), SPEED, revolutions=1, samples=32)
     assert usual.implicit_share == 0
     ring = dataclasses.replace(model.ring, ring_motion="quasi_static")

@@ -33,9 +33,9 @@ SHORT = 2
 """Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
 MOST_PARTS = 1000
 """From sample to sample."""
-STIFF = 20.0
-"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. Below,
-they cost more than they save: one takes as long as three explicit ones."""
+STIFF = 40.0
+"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. Below
+thirty times they cost more than they save: one takes as long as four or five explicit ones."""
 CHOICES = 16
 """In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
