@@ -17,9 +17,10 @@ def statistic_bars(found: BearingGradient, title: str = "") -> Figure:
     shown = [each for each in found.statistics.values() if each.value]
     count = max(1, len(shown))
     names = shown[0].directions if shown else ()
-    rows = -(-count // ROW)
-    figure = new_figure(11.0, 1.0 + rows * (0.8 + 0.28 * len(names)))
-    axes = figure.subplots(rows, ROW, sharey=True, squeeze=False)
+    columns = min(ROW, count)
+    rows = -(-count // columns)
+    figure = new_figure(11.0 * columns / ROW, 1.0 + rows * (0.8 + 0.28 * len(names)))
+    axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
     place = np.arange(len(names))
     for ax, each, colour in zip(axes.ravel(), shown, EDGE_COLOURS * 2, strict=False):
         dress(ax)
