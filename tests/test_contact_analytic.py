@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.forces import contact_force, power_10_9, restitution_damping, smooth_plus, smooth_plus_slope
+from jaxcage.forces import contact_force, inverse_root, power_10_9, restitution_damping, smooth_plus, smooth_plus_slope
 from jaxcage.models import case
 
 
@@ -156,6 +156,11 @@ def test_smooth_plus_joins_with_three_continuous_derivatives(joint):
     third = derivatives(lambda u: smooth_plus(u, WIDTH), 3)[-1]
     inside = float(third(0.5 * WIDTH))
     assert abs(inside) * WIDTH**2 > 1.0  # it is not zero everywhere
+
+
+def test_inverse_root():
+    x = np.logspace(-200, 200, 101)
+    np.testing.assert_allclose(jax.vmap(inverse_root)(jnp.asarray(x)), x**-0.5, rtol=4e-16)
 
 
 def test_smooth_plus_is_exact_outside_and_close_inside():

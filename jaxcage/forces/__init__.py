@@ -114,7 +114,7 @@ check_layer(
     globals(),
     "approach_speed contact_force contact_slopes cross_force cubic_stiffness effective_eccentricity "
     "film_drive film_pressure film_pressure_field film_resistance film_scale finite_film_force "
-    "fixed_half_resistance full_resistance half_circle_resistance impact_history impact_time_scale "
+    "fixed_half_resistance full_resistance half_circle_resistance impact_history impact_time_scale inverse_root "
     "polar_resistance power_10_9 pressure_force pulse_spectrum pulse_train pulse_train_force "
     "restitution_damping rib_force root_9 short_film_excess short_film_force smooth_norm smooth_plus "
     "smooth_plus_slope solve_ring spring_force supply_force support_slopes synchronous_amplitude "
