@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -33,9 +32,9 @@ SHORT = 2
 """Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
 MOST_PARTS = 1000
 """From sample to sample."""
-STIFF = 40.0
-"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. Below
-thirty times they cost more than they save: one takes as long as four or five explicit ones."""
+STIFF = 20.0
+"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. One
+takes as long as three or four explicit ones."""
 CHOICES = 16
 """In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
@@ -90,13 +89,9 @@ class BearingRun:
 
 @jitted
 def _begun(model: BearingModel, speed: Scalar, state: BearingState, step: Scalar) -> Lanes:
-    at, states = _twice((model.at_speed(speed), state))
-    return begin(at, states, step)
-
-
-def _twice(tree: Any) -> Any:
     """Two lanes of the same: one runs by steps of the tolerance, the other by about half as many."""
-    return jax.tree.map(lambda x: jnp.stack([jnp.asarray(x, dtype=float)] * 2, axis=-1), tree)
+    states = jax.tree.map(lambda x: jnp.stack([jnp.asarray(x, dtype=float)] * 2, axis=-1), state)
+    return begin(model.at_speed(speed), states, step)
 
 
 @jitted
@@ -111,7 +106,7 @@ def _run(
     implicit: bool,
 ) -> tuple[Lanes, tuple[Array, ...]]:
     """One span after the other; what there was at each end, peaks, errors and steps between."""
-    at, scale = _twice((model.at_speed(speed), state_scale(model, speed)))
+    at, scale = model.at_speed(speed), state_scale(model, speed)
     slowest = jnp.abs(at.rolling_cage_speed) * (STALLED if by == "angle" else 0.0)
     controls = Controls(tolerance * jnp.array([1.0, HALF]), limits[1], limits[2], MOST_STEPS, slowest)
 
@@ -127,7 +122,7 @@ def _run(
         )
         failed = (fresh.outcome != 0) & (fresh.outcome != INACCURATE)
         after = advance(at, scale, fresh, jnp.where(failed, 0.0, span), controls, by, implicit)
-        apart = jax.tree.map(lambda x, s: jnp.max(jnp.abs(x[..., 0] - x[..., 1]) / s[..., 0]), after.state, scale)
+        apart = jax.tree.map(lambda x, s: jnp.max(jnp.abs(x[..., 0] - x[..., 1]) / s), after.state, scale)
         error = jnp.maximum(apart.rollers, apart.bodies)
         return after, (after.packed[:, 0], after.peaks[:, 0], error, after.error[0], after.steps[0])
 

@@ -59,7 +59,7 @@ def implicit_step(
     begin, moved, passing = _apart(numbers)[0], *_paced(rates, over_angle)
     blocks = arrow(at, begin, over_angle)
     held = factors(blocks, 1 / (RODAS4.gamma * h))
-    added = lambda row, u: jax.tree.map(lambda x: jnp.tensordot(row, x, 1), u)
+    added = lambda row, u: jax.tree.map(lambda x: jnp.sum(row.reshape(-1, *[1] * (x.ndim - 1)) * x, axis=0), u)
 
     def stage(i: Array, carry: Any) -> Any:
         """A stage; the last one is the end of the step."""

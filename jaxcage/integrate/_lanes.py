@@ -5,6 +5,7 @@ whose estimated error is above the tolerance in any part of the state. Lanes are
 stages a loop, so that a step is compiled once however many rollers and lanes there are.
 """
 
+import functools
 from typing import Any, Literal, NamedTuple
 
 import jax
@@ -104,7 +105,7 @@ def begin(at: BearingAtSpeed, state: BearingState, step: Scalar) -> Lanes:
     """Lanes at their beginning."""
     lanes = state.bodies.shape[-1]
     y = packed(state, jnp.zeros((INTEGRALS, lanes)))
-    y, rates, peaks = _over(_field, at, y)
+    y, rates, peaks = _over(functools.partial(_field, at), y)
     count = jnp.zeros((lanes,), jnp.int32)
     return Lanes(y, rates, peaks, jnp.ones((lanes,)) * step, jnp.zeros((lanes,)), count, count, count)
 
@@ -120,11 +121,11 @@ def advance(
 ) -> Lanes:
     """Every lane over its `span`, in as many steps as it needs.
 
-    **Arguments:** laws and scale of each lane, with lanes last; lanes; how far [rad or s]; controls; whether steps are
+    **Arguments:** laws and scale, the same for all lanes; lanes; how far [rad or s]; controls; whether steps are
     implicit (not with a quasi-static inner ring).
     """
     n_state = lanes.packed.shape[0] - INTEGRALS
-    units = 1 / packed(scale, jnp.ones((INTEGRALS, span.size)))[: n_state - 2]
+    units = 1 / packed(scale, jnp.ones(INTEGRALS))[: n_state - 2]
     step = _implicit_step if implicit else _explicit_step
 
     def attempt(carry: tuple[Lanes, Array]) -> tuple[Lanes, Array]:
@@ -132,7 +133,7 @@ def advance(
         left = span - done
         h = jnp.where(left <= lanes.step, left, jnp.where(left < 2 * lanes.step, left / 2, lanes.step))
         found, estimate = step(at, lanes, h, by)
-        error = _over(lambda e, u: jnp.max(jnp.abs(e) * u), estimate[: n_state - 2], units)
+        error = _over(lambda e: jnp.max(jnp.abs(e) * units), estimate[: n_state - 2])
         error = jax.lax.stop_gradient(error)
         new, done = _accepted(lanes, found, h, left, error, done, span, controls)
         lost = (jnp.abs(new.rates[n_state - 2]) < controls.slowest) | (new.peaks[-1] > FAR)
@@ -160,7 +161,7 @@ def _explicit_step(at: BearingAtSpeed, lanes: Lanes, h: Array, by: By) -> tuple[
         _, _, k, total = c
         share, weight = jnp.asarray((0.5, 0.5, 1.0, 0.0))[i], jnp.asarray((2.0, 2.0, 1.0, 0.0))[i]
         way = jnp.where(i == 3, total / 6, share * k)  # the last stage is the first of the next step
-        moved, rates, peaks = _over(_field, at, move(y, h, way))
+        moved, rates, peaks = _over(functools.partial(_field, at), move(y, h, way))
         new = slope(rates)
         return (moved, rates, peaks), k, new, total + weight * new
 
@@ -171,11 +172,11 @@ def _explicit_step(at: BearingAtSpeed, lanes: Lanes, h: Array, by: By) -> tuple[
 def _implicit_step(at: BearingAtSpeed, lanes: Lanes, h: Array, by: By) -> tuple[Found, Array]:
     """The same by an implicit method."""
 
-    def lane(at: BearingAtSpeed, numbers: Array, rates: Array, h: Array) -> tuple[Found, Array]:
+    def lane(numbers: Array, rates: Array, h: Array) -> tuple[Found, Array]:
         end, after, error, peaks = implicit_step(at, unpacked(numbers), unpacked(rates), h, by == "angle")
         return (packed(*end), packed(*after), peaks), jnp.append(error.rollers.T.ravel(), error.bodies[:-1])
 
-    return _over(lane, at, lanes.packed, lanes.rates, jnp.where(h > 0, h, 1.0))
+    return _over(lane, lanes.packed, lanes.rates, jnp.where(h > 0, h, 1.0))
 
 
 def _accepted(
