@@ -42,7 +42,6 @@ from ._film import (
     fixed_half_resistance as fixed_half_resistance,
     full_resistance as full_resistance,
     half_circle_resistance as half_circle_resistance,
-    polar_resistance as polar_resistance,
     short_film_force as short_film_force,
     supply_force as supply_force,
 )
@@ -115,7 +114,7 @@ check_layer(
     "approach_speed contact_force contact_slopes cross_force cubic_stiffness effective_eccentricity "
     "film_drive film_pressure film_pressure_field film_resistance film_scale finite_film_force "
     "fixed_half_resistance full_resistance half_circle_resistance impact_history impact_time_scale inverse_root "
-    "polar_resistance power_10_9 pressure_force pulse_spectrum pulse_train pulse_train_force "
+    "power_10_9 pressure_force pulse_spectrum pulse_train pulse_train_force "
     "restitution_damping rib_force root_9 short_film_excess short_film_force smooth_norm smooth_plus "
     "smooth_plus_slope solve_ring spring_force supply_force support_slopes synchronous_amplitude "
     "synchronous_force unbalance_force weight",

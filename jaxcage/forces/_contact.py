@@ -12,7 +12,7 @@ from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
-from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows, turned
+from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows
 from ._smooth import power_10_9, root_9, smooth_plus, smooth_plus_slope
 
 
@@ -123,12 +123,17 @@ class ContactForce(AbstractForce):
         return -normal * at.nx, -normal * at.ny, 0.0
 
     def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
-        """Closed form, in the frame (n, t) of the line of centres."""
+        """Closed form: a displacement u turns the line of centres n by (u - n n.u)/eps."""
         at, c = motion.place, motion.land.clearance
-        rate = c * (at.nx * at.vx + at.ny * at.vy)
-        normal = contact_force(c * at.excess, rate, self.stiffness, self.damping)
-        stiff, damp = contact_slopes(c * at.excess, rate, self.stiffness, self.damping)
-        slip = (at.nx * at.vy - at.ny * at.vx) * at.per_eps
-        of_q = ((-stiff * at.touch, -damp * slip), (0.0, -normal * motion.land.per_clearance * at.per_eps))
-        of_v = ((-damp, 0.0), (0.0, 0.0))
-        return turned(of_q, at.nx, at.ny), turned(of_v, at.nx, at.ny)
+        nx, ny, rate = at.nx, at.ny, at.nx * at.vx + at.ny * at.vy
+        normal = contact_force(c * at.excess, c * rate, self.stiffness, self.damping)
+        stiff, damp = contact_slopes(c * at.excess, c * rate, self.stiffness, self.damping)
+        swing, turn = damp * at.per_eps, normal * motion.land.per_clearance * at.per_eps
+        push = stiff * at.touch - swing * rate
+        of_x, of_y = push * nx + swing * at.vx, push * ny + swing * at.vy
+        xx, xy, yy = nx * nx, nx * ny, ny * ny
+        of_q = (
+            (-nx * of_x - turn * (1 - xx), turn * xy - nx * of_y),
+            (turn * xy - ny * of_x, -ny * of_y - turn * (1 - yy)),
+        )
+        return of_q, ((-damp * xx, -damp * xy), (-damp * xy, -damp * yy))

@@ -44,6 +44,24 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
 
 
+class FixedArc(NamedTuple):
+    """What M of a fixed arc is made of: M = isotropic I + radial r r^T - skew (n r'^T + r' n^T) with r' = (-y, x)."""
+
+    inverse: Scalar
+    """1 / (1 - eps^2)."""
+    isotropic: Scalar
+    radial: Scalar
+    skew: Scalar
+
+
+def fixed_arc(model: ShortFilm, square: Scalar) -> FixedArc:
+    """The parts of M for the fixed half circle or the whole one, at the square of the eccentricity ratio."""
+    inverse = 1 / (1 - square)
+    half = model == "fixed_half"
+    isotropic = (jnp.pi / 2 if half else jnp.pi) * inverse * jnp.sqrt(inverse)
+    return FixedArc(inverse, isotropic, 3 * isotropic * inverse, 2 * inverse * inverse if half else 0 * inverse)
+
+
 def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance:
     """M over the half circle that trails the line of centres (alpha from 0 to pi), as in (27).
 
@@ -51,10 +69,7 @@ def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance
     the centre).
     """
     nx, ny = direction
-    inverse = 1 / (1 - (x * x + y * y))
-    isotropic = (jnp.pi / 2) * inverse * jnp.sqrt(inverse)
-    radial = 3 * isotropic * inverse
-    skew = 2 * inverse * inverse
+    _, isotropic, radial, skew = fixed_arc("fixed_half", x * x + y * y)
     return Resistance(
         isotropic + radial * x * x + 2 * skew * nx * y,
         radial * x * y - skew * (nx * x - ny * y),
@@ -62,39 +77,9 @@ def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance
     )
 
 
-class PolarResistance(NamedTuple):
-    """M of a fixed arc in the frame (n, t) of the line of centres: M = a I + b n n^T - g (n t^T + t n^T).
-
-    Each coefficient depends on the eccentricity ratio alone; `d_` are derivatives with respect to it.
-    """
-
-    a: Scalar
-    b: Scalar
-    g: Scalar
-    d_a: Scalar
-    d_b: Scalar
-    d_g: Scalar
-
-
-def polar_resistance(model: ShortFilm, eps: Scalar) -> PolarResistance:
-    """Coefficients of `fixed_half_resistance` or `full_resistance`, and how they change with eccentricity ratio."""
-    inverse = 1 / (1 - eps * eps)
-    a = (jnp.pi / 2 if model == "fixed_half" else jnp.pi) * inverse * jnp.sqrt(inverse)
-    steep = eps * inverse
-    d_a = 3 * steep * a
-    if model == "full":
-        g = d_g = jnp.zeros_like(inverse)
-    else:
-        g = 2 * steep * inverse
-        d_g = 2 * inverse * inverse * (1 + 4 * eps * steep)
-    return PolarResistance(a, eps * d_a, g, d_a, d_a * (2 + 5 * eps * steep), d_g)
-
-
 def full_resistance(x: Scalar, y: Scalar) -> Resistance:
     """M over the whole circle: pressure of both signs (full Sommerfeld condition)."""
-    inverse = 1 / (1 - (x * x + y * y))
-    isotropic = jnp.pi * inverse * jnp.sqrt(inverse)
-    radial = 3 * isotropic * inverse
+    _, isotropic, radial, _ = fixed_arc("full", x * x + y * y)
     return Resistance(isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y)
 
 

@@ -11,10 +11,10 @@ from jaxtyping import Array
 
 from .._parameters import choice, count, parameter
 from .._types import Scalar
-from ._film import FilmModel, ShortFilm, film_drive, film_resistance, film_scale, polar_resistance, supply_force
+from ._film import FilmModel, ShortFilm, film_drive, film_resistance, film_scale, fixed_arc, supply_force
 from ._finite_film import finite_film_force
 from ._land import Place
-from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows, turned
+from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows
 from ._smooth import inverse_root
 
 
@@ -94,8 +94,7 @@ class FilmForce(AbstractForce):
     def slopes(self, motion: Motion) -> tuple[Rows, Rows] | None:
         """Closed form for a fixed arc; one solve, differentiated along all four, where the pressure is solved for.
 
-        In the frame (n, t) of the line of centres dn = t (t.u)/eps and dt = -n (t.u)/eps for a displacement u. Exact
-        outside the film's smoothing length of the centre.
+        A displacement u turns the line of centres n by dn = (u - n n.u)/eps and t = (-n_y, n_x), across it, by as much.
         """
         if self.model == "positive_pressure":
             return None
@@ -105,24 +104,42 @@ class FilmForce(AbstractForce):
         nx, ny, per_eps = place.nx, place.ny, place.per_eps
         px, py = film_drive(place.x, place.y, place.vx, place.vy, omega)
         p_n, p_t = nx * px + ny * py, nx * py - ny * px
-        m = polar_resistance(self.model, place.eps - place.excess)
-        open_ = 1 - place.touch  # how much of a change of eps the film's coefficients see
+        # The film is at w n, shorter than the cage's place by the excess, and than w by the length that rounds n off.
+        w, open_, length = place.eps - place.excess, 1 - place.touch, nx * nx + ny * ny
+        inverse, isotropic, radial, skew = fixed_arc(self.model, w * w * length)
+        steep = w * (w * (1 - length) * per_eps + length * open_)  # half of the square's derivative along n
+        # M P = isotropic P + b n p_n - g (n p_t + t p_n)
+        b, g = radial * w * w, skew * w
+        d_b, d_g = radial * w * (5 * inverse * steep * w + 2 * open_), skew * (4 * inverse * steep * w + open_)
+        of_pn = ((px - p_n * nx) * per_eps - omega * ny, (py - p_n * ny) * per_eps + omega * nx)
+        of_pt = ((py - p_t * nx) * per_eps - omega * nx, (-px - p_t * ny) * per_eps - omega * ny)
+        along_n, along_t = d_b * p_n - d_g * p_t, d_g * p_n
+        of_n = [along_n * n + b * x - g * y for n, x, y in zip((nx, ny), of_pn, of_pt, strict=True)]
+        of_t = [along_t * n + g * x for n, x in zip((nx, ny), of_pn, strict=True)]
         half = -self.scale / 2 * per_c
-        at_centre, turning = p_n * per_eps, p_t * per_eps
-        thrust = self.supply_scale * per_c * per_eps * (2 if self.model == "fixed_half" else 0)
+        thrust = 2 * self.supply_scale * per_c if self.model == "fixed_half" else 0.0
+        swelling, turning = radial * steep, (b * p_n - g * p_t) * per_eps
+        across = (thrust - half * g * p_n) * per_eps
+        shear = isotropic * omega
         of_q = (
             (
-                half * (open_ * ((m.d_a + m.d_b) * p_n - m.d_g * p_t) + m.g * omega),
-                half * ((m.a + m.b) * omega + m.b * turning + 2 * m.g * at_centre) - thrust,
+                half * (swelling * px * nx + turning * (1 - nx * nx) + nx * of_n[0] + ny * of_t[0]) + across * nx * ny,
+                half * (swelling * px * ny + shear - turning * nx * ny + nx * of_n[1] + ny * of_t[1])
+                - across * (1 - ny * ny),
             ),
             (
-                half * (open_ * (m.d_a * p_t - m.d_g * p_n) - m.a * omega),
-                half * (m.b * at_centre - m.g * (2 * turning + omega)),
+                half * (swelling * py * nx - shear - turning * nx * ny + ny * of_n[0] - nx * of_t[0])
+                + across * (1 - nx * nx),
+                half * (swelling * py * ny + turning * (1 - ny * ny) + ny * of_n[1] - nx * of_t[1]) - across * nx * ny,
             ),
         )
-        drag = 2 * half
-        of_v = ((drag * (m.a + m.b), -drag * m.g), (-drag * m.g, drag * m.a))
-        return turned(of_q, nx, ny), turned(of_v, nx, ny)
+        drag, skewed = 2 * half, 2 * g * nx * ny
+        xy = drag * (b * nx * ny - g * (nx * nx - ny * ny))
+        of_v = (
+            (drag * (isotropic + b * nx * nx + skewed), xy),
+            (xy, drag * (isotropic + b * ny * ny - skewed)),
+        )
+        return of_q, of_v
 
     def _solved_slopes(self, motion: Motion) -> tuple[Rows, Rows]:
         def held(state: Array) -> Array:

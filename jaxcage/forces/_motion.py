@@ -117,14 +117,3 @@ class AbstractForcing(AbstractForce):
     def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
         none = ((0.0, 0.0), (0.0, 0.0))
         return none, none
-
-
-def turned(k: Rows, nx: Scalar, ny: Scalar) -> Rows:
-    """A matrix in the frame (n, t), with t = (-ny, nx), in Cartesian coordinates."""
-    (nn, nt), (tn, tt) = k
-    xx, xy, yy = nx * nx, nx * ny, ny * ny
-    both = nt + tn
-    return (
-        (nn * xx - both * xy + tt * yy, (nn - tt) * xy + nt * xx - tn * yy),
-        ((nn - tt) * xy + tn * xx - nt * yy, nn * yy + both * xy + tt * xx),
-    )

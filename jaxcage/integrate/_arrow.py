@@ -145,9 +145,9 @@ def _of_roller(over_angle: bool) -> Law:
 def _of_bodies(over_angle: bool) -> Law:
     """Rates of the bodies and of what is integrated beside them, by themselves and what all rollers pass on."""
 
-    def f(at: BearingAtSpeed, _: Sequence[Any], y: Sequence[Any]) -> list[Any]:
+    def f(at: BearingAtSpeed, none: Sequence[Any], y: Sequence[Any]) -> list[Any]:
         cage, sums = Bodies(*y[: OF_BODIES - 1]), Passed(*y[OF_BODIES:])
-        rates, beside, _ = at.body_rates(cage, cos_sin(y[OF_BODIES - 1]), sums, at.on_land(cage))
+        rates, beside, *_ = at.body_rates(cage, cos_sin(y[OF_BODIES - 1]), sums, at.on_land(cage))
         return _paced([*rates, cage.cage_speed, jnp.ones_like(cage.cage_speed), *beside], cage, over_angle)
 
     return f

@@ -19,6 +19,8 @@ REVOLUTION = 2 * math.pi
 STEPS = 512
 """Fewest steps of a revolution."""
 TOLERANCE = 1e-11
+PARTS = 32
+"""Of a revolution, after each of which a tangent is made 1 long again."""
 ESCAPE = 2.0
 """Eccentricity ratio beyond which the cage is outside."""
 STEP = 1e-20
@@ -171,7 +173,8 @@ def growth(
     """Logarithm of the growth of a tangent vector in each of `count` revolutions: its mean is the largest exponent.
 
     The variational equation is integrated with the state; its right-hand side is the imaginary part of the field at
-    y + i h w, exact to rounding. The vector is renormalised after every revolution.
+    y + i h w, exact to rounding. The vector is made 1 long again in between: the tolerance is that of
+    such a vector, and one that shrinks a lot is lost in it.
 
     **Arguments:** as for `revolutions`, and the vector at the beginning, in units of the scale.
     """
@@ -186,12 +189,13 @@ def growth(
     w = np.random.default_rng(0).normal(size=n) if direction is None else np.asarray(direction, dtype=float)
     z = np.concatenate([np.asarray(state, dtype=float) / unit, w / np.linalg.norm(w)])
     found = []
-    for _ in range(count):
-        z = _one(field, f, z, method, tolerance, steps)[1][:, -1]
+    edges = np.linspace(0.0, REVOLUTION, PARTS + 1)
+    for span in [*zip(edges[:-1], edges[1:], strict=True)] * count:
+        z = _one(field, f, z, method, tolerance, steps, span)[1][:, -1]
         size = np.linalg.norm(z[n:])
         z[n:] /= size
         found.append(math.log(size))
-    return np.array(found)
+    return np.reshape(found, (count, PARTS)).sum(axis=1)
 
 
 class Confirmed(NamedTuple):
