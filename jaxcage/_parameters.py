@@ -7,6 +7,7 @@ What is declared here once is used by the configuration reader (units, ranges, u
 import dataclasses
 import functools
 import math
+import reprlib
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any, Literal, TypeVar
@@ -331,7 +332,7 @@ def allowed(info: ParameterInfo) -> str:
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
     """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
     if isinstance(value, _NO_NUMBERS):
-        raise ArgumentError(name, said=f"{allowed(info)}, but {value!r} was given.")
+        raise ArgumentError(name, said=f"{allowed(info)}, but {reprlib.repr(value)} was given.")
     if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
         return
     numbers = np.asarray(value, dtype=float)

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import math
+import reprlib
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any, overload
@@ -36,7 +37,7 @@ def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> 
     """
     for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
         if wrong("", float, value) or not math.isfinite(value):
-            raise ArgumentError(name, said=f"must be a finite number, but {value!r} was given.")
+            raise ArgumentError(name, said=f"must be a finite number, but {reprlib.repr(value)} was given.")
     if said := wrong("count", int, count):
         raise ArgumentError("count", said=f"must be {said}, but {count!r} was given.")
     if last is None:
