@@ -41,7 +41,7 @@ TOLERANCE = 1e-5
 """Of a step, in units of the state's scale."""
 RATE = 0.5
 """Revolutions a second, about."""
-SWEEPING = 15.0
+SWEEPING = 30.0
 """Revolutions of lanes that a core makes in a second in a sweep, about, exponents with them."""
 
 
