@@ -20,7 +20,7 @@ class Place(NamedTuple):
     """Eccentricity ratio."""
     per_eps: Scalar
     nx: Scalar
-    """Line of centres, a unit vector."""
+    """Line of centres, a unit vector but for what rounds it off at the centre."""
     ny: Scalar
     gap: Scalar
     """How far eps is beyond the onset of contact, negative before it."""

@@ -120,6 +120,7 @@ def _changes(
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0, 1))
 def _in_lanes(kernel: Callable[..., list[Any]], results: int, shared: list[Array], lanes: list[Array]) -> list[Array]:
+    """`lanewise` with derivatives."""
     return list(lanewise(kernel, results, shared, lanes))
 
 

@@ -173,8 +173,8 @@ def growth(
     """Logarithm of the growth of a tangent vector in each of `count` revolutions: its mean is the largest exponent.
 
     The variational equation is integrated with the state; its right-hand side is the imaginary part of the field at
-    y + i h w, exact to rounding. The vector is made 1 long again in between: the tolerance is that of
-    such a vector, and one that shrinks a lot is lost in it.
+    y + i h w, exact to rounding. The vector is made 1 long again many times in a revolution: the
+    tolerance is that of such a vector, and one that has shrunk a lot is lost in it.
 
     **Arguments:** as for `revolutions`, and the vector at the beginning, in units of the scale.
     """
