@@ -45,6 +45,7 @@ from ._bearing_blocks import (
 from ._bearing_step import FOLLOWED as FOLLOWED, INTEGRATED as INTEGRATED
 from ._controlled import (
     DEFAULT_ERROR as DEFAULT_ERROR,
+    SURE as SURE,
     ControlledSteps as ControlledSteps,
     controlled as controlled,
     finer as finer,

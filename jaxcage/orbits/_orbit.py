@@ -15,7 +15,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
-from ..integrate import AbstractMethod, FixedSteps, compiled, strobe_map
+from ..integrate import SURE, AbstractMethod, FixedSteps, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
 from ._liouville import divergence_integral
@@ -64,11 +64,11 @@ class OrbitEquations(AbstractMapEquations):
         return OrbitEquations(by_steps(self.problem, steps), self.frame)
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """By the change of the map, and of its derivative over its own size."""
+        """By the change of the map, stated with the margin that lanes have, and of its derivative over its own size."""
         n = self.problem.dimension
         image = abs(fine @ moved[..., None])[..., 0].max(-1)
         size = lambda m: abs(m[..., :n, :n]).max((-2, -1))
-        return image, image / IMAGE + size(fine - coarse) / (1 + size(fine)) / SLOPE
+        return SURE * image, image / IMAGE + size(fine - coarse) / (1 + size(fine)) / SLOPE
 
 
 class Orbit(eqx.Module):
@@ -90,8 +90,9 @@ class Orbit(eqx.Module):
     steps: Int[Array, ""]
     """Steps per revolution; 1 where the method has no such number."""
     error: Float[Array, ""]
-    """Largest component of the change of P at the orbit against half as many steps, in units of the system's scale;
-    infinite where there is no orbit by these, NaN where the method has no number of steps."""
+    """Three times the largest component of the change of P at the orbit against half as many steps, in units of the
+    system's scale: at a grazing contact one difference of steps may be too small by chance. Infinite where there is no
+    orbit by these, NaN where the method has no number of steps."""
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
     periods: Int[Array, ""]

@@ -107,7 +107,7 @@ def try_readings(
     models: Mapping[str, CageModel],
     *,
     readings: Sequence[Reading] = READINGS,
-    speeds: int = 119,
+    speeds: int = 95,
     discard: int = 300,
     revolutions: int = 300,
     report: Callable[[str, int, int], None] | None = None,
