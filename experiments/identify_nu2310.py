@@ -8,12 +8,14 @@ with a price for every band too many. The first begins with quasi-random designs
 Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
 others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the
 paper. `--check` shows what the ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts;
-with four times the steps by `--steps 4`, to another horizon by `--horizon 6000`.
+with four times the steps by `--steps 4`, to another horizon by `--horizon 6000`. `--trade-off` runs nothing and shows
+how well the cases go together: what the ledger's designs reach in some of them, and in those left out.
 """
 
 import argparse
 import csv
 import dataclasses
+import itertools
 import json
 import time
 from pathlib import Path
@@ -132,6 +134,25 @@ def check(models: dict[str, jc.CageModel], values: dict[str, float], steps: int,
     print(f"{np.sum(np.array(errors) <= 10)} of {len(errors)} within 10 %, median error {np.median(errors):.1f} %")
 
 
+def trade_off(ledger: Ledger) -> None:
+    """How far off the ledger's designs are in each case and in all choices of cases: means of the score's parts."""
+    reached = [rows for stage in STAGES if (rows := ledger.of(stage.name))]
+    cases = list(PUBLISHED_CASES)
+    off = np.array([[float(row[c]) for c in cases] for row in reached[-1]])
+    mean = lambda some: off[:, list(some)].mean(axis=1)
+    print(f"{len(off)} designs of the stage '{reached[-1][0]['stage']}'\n")
+    print("case  the best for it alone  the best for the other five: in these  in it")
+    for i, case in enumerate(cases):
+        others = mean(set(range(len(cases))) - {i})
+        best = np.argmin(others)
+        print(f"{case:4s}{off[:, i].min():23.3f}{others[best]:39.3f}{off[best, i]:7.3f}")
+    print(f"\n{'cases':5s}  {'that go together best':>22s}  mean  {'that go together worst':>22s}  mean")
+    for n in range(2, len(cases) + 1):
+        best = sorted((mean(some).min(), some) for some in itertools.combinations(range(len(cases)), n))
+        ends = [f"{', '.join(cases[i] for i in some):>22s} {value:.3f}" for value, some in (best[0], best[-1])]
+        print(f"{n:5d}  {'  '.join(ends)}")
+
+
 def search(
     stage: Stage, models: dict[str, jc.CageModel], ledger: Ledger, begin: dict[str, float], until: float, seed: int
 ) -> bool:
@@ -172,6 +193,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--begin", type=Path, help="JSON file of values, instead of the ledger's best")
     parser.add_argument("--check", action="store_true", help="no search: the edges with the values to begin with")
+    parser.add_argument("--trade-off", action="store_true", help="no search: how well the cases go together")
     parser.add_argument(
         "--steps", type=int, default=1, choices=(1, 2, 4, 8), help="of a check: so many times the steps"
     )
@@ -182,6 +204,8 @@ def main() -> None:
     read = dict(each.split("=", 1) for each in given.read)
     models = {name: jc.replace(jc.case(name, "identified"), **read) for name in given.cases}
     ledger = Ledger(given.ledger)
+    if given.trade_off:
+        return trade_off(ledger)
     begin = json.loads(given.begin.read_text()) if given.begin else None
     if given.check:
         return check(models, begin or ledger.best(), given.steps, given.horizon)

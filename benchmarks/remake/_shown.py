@@ -74,6 +74,7 @@ CHAOS = ("Chaotic zones of", "Transient chaos of")
 FIT = "python experiments/identify_nu2310.py --check --cases {0} --begin experiments/case_fits/{0}.json"
 CRISES = "jaxcage gradient 1a --lasting --first 9000 --last 12900 --count 40 --designs 32"
 CHECK = "python experiments/identify_nu2310.py --check"
+TRADE = "python experiments/identify_nu2310.py --trade-off --ledger experiments/lasting_search"
 OPTIMISE = _notebook("optimise_gap_and_balance", "gradient_or_not")
 
 SHOWN = (
@@ -98,6 +99,8 @@ SHOWN = (
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
     Shown("case-fits", REPRODUCTION, [FIT.format(c) for c in CASES], ex.case_fits),
     Shown("lasting-fit", REPRODUCTION, [CHECK, f"{CHECK} --ledger experiments/lasting_search.csv"], ex.lasting_fit),
+    Shown("trade-off", REPRODUCTION, [f"{TRADE}.csv"], ex.printed),
+    Shown("trade-off-physical", REPRODUCTION, [f"{TRADE}_physical.csv"], ex.printed),
     _figure("reproduction-figure", REPRODUCTION, REPRODUCE, "reproduce_7a.png"),
     Shown("readings", REPRODUCTION, ["jaxcage reproduce --quick"], ex.readings),
     Shown("lasting", REPRODUCTION, [f"jaxcage sweep {c}{o}" for c in CASES for o in (" --horizon 0", "")], ex.lasting),

@@ -13,13 +13,14 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod
+from ..integrate import AbstractMethod, Rodas4
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, follow, take
 from ._by_name import SPEED, Parameter, value as value_of
 from ._follower import (
     Follower,
     Start,
+    by_rodas4,
     eigenvalues,
     is_stable,
     make_follower,
@@ -117,6 +118,8 @@ def branch(
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
+    if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
+        follower = by_rodas4(follower)
     state = guess_state(system, known_speed, state)
     (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], periods, steps)
     if found is None:

@@ -15,7 +15,7 @@ from ._arclength import LOOSE, Corrected, Curves, settle_on, stack, take
 from ._by_name import Parameter, with_value
 from ._orbit import OrbitEquations, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
-from ._steps import STIFF_FIRST, Counts, counted
+from ._steps import Counts, counted, stiff
 
 
 Start = tuple[np.ndarray, float]
@@ -95,8 +95,12 @@ def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
     (u,) = seeds(follower, frame, [start]).jacobian
     if np.all(np.isfinite(u)):
         return follower
-    chosen, counts = counted(None, solver="rodas4", first=STIFF_FIRST)
-    return eqx.tree_at(lambda f: (f.problem.method, f.counts), follower, (chosen, counts))
+    return by_rodas4(follower)
+
+
+def by_rodas4(follower: Follower) -> Follower:
+    """The follower with Rodas4, as many steps as are needed."""
+    return eqx.tree_at(lambda f: (f.problem.method, f.counts), follower, stiff())
 
 
 def turned(points: Corrected, sign: Any) -> Corrected:

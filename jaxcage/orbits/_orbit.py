@@ -20,7 +20,7 @@ from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
 from ._liouville import divergence_integral
 from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
-from ._steps import ENOUGH, IMAGE, SLOPE, Counts, by_steps, from_steps, that_serves
+from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
 if TYPE_CHECKING:
@@ -214,9 +214,10 @@ def _find(
         u0 = jnp.append(u0, 1.0)
     equations = OrbitEquations(problem, frame)
     u, found = settled(equations, given, u0, counts, at_root=True)
-    u, equations = jnp.where(found.converged, u, jnp.nan), equations.by_steps(found.steps)
+    converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
+    u, equations = jnp.where(converged, u, jnp.nan), equations.by_steps(found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
-    monodromy = jnp.where(found.converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
+    monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
     state, speed, multipliers = _place(equations, u, monodromy, given)
     expected = divergence_integral(equations.problem.prepare(u, given, frame), state, frame.periods)
     floor = _resolved(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0))
@@ -229,7 +230,7 @@ def _find(
         liouville=jnp.maximum(jnp.linalg.slogdet(monodromy)[1], floor) - jnp.maximum(expected, floor),
         steps=found.steps,
         error=found.error,
-        converged=found.converged,
+        converged=converged,
         iterations=found.iterations,
         periods=frame.periods,
         self_excited=problem.free_speed,
@@ -266,8 +267,8 @@ def periodic_orbit(
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
     - `revolutions`: simulate so many before Newton takes over; by default 200 without a guess and none with one.
     - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
-    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, where that is not
-        stable, by Rodas4 (which only without `jit` and `vmap`).
+    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, where that finds
+        none that stays where it is with more steps, by Rodas4 (which only without `jit` and `vmap`).
 
     **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and
     `vmap`. State, speed and multipliers have derivatives of every order with respect to `system` and `speed`, through
@@ -297,7 +298,7 @@ def periodic_orbit(
         state, speed, multipliers = _place(equations, u, monodromy, given)
         return dataclasses.replace(found, state=state, speed=speed, multipliers=multipliers, monodromy=monodromy)
 
-    return that_serves(find, method)
+    return that_serves(find, method, serves=lambda found: found.converged)
 
 
 def is_free(period: str) -> bool:

@@ -29,7 +29,7 @@ orbit's steps and half as many."""
 POINT = 1e-7
 """The same for the place of a bifurcation, relative."""
 SETTLED = 2e-4
-"""A point whose place changes by more, relative, is not known."""
+"""A point whose place changes by more, relative, is not known; nor an orbit, if its map does, in units of the scale."""
 STIFF_FIRST = 512
 
 
@@ -92,12 +92,22 @@ def by_steps(problem: Problem, steps: Any) -> Problem:
     return eqx.tree_at(lambda p: p.method.steps, problem, jnp.asarray(steps, int))
 
 
-def that_serves(find: Callable[[AbstractMethod, Counts], Any], method: AbstractMethod | None, most: int = MOST) -> Any:
-    """What `find` finds by a method; without one by Runge-Kutta or, where that is not stable, by Rodas4.
+def that_serves(
+    find: Callable[[AbstractMethod, Counts], Any],
+    method: AbstractMethod | None,
+    most: int = MOST,
+    serves: Callable[[Any], Array] = lambda found: jnp.all(jnp.isfinite(found.residual)),
+) -> Any:
+    """What `find` finds by a method; without one by Runge-Kutta or, where that does not serve, by Rodas4.
 
     Which one is a matter of compilation: inside `jit` and `vmap` it is Runge-Kutta.
     """
     found = find(*counted(method, most))
-    if method is not None or isinstance(found.residual, Tracer) or bool(jnp.all(jnp.isfinite(found.residual))):
+    if method is not None or isinstance(found.residual, Tracer) or bool(serves(found)):
         return found
-    return find(*counted(None, most, "rodas4", STIFF_FIRST))
+    return find(*stiff(most))
+
+
+def stiff(most: int = MOST) -> tuple[AbstractMethod, Counts]:
+    """Rodas4 with its number of steps left open, and the numbers to try."""
+    return counted(None, most, "rodas4", STIFF_FIRST)
