@@ -23,6 +23,8 @@ class Reading:
     answer: str
     model: Callable[[CageModel], CageModel] = lambda model: model
     method: Callable[[], AbstractMethod | None] = lambda: None
+    confirm: bool = True
+    """Whether labels are those of finer steps; not where it is asked what these steps show."""
     first_start_only: bool = False
     persist: int = 0
     """Revolutions that chaos must outlast to count."""
@@ -91,8 +93,8 @@ READINGS: tuple[Reading, ...] = (
     Reading("impact", "roller by roller", _roller_pass, _plain),
     Reading("impact", "none", _scaled("amplitude", 0.0)),
     Reading("rib", "elastic", _elastic, _plain),
-    Reading("integration", "Newmark, 64 steps", method=lambda: method("newmark", steps=64)),
-    Reading("integration", "Newmark, 256 steps", method=lambda: method("newmark", steps=256)),
+    Reading("integration", "Newmark, 64 steps", method=lambda: method("newmark", steps=64), confirm=False),
+    Reading("integration", "Newmark, 256 steps", method=lambda: method("newmark", steps=256), confirm=False),
     Reading("start", "the paper's alone", first_start_only=True),
     Reading("chaos", "outlasts 3000 revolutions", persist=3000),
     Reading("speed axis", "shaft speed", cage_per_printed=lambda model: float(model.bearing.cage_speed_ratio)),
@@ -127,6 +129,7 @@ def try_readings(
             starts=starts,
             discard=discard,
             revolutions=revolutions,
+            confirm=reading.confirm,
             horizon=reading.persist,
             method=reading.method(),
         )
