@@ -29,7 +29,7 @@ orbit's steps and half as many."""
 POINT = 1e-7
 """The same for the place of a bifurcation, relative."""
 SETTLED = 2e-4
-"""A point whose place changes by more, relative, is not known; nor an orbit, if its map does, in units of the scale."""
+"""A point whose place changes by more, relative, is not known; nor is an orbit with a larger error."""
 STIFF_FIRST = 512
 
 
