@@ -14,7 +14,6 @@ from benchmarks.remake._excerpts import (
     case_fits,
     every_kind,
     fenced,
-    lasting,
     lasting_fit,
     printed,
     readings,
@@ -214,18 +213,6 @@ def test_readings_of_the_reproduction():
     rows = readings([document(readings=[r | {"edges": edges} for r in (own, one, one | {"case": "1b"})])]).splitlines()
     assert len(rows) == 5 and rows[2].startswith("as the cases have it  ")
     assert rows[3].split() == "film: none 88 % 1 6750 - -".split()
-
-
-def test_what_lasts_of_zone_1():
-    """The zone that shares most speeds with the published one, without a horizon and with it."""
-    published = [{"onset_rpm": 9100.0, "exit_rpm": 12000.0}]
-    zone = lambda a, b: {"onset_rpm": a, "exit_rpm": b}
-    of = dict(case="1a", discard=300, speeds=10, starts=3, published=published)
-    first = document(**of, horizon=0, zones=[zone(6950.0, 12450.0), zone(23950.0, None)], labels={"chaotic": 12})
-    second = document(**of, horizon=3000, zones=[zone(None, 4000.0), zone(9550.0, None)], labels={"chaotic": 9})
-    head, row = lasting([first, second]).splitlines()[1:3]
-    assert head.split() == "case zone 1 published after 300 revolutions after 3000 chaotic lanes".split()
-    assert row.split() == "1a 9100 to 12000 6950 to 12450 9550 to past range 40 -> 30 %".split()
 
 
 def test_fits_of_each_case_and_the_row_of_the_speed_table():

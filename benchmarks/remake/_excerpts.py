@@ -97,32 +97,6 @@ def readings(runs: Sequence[Run]) -> str:
     return aligned([("reading", "chaotic", "zones", *EDGES), *body])
 
 
-def lasting(runs: Sequence[Run]) -> str:
-    """Zone 1 of each case without a horizon and with one: sweeps in pairs."""
-    head = ("case", "zone 1 published", "after {} revolutions", "after {}", "chaotic lanes")
-    rows: list[tuple[str, ...]] = []
-    for first, second in zip(runs[::2], runs[1::2], strict=True):
-        a, b = first.document, second.document
-        zone = a["published"][0]
-        share = lambda d: f"{100 * d['labels'].get('chaotic', 0) / (d['speeds'] * d['starts']):.0f}"
-        of = lambda d, z=zone: _widest(d["zones"], z)
-        published = f"{zone['onset_rpm']:.0f} to {zone['exit_rpm']:.0f}"
-        rows.append((a["case"], published, of(a), of(b), f"{share(a)} -> {share(b)} %"))
-        head = (*head[:2], head[2].format(a["discard"]), head[3].format(b["horizon"]), head[4])
-    return aligned([head, *rows])
-
-
-def _widest(zones: Sequence[dict], published: dict) -> str:
-    """The zone that shares most speeds with a published one."""
-    low, high = (lambda z: z["onset_rpm"] or 0.0), (lambda z: z["exit_rpm"] or 1e9)
-    shared = lambda z: min(high(z), high(published)) - max(low(z), low(published))
-    best = max(zones, key=shared, default=None)
-    if best is None or shared(best) <= 0:
-        return "none"
-    ends = [best["onset_rpm"], best["exit_rpm"]]
-    return " to ".join("past range" if x is None else f"{x:.0f}" for x in ends)
-
-
 def case_fits(runs: Sequence[Run]) -> str:
     """Each case with the constants fitted to it alone, from `identify_nu2310.py --check`."""
     rows = []
