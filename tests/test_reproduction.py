@@ -79,7 +79,14 @@ def test_an_observer_reads_zones_off_a_diagram():
     speeds = np.concatenate([jc.rpm(10400, 10800, 3), jc.rpm(16000, 16400, 3)])
     seen = jc.sweep(model, speeds, starts=1, horizon=0, method=jc.method("rk4", steps=1024))
     assert list(np.char.startswith(seen.label[:, 0], "periodic")) == [False] * 3 + [True] * 3
-    ((found,),) = observed_zones([model], speeds, Observer("late", steps=128, discard=300, drawn=200))
+    late, brief = (
+        Observer("late", steps=128, discard=300, drawn=200),
+        Observer("brief", steps=128, discard=290, drawn=8),
+    )
+    drawn = observed_zones([model], speeds, [late, brief])
+    assert drawn["late"] == observed_zones([model], speeds, [late])["late"]
+    assert drawn["brief"] == [()]  # eight points are no band
+    ((found,),) = drawn["late"]
     assert found.onset is None and found.exit is not None and found.exit.speed_rpm == pytest.approx(13400)
 
 
@@ -143,6 +150,19 @@ def test_readings_change_the_model_and_say_what_came_of_it():
     assert not np.allclose(film.sweep.last, base.sweep.last)
     thin = film.reading.model(model)
     assert float(thin.lubricant.dynamic_viscosity) < 1e-6 * float(model.lubricant.dynamic_viscosity)
+
+
+@pytest.mark.slow
+def test_chaos_that_lasts_and_chaos_at_first_are_read_off_one_sweep():
+    """They differ by the horizon alone: what each says is what it says when it is tried without the other."""
+    model = {"1a": jc.case("1a", "preliminary")}
+    both = [r for r in READINGS if r.case == "1a" and r.question in ("as the cases have it", "chaos")]
+    tried = lambda readings: try_readings(model, readings=readings, speeds=12, discard=60, revolutions=40)
+    first, lasting = tried(both)
+    (alone,) = tried(both[:1])
+    assert first.sweep.escape is None and lasting.sweep.escape is not None
+    assert (first.edges, first.zones, first.chaotic_share) == (alone.edges, alone.zones, alone.chaotic_share)
+    np.testing.assert_array_equal(first.sweep.last, lasting.sweep.last)
 
 
 @pytest.mark.slow

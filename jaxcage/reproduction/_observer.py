@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ..analysis import CLOSE_BELOW_RPM, Edge, Sweep, Zone, close_windows
+from ..analysis import CLOSE_BELOW_RPM, Edge, Zone, close_windows
 from ..integrate import method
 from ..models import CageModel
 from ..sweeps import sweep_designs
@@ -60,35 +60,43 @@ def marks(points: Float[np.ndarray, " points"], size: float) -> int:
     return count
 
 
-def looks_chaotic(swept: Sweep, observer: Observer) -> Bool[np.ndarray, " speeds"]:
-    """Speeds at which the vertical positions of the first start fill more than a few dots; a failed lane does not."""
-    heights = swept.strobe[:, 0, :, 1]
-    return np.array([bool(np.isfinite(y).all()) and marks(y, observer.mark) > observer.dots for y in heights])
+def looks_chaotic(points: Float[np.ndarray, "speeds drawn"], observer: Observer) -> Bool[np.ndarray, " speeds"]:
+    """Speeds at which the vertical positions fill more than a few dots; a failed lane does not."""
+    return np.array([bool(np.isfinite(y).all()) and marks(y, observer.mark) > observer.dots for y in points])
 
 
 def observed_zones(
-    models: Sequence[CageModel], speeds: Float[np.ndarray, " speeds"], observer: Observer
-) -> list[tuple[Zone, ...]]:
-    """The zones of each model that an observer reads off its diagram, at speeds [rad/s] in ascending order."""
-    swept = sweep_designs(
-        models,
-        speeds,
-        starts=1,
-        discard=observer.discard,
-        revolutions=observer.drawn,
-        keep=observer.drawn,
-        blocks=1,
-        exponents=0,
-        confirm=False,
-        horizon=0,
-        method=method("newmark", steps=observer.steps),
-    )
-    return [_zones(s, looks_chaotic(s, observer)) for s in swept]
+    models: Sequence[CageModel], speeds: Float[np.ndarray, " speeds"], observers: Sequence[Observer]
+) -> dict[str, list[tuple[Zone, ...]]]:
+    """The zones of each model that each observer, by name, reads off its diagram, at speeds [rad/s] in ascending order.
+
+    Observers with the same step look at the same motion.
+    """
+    found = {}
+    for steps in dict.fromkeys(o.steps for o in observers):
+        these = [o for o in observers if o.steps == steps]
+        first = min(o.discard for o in these)
+        length = max(o.discard + o.drawn for o in these) - first
+        swept = sweep_designs(
+            models,
+            speeds,
+            starts=1,
+            discard=first,
+            revolutions=length,
+            keep=length,
+            blocks=1,
+            exponents=0,
+            confirm=False,
+            horizon=0,
+            method=method("newmark", steps=steps),
+        )
+        for o in these:
+            drawn = slice(o.discard - first, o.discard - first + o.drawn)
+            found[o.name] = [_zones(s.rpm, looks_chaotic(s.strobe[:, 0, drawn, 1], o)) for s in swept]
+    return found
 
 
-def _zones(swept: Sweep, chaotic: Bool[np.ndarray, " speeds"]) -> tuple[Zone, ...]:
-    rpm = swept.rpm
-
+def _zones(rpm: Float[np.ndarray, " speeds"], chaotic: Bool[np.ndarray, " speeds"]) -> tuple[Zone, ...]:
     def edge(inside: int, outside: int) -> Edge | None:
         if not 0 <= outside < rpm.size:
             return None

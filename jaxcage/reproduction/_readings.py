@@ -115,6 +115,9 @@ def try_readings(
     report: Callable[[str, int, int], None] | None = None,
 ) -> list[ReadingResult]:
     """Sweep the case of each reading, of `models` by name, and compare on the printed axis."""
+    motion = lambda reading: dataclasses.replace(reading, question="", answer="", persist=0)
+    horizon = {motion(r): max(x.persist for x in readings if motion(x) == motion(r)) for r in readings}
+    swept: dict[Reading, Sweep] = {}
     results = []
     for i, reading in enumerate(readings):
         if report is not None:
@@ -122,17 +125,21 @@ def try_readings(
         read = reading.model(models[reading.case])
         ratio = reading.cage_per_printed(read)
         grid = ratio * rpm(*ZONE_RANGE_RPM, speeds)
-        starts = [tuple(float(c) for c in read.starts(float(grid[0]))[0])] if reading.first_start_only else None
-        found = sweep(
-            read,
-            grid,
-            starts=starts,
-            discard=discard,
-            revolutions=revolutions,
-            confirm=reading.confirm,
-            horizon=reading.persist,
-            method=reading.method(),
-        )
+        same = motion(reading)
+        if same not in swept:
+            swept[same] = sweep(
+                read,
+                grid,
+                starts=1 if reading.first_start_only else None,
+                discard=discard,
+                revolutions=revolutions,
+                confirm=reading.confirm,
+                horizon=horizon[same],
+                method=reading.method(),
+            )
+        found = swept[same]
+        if not reading.persist:
+            found = dataclasses.replace(found, escape=None)
         found = dataclasses.replace(found, speed=found.speed / ratio)
         chaotic = zones(found)
         results.append(

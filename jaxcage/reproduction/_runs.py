@@ -76,10 +76,9 @@ def run_all(
         say(f"orbits of {name}", i, len(models))
         found = synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name])
         loss[name] = loss_zones(found)
-    diagrams = {}
-    for i, observer in enumerate(observers):
-        say(f"diagrams, {observer.name}", i, len(observers))
-        diagrams[observer.name] = dict(zip(models, observed_zones(list(models.values()), grid, observer), strict=True))
+    say("diagrams", 0, 1)
+    seen = observed_zones(list(models.values()), grid, observers)
+    diagrams = {observer: dict(zip(models, found, strict=True)) for observer, found in seen.items()}
     say("strobe sections", 0, 1)
     observed = section_revolutions - SECTION_REVOLUTIONS[0]
     blocks = max(n for n in range(1, 21) if observed % n == 0)
