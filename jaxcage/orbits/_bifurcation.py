@@ -70,9 +70,6 @@ class PointEquations(AbstractMapEquations):
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
         return differentiated(self, u, given)
 
-    def by_steps(self, steps: Any) -> "PointEquations":
-        return eqx.tree_at(lambda e: e.problem, self, by_steps(self.problem, steps))
-
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the parameters, a unit of which is a tenth of their size."""
         m = self.problem.equations
@@ -258,7 +255,7 @@ def _find_point(
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, frame, left, right, kind)
     u, found = settled(equations, given, u0, counts, at_root=True)
-    u, equations = jnp.where(found.converged, u, jnp.nan), equations.by_steps(found.steps)
+    u, equations = jnp.where(found.converged, u, jnp.nan), by_steps(equations, found.steps)
     return _describe(equations, u, found, given), equations, u, found.aux
 
 

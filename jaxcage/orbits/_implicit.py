@@ -25,7 +25,7 @@ from .._types import Scalar
 from ..integrate import StrobeMap, compiled
 from ._newton import DampedNewton, NewtonState
 from ._problem import Frame, OrbitProblem, Prepared, ReturnMap, frozen
-from ._steps import GIVEN_UP, Counts
+from ._steps import GIVEN_UP, Counts, by_steps
 
 
 class AbstractEquations(eqx.Module):
@@ -34,18 +34,6 @@ class AbstractEquations(eqx.Module):
     @abc.abstractmethod
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
         """The equations, their derivative, and what else is wanted at the root."""
-
-    @abc.abstractmethod
-    def by_steps(self, steps: Int[Array, ""] | int) -> "AbstractEquations":
-        """The same equations by another number of steps."""
-
-    @abc.abstractmethod
-    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
-
-        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
-        or of NumPy.
-        """
 
 
 class AbstractMapEquations(AbstractEquations):
@@ -64,6 +52,14 @@ class AbstractMapEquations(AbstractEquations):
     ) -> tuple[Float[Array, " n"], Any]:
         """The equations, with the image of the state and its derivatives (see `ReturnMap.pushed`), and what else is
         wanted at the root."""
+
+    @abc.abstractmethod
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
+
+        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
+        or of NumPy.
+        """
 
 
 def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
@@ -90,7 +86,7 @@ class Found(eqx.Module):
     steps: Int[Array, ""]
     """Steps per revolution."""
     error: Float[Array, ""]
-    """Distance to the root by half as many (see `AbstractEquations.apart`), infinite where none was found; NaN where
+    """Distance to the root by half as many (see `AbstractMapEquations.apart`), infinite where none was found; NaN where
     that was not looked at."""
 
 
@@ -129,13 +125,13 @@ def solve(
 
 
 def settled(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+    equations: AbstractMapEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
     """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
 
     **Returns:** the root by the last number of steps, and `Found`.
     """
-    once = lambda steps, u, skip: solve(equations.by_steps(steps), given, u, at_root=at_root, skip=skip)
+    once = lambda steps, u, skip: solve(by_steps(equations, steps), given, u, at_root=at_root, skip=skip)
 
     def turn(carry: tuple) -> tuple:
         i, u, before, done = carry

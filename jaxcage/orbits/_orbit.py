@@ -60,9 +60,6 @@ class OrbitEquations(AbstractMapEquations):
             jacobian = jnp.concatenate([jacobian, jnp.zeros((1, u.size)).at[0, :n].set(frame.phase_direction)])
         return r, jacobian, None
 
-    def by_steps(self, steps: Any) -> "OrbitEquations":
-        return OrbitEquations(by_steps(self.problem, steps), self.frame)
-
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the map, stated with the margin that lanes have, and of its derivative over its own size."""
         n = self.problem.dimension
@@ -215,7 +212,7 @@ def _find(
     equations = OrbitEquations(problem, frame)
     u, found = settled(equations, given, u0, counts, at_root=True)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
-    u, equations = jnp.where(converged, u, jnp.nan), equations.by_steps(found.steps)
+    u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
     monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
     state, speed, multipliers = _place(equations, u, monodromy, given)

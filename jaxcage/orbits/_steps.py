@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
@@ -81,15 +82,14 @@ def from_steps(counts: Counts, steps: Any) -> Counts:
     return counts._replace(first=jnp.where(counts.tolerance > 0, first, counts.first))
 
 
-Problem = TypeVar("Problem", bound=eqx.Module)
+T = TypeVar("T", bound=eqx.Module)
 
 
-def by_steps(problem: Problem, steps: Any) -> Problem:
-    """A problem by so many steps a revolution; as it is where its method has no such number."""
-    method = problem.method  # pyright: ignore[reportAttributeAccessIssue]
-    if not isinstance(method, FixedSteps):
-        return problem
-    return eqx.tree_at(lambda p: p.method.steps, problem, jnp.asarray(steps, int))
+def by_steps(tree: T, steps: Any) -> T:
+    """A problem or equations by so many steps a revolution; as they are where the method has no such number."""
+    fixed = lambda node: isinstance(node, FixedSteps)
+    changed = lambda node: FixedSteps(node.solver, jnp.asarray(steps, int)) if fixed(node) else node
+    return jax.tree.map(changed, tree, is_leaf=fixed)
 
 
 def that_serves(
