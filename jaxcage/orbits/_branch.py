@@ -22,6 +22,7 @@ from ._follower import (
     Start,
     by_rodas4,
     eigenvalues,
+    in_a_row,
     is_stable,
     make_follower,
     seeds,
@@ -219,9 +220,7 @@ def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple
         count = stable.size - 1  # the last point is past the first
         order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
         return take(up.points, order), (up.ended, up.ended)
-    back = turned(take(down.points, np.arange(len(down.points.u) - 1, 0, -1)), -1.0)
-    points = jax.tree.map(lambda a, b: np.concatenate([a, b]), back, up.points)
-    return points, (down.ended, up.ended)
+    return in_a_row(down.points, up.points), (down.ended, up.ended)
 
 
 def describe(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -106,6 +107,12 @@ def by_rodas4(follower: Follower) -> Follower:
 def turned(points: Corrected, sign: Any) -> Corrected:
     """The same points, to be followed the other way where `sign` is -1."""
     return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
+
+
+def in_a_row(back: Corrected, ahead: Corrected) -> Corrected:
+    """The points of two directions from one point as one row, from the end of the first to that of the second."""
+    back = turned(take(back, np.arange(len(back.u) - 1, 0, -1)), -1.0)
+    return jax.tree.map(lambda a, b: np.concatenate([a, b]), back, ahead)
 
 
 def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
