@@ -252,15 +252,19 @@ class Trace(NamedTuple):
     `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step."""
 
 
+def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
+    """Whether the step from u to v goes through one of `points`, to the accuracy of the chord."""
+    step = v - u
+    share = (points - u) @ step / np.dot(step, step)
+    off = np.linalg.norm(u + share[:, None] * step - points, axis=1)
+    return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
+
+
 def _closed(points: list[Corrected]) -> bool:
     """Whether the last step passed the first point in the same direction."""
-    if len(points) < 8:
-        return False
     first, before, last = points[0], points[-2], points[-1]
-    step = last.u - before.u
-    share = np.dot(first.u - before.u, step) / np.dot(step, step)
-    off = np.linalg.norm(before.u + share * step - first.u)
-    return bool(0 < share <= 1 and off < 0.2 * np.linalg.norm(step) and np.dot(step, first.tangent) > 0)
+    same = np.dot(last.u - before.u, first.tangent) > 0
+    return len(points) >= 8 and bool(same) and passes(before.u, last.u, first.u[None])
 
 
 def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:

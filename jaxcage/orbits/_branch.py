@@ -15,7 +15,7 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, Rodas4
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, Trace, follow, take
+from ._arclength import Corrected, Steps, Trace, follow, passes, take
 from ._by_name import SPEED, Parameter, value as value_of
 from ._follower import (
     Follower,
@@ -200,14 +200,6 @@ def follow_both_ways(
     kept = [i for i in range(count) if not taken[i]]
     found = describe(follower, frame, [joined(follower, traces[i], traces[i + count]) for i in kept], kept)
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
-
-
-def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
-    """Whether the step from u to v goes through one of `points`, to the accuracy of the chord."""
-    step = v - u
-    share = (points - u) @ step / np.dot(step, step)
-    off = np.linalg.norm(u + share[:, None] * step - points, axis=1)
-    return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
 
 
 def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
