@@ -172,13 +172,13 @@ def _as_root(given: Any, *, equations: AbstractMapEquations, u: Array, aux: Any)
 def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> Any:
     (given,), (given_dot,) = primals, tangents
     u, aux = _as_root(given, equations=equations, u=u, aux=aux)
-    numbers, moving = eqx.filter_jvp(lambda g: _numbers(equations, u, g), (given,), (given_dot,))
+    numbers, moving = eqx.filter_jvp(lambda g: numbers_around(equations, u, g), (given,), (given_dot,))
     x = jnp.concatenate([u[: equations.frame.scale.size], numbers.k])
     around, slopes = by_columns(x, f=Slopes(Push(frozen(numbers.like), equations.frame)))
     return (u, aux), _moved(equations, u, numbers, around, slopes, moving.k)
 
 
-class _Numbers(NamedTuple):
+class Numbers(NamedTuple):
     """What is known of the field at a root, or its tangent."""
 
     k: Float[Array, " k"]
@@ -188,14 +188,15 @@ class _Numbers(NamedTuple):
 
 
 @compiled
-def _numbers(equations: AbstractMapEquations, u: Array, given: Any) -> _Numbers:
+def numbers_around(equations: AbstractMapEquations, u: Array, given: Any) -> Numbers:
+    """The numbers of the field at the unknowns u, and how they follow from these."""
     row = lambda v: numbers_of(equations.prepare(v, given))[0]
-    return _Numbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
+    return Numbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
 
 
 @compiled
 def _moved(
-    equations: AbstractMapEquations, u: Array, numbers: _Numbers, around: Any, slopes: Any, k_dot: Array
+    equations: AbstractMapEquations, u: Array, numbers: Numbers, around: Any, slopes: Any, k_dot: Array
 ) -> tuple[Array, Any]:
     """Derivatives of a root, and of what else is known there, along `k_dot`."""
     k, k_of_u, like = numbers
