@@ -67,14 +67,11 @@ def account(
     seen = _located(follower, frame, rows, lanes)
     left = lambda i: _gaps(follower, rows[i], [(s.after, s.kind) for s in seen[i]])
     doubtful = [i for i in range(len(rows)) if left(i)]
-    if doubtful:
-        again, of = (
-            [_again(follower, frame, rows[i], lanes[i], left(i)) for i in doubtful],
-            [lanes[i] for i in doubtful],
-        )
-        again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
-        for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
-            rows[i], seen[i] = row, mine
+    of = [lanes[i] for i in doubtful]
+    again = [_again(follower, frame, rows[i], lanes[i], left(i)) for i in doubtful]
+    again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
+    for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
+        rows[i], seen[i] = row, mine
     for i, lane in enumerate(lanes):
         rows[i], seen[i] = _parted(follower, frame, rows[i], lane, seen[i])
     found = []
@@ -99,20 +96,28 @@ def _parted(
 ) -> tuple[Corrected, list[Seen]]:
     """The orbits with one more between bifurcations that are in the same step, and the bifurcations after theirs."""
     seen = _in_order(row, seen)
-    chord = np.array([b.point.u - a.point.u for a, b in itertools.pairwise(seen)])
-    length = np.linalg.norm(chord, axis=1) if seen[1:] else np.zeros(0)
-    within = np.array([a.after == b.after for a, b in itertools.pairwise(seen)], dtype=bool)
-    after = np.array([s.after for s in seen], dtype=int)
-    pairs = np.flatnonzero(within & (length > APART))
+    far = lambda a, b: np.linalg.norm(b.point.u - a.point.u) > APART
+    close = [a.after == b.after and far(a, b) for a, b in itertools.pairwise(seen)]
+    pairs = np.flatnonzero(close)
     if not pairs.size:
         return row, seen
-    middle = np.stack([seen[k].point.u for k in pairs]) + chord[pairs] / 2
-    steps = np.array([max(seen[k].point.steps, seen[k + 1].point.steps) for k in pairs])
-    got = correct(follower.curves(frame, [lane] * pairs.size), middle, chord[pairs] / length[pairs, None], steps)
-    good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length[pairs] / 2)
-    pairs, got = pairs[good], measured_as(take(got, good), take(row, after[pairs[good]]))
-    row = jax.tree.map(lambda x, y: np.insert(x, after[pairs] + 1, y, axis=0), row, got)
-    return row, [s._replace(after=s.after + int(np.sum(pairs < k))) for k, s in enumerate(seen)]
+    places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(s.point for s in seen))
+    after = np.array([seen[k].after for k in pairs])
+    row, good = _with_middles(follower, frame, row, lane, after, take(places, pairs), take(places, pairs + 1))
+    return row, [s._replace(after=s.after + int(np.sum(pairs[good] < k))) for k, s in enumerate(seen)]
+
+
+def _with_middles(
+    follower: Follower, frame: Frame, row: Corrected, lane: int, after: np.ndarray, one: Corrected, other: Corrected
+) -> tuple[Corrected, np.ndarray]:
+    """The orbits with further ones `after` these, halfway from one to another; and which of them were found."""
+    chord = other.u - one.u
+    length = np.linalg.norm(chord, axis=1)
+    middle, normal = one.u + chord / 2, chord / length[:, None]
+    got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, np.maximum(one.steps, other.steps))
+    good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length / 2)
+    new = measured_as(take(got, good), take(row, after[good]))
+    return jax.tree.map(lambda x, y: np.insert(x, after[good] + 1, y, axis=0), row, new), good
 
 
 def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
@@ -179,16 +184,9 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         after = np.array([k for k in longest if length[k] > APART], dtype=int)
         if not after.size:
             break
-        chord = row.u[after + 1] - row.u[after]
-        middle, normal = row.u[after] + chord / 2, chord / length[after, None]
-        steps = np.maximum(row.steps[after], row.steps[after + 1])
-        got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, steps)
-        between = np.linalg.norm(got.u - middle, axis=1) < length[after] / 2
-        some = np.flatnonzero(got.converged & between)
-        if not some.size:
+        row, good = _with_middles(follower, frame, row, lane, after, take(row, after), take(row, after + 1))
+        if not np.any(good):
             break
-        blank = measured_as(got, take(row, after))
-        row = jax.tree.map(lambda x, y: np.insert(x, after[some] + 1, y[some], axis=0), row, blank)
     return row
 
 
@@ -233,10 +231,8 @@ def count_of(follower: Follower, points: Corrected, circle: float = 1.0) -> np.n
 
 def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
     """Index and kind of each change of sign."""
-    found = []
-    for kind, value in signals(follower, points).items():
-        found += [(int(k), kind) for k in np.flatnonzero(value[:-1] * value[1:] < 0)]
-    return sorted(found)
+    values = signals(follower, points)
+    return sorted((int(k), kind) for kind, f in values.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0))
 
 
 def locate(
