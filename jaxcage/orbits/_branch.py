@@ -21,9 +21,7 @@ from ._follower import (
     Follower,
     Start,
     by_rodas4,
-    eigenvalues,
     in_a_row,
-    is_stable,
     make_follower,
     seeds,
     stable_steps,
@@ -184,7 +182,7 @@ def follow_both_ways(
         walked[lane] = points
         own = lane % count
         step = points[-2].u, points[-1].u
-        calm = is_stable(eigenvalues(follower.monodromy(points[-1])), follower.problem.free_speed)
+        calm = follower.unstable(points[-1]) == 0
         unstable[lane] = 0 if calm else unstable[lane] + 1
         if taken[own] or (patience is not None and unstable[lane] >= patience):
             return True
@@ -208,7 +206,7 @@ def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple
     A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
     """
     if up.ended == "closed":
-        stable = is_stable(eigenvalues(follower.monodromy(up.points)), follower.problem.free_speed)
+        stable = follower.unstable(up.points) == 0
         count = stable.size - 1  # the last point is past the first
         order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
         return take(up.points, order), (up.ended, up.ended)
@@ -250,8 +248,8 @@ def _branch(
     ended: tuple[str, str],
 ) -> Branch:
     problem, free = follower.problem, follower.problem.free_speed
-    multipliers = eigenvalues(follower.monodromy(points))
-    stable = is_stable(multipliers, free)
+    multipliers = follower.multipliers(points)
+    stable = follower.unstable(points) == 0
     n = problem.dimension
     scale = np.asarray(frame.scale)
     name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
@@ -265,7 +263,7 @@ def _branch(
     special = []
     before = [found.after for found, _ in seen]
     for i, ((k, kind, p, error), cubic) in enumerate(seen):
-        mu = eigenvalues(follower.monodromy(p))
+        mu = follower.multipliers(p)
         direction = np.zeros(n)
         if kind in CRITICAL:
             direction = np.linalg.svd(follower.monodromy(p) - CRITICAL[kind] * np.eye(n))[2][-1]

@@ -14,7 +14,7 @@ from ..models import AbstractForcedSystem
 from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
-from ._follower import Follower, eigenvalues, make_follower
+from ._follower import Follower, make_follower
 from ._point import Point
 from ._singularity import test_functions
 
@@ -116,7 +116,7 @@ def doubled_branch(
 
 
 def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
-    return test_functions(eigenvalues(follower.monodromy(points)))["period-doubling"]
+    return test_functions(follower.multipliers(points))["period-doubling"]
 
 
 def cascade(

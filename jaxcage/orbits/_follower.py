@@ -63,6 +63,18 @@ class Follower(eqx.Module):
         n = self.problem.dimension
         return points.jacobian[..., :n, :n] + np.eye(n)
 
+    def multipliers(self, points: Corrected) -> np.ndarray:
+        """Those of each orbit, the largest first."""
+        return eigenvalues(self.monodromy(points))
+
+    def unstable(self, points: Corrected, circle: float = 1.0) -> Any:
+        """How many multipliers of each orbit are outside a circle, without the one at 1 of a self-excited orbit."""
+        multipliers = self.multipliers(points)
+        size = np.abs(multipliers)
+        if self.problem.free_speed:
+            np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
+        return np.sum(~(size < circle), axis=-1)
+
 
 def make_follower(
     system: AbstractForcedSystem,
@@ -94,9 +106,7 @@ def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
         return follower
     frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
     (u,) = seeds(follower, frame, [start]).jacobian
-    if np.all(np.isfinite(u)):
-        return follower
-    return by_rodas4(follower)
+    return follower if np.all(np.isfinite(u)) else by_rodas4(follower)
 
 
 def by_rodas4(follower: Follower) -> Follower:
@@ -119,16 +129,3 @@ def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
     """Multipliers, the largest first."""
     mu = np.linalg.eigvals(monodromy).astype(complex)
     return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
-
-
-def unstable_count(multipliers: np.ndarray, free: bool, circle: float = 1.0) -> Any:
-    """How many multipliers are outside a circle, without the one at 1 of a self-excited orbit."""
-    size = np.abs(multipliers)
-    if free:
-        np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
-    return np.sum(~(size < circle), axis=-1)
-
-
-def is_stable(multipliers: np.ndarray, free: bool) -> Any:
-    """Whether all multipliers are inside the unit circle, but for the one at 1 of a self-excited orbit."""
-    return unstable_count(multipliers, free) == 0

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
-from ._follower import Follower, eigenvalues, unstable_count
+from ._follower import Follower
 from ._illinois import LOCATED, zeros
 from ._point import UNEXPLAINED
 from ._problem import Frame
@@ -77,7 +77,7 @@ def account(
     found = []
     for i, (row, mine) in enumerate(zip(rows, seen, strict=True)):
         for a, b in left(i):
-            k = a + int(np.argmax(np.diff(count_of(follower, row)[a : b + 1]) != 0))
+            k = a + int(np.argmax(np.diff(follower.unstable(row)[a : b + 1]) != 0))
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
             middle = take(row, np.array(k))._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Seen(k, UNEXPLAINED, middle, far))
@@ -122,8 +122,8 @@ def _with_middles(
 
 def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
     """Pairs of orbits between which the count of unstable multipliers changes by what was seen does not explain."""
-    count = count_of(follower, row)
-    clear = np.flatnonzero(count_of(follower, row, 1 + CLEAR) == count_of(follower, row, 1 - CLEAR))
+    count = follower.unstable(row)
+    clear = np.flatnonzero(follower.unstable(row, 1 + CLEAR) == follower.unstable(row, 1 - CLEAR))
     found = []
     for a, b in zip(clear[:-1].tolist(), clear[1:].tolist(), strict=True):
         crossing = sum(2 if kind == "Neimark-Sacker" else 1 for k, kind in seen if a <= k < b)
@@ -135,7 +135,7 @@ def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -
 
 def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     """What was seen, without products of two multipliers that pass 1 while no complex pair leaves the circle."""
-    mu = eigenvalues(follower.monodromy(row))
+    mu = follower.multipliers(row)
     pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
     return [(k, kind) for k, kind in brackets(follower, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
@@ -143,7 +143,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     """Steps over which a test function may vanish twice: two special points of a kind, whose effects on the count may
     cancel."""
-    tests = test_functions(eigenvalues(follower.monodromy(row)))
+    tests = test_functions(follower.multipliers(row))
     if follower.problem.free_speed:
         del tests["fold"]  # zero along the branch
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
@@ -209,24 +209,19 @@ def _located(follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes:
     places = locate(follower, frame, [(lanes[i], rows[i], k, kind) for i, k, kind in wanted])
     seen: list[list[Seen]] = [[] for _ in rows]
     for (i, k, kind), place in zip(wanted, places, strict=True):
-        if place is not None and matches(kind, eigenvalues(follower.monodromy(place[0]))):
+        if place is not None and matches(kind, follower.multipliers(place[0])):
             seen[i].append(Seen(k, kind, *place))
     return seen
 
 
 def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
     """Functions along a branch that change sign at its special points."""
-    tests = test_functions(eigenvalues(follower.monodromy(points)))
+    tests = test_functions(follower.multipliers(points))
     tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
     tests["fold"] = points.tangent[..., -1]
     if follower.problem.free_speed:
         del tests["branch-point"]
     return tests
-
-
-def count_of(follower: Follower, points: Corrected, circle: float = 1.0) -> np.ndarray:
-    """How many multipliers of each orbit are outside a circle."""
-    return unstable_count(eigenvalues(follower.monodromy(points)), follower.problem.free_speed, circle)
 
 
 def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
