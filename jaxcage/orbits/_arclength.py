@@ -198,17 +198,17 @@ def correct(
     return points._replace(error=error, over=over, moved=far)
 
 
-def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0, allowed: float = 1.0) -> Corrected:
+def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any) -> Corrected:
     """Points of many curves on planes across them, by as many steps as each needs.
 
-    **Arguments:** as for `correct`; the numbers of steps to begin with; how large `over` may be.
+    **Arguments:** as for `correct`; the numbers of steps to begin with.
     """
     first = int(curves.counts.first if curves.chooses else curves.counts.last)
     count = np.maximum(np.broadcast_to(steps, at.shape[0]), first)
     found = correct(curves, at, normal, count, measured=True)
     while curves.chooses:
         given_up = ~found.converged & (found.steps >= GIVEN_UP)
-        again = np.flatnonzero(~(found.over <= allowed) & ~given_up & (found.steps < int(curves.counts.last)))
+        again = np.flatnonzero(~(found.over <= LOOSE) & ~given_up & (found.steps < int(curves.counts.last)))
         if not again.size:
             break
         begin = np.where(found.converged[again, None], found.u[again], at[again])

@@ -11,7 +11,7 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
+from ._arclength import Corrected, Steps, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
 from ._follower import Follower, make_follower
@@ -103,7 +103,7 @@ def doubled_branch(
     across[0, : scale.size] = np.asarray(point.direction) / scale
     across /= np.linalg.norm(across)
     while amplitude > SMALLEST_AMPLITUDE:
-        start = settle_on(curves, u + amplitude * across, across, int(point.steps), LOOSE)
+        start = settle_on(curves, u + amplitude * across, across, int(point.steps))
         if start.converged[0] and _doubling(follower, start)[0] > 0 and abs(start.u[0, -1] - u[0, -1]) < 1.0:
             break
         amplitude /= 4

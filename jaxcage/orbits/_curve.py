@@ -15,7 +15,7 @@ from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Curves, Steps, follow, put, settle_on, stack, take
+from ._arclength import Corrected, Curves, Steps, follow, put, settle_on, stack, take
 from ._bifurcation import PointEquations, critical_matrix
 from ._by_name import SPEED, value as value_of
 from ._follower import eigenvalues, in_a_row, turned
@@ -179,7 +179,7 @@ class _Tracer(NamedTuple):
         normal = np.zeros((1, u.size))
         normal[0, -1] = 1.0
         curves = self.curves(1, *stack(null_vectors(a), 1))
-        return settle_on(curves, u[None], normal, steps // 2, LOOSE), curves
+        return settle_on(curves, u[None], normal, steps // 2), curves
 
     def curves(self, count: int, left: Any, right: Any) -> Curves:
         """So many curves with these borders."""

@@ -12,7 +12,7 @@ from jaxtyping import Array
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Curves, settle_on, stack, take
+from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._by_name import Parameter, with_value
 from ._orbit import OrbitEquations, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
@@ -97,7 +97,7 @@ def seeds(follower: Follower, frame: Frame, starts: Sequence[Start], steps: int 
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps, LOOSE)
+    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps)
 
 
 def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
