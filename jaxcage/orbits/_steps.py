@@ -57,17 +57,13 @@ def counted(
 ) -> tuple[AbstractMethod, Counts]:
     """A method with its number of steps left open, and the numbers to try: those of the method and half as many, or,
     without a method, as many as are needed."""
+    chosen = make_method(solver) if method is None else method
+    if not isinstance(chosen, FixedSteps):
+        return chosen, _counts(1, 1, 0.0)
+    left_open = by_steps(chosen, 1)
     if method is None:
-        chosen = make_method(solver)
-        assert isinstance(chosen, FixedSteps)
-        return _open(chosen), _counts(first, most, 1.0)
-    if not isinstance(method, FixedSteps):
-        return method, _counts(1, 1, 0.0)
-    return _open(method), _counts(jnp.maximum(method.steps // 2, 1), method.steps, 0.0)
-
-
-def _open(method: FixedSteps) -> FixedSteps:
-    return FixedSteps(method.solver, jnp.asarray(1, int))
+        return left_open, _counts(first, most, 1.0)
+    return left_open, _counts(jnp.maximum(chosen.steps // 2, 1), chosen.steps, 0.0)
 
 
 def _counts(first: Any, last: Any, tolerance: float) -> Counts:
@@ -86,7 +82,7 @@ T = TypeVar("T", bound=eqx.Module)
 
 
 def by_steps(tree: T, steps: Any) -> T:
-    """A problem or equations by so many steps a revolution; as they are where the method has no such number."""
+    """A method, a problem or equations by so many steps a revolution; as they are where there is no such number."""
     fixed = lambda node: isinstance(node, FixedSteps)
     changed = lambda node: FixedSteps(node.solver, jnp.asarray(steps, int)) if fixed(node) else node
     return jax.tree.map(changed, tree, is_leaf=fixed)
