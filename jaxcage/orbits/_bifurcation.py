@@ -1,7 +1,7 @@
 """Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
 
 import dataclasses
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -135,7 +135,7 @@ def bifurcation(
     require_x64()
     if not reach >= 0:
         raise ArgumentError("reach", said=f"must be at least 0, but {reach:g} was given.")
-    if kind not in get_args(Kind):
+    if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
