@@ -184,11 +184,9 @@ def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
                 beyond = piece.rpm > other.rpm[-1]
                 top = b if b.upper_rpm > a.upper_rpm else a
                 joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
-                rows = (
-                    np.concatenate([other.rpm, piece.rpm[beyond]]),
-                    np.concatenate([other.state, piece.state[beyond]]),
-                )
-                whole[i] = _Piece(joined, *rows)
+                rpm = np.concatenate([other.rpm, piece.rpm[beyond]])
+                state = np.concatenate([other.state, piece.state[beyond]])
+                whole[i] = _Piece(joined, rpm, state)
                 break
         else:
             whole.append(piece)
