@@ -32,7 +32,8 @@ AT_REST = 1e-3
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
-"""Parts of a revolution over which the divergence is integrated, where the method has no steps and where it has."""
+"""Parts of a revolution over which the divergence is integrated: of a method without steps, and of steps that are a
+multiple of so many."""
 
 
 class OrbitEquations(AbstractMapEquations):
