@@ -96,9 +96,8 @@ def _parted(
 ) -> tuple[Corrected, list[Seen]]:
     """The orbits with one more between bifurcations that are in the same step, and the bifurcations after theirs."""
     seen = _in_order(row, seen)
-    far = lambda a, b: np.linalg.norm(b.point.u - a.point.u) > APART
-    close = [a.after == b.after and far(a, b) for a, b in itertools.pairwise(seen)]
-    pairs = np.flatnonzero(close)
+    far = lambda a, b: bool(np.linalg.norm(b.point.u - a.point.u) > APART)
+    pairs = np.flatnonzero([a.after == b.after and far(a, b) for a, b in itertools.pairwise(seen)])
     if not pairs.size:
         return row, seen
     places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(s.point for s in seen))
