@@ -314,13 +314,4 @@ def _zeros(
         both = put(both, other, redone)
     signal = lambda i, points: signals(follower, points)[str(kinds[i])]
     pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
-    there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
-    kept = np.flatnonzero(there).tolist()
-    found: list[Corrected | None] = [None] * len(ends)
-    if kept:
-        of_kept = lambda i, points: signal(kept[i], points)
-        closely = np.broadcast_to(within, len(ends))[kept]
-        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept], closely)
-        for i, p in zip(kept, some, strict=True):
-            found[i] = p
-    return found
+    return zeros(curves, pairs, signal, steps, within)
