@@ -244,31 +244,27 @@ def locate(
     if chooses:
         steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
 
-    def beside(lanes: list[int]) -> list[Corrected | None]:
-        """Where those of these lanes vanish, close to where they did by fewer steps."""
-        placed: list[Corrected | None] = [None] * len(lanes)
-        known = [(j, i, p) for j, i in enumerate(lanes) if (p := found[i]) is not None]
-        if known:
-            some = [i for _, i, _ in known]
-            ends = [_sides(p, 2 * moved[i]) for _, i, p in known]
-            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some], within[some])
-            for (j, _, _), p in zip(known, there, strict=True):
-                placed[j] = p
-        return placed
+    def between(i: int, beyond: int | None) -> Corrected | None:
+        """Points on both sides of it: of the branch, so many orbits further out, or close to where it was found."""
+        _, points, k, _ = wanted[i]
+        if beyond is not None:
+            return take(points, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(points.u) - 1)]))
+        place = found[i]
+        return None if place is None else _sides(place, 2 * moved[i])
 
     def at(lanes: list[int]) -> list[Corrected | None]:
-        """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
-        placed = beside(lanes)
-        for beyond in WIDER:
-            left = [j for j, p in enumerate(placed) if p is None]
-            some = [lanes[j] for j in left]
+        """Where those of these lanes vanish: close to where they did by fewer steps, between the two orbits or, by
+        other steps than theirs, further out."""
+        placed: dict[int, Corrected | None] = dict.fromkeys(lanes)
+        for beyond in (None, *WIDER):
+            ends = {i: e for i in lanes if placed[i] is None and (e := between(i, beyond)) is not None}
+            some = list(ends)
             if some:
-                rows = [(wanted[i][1], wanted[i][2]) for i in some]
-                ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
-                there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])
-                for j, p in zip(left, there, strict=True):
-                    placed[j] = p
-        return placed
+                closely = within[some] if beyond is None else LOCATED
+                mine = [kinds[i] for i in some]
+                there = _zeros(follower, curves.take(some), list(ends.values()), mine, steps[some], closely)
+                placed.update(zip(some, there, strict=True))
+        return list(placed.values())
 
     moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for _, points, k, _ in wanted])
     within = np.full(len(wanted), LOCATED)
@@ -303,7 +299,7 @@ def _zeros(
     ends: Sequence[Corrected],
     kinds: Sequence[str],
     steps: np.ndarray,
-    within: Any = LOCATED,
+    within: Any,
 ) -> list[Corrected | None]:
     """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
     both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
