@@ -24,7 +24,7 @@ from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import Point
 from ._problem import Frame, Given, OrbitProblem, ReturnMap, across_orbit, make_frame
-from ._singularity import Kind, null_vectors
+from ._singularity import Kind, null_vectors, test_functions
 from ._steps import ENOUGH, Counts, by_steps, counted
 
 
@@ -228,25 +228,25 @@ class _Tracer(NamedTuple):
     def signals(self, points: Corrected) -> dict[str, np.ndarray]:
         """Functions along the curve that change sign at codimension-2 points."""
         rows = [_others(self.kind, mu) for mu in eigenvalues(points.aux.monodromy)]
-        product = lambda shift: np.array([np.prod(others + shift).real for others, _ in rows])
-        pairs = np.array([np.prod([a * b - 1 for a, b in itertools.combinations(o, 2)]).real for o, _ in rows])
+        others = test_functions(np.array([o for o, _ in rows]))
+        flip, fold, pairs = (others[kind] for kind in ("period-doubling", "fold", "Neimark-Sacker"))
         found = {"extreme": points.tangent[..., -2]}
         if self.kind == "Neimark-Sacker":
             cosine = np.array([c for _, c in rows])
             found |= {f"1:{k} resonance": cosine - at for k, at in ((1, 1.0), (2, -1.0), (3, -0.5), (4, 0.0))}
             return found | {
-                "fold-Neimark-Sacker": product(-1),
-                "flip-Neimark-Sacker": product(1),
+                "fold-Neimark-Sacker": fold,
+                "flip-Neimark-Sacker": flip,
                 "double Neimark-Sacker": pairs,
             }
         if self.kind == "period-doubling":
-            return found | {"1:2 resonance": product(1), "fold-flip": product(-1), "flip-Neimark-Sacker": pairs}
+            return found | {"1:2 resonance": flip, "fold-flip": fold, "flip-Neimark-Sacker": pairs}
         n = self.problem.dimension
         bend = np.sum(points.jacobian[..., -1, :n] * points.aux.right[..., :n], axis=-1)
         return found | {
             "cusp": bend,
-            "1:1 resonance": product(-1),
-            "fold-flip": product(1),
+            "1:1 resonance": fold,
+            "fold-flip": flip,
             "fold-Neimark-Sacker": pairs,
         }
 
