@@ -157,7 +157,7 @@ def branches(
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
     single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)
-    follower = Follower(single.problem, single.counts, given, lower, upper, single.unit, True)
+    follower = dataclasses.replace(single, given=given, designs=True)
     return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
 
 
