@@ -20,7 +20,7 @@ from ._implicit import AbstractMapEquations, Found, as_root, differentiated, set
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point
-from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, across_orbit, frozen, is_traced, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, across_orbit, frozen, is_traced, make_frame, returned
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 from ._walk import walk
@@ -248,7 +248,7 @@ def _find_point(
         u0 = jnp.where(found.converged, u1, u0)
     u0 = jnp.append(u0, at / unit)
     strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given, frame)
-    _, monodromy = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
+    _, monodromy = returned(strobe, frame, u0[: problem.dimension])
     a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":

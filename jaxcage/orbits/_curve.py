@@ -23,7 +23,7 @@ from ._illinois import zeros
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import Point
-from ._problem import Frame, Given, OrbitProblem, ReturnMap, across_orbit, make_frame
+from ._problem import Frame, Given, OrbitProblem, across_orbit, make_frame, returned
 from ._singularity import Kind, null_vectors, test_functions
 from ._steps import ENOUGH, Counts, by_steps, counted
 
@@ -174,7 +174,7 @@ class _Tracer(NamedTuple):
         u = np.array([*z, *free, *(np.array(values) / self.units)])
         steps = int(point.steps) or min(int(self.counts.last), ENOUGH)
         strobe = by_steps(self.problem, steps).prepare(jnp.asarray(u), self.given, self.frame)
-        _, monodromy = ReturnMap(strobe, self.frame).pushed(jnp.asarray(z))
+        _, monodromy = returned(strobe, self.frame, jnp.asarray(z))
         a = critical_matrix(self.problem, self.kind, strobe, jnp.asarray(z), monodromy, self.frame)
         normal = np.zeros((1, u.size))
         normal[0, -1] = 1.0

@@ -24,7 +24,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._types import Scalar
 from ..integrate import StrobeMap, compiled
 from ._newton import DampedNewton, NewtonState
-from ._problem import Frame, OrbitProblem, Prepared, ReturnMap, frozen
+from ._problem import Frame, OrbitProblem, Prepared, frozen, returned
 from ._steps import GIVEN_UP, Counts, by_steps
 
 
@@ -50,7 +50,7 @@ class AbstractMapEquations(AbstractEquations):
     def closing(
         self, u: Float[Array, " n"], prepared: Prepared, image: Float[Array, " dim"], columns: Float[Array, "dim c"]
     ) -> tuple[Float[Array, " n"], Any]:
-        """The equations, with the image of the state and its derivatives (see `ReturnMap.pushed`), and what else is
+        """The equations, with the image of the state and its derivatives (see `returned`), and what else is
         wanted at the root."""
 
     @abc.abstractmethod
@@ -68,8 +68,8 @@ def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given
     def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
         prepared = equations.prepare(u, given)
         strobe, drifts = prepared
-        pushed = ReturnMap(strobe, equations.frame).pushed(u[: equations.frame.scale.size], drifts)
-        r, aux = equations.closing(u, prepared, *pushed)
+        image, columns = returned(strobe, equations.frame, u[: equations.frame.scale.size], drifts)
+        r, aux = equations.closing(u, prepared, image, columns)
         return r, (r, aux)
 
     jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
@@ -178,7 +178,7 @@ def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations
     return (u, aux), _moved(equations, u, numbers, around, slopes, moving.k)
 
 
-class Numbers(NamedTuple):
+class FieldNumbers(NamedTuple):
     """What is known of the field at a root, or its tangent."""
 
     k: Float[Array, " k"]
@@ -188,15 +188,15 @@ class Numbers(NamedTuple):
 
 
 @compiled
-def numbers_around(equations: AbstractMapEquations, u: Array, given: Any) -> Numbers:
+def numbers_around(equations: AbstractMapEquations, u: Array, given: Any) -> FieldNumbers:
     """The numbers of the field at the unknowns u, and how they follow from these."""
     row = lambda v: numbers_of(equations.prepare(v, given))[0]
-    return Numbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
+    return FieldNumbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
 
 
 @compiled
 def _moved(
-    equations: AbstractMapEquations, u: Array, numbers: Numbers, around: Any, slopes: Any, k_dot: Array
+    equations: AbstractMapEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
 ) -> tuple[Array, Any]:
     """Derivatives of a root, and of what else is known there, along `k_dot`."""
     k, k_of_u, like = numbers
@@ -244,7 +244,7 @@ class Push(eqx.Module):
     def __call__(self, x: Array) -> tuple[Array, Array]:
         n = self.frame.scale.size
         strobe, drifts = numbers_of(self.like)[1](x[n:])
-        return ReturnMap(strobe, self.frame).pushed(x[:n], drifts)
+        return returned(strobe, self.frame, x[:n], drifts)
 
 
 class Slopes(eqx.Module):

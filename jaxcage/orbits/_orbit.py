@@ -18,7 +18,7 @@ from .._types import Scalar, State
 from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
-from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
 from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
@@ -55,7 +55,7 @@ class OrbitEquations(AbstractMapEquations):
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
         problem, frame, n = self.problem, self.frame, self.problem.dimension
         drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
-        image, columns = ReturnMap(problem.prepare(u, given, frame), frame).pushed(u[:n], drifts)
+        image, columns = returned(problem.prepare(u, given, frame), frame, u[:n], drifts)
         r = problem.orbit_residual(u[:n], image, frame)
         jacobian = columns - jnp.eye(n, u.size)
         if problem.free_speed:
