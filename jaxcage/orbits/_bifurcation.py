@@ -61,7 +61,8 @@ class PointEquations(AbstractMapEquations):
         n, m = self.problem.dimension, self.problem.equations
         z, monodromy = u[:n], columns[:, :n]
         closing = self.problem.orbit_residual(z, image, self.frame)
-        g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
+        a = critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame)
+        g, q, p = bordered(a, self.left, self.right)
         known = Singular(monodromy, q, p)
         if not drifts:
             return jnp.append(closing, g), known
@@ -75,10 +76,6 @@ class PointEquations(AbstractMapEquations):
         m = self.problem.equations
         shift = abs(moved[..., m : m + len(self.problem.parameters)]).max(-1)
         return shift, shift / (10 * POINT)
-
-    @property
-    def borders(self) -> tuple[Array, Array]:
-        return self.left, self.right
 
 
 def critical_matrix(
@@ -274,7 +271,8 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     matches = is_critical(kind, multipliers)
-    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, equations.borders)
+    borders = equations.left, equations.right
+    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, borders)
     at = problem.values(u, frame)[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
     error = found.error * frame.units[0]

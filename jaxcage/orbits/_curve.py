@@ -178,21 +178,22 @@ class _Tracer(NamedTuple):
         a = critical_matrix(self.problem, self.kind, strobe, jnp.asarray(z), monodromy, self.frame)
         normal = np.zeros((1, u.size))
         normal[0, -1] = 1.0
-        curves = self.curves(1, *stack(null_vectors(a), 1))
+        curves = self.curves(stack(null_vectors(a), 1))
         return settle_on(curves, u[None], normal, steps // 2), curves
 
-    def curves(self, count: int, left: Any, right: Any) -> Curves:
-        """So many curves with these borders."""
-        problem, frame = stack((self.problem, self.frame), count)
-        return Curves(PointEquations(problem, frame, left, right, self.kind), self.given, self.counts)
+    def curves(self, borders: tuple[np.ndarray, np.ndarray]) -> Curves:
+        """A curve for each pair of borders, these with the lanes first."""
+        left, right = (jnp.asarray(b[0]) for b in borders)
+        first = PointEquations(self.problem, self.frame, left, right, self.kind)
+        equations = eqx.tree_at(lambda e: (e.left, e.right), stack(first, len(borders[0])), borders)
+        return Curves(equations, self.given, self.counts)
 
     def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
         """Coefficients of the normal form and their errors."""
         known = [self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
         kinds = [self.kind if k else "" for k in known]
         across = across_orbit(self.problem, self.frame)
-        curves = self.curves(len(kinds), *_borders(points))
-        return coefficients(curves, points, kinds, self.problem.dimension, FEW, across=across)
+        return coefficients(self.curves(_borders(points)), points, kinds, self.problem.dimension, FEW, across=across)
 
     def special(self, points: Corrected, cubic: Float[np.ndarray, "points 2"]) -> list[CodimensionTwo]:
         """Codimension-2 points between the points of one direction, located."""
@@ -204,7 +205,7 @@ class _Tracer(NamedTuple):
         if not wanted:
             return []
         ends = [take(points, np.array([k, m])) for _, k, m in wanted]
-        curves = self.curves(len(wanted), *_borders(take(points, np.array([k for _, k, _ in wanted]))))
+        curves = self.curves(_borders(take(points, np.array([k for _, k, _ in wanted]))))
         steps = np.array([e.steps.max() for e in ends])
 
         def signal(i: int, p: Corrected) -> np.ndarray:
@@ -283,4 +284,5 @@ def _borders(points: Corrected) -> tuple[np.ndarray, np.ndarray]:
 
 def _fresh_borders(curves: Any, points: Corrected, lanes: np.ndarray) -> Any:
     """Borders from the last points, so that they stay far from singular."""
-    return eqx.tree_at(lambda c: c.borders, curves, put(curves.borders, lanes, _borders(points)))
+    renewed = put((curves.left, curves.right), lanes, _borders(points))
+    return eqx.tree_at(lambda c: (c.left, c.right), curves, renewed)
