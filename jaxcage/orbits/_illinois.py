@@ -42,9 +42,9 @@ def zeros(
     """
     lanes = len(ends)
     within = np.broadcast_to(within, lanes)
-    f = np.array([signal(i, e) if np.all(e.converged) else [np.nan, np.nan] for i, e in enumerate(ends)])
-    active = np.prod(f, axis=1) < 0
-    f0, f1 = np.where(active[:, None], f, np.nan).T.copy()
+    values = np.array([signal(i, e) if np.all(e.converged) else [np.nan, np.nan] for i, e in enumerate(ends)])
+    active = np.prod(values, axis=1) < 0
+    f0, f1 = np.where(active[:, None], values, np.nan).T.copy()
     u0, u1 = np.where(active[:, None], np.stack([e.u for e in ends], axis=1), np.nan)
     chord = u1 - u0
     length = np.linalg.norm(chord, axis=1)
