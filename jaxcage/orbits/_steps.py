@@ -83,9 +83,8 @@ T = TypeVar("T", bound=eqx.Module)
 
 def by_steps(tree: T, steps: Any) -> T:
     """A method, a problem or equations by so many steps a revolution; as they are where there is no such number."""
-    fixed = lambda node: isinstance(node, FixedSteps)
-    changed = lambda node: FixedSteps(node.solver, jnp.asarray(steps, int)) if fixed(node) else node
-    return jax.tree.map(changed, tree, is_leaf=fixed)
+    changed = lambda x: FixedSteps(x.solver, jnp.asarray(steps, int)) if isinstance(x, FixedSteps) else x
+    return jax.tree.map(changed, tree, is_leaf=lambda x: isinstance(x, AbstractMethod))  # not the rungs of a ladder
 
 
 def that_serves(
