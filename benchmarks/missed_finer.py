@@ -20,7 +20,6 @@ def twice_the_steps() -> Iterator[None]:
     part = 2.0**-ORDER
     changed = (
         (_arclength, "LOOSE", part),
-        (_follower, "LOOSE", part),
         (_located, "POINT", part),
         (_located, "MOST_OF_A_POINT", 2),
     )

@@ -6,9 +6,8 @@
 | `_problem`     | the equations of an orbit and their unknowns                                       |
 | `_newton`      | damped Newton as an optimistix solver                                              |
 | `_implicit`    | roots with derivatives by the implicit function theorem                            |
-| `_orbit`       | periodic orbits and their multipliers                                              |
+| `_orbit`       | periodic orbits, their multipliers, and the determinant these must have            |
 | `_coexisting`  | all orbits that many starts lead to                                                |
-| `_liouville`   | the determinant that every monodromy matrix must have                              |
 | `_singularity` | matrices and test functions that vanish at bifurcations                            |
 | `_walk`        | a bifurcation looked for along the branch of its orbits                            |
 | `_point`       | a bifurcation: solved for, met on a branch, or known from elsewhere                |

@@ -21,8 +21,8 @@ from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
 from ._astray import ASIDE, CROSSED, classified
-from ._implicit import TOLERANCE, AbstractEquations, solve
-from ._steps import GIVEN_UP, Counts
+from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, solve
+from ._steps import GIVEN_UP, Counts, by_steps
 
 
 LANES, FEW = (8, 32), 40
@@ -51,7 +51,7 @@ MOVED = 0.1
 class OnPlane(AbstractEquations):
     """Equations of a curve, on the plane through `at` across `normal`."""
 
-    curve: AbstractEquations
+    curve: AbstractMapEquations
     at: Float[Array, " n"]
     normal: Float[Array, " n"]
 
@@ -59,12 +59,6 @@ class OnPlane(AbstractEquations):
         r, jacobian, aux = self.curve.linearised(u, given)
         off = jnp.dot(self.normal, u - self.at)
         return jnp.append(r, off), jnp.concatenate([jacobian, self.normal[None]]), aux
-
-    def by_steps(self, steps: Any) -> "OnPlane":
-        return OnPlane(self.curve.by_steps(steps), self.at, self.normal)
-
-    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        return self.curve.apart(moved, coarse[..., :-1, :], fine[..., :-1, :])
 
 
 class Corrected(NamedTuple):
@@ -75,19 +69,18 @@ class Corrected(NamedTuple):
     """Unit tangent, on the side of the normal of the plane."""
     jacobian: Any
     converged: Any
-    iterations: Any
     aux: Any
     steps: Any
     """Steps per revolution."""
     error: Any
-    """Distance to what half the steps give, and the same over what is allowed (see `AbstractEquations.apart`)."""
+    """Distance to what half the steps give, and the same over what is allowed (see `AbstractMapEquations.apart`)."""
     over: Any
     moved: Any
     """The same in the unknowns' units."""
 
 
 def _correct(
-    curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
+    curve: AbstractMapEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
 ) -> Corrected:
     """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
 
@@ -95,7 +88,7 @@ def _correct(
         at, normal = plane
         by = jnp.where(half, (steps + 1) // 2, steps)
         last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
-        across, near = OnPlane(curve, at, normal).by_steps(by), tolerance > TOLERANCE
+        across, near = OnPlane(by_steps(curve, by), at, normal), tolerance > TOLERANCE
         u, found = solve(across, given, at, CORRECTIONS, last, skip=skip, near=near)
         jacobian = found.newton.jacobian[:-1]
         whole = jnp.concatenate([jacobian, normal[None]])
@@ -103,7 +96,7 @@ def _correct(
         tangent = tangent / jnp.linalg.norm(tangent)
         fine = found.converged & jnp.all(jnp.isfinite(u)) & jnp.all(jnp.isfinite(tangent))
         unknown = jnp.full(3, jnp.nan)
-        return (u, tangent), Corrected(u, tangent, jacobian, fine, found.iterations, found.aux, by, *unknown)
+        return (u, tangent), Corrected(u, tangent, jacobian, fine, found.aux, by, *unknown)
 
     return jax.lax.scan(turn, (at, normal), jnp.array([False, True]))[1]
 
@@ -142,7 +135,7 @@ def stack(tree: Any, lanes: int) -> Any:
 class Curves(NamedTuple):
     """Many curves of one kind, and the numbers of steps that may be tried."""
 
-    equations: AbstractEquations
+    equations: AbstractMapEquations
     """Their arrays with the lanes first."""
     given: Any
     counts: Counts
@@ -205,17 +198,17 @@ def correct(
     return points._replace(error=error, over=over, moved=far)
 
 
-def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any = 0, allowed: float = 1.0) -> Corrected:
+def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any) -> Corrected:
     """Points of many curves on planes across them, by as many steps as each needs.
 
-    **Arguments:** as for `correct`; the numbers of steps to begin with; how large `over` may be.
+    **Arguments:** as for `correct`; the numbers of steps to begin with.
     """
     first = int(curves.counts.first if curves.chooses else curves.counts.last)
     count = np.maximum(np.broadcast_to(steps, at.shape[0]), first)
     found = correct(curves, at, normal, count, measured=True)
     while curves.chooses:
         given_up = ~found.converged & (found.steps >= GIVEN_UP)
-        again = np.flatnonzero(~(found.over <= allowed) & ~given_up & (found.steps < int(curves.counts.last)))
+        again = np.flatnonzero(~(found.over <= LOOSE) & ~given_up & (found.steps < int(curves.counts.last)))
         if not again.size:
             break
         begin = np.where(found.converged[again, None], found.u[again], at[again])
@@ -259,15 +252,19 @@ class Trace(NamedTuple):
     `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step."""
 
 
+def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
+    """Whether the step from u to v goes through one of `points`, to the accuracy of the chord."""
+    step = v - u
+    share = (points - u) @ step / np.dot(step, step)
+    off = np.linalg.norm(u + share[:, None] * step - points, axis=1)
+    return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
+
+
 def _closed(points: list[Corrected]) -> bool:
     """Whether the last step passed the first point in the same direction."""
-    if len(points) < 8:
-        return False
     first, before, last = points[0], points[-2], points[-1]
-    step = last.u - before.u
-    share = np.dot(first.u - before.u, step) / np.dot(step, step)
-    off = np.linalg.norm(before.u + share * step - first.u)
-    return bool(0 < share <= 1 and off < 0.2 * np.linalg.norm(step) and np.dot(step, first.tangent) > 0)
+    same = np.dot(last.u - before.u, first.tangent) > 0
+    return len(points) >= 8 and bool(same) and passes(before.u, last.u, first.u[None])
 
 
 def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -291,7 +288,7 @@ def follow(
     steps: Steps,
     inside: Callable[[np.ndarray], np.ndarray],
     stop: Callable[[int, list[Corrected]], bool] = lambda lane, points: False,
-    update: Callable[[AbstractEquations, Corrected, np.ndarray], AbstractEquations] | None = None,
+    update: Callable[[AbstractMapEquations, Corrected, np.ndarray], AbstractMapEquations] | None = None,
 ) -> list[Trace]:
     """Follow many curves from their first points, each in the direction of its tangent.
 

@@ -5,10 +5,10 @@ beside it has its own place, but neither; two that nearly meet look as if they c
 what is between them.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 
 ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
@@ -19,26 +19,16 @@ CROSSED, ASIDE = 1e-4, 0.01
 crosses another, and the step is taken in one from so far off: near the crossing tangents are lost to rounding."""
 
 
-class Step(NamedTuple):
-    """What is known of steps of many curves."""
-
-    missed: Float[np.ndarray, " lanes"]
-    """Distance of the point from its prediction."""
-    turned: Float[np.ndarray, " lanes"]
-    """Angle between the tangents, over the largest allowed."""
-    sure: Bool[np.ndarray, " lanes"]
-    """Whether the point is on the curve, or on one that crosses it."""
-    same: Bool[np.ndarray, " lanes"]
-    """Whether the orientation is."""
-
-
 def classified(
     steps: Any, last: Any, got: Any, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
-) -> Step:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Steps classified by the points that they begin and end with.
 
     **Arguments:** what is allowed (`Steps`); last points and new ones (`Corrected`); predictions and their unit
     tangents; lengths of the steps and of those before, infinite where there was none.
+
+    **Returns:** distance of each point from its prediction; angle between the tangents, over the largest allowed;
+    whether the point is on the curve, or on one that crosses it; and whether the orientation is the same.
     """
     turned = np.arccos(np.clip(np.sum(got.tangent * last.tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
     missed = np.linalg.norm(got.u - ahead, axis=1)
@@ -48,7 +38,7 @@ def classified(
     belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length), OF_MISSED * missed)
     sure = got.converged & (turned < 1) & (missed < steps.bend * length) & smooth & belongs
     same = orientation(got.jacobian, got.tangent) == orientation(last.jacobian, last.tangent)
-    return Step(missed, turned, sure, same)
+    return missed, turned, sure, same
 
 
 def astray(

@@ -1,7 +1,7 @@
 """Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
 
 import dataclasses
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -20,7 +20,7 @@ from ._implicit import AbstractMapEquations, Found, as_root, differentiated, set
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point
-from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, across_orbit, frozen, is_traced, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, across_orbit, frozen, is_traced, make_frame, returned
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 from ._walk import walk
@@ -61,7 +61,8 @@ class PointEquations(AbstractMapEquations):
         n, m = self.problem.dimension, self.problem.equations
         z, monodromy = u[:n], columns[:, :n]
         closing = self.problem.orbit_residual(z, image, self.frame)
-        g, q, p = bordered(critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame), *self.borders)
+        a = critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame)
+        g, q, p = bordered(a, self.left, self.right)
         known = Singular(monodromy, q, p)
         if not drifts:
             return jnp.append(closing, g), known
@@ -70,18 +71,11 @@ class PointEquations(AbstractMapEquations):
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
         return differentiated(self, u, given)
 
-    def by_steps(self, steps: Any) -> "PointEquations":
-        return eqx.tree_at(lambda e: e.problem, self, by_steps(self.problem, steps))
-
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the parameters, a unit of which is a tenth of their size."""
         m = self.problem.equations
         shift = abs(moved[..., m : m + len(self.problem.parameters)]).max(-1)
         return shift, shift / (10 * POINT)
-
-    @property
-    def borders(self) -> tuple[Array, Array]:
-        return self.left, self.right
 
 
 def critical_matrix(
@@ -138,7 +132,7 @@ def bifurcation(
     require_x64()
     if not reach >= 0:
         raise ArgumentError("reach", said=f"must be at least 0, but {reach:g} was given.")
-    if kind not in get_args(Kind):
+    if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
@@ -251,14 +245,14 @@ def _find_point(
         u0 = jnp.where(found.converged, u1, u0)
     u0 = jnp.append(u0, at / unit)
     strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given, frame)
-    _, monodromy = ReturnMap(strobe, frame).pushed(u0[: problem.dimension])
+    _, monodromy = returned(strobe, frame, u0[: problem.dimension])
     a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, frame, left, right, kind)
     u, found = settled(equations, given, u0, counts, at_root=True)
-    u, equations = jnp.where(found.converged, u, jnp.nan), equations.by_steps(found.steps)
+    u, equations = jnp.where(found.converged, u, jnp.nan), by_steps(equations, found.steps)
     return _describe(equations, u, found, given), equations, u, found.aux
 
 
@@ -277,7 +271,8 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     matches = is_critical(kind, multipliers)
-    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, equations.borders)
+    borders = equations.left, equations.right
+    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, borders)
     at = problem.values(u, frame)[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
     error = found.error * frame.units[0]

@@ -15,14 +15,13 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, Rodas4
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, Trace, follow, take
+from ._arclength import Corrected, Steps, Trace, follow, passes, take
 from ._by_name import SPEED, Parameter, value as value_of
 from ._follower import (
     Follower,
     Start,
     by_rodas4,
-    eigenvalues,
-    is_stable,
+    in_a_row,
     make_follower,
     seeds,
     stable_steps,
@@ -158,7 +157,7 @@ def branches(
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
     single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)
-    follower = Follower(single.problem, single.counts, given, lower, upper, single.unit, True)
+    follower = dataclasses.replace(single, given=given, designs=True)
     return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
 
 
@@ -183,7 +182,7 @@ def follow_both_ways(
         walked[lane] = points
         own = lane % count
         step = points[-2].u, points[-1].u
-        calm = is_stable(eigenvalues(follower.monodromy(points[-1])), follower.problem.free_speed)
+        calm = follower.unstable(points[-1]) == 0
         unstable[lane] = 0 if calm else unstable[lane] + 1
         if taken[own] or (patience is not None and unstable[lane] >= patience):
             return True
@@ -201,27 +200,17 @@ def follow_both_ways(
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
 
 
-def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
-    """Whether the step from u to v goes through one of `points`, to the accuracy of the chord."""
-    step = v - u
-    share = (points - u) @ step / np.dot(step, step)
-    off = np.linalg.norm(u + share[:, None] * step - points, axis=1)
-    return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
-
-
 def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
     """Both directions as one row of points.
 
     A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
     """
     if up.ended == "closed":
-        stable = is_stable(eigenvalues(follower.monodromy(up.points)), follower.problem.free_speed)
+        stable = follower.unstable(up.points) == 0
         count = stable.size - 1  # the last point is past the first
         order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
         return take(up.points, order), (up.ended, up.ended)
-    back = turned(take(down.points, np.arange(len(down.points.u) - 1, 0, -1)), -1.0)
-    points = jax.tree.map(lambda a, b: np.concatenate([a, b]), back, up.points)
-    return points, (down.ended, up.ended)
+    return in_a_row(down.points, up.points), (down.ended, up.ended)
 
 
 def describe(
@@ -259,8 +248,8 @@ def _branch(
     ended: tuple[str, str],
 ) -> Branch:
     problem, free = follower.problem, follower.problem.free_speed
-    multipliers = eigenvalues(follower.monodromy(points))
-    stable = is_stable(multipliers, free)
+    multipliers = follower.multipliers(points)
+    stable = follower.unstable(points) == 0
     n = problem.dimension
     scale = np.asarray(frame.scale)
     name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
@@ -274,7 +263,7 @@ def _branch(
     special = []
     before = [found.after for found, _ in seen]
     for i, ((k, kind, p, error), cubic) in enumerate(seen):
-        mu = eigenvalues(follower.monodromy(p))
+        mu = follower.multipliers(p)
         direction = np.zeros(n)
         if kind in CRITICAL:
             direction = np.linalg.svd(follower.monodromy(p) - CRITICAL[kind] * np.eye(n))[2][-1]

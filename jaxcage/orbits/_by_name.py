@@ -19,19 +19,15 @@ Parameter: TypeAlias = str | Callable[[Any], Any]
 SPEED = "speed"
 
 
-def _is_number(leaf: Any) -> bool:
-    return isinstance(leaf, float) or eqx.is_inexact_array(leaf)
-
-
 def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
     """Numbers of a user's own module by the last word of their path, dotted where that alone is ambiguous."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(system)
     paths: list[tuple[str, ...]] = []
     for path, leaf in leaves:
-        if all(isinstance(key, jax.tree_util.GetAttrKey) for key in path) and _is_number(leaf):
-            names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
-            if not any(name.startswith("_") for name in names):
-                paths.append(names)
+        names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
+        public = len(names) == len(path) and not any(name.startswith("_") for name in names)
+        if public and (isinstance(leaf, float) or eqx.is_inexact_array(leaf)):
+            paths.append(names)
     last = [path[-1] for path in paths]
     return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
 

@@ -11,10 +11,10 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Steps, follow, settle_on
+from ._arclength import Corrected, Steps, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
-from ._follower import Follower, eigenvalues, make_follower
+from ._follower import Follower, make_follower
 from ._point import Point
 from ._singularity import test_functions
 
@@ -103,7 +103,7 @@ def doubled_branch(
     across[0, : scale.size] = np.asarray(point.direction) / scale
     across /= np.linalg.norm(across)
     while amplitude > SMALLEST_AMPLITUDE:
-        start = settle_on(curves, u + amplitude * across, across, int(point.steps), LOOSE)
+        start = settle_on(curves, u + amplitude * across, across, int(point.steps))
         if start.converged[0] and _doubling(follower, start)[0] > 0 and abs(start.u[0, -1] - u[0, -1]) < 1.0:
             break
         amplitude /= 4
@@ -116,7 +116,7 @@ def doubled_branch(
 
 
 def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
-    return test_functions(eigenvalues(follower.monodromy(points)))["period-doubling"]
+    return test_functions(follower.multipliers(points))["period-doubling"]
 
 
 def cascade(

@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,16 +15,16 @@ from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Curves, Steps, follow, settle_on, stack, take
+from ._arclength import Corrected, Curves, Steps, follow, put, settle_on, stack, take
 from ._bifurcation import PointEquations, critical_matrix
 from ._by_name import SPEED, value as value_of
-from ._follower import eigenvalues, turned
+from ._follower import eigenvalues, in_a_row, turned
 from ._illinois import zeros
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import Point
-from ._problem import Given, OrbitProblem, ReturnMap, across_orbit, make_frame
-from ._singularity import Kind, null_vectors
+from ._problem import Frame, Given, OrbitProblem, across_orbit, make_frame, returned
+from ._singularity import Kind, null_vectors, test_functions
 from ._steps import ENOUGH, Counts, by_steps, counted
 
 
@@ -113,7 +113,13 @@ def curve(
         )
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
-    tracer = _Tracer.at(system, point, (x, y), (x_lower, lower), (x_upper, upper), is_free(period), method)
+    low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
+    units = (high - low) / 20
+    chosen, counts = counted(method)
+    problem = OrbitProblem(chosen, system.dimension, is_free(period), (x, y))
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
+    frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), point.periods)
+    tracer = _Tracer(problem, counts, given, frame, point.kind, units)
     start, curves = tracer.start(point)
     if not bool(start.converged[0]):
         raise ArgumentError(
@@ -124,93 +130,70 @@ def curve(
         curves.take(np.zeros(2, dtype=int)),
         both,
         steps=steps,
-        inside=tracer.inside,
+        inside=lambda u: np.all((u[..., -2:] * units > low) & (u[..., -2:] * units < high), axis=-1),
         update=_fresh_borders,
     )
     cubic = [tracer.cubic(t.points) for t in (down, up)]
     special = [p for t, c in zip((down, up), cubic, strict=True) for p in tracer.special(t.points, c)]
-    back = take(down.points, np.arange(len(down.points.u) - 1, 0, -1))
-    u, m = (np.concatenate([f(back), f(up.points)]) for f in (lambda p: p.u, lambda p: p.aux.monodromy))
-    multipliers = eigenvalues(m)
+    points = in_a_row(down.points, up.points)
+    multipliers = eigenvalues(points.aux.monodromy)
     return Curve(
         kind=point.kind,
         x=x,
         y=y,
-        x_value=u[:, -2] * tracer.units[0],
-        y_value=u[:, -1] * tracer.units[1],
-        state=u[:, : system.dimension] * np.asarray(tracer.scale),
+        x_value=points.u[:, -2] * units[0],
+        y_value=points.u[:, -1] * units[1],
+        state=points.u[:, : system.dimension] * np.asarray(frame.scale),
         multipliers=multipliers,
         genuine=np.array([point.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) <= 1 for mu in multipliers]),
         special=tuple(special),
-        steps=np.concatenate([back.steps, up.points.steps]),
-        error=np.concatenate([back.error, up.points.error]) * tracer.units[0],
+        steps=points.steps,
+        error=points.error * units[0],
         ended=(down.ended, up.ended),
         name=name,
         criticality=np.array([criticality(point.kind, *c) for c in np.concatenate([cubic[0][:0:-1], cubic[1]])]),
     )
 
 
-class _Tracer(eqx.Module):
+class _Tracer(NamedTuple):
     """What both directions of a curve share."""
 
     problem: OrbitProblem
     counts: Counts
     given: Given
-    kind: Kind = eqx.field(static=True)
-    units: tuple[float, float]
-    lower: tuple[float, float]
-    upper: tuple[float, float]
-    frame: Any
-
-    @classmethod
-    def at(cls, system, point, names, lower, upper, free, method) -> "_Tracer":
-        chosen, counts = counted(method)
-        problem = OrbitProblem(chosen, system.dimension, free, names)
-        given = Given(system, jnp.asarray(point.speed, dtype=float))
-        units = tuple((b - a) / 20 for a, b in zip(lower, upper, strict=True))
-        frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), point.periods)
-        return cls(problem, counts, given, point.kind, units, lower, upper, frame)
-
-    @property
-    def scale(self) -> Any:
-        return self.frame.scale
-
-    def inside(self, u: np.ndarray) -> np.ndarray:
-        values = u[..., -2:] * np.asarray(self.units)
-        return np.all((values > np.asarray(self.lower)) & (values < np.asarray(self.upper)), axis=-1)
+    frame: Frame
+    kind: Kind
+    units: Float[np.ndarray, "2"]
 
     def start(self, point: Any) -> tuple[Corrected, Curves]:
         """The point itself, with `y` kept, and the curve; one lane."""
         values = [float(value_of(self.given.system, self.given.speed, p)) for p in self.problem.parameters]
         values[0] = float(point.value)
         free = [1.0] if self.problem.free_speed else []
-        z = np.asarray(point.state) / np.asarray(self.scale)
-        u = np.array([*z, *free, *(v / w for v, w in zip(values, self.units, strict=True))])
+        z = np.asarray(point.state) / np.asarray(self.frame.scale)
+        u = np.array([*z, *free, *(np.array(values) / self.units)])
         steps = int(point.steps) or min(int(self.counts.last), ENOUGH)
         strobe = by_steps(self.problem, steps).prepare(jnp.asarray(u), self.given, self.frame)
-        _, monodromy = ReturnMap(strobe, self.frame).pushed(jnp.asarray(z))
+        _, monodromy = returned(strobe, self.frame, jnp.asarray(z))
         a = critical_matrix(self.problem, self.kind, strobe, jnp.asarray(z), monodromy, self.frame)
-        equations = stack(PointEquations(self.problem, self.frame, *null_vectors(a), self.kind), 1)
         normal = np.zeros((1, u.size))
         normal[0, -1] = 1.0
-        curves = self.curves(equations)
-        return settle_on(curves, u[None], normal, steps // 2, LOOSE), curves
+        curves = self.curves(stack(null_vectors(a), 1))
+        return settle_on(curves, u[None], normal, steps // 2), curves
 
-    def curves(self, equations: Any) -> Curves:
+    def curves(self, borders: tuple[np.ndarray, np.ndarray]) -> Curves:
+        """A curve for each pair of borders, these with the lanes first."""
+        left, right = (jnp.asarray(b[0]) for b in borders)
+        first = PointEquations(self.problem, self.frame, left, right, self.kind)
+        equations = eqx.tree_at(lambda e: (e.left, e.right), stack(first, len(borders[0])), borders)
         return Curves(equations, self.given, self.counts)
-
-    def through(self, points: Corrected) -> Curves:
-        """A curve through each point."""
-        count = len(points.u)
-        base = stack(PointEquations(self.problem, self.frame, jnp.zeros(1), jnp.zeros(1), self.kind), count)
-        return self.curves(_fresh_borders(base, points, np.arange(count)))
 
     def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
         """Coefficients of the normal form and their errors."""
         known = [self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
         kinds = [self.kind if k else "" for k in known]
         across = across_orbit(self.problem, self.frame)
-        return coefficients(self.through(points), points, kinds, self.problem.dimension, FEW, across=across)
+        return coefficients(self.curves(_borders(points)), points, kinds, self.problem.dimension, FEW, across=across)
 
     def special(self, points: Corrected, cubic: Float[np.ndarray, "points 2"]) -> list[CodimensionTwo]:
         """Codimension-2 points between the points of one direction, located."""
@@ -222,7 +205,7 @@ class _Tracer(eqx.Module):
         if not wanted:
             return []
         ends = [take(points, np.array([k, m])) for _, k, m in wanted]
-        curves = self.through(take(points, np.array([k for _, k, _ in wanted])))
+        curves = self.curves(_borders(take(points, np.array([k for _, k, _ in wanted]))))
         steps = np.array([e.steps.max() for e in ends])
 
         def signal(i: int, p: Corrected) -> np.ndarray:
@@ -236,7 +219,7 @@ class _Tracer(eqx.Module):
                 at = abs(signal(i, jax.tree.map(lambda x: np.asarray(x)[None], p))[0])
                 p = p if at < 0.01 * np.min(np.abs(cubic[[k, m], 0])) else None
             if p is not None and _real(kind, self.kind, eigenvalues(p.aux.monodromy)):
-                x, y = p.u[-2:] * np.asarray(self.units)
+                x, y = p.u[-2:] * self.units
                 found.append(CodimensionTwo(kind, float(x), float(y), eigenvalues(p.aux.monodromy)))
         # At a cusp the curve turns back in every parameter.
         cusps = [p for p in found if p.kind == "cusp"]
@@ -246,25 +229,25 @@ class _Tracer(eqx.Module):
     def signals(self, points: Corrected) -> dict[str, np.ndarray]:
         """Functions along the curve that change sign at codimension-2 points."""
         rows = [_others(self.kind, mu) for mu in eigenvalues(points.aux.monodromy)]
-        product = lambda shift: np.array([np.prod(others + shift).real for others, _ in rows])
-        pairs = np.array([np.prod([a * b - 1 for a, b in itertools.combinations(o, 2)]).real for o, _ in rows])
+        others = test_functions(np.array([o for o, _ in rows]))
+        flip, fold, pairs = (others[kind] for kind in ("period-doubling", "fold", "Neimark-Sacker"))
         found = {"extreme": points.tangent[..., -2]}
         if self.kind == "Neimark-Sacker":
             cosine = np.array([c for _, c in rows])
             found |= {f"1:{k} resonance": cosine - at for k, at in ((1, 1.0), (2, -1.0), (3, -0.5), (4, 0.0))}
             return found | {
-                "fold-Neimark-Sacker": product(-1),
-                "flip-Neimark-Sacker": product(1),
+                "fold-Neimark-Sacker": fold,
+                "flip-Neimark-Sacker": flip,
                 "double Neimark-Sacker": pairs,
             }
         if self.kind == "period-doubling":
-            return found | {"1:2 resonance": product(1), "fold-flip": product(-1), "flip-Neimark-Sacker": pairs}
+            return found | {"1:2 resonance": flip, "fold-flip": fold, "flip-Neimark-Sacker": pairs}
         n = self.problem.dimension
         bend = np.sum(points.jacobian[..., -1, :n] * points.aux.right[..., :n], axis=-1)
         return found | {
             "cusp": bend,
-            "1:1 resonance": product(-1),
-            "fold-flip": product(1),
+            "1:1 resonance": fold,
+            "fold-flip": flip,
             "fold-Neimark-Sacker": pairs,
         }
 
@@ -293,16 +276,13 @@ def _real(what: str, kind: str, multipliers: np.ndarray) -> bool:
     return kind != "Neimark-Sacker" or abs(cosine) <= 1 + 1e-6
 
 
-def _fresh_borders(curves: Any, points: Corrected, lanes: np.ndarray) -> Any:
-    """Borders from the null vectors at the last points, so that they stay far from singular."""
+def _borders(points: Corrected) -> tuple[np.ndarray, np.ndarray]:
+    """Left and right borders from the null vectors at some points."""
     unit = lambda v: v / np.linalg.norm(v, axis=-1, keepdims=True)
-    left, right = unit(np.asarray(points.aux.left)), unit(np.asarray(points.aux.right))
+    return unit(points.aux.left), unit(points.aux.right)
 
-    def renewed(old: Any, new: np.ndarray) -> np.ndarray:
-        if old.shape[1:] != new.shape[1:]:
-            return new
-        whole = np.array(old)
-        whole[lanes] = new
-        return whole
 
-    return eqx.tree_at(lambda c: (c.left, c.right), curves, (renewed(curves.left, left), renewed(curves.right, right)))
+def _fresh_borders(curves: Any, points: Corrected, lanes: np.ndarray) -> Any:
+    """Borders from the last points, so that they stay far from singular."""
+    renewed = put((curves.left, curves.right), lanes, _borders(points))
+    return eqx.tree_at(lambda c: (c.left, c.right), curves, renewed)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -11,7 +12,7 @@ from jaxtyping import Array
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import LOOSE, Corrected, Curves, settle_on, stack, take
+from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._by_name import Parameter, with_value
 from ._orbit import OrbitEquations, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
@@ -62,6 +63,18 @@ class Follower(eqx.Module):
         n = self.problem.dimension
         return points.jacobian[..., :n, :n] + np.eye(n)
 
+    def multipliers(self, points: Corrected) -> np.ndarray:
+        """Those of each orbit, the largest first."""
+        return eigenvalues(self.monodromy(points))
+
+    def unstable(self, points: Corrected, circle: float = 1.0) -> Any:
+        """How many multipliers of each orbit are outside a circle, without the one at 1 of a self-excited orbit."""
+        multipliers = self.multipliers(points)
+        size = np.abs(multipliers)
+        if self.problem.free_speed:
+            np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
+        return np.sum(~(size < circle), axis=-1)
+
 
 def make_follower(
     system: AbstractForcedSystem,
@@ -84,7 +97,7 @@ def seeds(follower: Follower, frame: Frame, starts: Sequence[Start], steps: int 
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps, LOOSE)
+    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps)
 
 
 def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
@@ -93,9 +106,7 @@ def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
         return follower
     frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
     (u,) = seeds(follower, frame, [start]).jacobian
-    if np.all(np.isfinite(u)):
-        return follower
-    return by_rodas4(follower)
+    return follower if np.all(np.isfinite(u)) else by_rodas4(follower)
 
 
 def by_rodas4(follower: Follower) -> Follower:
@@ -108,20 +119,13 @@ def turned(points: Corrected, sign: Any) -> Corrected:
     return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
 
 
+def in_a_row(back: Corrected, ahead: Corrected) -> Corrected:
+    """The points of two directions from one point as one row, from the end of the first to that of the second."""
+    back = turned(take(back, np.arange(len(back.u) - 1, 0, -1)), -1.0)
+    return jax.tree.map(lambda a, b: np.concatenate([a, b]), back, ahead)
+
+
 def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
     """Multipliers, the largest first."""
     mu = np.linalg.eigvals(monodromy).astype(complex)
     return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
-
-
-def unstable_count(multipliers: np.ndarray, free: bool, circle: float = 1.0) -> Any:
-    """How many multipliers are outside a circle, without the one at 1 of a self-excited orbit."""
-    size = np.abs(multipliers)
-    if free:
-        np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
-    return np.sum(~(size < circle), axis=-1)
-
-
-def is_stable(multipliers: np.ndarray, free: bool) -> Any:
-    """Whether all multipliers are inside the unit circle, but for the one at 1 of a self-excited orbit."""
-    return unstable_count(multipliers, free) == 0

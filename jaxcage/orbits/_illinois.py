@@ -33,24 +33,25 @@ def zeros(
     **Arguments:**
 
     - `curves`: as for `correct`, one curve per pair of ends.
-    - `ends`: pairs of neighbouring points, between which the signal changes sign.
+    - `ends`: pairs of neighbouring points.
     - `signal`: values for the lane's number and some points of its curve.
     - `steps`: per revolution.
     - `within`: places are refined until they move by less than this, in the unknowns' units; one for all or each.
 
-    **Returns:** a point per pair, None where the curve was lost.
+    **Returns:** a point per pair, None where the signal does not change sign between them, or the curve was lost.
     """
     lanes = len(ends)
     within = np.broadcast_to(within, lanes)
-    u0, u1 = (np.stack([e.u[j] for e in ends]) for j in (0, 1))
-    f0, f1 = np.array([signal(i, e) for i, e in enumerate(ends)]).T.copy()
+    values = np.array([signal(i, e) if np.all(e.converged) else [np.nan, np.nan] for i, e in enumerate(ends)])
+    active = np.prod(values, axis=1) < 0
+    f0, f1 = np.where(active[:, None], values, np.nan).T.copy()
+    u0, u1 = np.where(active[:, None], np.stack([e.u for e in ends], axis=1), np.nan)
     chord = u1 - u0
     length = np.linalg.norm(chord, axis=1)
     normal = chord / length[:, None]
     low, high, last, aside = np.zeros(lanes), np.ones(lanes), np.zeros(lanes), np.zeros(lanes)
     sides = [[take(e, np.array(j)) for j in (0, 1)] for e in ends]
     best: list[Corrected | None] = [None] * lanes
-    active = np.ones(lanes, dtype=bool)
     for _ in range(MOST):
         index = np.flatnonzero(active)
         if index.size == 0:

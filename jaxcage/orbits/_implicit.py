@@ -24,8 +24,8 @@ from jaxtyping import Array, Bool, Float, Int
 from .._types import Scalar
 from ..integrate import StrobeMap, compiled
 from ._newton import DampedNewton, NewtonState
-from ._problem import Frame, OrbitProblem, Prepared, ReturnMap, frozen
-from ._steps import GIVEN_UP, Counts
+from ._problem import Frame, OrbitProblem, Prepared, frozen, returned
+from ._steps import GIVEN_UP, Counts, by_steps
 
 
 class AbstractEquations(eqx.Module):
@@ -34,18 +34,6 @@ class AbstractEquations(eqx.Module):
     @abc.abstractmethod
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
         """The equations, their derivative, and what else is wanted at the root."""
-
-    @abc.abstractmethod
-    def by_steps(self, steps: Int[Array, ""] | int) -> "AbstractEquations":
-        """The same equations by another number of steps."""
-
-    @abc.abstractmethod
-    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
-
-        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
-        or of NumPy.
-        """
 
 
 class AbstractMapEquations(AbstractEquations):
@@ -62,8 +50,16 @@ class AbstractMapEquations(AbstractEquations):
     def closing(
         self, u: Float[Array, " n"], prepared: Prepared, image: Float[Array, " dim"], columns: Float[Array, "dim c"]
     ) -> tuple[Float[Array, " n"], Any]:
-        """The equations, with the image of the state and its derivatives (see `ReturnMap.pushed`), and what else is
+        """The equations, with the image of the state and its derivatives (see `returned`), and what else is
         wanted at the root."""
+
+    @abc.abstractmethod
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
+
+        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
+        or of NumPy.
+        """
 
 
 def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
@@ -72,8 +68,8 @@ def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given
     def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
         prepared = equations.prepare(u, given)
         strobe, drifts = prepared
-        pushed = ReturnMap(strobe, equations.frame).pushed(u[: equations.frame.scale.size], drifts)
-        r, aux = equations.closing(u, prepared, *pushed)
+        image, columns = returned(strobe, equations.frame, u[: equations.frame.scale.size], drifts)
+        r, aux = equations.closing(u, prepared, image, columns)
         return r, (r, aux)
 
     jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
@@ -90,7 +86,7 @@ class Found(eqx.Module):
     steps: Int[Array, ""]
     """Steps per revolution."""
     error: Float[Array, ""]
-    """Distance to the root by half as many (see `AbstractEquations.apart`), infinite where none was found; NaN where
+    """Distance to the root by half as many (see `AbstractMapEquations.apart`), infinite where none was found; NaN where
     that was not looked at."""
 
 
@@ -129,13 +125,13 @@ def solve(
 
 
 def settled(
-    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+    equations: AbstractMapEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
     """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
 
     **Returns:** the root by the last number of steps, and `Found`.
     """
-    once = lambda steps, u, skip: solve(equations.by_steps(steps), given, u, at_root=at_root, skip=skip)
+    once = lambda steps, u, skip: solve(by_steps(equations, steps), given, u, at_root=at_root, skip=skip)
 
     def turn(carry: tuple) -> tuple:
         i, u, before, done = carry
@@ -176,13 +172,13 @@ def _as_root(given: Any, *, equations: AbstractMapEquations, u: Array, aux: Any)
 def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> Any:
     (given,), (given_dot,) = primals, tangents
     u, aux = _as_root(given, equations=equations, u=u, aux=aux)
-    numbers, moving = eqx.filter_jvp(lambda g: _numbers(equations, u, g), (given,), (given_dot,))
+    numbers, moving = eqx.filter_jvp(lambda g: numbers_around(equations, u, g), (given,), (given_dot,))
     x = jnp.concatenate([u[: equations.frame.scale.size], numbers.k])
     around, slopes = by_columns(x, f=Slopes(Push(frozen(numbers.like), equations.frame)))
     return (u, aux), _moved(equations, u, numbers, around, slopes, moving.k)
 
 
-class _Numbers(NamedTuple):
+class FieldNumbers(NamedTuple):
     """What is known of the field at a root, or its tangent."""
 
     k: Float[Array, " k"]
@@ -192,14 +188,15 @@ class _Numbers(NamedTuple):
 
 
 @compiled
-def _numbers(equations: AbstractMapEquations, u: Array, given: Any) -> _Numbers:
+def numbers_around(equations: AbstractMapEquations, u: Array, given: Any) -> FieldNumbers:
+    """The numbers of the field at the unknowns u, and how they follow from these."""
     row = lambda v: numbers_of(equations.prepare(v, given))[0]
-    return _Numbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
+    return FieldNumbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
 
 
 @compiled
 def _moved(
-    equations: AbstractMapEquations, u: Array, numbers: _Numbers, around: Any, slopes: Any, k_dot: Array
+    equations: AbstractMapEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
 ) -> tuple[Array, Any]:
     """Derivatives of a root, and of what else is known there, along `k_dot`."""
     k, k_of_u, like = numbers
@@ -247,7 +244,7 @@ class Push(eqx.Module):
     def __call__(self, x: Array) -> tuple[Array, Array]:
         n = self.frame.scale.size
         strobe, drifts = numbers_of(self.like)[1](x[n:])
-        return ReturnMap(strobe, self.frame).pushed(x[:n], drifts)
+        return returned(strobe, self.frame, x[:n], drifts)
 
 
 class Slopes(eqx.Module):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
-from ._follower import Follower, eigenvalues, unstable_count
+from ._follower import Follower
 from ._illinois import LOCATED, zeros
 from ._point import UNEXPLAINED
 from ._problem import Frame
@@ -67,20 +67,17 @@ def account(
     seen = _located(follower, frame, rows, lanes)
     left = lambda i: _gaps(follower, rows[i], [(s.after, s.kind) for s in seen[i]])
     doubtful = [i for i in range(len(rows)) if left(i)]
-    if doubtful:
-        again, of = (
-            [_again(follower, frame, rows[i], lanes[i], left(i)) for i in doubtful],
-            [lanes[i] for i in doubtful],
-        )
-        again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
-        for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
-            rows[i], seen[i] = row, mine
+    of = [lanes[i] for i in doubtful]
+    again = [_again(follower, frame, rows[i], lanes[i], left(i)) for i in doubtful]
+    again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
+    for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
+        rows[i], seen[i] = row, mine
     for i, lane in enumerate(lanes):
         rows[i], seen[i] = _parted(follower, frame, rows[i], lane, seen[i])
     found = []
     for i, (row, mine) in enumerate(zip(rows, seen, strict=True)):
         for a, b in left(i):
-            k = a + int(np.argmax(np.diff(count_of(follower, row)[a : b + 1]) != 0))
+            k = a + int(np.argmax(np.diff(follower.unstable(row)[a : b + 1]) != 0))
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
             middle = take(row, np.array(k))._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Seen(k, UNEXPLAINED, middle, far))
@@ -99,26 +96,33 @@ def _parted(
 ) -> tuple[Corrected, list[Seen]]:
     """The orbits with one more between bifurcations that are in the same step, and the bifurcations after theirs."""
     seen = _in_order(row, seen)
-    chord = np.array([b.point.u - a.point.u for a, b in itertools.pairwise(seen)])
-    length = np.linalg.norm(chord, axis=1) if seen[1:] else np.zeros(0)
-    within = np.array([a.after == b.after for a, b in itertools.pairwise(seen)], dtype=bool)
-    after = np.array([s.after for s in seen], dtype=int)
-    pairs = np.flatnonzero(within & (length > APART))
+    far = lambda a, b: bool(np.linalg.norm(b.point.u - a.point.u) > APART)
+    pairs = np.flatnonzero([a.after == b.after and far(a, b) for a, b in itertools.pairwise(seen)])
     if not pairs.size:
         return row, seen
-    middle = np.stack([seen[k].point.u for k in pairs]) + chord[pairs] / 2
-    steps = np.array([max(seen[k].point.steps, seen[k + 1].point.steps) for k in pairs])
-    got = correct(follower.curves(frame, [lane] * pairs.size), middle, chord[pairs] / length[pairs, None], steps)
-    good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length[pairs] / 2)
-    pairs, got = pairs[good], measured_as(take(got, good), take(row, after[pairs[good]]))
-    row = jax.tree.map(lambda x, y: np.insert(x, after[pairs] + 1, y, axis=0), row, got)
-    return row, [s._replace(after=s.after + int(np.sum(pairs < k))) for k, s in enumerate(seen)]
+    places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(s.point for s in seen))
+    after = np.array([seen[k].after for k in pairs])
+    row, good = _with_middles(follower, frame, row, lane, after, take(places, pairs), take(places, pairs + 1))
+    return row, [s._replace(after=s.after + int(np.sum(pairs[good] < k))) for k, s in enumerate(seen)]
+
+
+def _with_middles(
+    follower: Follower, frame: Frame, row: Corrected, lane: int, after: np.ndarray, one: Corrected, other: Corrected
+) -> tuple[Corrected, np.ndarray]:
+    """The orbits with further ones `after` these, halfway from one to another; and which of them were found."""
+    chord = other.u - one.u
+    length = np.linalg.norm(chord, axis=1)
+    middle, normal = one.u + chord / 2, chord / length[:, None]
+    got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, np.maximum(one.steps, other.steps))
+    good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length / 2)
+    new = measured_as(take(got, good), take(row, after[good]))
+    return jax.tree.map(lambda x, y: np.insert(x, after[good] + 1, y, axis=0), row, new), good
 
 
 def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
     """Pairs of orbits between which the count of unstable multipliers changes by what was seen does not explain."""
-    count = count_of(follower, row)
-    clear = np.flatnonzero(count_of(follower, row, 1 + CLEAR) == count_of(follower, row, 1 - CLEAR))
+    count = follower.unstable(row)
+    clear = np.flatnonzero(follower.unstable(row, 1 + CLEAR) == follower.unstable(row, 1 - CLEAR))
     found = []
     for a, b in zip(clear[:-1].tolist(), clear[1:].tolist(), strict=True):
         crossing = sum(2 if kind == "Neimark-Sacker" else 1 for k, kind in seen if a <= k < b)
@@ -130,7 +134,7 @@ def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -
 
 def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     """What was seen, without products of two multipliers that pass 1 while no complex pair leaves the circle."""
-    mu = eigenvalues(follower.monodromy(row))
+    mu = follower.multipliers(row)
     pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
     return [(k, kind) for k, kind in brackets(follower, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
@@ -138,7 +142,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     """Steps over which a test function may vanish twice: two special points of a kind, whose effects on the count may
     cancel."""
-    tests = test_functions(eigenvalues(follower.monodromy(row)))
+    tests = test_functions(follower.multipliers(row))
     if follower.problem.free_speed:
         del tests["fold"]  # zero along the branch
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
@@ -179,16 +183,9 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         after = np.array([k for k in longest if length[k] > APART], dtype=int)
         if not after.size:
             break
-        chord = row.u[after + 1] - row.u[after]
-        middle, normal = row.u[after] + chord / 2, chord / length[after, None]
-        steps = np.maximum(row.steps[after], row.steps[after + 1])
-        got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, steps)
-        between = np.linalg.norm(got.u - middle, axis=1) < length[after] / 2
-        some = np.flatnonzero(got.converged & between)
-        if not some.size:
+        row, good = _with_middles(follower, frame, row, lane, after, take(row, after), take(row, after + 1))
+        if not np.any(good):
             break
-        blank = measured_as(got, take(row, after))
-        row = jax.tree.map(lambda x, y: np.insert(x, after[some] + 1, y[some], axis=0), row, blank)
     return row
 
 
@@ -211,14 +208,14 @@ def _located(follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes:
     places = locate(follower, frame, [(lanes[i], rows[i], k, kind) for i, k, kind in wanted])
     seen: list[list[Seen]] = [[] for _ in rows]
     for (i, k, kind), place in zip(wanted, places, strict=True):
-        if place is not None and matches(kind, eigenvalues(follower.monodromy(place[0]))):
+        if place is not None and matches(kind, follower.multipliers(place[0])):
             seen[i].append(Seen(k, kind, *place))
     return seen
 
 
 def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
     """Functions along a branch that change sign at its special points."""
-    tests = test_functions(eigenvalues(follower.monodromy(points)))
+    tests = test_functions(follower.multipliers(points))
     tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
     tests["fold"] = points.tangent[..., -1]
     if follower.problem.free_speed:
@@ -226,17 +223,10 @@ def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
     return tests
 
 
-def count_of(follower: Follower, points: Corrected, circle: float = 1.0) -> np.ndarray:
-    """How many multipliers of each orbit are outside a circle."""
-    return unstable_count(eigenvalues(follower.monodromy(points)), follower.problem.free_speed, circle)
-
-
 def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
     """Index and kind of each change of sign."""
-    found = []
-    for kind, value in signals(follower, points).items():
-        found += [(int(k), kind) for k in np.flatnonzero(value[:-1] * value[1:] < 0)]
-    return sorted(found)
+    values = signals(follower, points)
+    return sorted((int(k), kind) for kind, f in values.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0))
 
 
 def locate(
@@ -254,31 +244,27 @@ def locate(
     if chooses:
         steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
 
-    def beside(lanes: list[int]) -> list[Corrected | None]:
-        """Where those of these lanes vanish, close to where they did by fewer steps."""
-        placed: list[Corrected | None] = [None] * len(lanes)
-        known = [(j, i, p) for j, i in enumerate(lanes) if (p := found[i]) is not None]
-        if known:
-            some = [i for _, i, _ in known]
-            ends = [_sides(p, 2 * moved[i]) for _, i, p in known]
-            there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some], within[some])
-            for (j, _, _), p in zip(known, there, strict=True):
-                placed[j] = p
-        return placed
+    def between(i: int, beyond: int | None) -> Corrected | None:
+        """Points on both sides of it: of the branch, so many orbits further out, or close to where it was found."""
+        _, points, k, _ = wanted[i]
+        if beyond is not None:
+            return take(points, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(points.u) - 1)]))
+        place = found[i]
+        return None if place is None else _sides(place, 2 * moved[i])
 
     def at(lanes: list[int]) -> list[Corrected | None]:
-        """Where those of these lanes vanish: between the two orbits or, by other steps than theirs, further out."""
-        placed = beside(lanes)
-        for beyond in WIDER:
-            left = [j for j, p in enumerate(placed) if p is None]
-            some = [lanes[j] for j in left]
+        """Where those of these lanes vanish: close to where they did by fewer steps, between the two orbits or, by
+        other steps than theirs, further out."""
+        placed: dict[int, Corrected | None] = dict.fromkeys(lanes)
+        for beyond in (None, *WIDER):
+            ends = {i: e for i in lanes if placed[i] is None and (e := between(i, beyond)) is not None}
+            some = list(ends)
             if some:
-                rows = [(wanted[i][1], wanted[i][2]) for i in some]
-                ends = [take(p, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(p.u) - 1)])) for p, k in rows]
-                there = _zeros(follower, curves.take(some), ends, [kinds[i] for i in some], steps[some])
-                for j, p in zip(left, there, strict=True):
-                    placed[j] = p
-        return placed
+                closely = within[some] if beyond is None else LOCATED
+                mine = [kinds[i] for i in some]
+                there = _zeros(follower, curves.take(some), list(ends.values()), mine, steps[some], closely)
+                placed.update(zip(some, there, strict=True))
+        return list(placed.values())
 
     moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for _, points, k, _ in wanted])
     within = np.full(len(wanted), LOCATED)
@@ -313,7 +299,7 @@ def _zeros(
     ends: Sequence[Corrected],
     kinds: Sequence[str],
     steps: np.ndarray,
-    within: Any = LOCATED,
+    within: Any,
 ) -> list[Corrected | None]:
     """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
     both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
@@ -324,13 +310,4 @@ def _zeros(
         both = put(both, other, redone)
     signal = lambda i, points: signals(follower, points)[str(kinds[i])]
     pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
-    there = [bool(np.all(p.converged) and np.prod(signal(i, p)) < 0) for i, p in enumerate(pairs)]
-    kept = np.flatnonzero(there).tolist()
-    found: list[Corrected | None] = [None] * len(ends)
-    if kept:
-        of_kept = lambda i, points: signal(kept[i], points)
-        closely = np.broadcast_to(within, len(ends))[kept]
-        some = zeros(curves.take(kept), [pairs[i] for i in kept], of_kept, steps[kept], closely)
-        for i, p in zip(kept, some, strict=True):
-            found[i] = p
-    return found
+    return zeros(curves, pairs, signal, steps, within)

@@ -42,28 +42,18 @@ class LeadingMultiplier(NamedTuple):
     """Steps per revolution."""
 
 
-class _Moved(NamedTuple):
-    size: Array
-    weight: Float[Array, " k"]
-    """d|mu| / d number of the field."""
-
-
 @compiled
-def _moved(n: int, around: _Expansion) -> _Moved:
-    mu, left, right = jnp.linalg.eigvals(around.monodromy), *_vectors(around.monodromy)
+def _moved(n: int, around: _Expansion) -> tuple[Array, Array]:
+    """|mu|, and its derivatives by the numbers of the field."""
+    mu, right = jnp.linalg.eigvals(around.monodromy), jnp.linalg.eig(around.monodromy)[1]
+    left = jnp.linalg.inv(right)  # in rows, with l r = 1
     i = jnp.argmax(jnp.abs(mu))
     closing = around.image_slope[:, :n] - jnp.eye(n)
     orbit = -jnp.linalg.solve(closing, around.image_slope[:, n:])
     matrix = around.monodromy_slope[:, :, n:] + jnp.einsum("abz,zk->abk", around.monodromy_slope[:, :, :n], orbit)
     change = jnp.einsum("a,abk,b->k", left[i], matrix.astype(mu.dtype), right[:, i])
     size = jnp.abs(mu[i])
-    return _Moved(size, jnp.real(jnp.conj(mu[i]) * change) / size)
-
-
-def _vectors(m: Float[Array, "n n"]) -> tuple[Array, Array]:
-    """Left (rows) and right (columns) eigenvectors, l r = 1."""
-    right = jnp.linalg.eig(m)[1]
-    return jnp.linalg.inv(right), right
+    return size, jnp.real(jnp.conj(mu[i]) * change) / size
 
 
 def leading_multiplier(
@@ -91,27 +81,23 @@ def leading_multiplier(
     before, steps = None, int(counts.first)
     while True:
         found = _by_newton(by_steps(problem, steps), given, frame, first if before is None else before[0])
-        if found is None:
-            error = np.inf
-        else:
-            error = np.inf if before is None else abs(float(found[1].size - before[1].size))
-        if steps >= int(counts.last) or error <= SLOPE * float(counts.tolerance):
-            break
-        if found is None and steps >= GIVEN_UP:
+        error = np.inf if found is None or before is None else abs(float(found[1] - before[1]))
+        given_up = found is None and steps >= GIVEN_UP
+        if steps >= int(counts.last) or error <= SLOPE * float(counts.tolerance) or given_up:
             break
         before, steps = found, min(2 * steps, int(counts.last))
     paths = parameter_paths(system)
     if found is None:
         nan = float("nan")
         return LeadingMultiplier(nan, dict.fromkeys(paths, nan), np.full(system.dimension, nan), error, steps)
-    u, moved = found
-    pulled = _pull_back(by_steps(problem, steps), given, frame, u, moved.weight)
+    u, size, weight = found
+    pulled = _pull_back(by_steps(problem, steps), given, frame, u, weight)
     slope = {name: float(get(pulled, path)) for name, path in paths.items()}
-    return LeadingMultiplier(float(moved.size), slope, np.asarray(problem.state(u, frame)), error, steps)
+    return LeadingMultiplier(float(size), slope, np.asarray(problem.state(u, frame)), error, steps)
 
 
-def _by_newton(problem: OrbitProblem, given: Given, frame: Frame, first: Array) -> tuple[Array, _Moved] | None:
-    """The orbit near the unknowns `first`, and its largest multiplier."""
+def _by_newton(problem: OrbitProblem, given: Given, frame: Frame, first: Array) -> tuple[Array, Array, Array] | None:
+    """The orbit near the unknowns `first`, the size of its largest multiplier, and the derivatives of that."""
     n, u = problem.dimension, first
     for _ in range(NEWTON):
         around = _expand(problem, given, frame, u)
@@ -120,6 +106,6 @@ def _by_newton(problem: OrbitProblem, given: Given, frame: Frame, first: Array) 
         if not size < NEARBY or float(jnp.max(jnp.abs(u - first))) > NEARBY:
             return None
         if size < CLOSED:
-            return u, _moved(n, around)
+            return u, *_moved(n, around)
         u = u.at[:n].add(-step)
     return None

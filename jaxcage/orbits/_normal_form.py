@@ -103,11 +103,6 @@ def normal_form_coefficient(
     return Coefficient(found[best + 1], apart[best])
 
 
-def with_half(fine: Coefficient, coarse: Coefficient) -> Coefficient:
-    """The first, with its distance to the second, by half the steps of a revolution, in its error."""
-    return Coefficient(fine.value, fine.error + abs(fine.value - coarse.value))
-
-
 def criticality(kind: str, value: float | np.floating, error: float | np.floating) -> str:
     """`supercritical` or `subcritical`; `unknown` where the coefficient is not known from zero, and nothing for a kind
     that is neither or where there is no coefficient."""
@@ -183,7 +178,7 @@ def coefficients(
             moved = plane.returned(curves.take(lane), at, points.tangent[lane], count)
             parts = np.split(plane.derivative(moved), counts[:-1])
             each.append([normal_form_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
-        found[mine] = [with_half(fine, coarse) for fine, coarse in zip(*each, strict=True)]
+        found[mine] = [(f.value, f.error + abs(f.value - half.value)) for f, half in zip(*each, strict=True)]
         if finer is not None:
             longer = np.stack([plane.basis @ c.right for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
             found[mine] /= np.sum(np.abs(longer) ** 2, axis=1, keepdims=True)

@@ -15,11 +15,10 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
-from ..integrate import SURE, AbstractMethod, FixedSteps, compiled, strobe_map
+from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
-from ._liouville import divergence_integral
-from ._problem import Frame, Given, OrbitProblem, Prepared, ReturnMap, frozen, is_traced, make_frame
+from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
 from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
@@ -32,6 +31,9 @@ AT_REST = 1e-3
 """A simulation has led to an orbit where it moves by less, in units of the system's scale."""
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
+ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
+"""Parts of a revolution over which the divergence is integrated: of a method without steps, and of steps that are a
+multiple of so many."""
 
 
 class OrbitEquations(AbstractMapEquations):
@@ -53,15 +55,12 @@ class OrbitEquations(AbstractMapEquations):
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
         problem, frame, n = self.problem, self.frame, self.problem.dimension
         drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
-        image, columns = ReturnMap(problem.prepare(u, given, frame), frame).pushed(u[:n], drifts)
+        image, columns = returned(problem.prepare(u, given, frame), frame, u[:n], drifts)
         r = problem.orbit_residual(u[:n], image, frame)
         jacobian = columns - jnp.eye(n, u.size)
         if problem.free_speed:
             jacobian = jnp.concatenate([jacobian, jnp.zeros((1, u.size)).at[0, :n].set(frame.phase_direction)])
         return r, jacobian, None
-
-    def by_steps(self, steps: Any) -> "OrbitEquations":
-        return OrbitEquations(by_steps(self.problem, steps), self.frame)
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the map, stated with the margin that lanes have, and of its derivative over its own size."""
@@ -176,6 +175,33 @@ def _resolved(m: Float[Array, "dim dim"]) -> Float[Array, ""]:
     return jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
 
 
+def divergence_integral(
+    strobe: StrobeMap, state: Float[Array, " dim"], periods: Int[Array, ""] | int
+) -> Float[Array, ""]:
+    """Integral over `periods` revolutions of the field's divergence along the orbit through `state` (SI).
+
+    By Liouville's identity it is log|det M|; for a mechanical system the divergence is minus damping over mass. It
+    checks every monodromy matrix: integration error, differentiation and, in stiff systems, multipliers lost to
+    rounding show as a disagreement. By the trapezoidal rule at the integration steps, or at as many of them as is
+    enough: on a closed orbit it converges faster than any power of the step where the field is smooth.
+    """
+    parts = ADAPTIVE_PARTS
+    if isinstance(strobe.method, FixedSteps):
+        steps = jnp.asarray(strobe.method.steps)
+        parts = jnp.where(steps % MOST_PARTS == 0, MOST_PARTS, steps)
+    h = REVOLUTION / jnp.asarray(parts, dtype=float)
+
+    def part(i: Array, carry: tuple) -> tuple:
+        y, total = carry
+        tau = jnp.mod(i, parts).astype(float) * h
+        divergence = strobe.field.linearise(tau, y).divergence
+        return strobe.part(y, jnp.mod(i, parts), parts).y, total + divergence
+
+    start = tuple(state[i] for i in range(state.size)), jnp.zeros(())
+    _, total = jax.lax.fori_loop(0, periods * parts, part, start)
+    return total * h
+
+
 def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts) -> Float[Array, " dim"]:
     """State after `revolutions` from `start` and, while that is not at rest, after as many again by twice the steps."""
     given = frozen(given)
@@ -215,7 +241,7 @@ def _find(
     equations = OrbitEquations(problem, frame)
     u, found = settled(equations, given, u0, counts, at_root=True)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
-    u, equations = jnp.where(converged, u, jnp.nan), equations.by_steps(found.steps)
+    u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
     monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
     state, speed, multipliers = _place(equations, u, monodromy, given)

@@ -4,7 +4,7 @@ Unknowns are numbers of order one: the state z in units of the system's scale, t
 speed of a self-excited system over its guess, and the free parameters in units of their own.
 
 What is expensive, the revolutions, sees the system only through the numbers of its field at one speed (for a cage some
-twenty of them); how these follow from the design is cheap. `prepare` does the latter, `ReturnMap` the former, so that a
+twenty of them); how these follow from the design is cheap. `prepare` does the latter, `returned` the former, so that a
 derivative with respect to any number of design parameters costs no more than one with respect to the field's numbers.
 """
 
@@ -64,29 +64,28 @@ class Frame(NamedTuple):
     periods: Int[Array, ""]
 
 
-class ReturnMap(eqx.Module):
-    """`periods` applications of the strobe map, in units of the frame."""
+def returned(
+    strobe: StrobeMap, frame: Frame, z: Float[Array, " dim"], drifts: Sequence[Any] = ()
+) -> tuple[Array, Array]:
+    """The return map, `periods` applications of the strobe map, in units of the frame.
 
-    strobe: StrobeMap
-    frame: Frame
+    **Returns:** the image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each
+    drift of the field's numbers (in a column each).
+    """
+    scale, n = frame.scale, z.size
+    zero = jnp.zeros(())
+    basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
+    start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
+    along = [*[None] * n, *drifts]
 
-    def pushed(self, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
-        """The image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each drift
-        of the field's numbers (in a column each)."""
-        scale, n = self.frame.scale, z.size
-        zero = jnp.zeros(())
-        basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
-        start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
-        along = [*[None] * n, *drifts]
+    def once(_: Array, carry: tuple) -> tuple:
+        y, tangents = carry
+        moved = pushed(strobe, y, tangents, along)
+        return moved.y, moved.tangents
 
-        def once(_: Array, carry: tuple) -> tuple:
-            y, tangents = carry
-            moved = pushed(self.strobe, y, tangents, along)
-            return moved.y, moved.tangents
-
-        y, tangents = jax.lax.fori_loop(0, self.frame.periods, once, start)
-        columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
-        return jnp.stack(y) / scale, columns / scale[:, None]
+    y, tangents = jax.lax.fori_loop(0, frame.periods, once, start)
+    columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
+    return jnp.stack(y) / scale, columns / scale[:, None]
 
 
 Prepared: TypeAlias = tuple[StrobeMap, list[Any]]

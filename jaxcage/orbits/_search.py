@@ -21,7 +21,7 @@ from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
 from ._by_name import SPEED
-from ._follower import Follower, Start, eigenvalues, is_stable, make_follower, seeds, stable_steps
+from ._follower import Follower, Start, make_follower, seeds, stable_steps
 from ._point import Point
 
 
@@ -184,11 +184,9 @@ def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
                 beyond = piece.rpm > other.rpm[-1]
                 top = b if b.upper_rpm > a.upper_rpm else a
                 joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
-                rows = (
-                    np.concatenate([other.rpm, piece.rpm[beyond]]),
-                    np.concatenate([other.state, piece.state[beyond]]),
-                )
-                whole[i] = _Piece(joined, *rows)
+                rpm = np.concatenate([other.rpm, piece.rpm[beyond]])
+                state = np.concatenate([other.state, piece.state[beyond]])
+                whole[i] = _Piece(joined, rpm, state)
                 break
         else:
             whole.append(piece)
@@ -300,7 +298,7 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     frame = follower.frame(jnp.asarray(met[0][0]), met[0][1], 1)
     points = seeds(follower, frame, met)
     good = points.converged.copy()
-    good[good] = is_stable(eigenvalues(follower.monodromy(take(points, good))), follower.problem.free_speed)
+    good[good] = follower.unstable(take(points, good)) == 0
     states = points.u[:, :-1] * np.asarray(frame.scale)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]

@@ -21,13 +21,14 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..integrate import AbstractMethod, StrobeMap, compiled
+from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
 from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._by_name import SPEED
 from ._cascade import FEIGENBAUM, Cascade
-from ._implicit import Push, Slopes, by_columns, numbers_of
+from ._implicit import Push, Slopes, by_columns, numbers_around, numbers_of
+from ._orbit import OrbitEquations
 from ._point import Point
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
@@ -85,22 +86,15 @@ class _Expansion(NamedTuple):
     monodromy: Float[Array, "dim dim"]
     image_slope: Float[Array, "dim x"]
     monodromy_slope: Float[Array, "dim dim x"]
-    drift: Float[Array, " k"]
-    """dk / d parameter, in the frame's unit."""
+    of_u: Float[Array, "k n"]
+    """Derivatives of k with respect to the unknowns."""
 
 
 def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, " n"]) -> _Expansion:
-    k, drift, like = _numbers(problem, given, frame, u)
+    k, of_u, like = numbers_around(OrbitEquations(problem, frame), u, given)
     x = jnp.concatenate([u[: problem.dimension], k])
-    (image, monodromy), (image_slope, monodromy_slope) = by_columns(x, f=Slopes(Push((like, []), frame)))
-    return _Expansion(image, monodromy, image_slope, monodromy_slope, drift)
-
-
-@compiled
-def _numbers(problem: OrbitProblem, given: Given, frame: Frame, u: Array) -> tuple[Array, Array, StrobeMap]:
-    """The numbers of the field, their drift, and the map that they are numbers of."""
-    row = lambda v: numbers_of(problem.prepare(v, given, frame))[0]
-    return row(u), jax.jacfwd(row)(u)[:, problem.dimension], problem.prepare(u, given, frame)
+    (image, monodromy), (image_slope, monodromy_slope) = by_columns(x, f=Slopes(Push(like, frame)))
+    return _Expansion(image, monodromy, image_slope, monodromy_slope, of_u)
 
 
 @compiled
@@ -131,7 +125,7 @@ def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
     closing = around.image_slope - jnp.eye(n, around.image_slope.shape[1])
     whole = jnp.concatenate([closing, jnp.einsum("ij,ijx->x", slope, around.monodromy_slope)[None]])
     of_numbers = whole[:, n:]
-    of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.drift)[:, None]], axis=1)
+    of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.of_u[:, n])[:, None]], axis=1)
     residual = jnp.append(around.image - z, g)
     return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known, (left, right)))
 

@@ -9,7 +9,7 @@ With monodromy matrix M an orbit is at a
 The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
 """
 
-from typing import Literal
+from typing import Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,7 +17,7 @@ from jaxtyping import Array, Complex, Float
 
 
 Kind = Literal["period-doubling", "Neimark-Sacker", "fold", "branch-point"]
-KINDS: tuple[Kind, ...] = ("period-doubling", "Neimark-Sacker", "fold", "branch-point")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:

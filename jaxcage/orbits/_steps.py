@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
@@ -56,17 +57,13 @@ def counted(
 ) -> tuple[AbstractMethod, Counts]:
     """A method with its number of steps left open, and the numbers to try: those of the method and half as many, or,
     without a method, as many as are needed."""
+    chosen = make_method(solver) if method is None else method
+    if not isinstance(chosen, FixedSteps):
+        return chosen, _counts(1, 1, 0.0)
+    left_open = by_steps(chosen, 1)
     if method is None:
-        chosen = make_method(solver)
-        assert isinstance(chosen, FixedSteps)
-        return _open(chosen), _counts(first, most, 1.0)
-    if not isinstance(method, FixedSteps):
-        return method, _counts(1, 1, 0.0)
-    return _open(method), _counts(jnp.maximum(method.steps // 2, 1), method.steps, 0.0)
-
-
-def _open(method: FixedSteps) -> FixedSteps:
-    return FixedSteps(method.solver, jnp.asarray(1, int))
+        return left_open, _counts(first, most, 1.0)
+    return left_open, _counts(jnp.maximum(chosen.steps // 2, 1), chosen.steps, 0.0)
 
 
 def _counts(first: Any, last: Any, tolerance: float) -> Counts:
@@ -81,15 +78,13 @@ def from_steps(counts: Counts, steps: Any) -> Counts:
     return counts._replace(first=jnp.where(counts.tolerance > 0, first, counts.first))
 
 
-Problem = TypeVar("Problem", bound=eqx.Module)
+T = TypeVar("T", bound=eqx.Module)
 
 
-def by_steps(problem: Problem, steps: Any) -> Problem:
-    """A problem by so many steps a revolution; as it is where its method has no such number."""
-    method = problem.method  # pyright: ignore[reportAttributeAccessIssue]
-    if not isinstance(method, FixedSteps):
-        return problem
-    return eqx.tree_at(lambda p: p.method.steps, problem, jnp.asarray(steps, int))
+def by_steps(tree: T, steps: Any) -> T:
+    """A method, a problem or equations by so many steps a revolution; as they are where there is no such number."""
+    changed = lambda x: FixedSteps(x.solver, jnp.asarray(steps, int)) if isinstance(x, FixedSteps) else x
+    return jax.tree.map(changed, tree, is_leaf=lambda x: isinstance(x, AbstractMethod))  # not the rungs of a ladder
 
 
 def that_serves(

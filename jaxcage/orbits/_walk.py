@@ -12,7 +12,7 @@ from ._arclength import Corrected, Steps, follow, take
 from ._branch import describe, joined
 from ._by_name import SPEED
 from ._follower import Follower, Start, seeds, stable_steps, turned
-from ._located import brackets, count_of
+from ._located import brackets
 from ._point import Point
 
 
@@ -39,7 +39,7 @@ def walk(follower: Follower, start: Start, periods: int, kind: str) -> tuple[Poi
         """Past a point of the kind, or further from the guess than the other direction found one."""
         step: Corrected = jax.tree.map(lambda *x: np.stack(x), *points[-2:])
         far = float(abs(step.u[1, -1] - first.u[0, -1]))
-        before, after = count_of(follower, step)
+        before, after = follower.unstable(step)
         if before != after and any(k == kind for _, k in brackets(follower, step)):
             reached.append(far)
             return True
