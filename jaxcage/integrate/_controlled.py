@@ -20,8 +20,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
-from ._method import AbstractMethod, AdaptiveSteps, FixedSteps, Stretch, make_fixed, run_steps
-from ._moved import Moved, moved_by
+from ._method import AbstractMethod, AdaptiveSteps, FixedSteps, Moved, Stretch, make_fixed, moved_by, run_steps
 from ._results import INACCURATE, result_of
 
 

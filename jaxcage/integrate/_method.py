@@ -2,7 +2,7 @@
 
 import abc
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -10,15 +10,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Int
+from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._explicit import ClassicalRK4
 from ._kernel import REVOLUTION, can_be_kernel, steps_through
+from ._march import with_tangents
 from ._newmark import NewmarkBeta
-from ._results import RESULTS
+from ._results import RESULTS, outcome_code
 from ._rosenbrock import Rodas3, Rodas4
 
 
@@ -34,6 +35,36 @@ class Stretch(NamedTuple):
     result: RESULTS
     error: Scalar = math.nan
     """How far the end moves with half as many steps, in units of the system's scale; NaN where that was not tried."""
+
+
+Tangents = tuple[State, ...]
+
+
+class Moved(NamedTuple):
+    """A lane after a revolution; or many, their axis last."""
+
+    y: State
+    tangents: Tangents
+    peak: Scalar
+    """Largest excursion on the way."""
+    outcome: Int[Array, "*lanes"]
+    level: Int[Array, "*lanes"]
+    """Which of the method's step counts is worth trying next."""
+    error: Float[Array, "*lanes"]
+    """How far off the end would be with half as many steps, in units of the scale; NaN where that was not tried."""
+    half: Tangents
+    """The tangent vectors with half as many steps; none where that was not tried."""
+
+
+def moved_by(advance: Callable[[Any], Stretch], start: Any, tangents: Sequence[Any]) -> Moved:
+    """One lane moved by `advance` from its start, the tangent vectors there by the derivative of that."""
+
+    def move(start: Any) -> tuple[State, tuple[Any, ...]]:
+        stretch = advance(start)
+        return stretch.y, (jnp.asarray(stretch.peak), outcome_code(stretch.result), jnp.asarray(stretch.error))
+
+    y, after, (peak, code, error) = with_tangents(move, start, tangents)
+    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error, ())
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
