@@ -17,6 +17,7 @@ from ._bearing_blocks import slowness
 from ._implicit import film_rate
 from ._lanes import By, Controls, Lanes, advance, begin
 from ._results import INACCURATE, OUTCOMES
+from ._simulate import require_counts
 
 
 TURN = 2 * np.pi
@@ -168,13 +169,7 @@ def simulate_bearing(
     value = float(speed)
     if not np.isfinite(value) or value == 0:
         raise ArgumentError("speed", said=f"must be a speed other than 0, but {value:g} rad/s was given.")
-    if revolutions < 1 or samples < 1 or discard < 0:
-        raise ArgumentError(
-            "revolutions",
-            "samples",
-            "discard",
-            said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
-        )
+    require_counts(revolutions, samples, discard)
     state = rolling_start(model, value) if start is None else start
     parts = _parts(model, value, samples)
     places = samples * parts
