@@ -34,7 +34,7 @@ from ..integrate import (
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
 from ._engine import Progress, alike, cores, workers
-from ._speed import checked_speeds, versions
+from ._speed import checked_speeds, require_lengths, versions
 
 
 CHUNKS = (8, 16, 32, 48, 64, 80, 96)
@@ -184,12 +184,7 @@ def require_bearings(
             raise ArgumentError("model", said="must have a dynamic inner ring, but its `ring_motion` is quasi_static.")
         if model.film.model == "finite_length":
             raise ArgumentError("model", said="must have a short film, but its film is of finite_length.")
-    if discard < 0 or revolutions < 1:
-        raise ArgumentError(
-            "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
-        )
-    if blocks < 1 or revolutions % blocks:
-        raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
+    require_lengths(discard, revolutions, blocks)
     if exponents not in (0, 1):
         raise ArgumentError("exponents", said=f"must be 0 or 1, but {exponents} was given.")
     if isinstance(starts, int):

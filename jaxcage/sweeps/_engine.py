@@ -142,9 +142,13 @@ def run_parts(
     which: Int[np.ndarray, " lanes"],
     y0: Float[np.ndarray, "lanes dim"],
 ) -> tuple[np.ndarray, ...]:
-    """`work` on all lanes, chunk by chunk on all cores."""
+    """`work` on all lanes, chunk by chunk on all cores: results with the lanes first, NaN where one begins nowhere."""
+    alive = np.all(np.isfinite(y0), axis=1)
+    y0 = np.where(alive[:, None], y0, 0.0)
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    return _in_chunks(begin, np.arange(speed.size), chunk_size(speed.size))
+    found = _in_chunks(begin, np.arange(speed.size), chunk_size(speed.size))
+    each = lambda x: alive.reshape(-1, *[1] * (x.ndim - 1))
+    return tuple(np.where(each(x), np.moveaxis(x, -1, 0), np.nan) for x in found)
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
