@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._recent import split
 from .._types import Scalar, State
 from ..models import ESCAPE
-from ._controlled import ControlledSteps, Levels, Pieces, climb, nowhere, run_level
+from ._controlled import ControlledSteps, Levels, climb, nowhere, run_level
 from ._kernel import KernelSolver, can_be_kernel, steps_through
 from ._method import FixedSteps, Moved, Stretch, Tangents, moved_by, result_at
 from ._results import outcome_code
@@ -107,9 +107,8 @@ def _lanes(
     def attempt(levels: Levels, i: Array, mine: Bool[Array, " lanes"]) -> Moved:
         def one(row: Sequence[Any], y: State, tangents: Tangents) -> Moved:
             strobe = remake(row)
-            return moved_by(
-                run_level(method, levels, i, Pieces(strobe.field, strobe.system, strobe.scale)), y, tangents
-            )
+            pieces = (strobe.field, strobe.system, strobe.scale)
+            return moved_by(run_level(method, levels, i, pieces), y, tangents)
 
         return _packed(one, mine, row, own, y, tangents)
 

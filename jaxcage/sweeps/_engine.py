@@ -190,9 +190,8 @@ def run_lanes(
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
     lanes, dim = y0.shape
-    if not isinstance(systems, Designs):
-        systems = Designs.of(list(systems) if isinstance(systems, Sequence) else [systems])
-    designs = systems
+    systems = systems if isinstance(systems, Sequence | Designs) else [systems]
+    designs = systems if isinstance(systems, Designs) else Designs.of(systems)
     which = np.zeros(lanes, int) if which is None else which
     size = chunk_size(lanes) if size is None else size
     plan = Plan(*map(int, plan))
