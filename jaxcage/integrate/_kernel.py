@@ -92,8 +92,9 @@ class KernelStep:
     @property
     def stage(self) -> "KernelStage | None":
         """The part that a step of an explicit method is made of."""
-        explicit = isinstance(self.solver, dfx.AbstractERK)
-        return KernelStage(self.solver, self.structure, self.abrupt) if explicit else None  # pyright: ignore
+        if not isinstance(self.solver, dfx.AbstractERK):
+            return None
+        return KernelStage(Stages.of(self.solver.tableau), self.structure, self.abrupt)  # pyright: ignore
 
     def watched(self, phase: Any) -> Numbers:
         """What is watched, at the beginning: the excursion, the phase and the length of the step."""
@@ -131,15 +132,10 @@ class KernelStage:
     that at its end; after the last stage all of them are the new state. Watched and fixed as in a step.
     """
 
-    solver: dfx.AbstractERK
+    stages: Stages
+    """The method's coefficients."""
     structure: Form
     abrupt: bool
-
-    @property
-    def stages(self) -> Stages:
-        """The method's coefficients."""
-        assert isinstance(self.solver.tableau, dfx.ButcherTableau)
-        return Stages.of(self.solver.tableau)
 
     @property
     def count(self) -> int:
