@@ -71,11 +71,11 @@ class Form(NamedTuple):
         return jax.tree.unflatten(self.tree, [next(each) if x is None else x[1] for x in self.rest])
 
 
-def split(tree: Any) -> tuple[Form, list[Any]]:
-    """The form of a pytree, and its arrays."""
+def split(tree: Any, taken: Callable[[Any], bool] = lambda x: isinstance(x, ARRAYS)) -> tuple[Form, list[Any]]:
+    """The form of a pytree, and its arrays, or those of its leaves that are `taken`."""
     leaves, shape = jax.tree.flatten(tree)
-    rest = tuple(None if isinstance(x, ARRAYS) else (type(x), x) for x in leaves)
-    return Form(shape, rest), [x for x in leaves if isinstance(x, ARRAYS)]
+    rest = tuple(None if taken(x) else (type(x), x) for x in leaves)
+    return Form(shape, rest), [x for x in leaves if taken(x)]
 
 
 def shapes(arrays: Sequence[Any]) -> Hashable:

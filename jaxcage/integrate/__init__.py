@@ -59,10 +59,10 @@ from ._method import (
     AbstractMethod as AbstractMethod,
     AdaptiveSteps as AdaptiveSteps,
     FixedSteps as FixedSteps,
+    Moved as Moved,
     Stretch as Stretch,
     method as method,
 )
-from ._moved import Moved as Moved
 from ._newmark import NewmarkBeta as NewmarkBeta
 from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
 from ._revolution import BLOCK as BLOCK, pushed as pushed, revolution as revolution

@@ -13,19 +13,13 @@ from .._errors import ArgumentError
 from .._recent import jitted
 from .._types import Scalar
 from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
-from ._bearing_blocks import slowness
+from ._bearing_blocks import FIRST, LONGEST, SHORTEST, STALLED, TURN, slowness
 from ._implicit import film_rate
 from ._lanes import By, Controls, Lanes, advance, begin
 from ._results import INACCURATE, OUTCOMES
+from ._simulate import require_counts
 
 
-TURN = 2 * np.pi
-FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
-"""First, longest and shortest step [rad] of the cage's angle."""
-STALLED = 0.05
-"""Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
-MOST_STEPS = 200_000
-"""In a part of a revolution between two samples."""
 IMBALANCE = 1e-6
 """Of the load, by which a quasi-static ring may be out of balance."""
 SHORT = 2
@@ -73,9 +67,8 @@ class BearingRun:
     @property
     def last(self) -> BearingState:
         """The state at the end."""
-        as_array = lambda x: jnp.asarray(x)
         clock = np.array([self.angle[-1], self.time[-1]])
-        return BearingState(as_array(self.rollers[-1]), as_array(self.bodies[-1]), as_array(clock))
+        return BearingState(*map(jnp.asarray, (self.rollers[-1], self.bodies[-1], clock)))
 
     def total(self, name: str) -> float:
         """An integral over the whole run, by its name."""
@@ -108,7 +101,7 @@ def _run(
     """One span after the other; what there was at each end, peaks, errors and steps between."""
     at, scale = model.at_speed(speed), state_scale(model, speed)
     slowest = jnp.abs(at.rolling_cage_speed) * (STALLED if by == "angle" else 0.0)
-    controls = Controls(tolerance * jnp.array([1.0, HALF]), limits[1], limits[2], MOST_STEPS, slowest)
+    controls = Controls(tolerance * jnp.array([1.0, HALF]), limits[1], limits[2], slowest)
 
     def part(lanes: Lanes, span: Array) -> tuple[Lanes, tuple[Array, ...]]:
         together = lambda x: jnp.stack([x[..., 0]] * 2, axis=-1)
@@ -168,13 +161,7 @@ def simulate_bearing(
     value = float(speed)
     if not np.isfinite(value) or value == 0:
         raise ArgumentError("speed", said=f"must be a speed other than 0, but {value:g} rad/s was given.")
-    if revolutions < 1 or samples < 1 or discard < 0:
-        raise ArgumentError(
-            "revolutions",
-            "samples",
-            "discard",
-            said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
-        )
+    require_counts(revolutions, samples, discard)
     state = rolling_start(model, value) if start is None else start
     parts = _parts(model, value, samples)
     places = samples * parts
@@ -241,14 +228,13 @@ def _recorded(
     implicit: bool | None,
 ) -> BearingRun:
     """The run, and its last revolution again."""
-    omega, (first_step, longest, shortest) = jnp.asarray(speed), limits
-    bounds = (jnp.asarray(first_step), jnp.asarray(longest), jnp.asarray(shortest))
+    omega, bounds = jnp.asarray(speed), tuple(map(jnp.asarray, limits))
     lanes = _begun(model, omega, state, bounds[0])
     parts, first = [], np.asarray(lanes.packed).T[:1]
-    if implicit is None and model.ring.ring_motion == "quasi_static":
+    if model.ring.ring_motion == "quasi_static":
+        if implicit:
+            raise ArgumentError("implicit", said="must be False or None for a quasi-static inner ring, but is True.")
         implicit = False
-    if implicit and model.ring.ring_motion == "quasi_static":
-        raise ArgumentError("implicit", said="must be False or None for a quasi-static inner ring, but is True.")
     pieces = np.split(spans, len(spans) // samples * (CHOICES if samples % CHOICES == 0 else 1))
     stiff = []
     for piece in pieces:

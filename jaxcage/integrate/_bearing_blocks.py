@@ -91,15 +91,6 @@ class _Going(NamedTuple):
     attempts: Array
 
 
-class _Limits(NamedTuple):
-    """Of a block, shared by all lanes."""
-
-    tolerance: Any
-    samples: Any
-    last_attempt: Any
-    """Whether this is the last attempt."""
-
-
 def _moving(state: BearingState) -> Moving:
     """Of a state with lanes last."""
     return Moving(tuple(row.reshape(-1) for row in state.rollers), tuple(state.bodies))
@@ -121,13 +112,12 @@ def begin_lanes(
     lanes = state.bodies.shape[-1]
     units = _inverse(scale)
     y = _moving(state)
-    tangent = Moving((), ())
+    law, tangent = law_of(at, units, lanes), Moving((), ())
     if direction is not None:
-        law = law_of(at, units, lanes)
         row = lambda parts, unit: tuple(x / u for x, u in zip(parts, unit, strict=True))
         along = _moving(direction)
         tangent = Moving(row(along.rollers, law.units.rollers), row(along.bodies, units.bodies))
-    point = first_point(law_of(at, units, lanes), state.clock[0], y, tangent)
+    point = first_point(law, state.clock[0], y, tangent)
     full = lambda x: jnp.full((lanes,), x)
     return BearingLanes(point, state.clock[0], full(FIRST), full(0).astype(jnp.int32))
 
@@ -180,15 +170,12 @@ def run_block(
     units = _inverse(scale)
     count = lanes.angle.shape[0]
     law = law_of(at, units, count)
-    before = _length(units, lanes.point.tangent, at.n_rollers)
+    point = lanes.point
+    before = _length(units, point.tangent, at.n_rollers)
     scaled = lambda m: Moving(
         tuple(x / law.layout.over(before) for x in m.rollers), tuple(x / before for x in m.bodies)
     )
-    point = (
-        lanes.point._replace(tangent=scaled(lanes.point.tangent), tangent_slope=scaled(lanes.point.tangent_slope))
-        if lanes.point.tangent.bodies
-        else lanes.point
-    )
+    point = point._replace(tangent=scaled(point.tangent), tangent_slope=scaled(point.tangent_slope))
     slowest = jnp.broadcast_to(STALLED * jnp.abs(jnp.asarray(at.rolling_cage_speed)), (count,))
     sense = jnp.broadcast_to(law.sense, (count,))
     slow = jnp.ceil(jnp.max(slowness(at, scale))).astype(jnp.int32)
@@ -209,16 +196,16 @@ def run_block(
             lambda _, lane: _to_try(*lane), 2, (), (course.base, course.within, course.step, sense, each)
         )
         new, error = step(law, angle, h, old)
-        limits = _Limits(tolerance, samples.astype(float), (going.attempts + 1 >= most).astype(float))
+        limits: tuple[Any, ...] = (tolerance, samples.astype(float), (going.attempts + 1 >= most).astype(float))
         leaves, tree = jax.tree.flatten(course)
         own = (error, h, new.y.bodies[4], slowest, sense, each, *old.integrand, *new.integrand, *new.watched)
 
         def accept(shared: tuple[Any, ...], lane: tuple[Any, ...]) -> list[Any]:
             course, own = jax.tree.unflatten(tree, lane[: len(leaves)]), lane[len(leaves) :]
-            after, taken, hit = _accepted(_Limits(*shared), course, own)
+            after, taken, hit = _accepted(shared, course, own)
             return [*jax.tree.leaves(after), taken, hit]
 
-        *after, taken, hit = lanewise(accept, len(leaves) + 2, tuple(limits), (*leaves, *own))
+        *after, taken, hit = lanewise(accept, len(leaves) + 2, limits, (*leaves, *own))
         point = kept(law, taken, new, old)
         here = (number == course.reached[None, None]) & (hit > 0)[None, None]
         places = jnp.where(here, place(point)[None], going.place)
@@ -257,17 +244,18 @@ def _to_try(base: Any, within: Any, step: Any, sense: Any, spacing: Any) -> tupl
     return h, base + sense * within
 
 
-def _accepted(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_Course, Any, Any]:
+def _accepted(shared: tuple[Any, ...], course: _Course, own: tuple[Any, ...]) -> tuple[_Course, Any, Any]:
     """Take the step of a lane or refuse it, and choose the next one."""
+    tolerance, samples, last_attempt = shared
     error, h, cage_speed, slowest, sense, spacing, *rest = own
     size = len(course.integrals)
     before, after, watched = rest[:size], rest[size : 2 * size], rest[2 * size :]
-    goes, left = _active(course, limits.samples), spacing - course.within
+    goes, left = _active(course, samples), spacing - course.within
     finite, shortest = jnp.isfinite(error), course.step <= SHORTEST
-    good = (error <= limits.tolerance) & finite
+    good = (error <= tolerance) & finite
     taken = goes & finite & (good | shortest)
     hit = taken & (h >= left)
-    root = jnp.sqrt(jnp.sqrt(limits.tolerance / jnp.maximum(error, 1e-30)))  # the estimate is of fourth order
+    root = jnp.sqrt(jnp.sqrt(tolerance / jnp.maximum(error, 1e-30)))  # the estimate is of fourth order
     tried = h * jnp.where(finite, jnp.clip(SAFETY * root, LEAST, MOST), LEAST)
     # A step that was shortened to end at a sample says nothing against the one that was to be tried.
     tried = jnp.where(good & (h < course.step), jnp.maximum(course.step, tried), tried)
@@ -275,7 +263,7 @@ def _accepted(limits: _Limits, course: _Course, own: tuple[Any, ...]) -> tuple[_
     code = jnp.where(goes & shortest & ~good, jnp.where(finite, 1.0 * INACCURATE, 1.0 * NOT_FINITE), 0.0)
     lost = taken & ((jnp.abs(cage_speed) < slowest) | (watched[-1] > FAR))
     code = jnp.where(lost, 1.0 * OUTSIDE, code)
-    code = jnp.where(goes & (limits.last_attempt > 0) & ~hit, 1.0 * TOO_MANY, code)
+    code = jnp.where(goes & (last_attempt > 0) & ~hit, 1.0 * TOO_MANY, code)
     worse = (course.outcome == 0) | ((code != 0) & (code != INACCURATE))
     add = lambda total, a, b: total + jnp.where(taken, h / 2 * (a + b), 0.0)
     follow = lambda p, w: jnp.where(taken, jnp.maximum(p, w), p)

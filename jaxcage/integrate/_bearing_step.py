@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ..forces._phase import cos_sin
 from ..models.whole import LEDGER, MEANS, MOVING, BearingAtSpeed, Bodies, Passed, Rollers
-from ._march import lanewise
+from ._march import lanewise, with_tangents
 
 
 Row = tuple[Array, ...]
@@ -118,14 +118,6 @@ def _taken(row: Sequence[Any], *sizes: int) -> list[tuple[Any, ...]]:
     return [tuple(row[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
 
 
-def _with_tangents(go: Callable[..., Any], values: Sequence[Row], tangents: Sequence[Row]) -> tuple[Any, Any, Any]:
-    """Results of `go`, their tangents (none without), and what it watches."""
-    if not any(tangents):
-        results, seen = go(*values)
-        return results, (), seen
-    return jax.jvp(go, tuple(values), tuple(tangents), has_aux=True)
-
-
 def _rollers_kernel(
     law: Law,
     phase: Row,
@@ -156,7 +148,8 @@ def _rollers_kernel(
         pocket = cos * cos_j - sin * sin_j, sin * cos_j + cos * sin_j
         share, weight = shared
 
-        def go(y0: Row, slope: Row, total: Row, bodies: Row) -> tuple[Any, Any]:
+        def go(rows: Sequence[Row]) -> tuple[Any, Any]:
+            y0, slope, total, bodies = rows
             way = [x / 6 for x in total] if ends else [share * x for x in slope]
             y = tuple(a + h * b for a, b in zip(y0, way, strict=True))
             rollers, cage = Rollers(*y), Bodies(*bodies)
@@ -166,13 +159,13 @@ def _rollers_kernel(
             return (*new, *(y if ends else sums), *passed[:MOVING]), (*passed[MOVING:], at.slip(rollers.spin))
 
         values, lane = _taken(lane, *sizes), lane[sum(sizes) :]
-        tangents = _taken(lane, *sizes) if pushed else []
+        tangents = [_taken(lane, *sizes)] if pushed else []
         lane = lane[sum(sizes) * pushed :]
-        results, slopes, seen = _with_tangents(go, values, tangents)
+        results, slopes, seen = with_tangents(go, values, tangents)
         if not ends:
-            return (*results, *slopes)
+            return (*results, *sum(slopes, ()))
         before, units = _taken(lane, OF_ROLLER, OF_ROLLER)
-        return (*results, *slopes, *seen, _error(h, before, results, units))
+        return (*results, *sum(slopes, ()), *seen, _error(h, before, results, units))
 
     more = [*last, *law.units.rollers] if last is not None else []
     given = [*own, *spread(values), *(spread(tangents) if pushed else ()), *more]
@@ -199,12 +192,13 @@ def _bodies_kernel(
     def f(at: BearingAtSpeed, shared: Row, lane: Row) -> Sequence[Any]:
         (cos, sin, h), lane = lane[:3], lane[3:]
         values, lane = _taken(lane, *sizes), lane[sum(sizes) :]
-        tangents = _taken(lane, *sizes) if pushed else []
+        tangents = [_taken(lane, *sizes)] if pushed else []
         lane = lane[sum(sizes) * pushed :]
         more, before, units = _taken(lane, len(rest), len(last), len(last))
         fill = more or (jnp.zeros_like(cos),) * (len(Passed._fields) - MOVING)
 
-        def go(bodies: Row, total: Row, sums: Row) -> tuple[Any, Any]:
+        def go(rows: Sequence[Row]) -> tuple[Any, Any]:
+            bodies, total, sums = rows
             cage = Bodies(*bodies)
             land = at.on_land(cage)
             rates, integrals, _ = at.body_rates(cage, (cos, sin), Passed(*sums, *fill), land)
@@ -213,10 +207,10 @@ def _bodies_kernel(
             integrands = _over_angle((jnp.ones_like(cos), *integrals, land.eps * land.eps), cage.cage_speed)
             return (*new, *sums), (*integrands, land.size, land.eps)
 
-        results, slopes, seen = _with_tangents(go, values, tangents)
+        results, slopes, seen = with_tangents(go, values, tangents)
         if not ends:
-            return (*results, *slopes)
-        return (*results, *slopes, *seen, _error(h, before, results, units))
+            return (*results, *sum(slopes, ()))
+        return (*results, *sum(slopes, ()), *seen, _error(h, before, results, units))
 
     units = law.units.bodies if ends else ()
     flat = lambda rows: [x for row in rows for x in row]

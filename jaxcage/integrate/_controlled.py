@@ -10,7 +10,7 @@ resolve, which leaves the state of a lane right and its exponent wrong.
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -20,8 +20,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
-from ._method import AbstractMethod, AdaptiveSteps, FixedSteps, Stretch, make_fixed, run_steps
-from ._moved import Moved, moved_by
+from ._method import AbstractMethod, AdaptiveSteps, FixedSteps, Moved, Stretch, make_fixed, moved_by, run_steps
 from ._results import INACCURATE, result_of
 
 
@@ -47,16 +46,10 @@ EASY = 8
 costs an eighth of the steps of the level that is taken."""
 
 Levels = FixedSteps | AdaptiveSteps
+Pieces = tuple[AbstractField, AbstractForcedSystem, State]
+"""What is integrated: field, system and its scale."""
 Attempt = Callable[[Levels, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
 """The revolution of those lanes that are marked by the i-th level of a solver."""
-
-
-class Pieces(NamedTuple):
-    """What is integrated."""
-
-    field: AbstractField
-    system: AbstractForcedSystem
-    scale: State
 
 
 class ControlledSteps(AbstractMethod):
@@ -89,7 +82,7 @@ class ControlledSteps(AbstractMethod):
         parts: Int[Array, ""] | int,
     ) -> Stretch:
         """One part, by the first level whose error is within the part's share of the tolerance, else by the last."""
-        pieces = Pieces(field, system, scale)
+        pieces = (field, system, scale)
         attempt = lambda levels, i, _: moved_by(run_level(self, levels, i, pieces, phase, parts), y, ())
         moved = climb(self, jnp.zeros((), jnp.int32), nowhere(y, ()), scale, attempt, system.harmonics, parts)
         return Stretch(moved.y, moved.peak, result_of(moved.outcome), moved.error)

@@ -14,6 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from .._recent import Form, split
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
 from ._explicit import Stages, chosen, explicit_step
@@ -31,33 +32,6 @@ def can_be_kernel(solver: Any) -> bool:
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
     return isinstance(solver, AbstractRosenbrock)
-
-
-@dataclasses.dataclass(frozen=True)
-class Structure:
-    """A module without its numbers."""
-
-    numbers: Any
-    rest: Any
-    leaves: tuple[tuple[type, Any], ...]
-
-    @classmethod
-    def of(cls, module: Any) -> tuple["Structure", list[Any]]:
-        """The structure of a module, and its numbers in a row."""
-        numbers, static = eqx.partition(module, eqx.is_inexact_array)
-        row, form = jax.tree.flatten(numbers)
-        leaves, rest = jax.tree.flatten(static)
-        return cls(form, rest, tuple((type(x), x) for x in leaves)), row
-
-    @property
-    def plain(self) -> bool:
-        """Whether the numbers are all the arrays there are."""
-        return not any(eqx.is_array(x) for _, x in self.leaves)
-
-    def remake(self, numbers: Sequence[Any]) -> Any:
-        """The module with these numbers."""
-        rest = jax.tree.unflatten(self.rest, [x for _, x in self.leaves])
-        return eqx.combine(jax.tree.unflatten(self.numbers, list(numbers)), rest)
 
 
 NEARNESS = 0.2
@@ -84,22 +58,22 @@ def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end:
 
 
 @functools.partial(jax.jit, static_argnums=0)
-def evaluated_often(structure: Structure, numbers: Numbers, tau: Scalar, y: State) -> State:
+def evaluated_often(structure: Form, numbers: Numbers, tau: Scalar, y: State) -> State:
     """The field of a structure of (field, system, scale)."""
-    return structure.remake(numbers)[0](tau, y)
+    return structure.filled(numbers)[0](tau, y)
 
 
 class _CalledField(AbstractField):
     """A field that a step evaluates several times, as calls of one function."""
 
-    structure: Structure = eqx.field(static=True)
+    structure: Form = eqx.field(static=True)
     numbers: Numbers
 
     def __call__(self, tau: Scalar, y: State) -> State:
         return evaluated_often(self.structure, self.numbers, tau, y)
 
     def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
-        return self.structure.remake(self.numbers)[0].linearise(tau, y)
+        return self.structure.filled(self.numbers)[0].linearise(tau, y)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,7 +83,7 @@ class KernelStep:
     system, scale)."""
 
     solver: KernelSolver
-    structure: Structure
+    structure: Form
     abrupt: bool
     """Whether the law changes abruptly somewhere, and steps are shortened there."""
     whole: bool = True
@@ -118,8 +92,9 @@ class KernelStep:
     @property
     def stage(self) -> "KernelStage | None":
         """The part that a step of an explicit method is made of."""
-        explicit = isinstance(self.solver, dfx.AbstractERK)
-        return KernelStage(self.solver, self.structure, self.abrupt) if explicit else None  # pyright: ignore
+        if not isinstance(self.solver, dfx.AbstractERK):
+            return None
+        return KernelStage(Stages.of(self.solver.tableau), self.structure, self.abrupt)  # pyright: ignore
 
     def watched(self, phase: Any) -> Numbers:
         """What is watched, at the beginning: the excursion, the phase and the length of the step."""
@@ -128,7 +103,7 @@ class KernelStep:
 
     def __call__(self, i: Any, moved: State, watched: Numbers, fixed: Numbers) -> tuple[State, Numbers]:
         phase, h, end, *numbers = fixed
-        _, system, _ = self.structure.remake(numbers)
+        _, system, _ = self.structure.filled(numbers)
         field = _CalledField(self.structure, tuple(numbers))
         peak, *clock = watched
         t0 = clock[0] if self.abrupt else phase + i * h
@@ -157,15 +132,10 @@ class KernelStage:
     that at its end; after the last stage all of them are the new state. Watched and fixed as in a step.
     """
 
-    solver: dfx.AbstractERK
-    structure: Structure
+    stages: Stages
+    """The method's coefficients."""
+    structure: Form
     abrupt: bool
-
-    @property
-    def stages(self) -> Stages:
-        """The method's coefficients."""
-        assert isinstance(self.solver.tableau, dfx.ButcherTableau)
-        return Stages.of(self.solver.tableau)
 
     @property
     def count(self) -> int:
@@ -179,7 +149,7 @@ class KernelStage:
 
     def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
         phase, h, until, *numbers = fixed
-        pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.remake(numbers)
+        pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.filled(numbers)
         field, system, scale = pieces
         method, n = self.stages, len(scale)
         step = jnp.floor(i / self.count)
@@ -207,9 +177,10 @@ def kernel_step(
 ) -> tuple[KernelStep, list[Any]]:
     """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
     watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
-    structure, numbers = Structure.of((field, *watching))
+    structure, numbers = split((field, *watching), eqx.is_inexact_array)
     step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
-    if structure.plain and all(jnp.ndim(x) == 0 for x in numbers):
+    plain = not any(eqx.is_array(x[1]) for x in structure.rest if x is not None)
+    if plain and all(jnp.ndim(x) == 0 for x in numbers):
         part = step.stage or step  # of several parts one says it for all
         moved = len(scale) * (step.stage.copies if step.stage else 1)
         if is_elementary(part, Sizes(moved, len(step.watched(0.0)), 3 + len(numbers))):

@@ -25,6 +25,8 @@ ORDER = 4.0
 """Of the estimates of both methods."""
 SAFETY, LEAST, MOST = 0.9, 0.2, 3.0
 """Of the step that the estimate asks for, and how far a step may be from the one before it."""
+MOST_STEPS = 200_000
+"""In a stretch."""
 FAR = 2.0
 """Eccentricity ratio beyond which a cage is no longer in its land."""
 NOT_FINITE, OUTSIDE, TOO_MANY = (OUTCOMES.index(name) for name in ("not_finite", "outside", "max_steps_reached"))
@@ -44,18 +46,12 @@ class Lanes(NamedTuple):
     error: Float[Array, " lanes"]
     """Sum of the estimated errors of all steps, each the largest of the state, in units of its scale."""
     steps: Int[Array, " lanes"]
-    refused: Int[Array, " lanes"]
     outcome: Int[Array, " lanes"]
 
     @property
     def state(self) -> BearingState:
         """The state of each lane."""
         return unpacked(self.packed)[0]
-
-    @property
-    def integrals(self) -> Array:
-        """What has been integrated beside it, as in `LEDGER` and `MEANS`."""
-        return unpacked(self.packed)[1]
 
 
 INTEGRALS = len(LEDGER) + len(MEANS)
@@ -91,7 +87,6 @@ class Controls(NamedTuple):
     """Longest step, in units of the angle or time."""
     shortest: Scalar
     """Shortest step: one that is still too inaccurate is taken, and the lane is `inaccurate`."""
-    most_steps: int
     slowest: Float[Array, " lanes"]
     """Speed of the cage below which its angle is no measure of progress [rad/s]; 0 where time is."""
 
@@ -107,7 +102,7 @@ def begin(at: BearingAtSpeed, state: BearingState, step: Scalar) -> Lanes:
     y = packed(state, jnp.zeros((INTEGRALS, lanes)))
     y, rates, peaks = _over(functools.partial(_field, at), y)
     count = jnp.zeros((lanes,), jnp.int32)
-    return Lanes(y, rates, peaks, jnp.ones((lanes,)) * step, jnp.zeros((lanes,)), count, count, count)
+    return Lanes(y, rates, peaks, jnp.ones((lanes,)) * step, jnp.zeros((lanes,)), count, count)
 
 
 def advance(
@@ -181,7 +176,7 @@ def _implicit_step(at: BearingAtSpeed, lanes: Lanes, h: Array, by: By) -> tuple[
 
 def _accepted(
     lanes: Lanes,
-    found: tuple[Array, Array, Array],
+    found: Found,
     h: Array,
     left: Array,
     error: Array,
@@ -200,24 +195,17 @@ def _accepted(
     tried = jnp.where(good & (h < lanes.step), jnp.maximum(lanes.step, tried), tried)
     tried = jnp.clip(tried, controls.shortest, controls.longest)
     code = jnp.where(taken & ~good, jnp.where(finite, INACCURATE, NOT_FINITE), 0)
-    code = jnp.where(active & (lanes.steps >= controls.most_steps), TOO_MANY, code)
+    code = jnp.where(active & (lanes.steps >= MOST_STEPS), TOO_MANY, code)
     outcome = jnp.where(lanes.outcome == 0, code, lanes.outcome).astype(jnp.int32)
     fatal = (outcome == NOT_FINITE) | (outcome == TOO_MANY)
-    keep = lambda new, old: jnp.where(taken, new, old)
     new = Lanes(
-        packed=_over(_kept, taken, after, lanes.packed),
-        rates=_over(_kept, taken, rates, lanes.rates),
-        peaks=_over(_kept, taken, jnp.maximum(lanes.peaks, peaks), lanes.peaks),
+        packed=_over(jnp.where, taken, after, lanes.packed),
+        rates=_over(jnp.where, taken, rates, lanes.rates),
+        peaks=_over(jnp.where, taken, jnp.maximum(lanes.peaks, peaks), lanes.peaks),
         step=jax.lax.stop_gradient(jnp.where(active, tried, lanes.step)),
-        error=lanes.error + keep(error, jnp.zeros_like(error)),
+        error=lanes.error + jnp.where(taken, error, jnp.zeros_like(error)),
         steps=lanes.steps + taken.astype(jnp.int32),
-        refused=lanes.refused + (active & ~taken).astype(jnp.int32),
         outcome=outcome,
     )
     done = jnp.where(taken, jnp.where(h >= left, span, done + h), done)
     return new, jnp.where(fatal, span, done)
-
-
-def _kept(taken: Array, new: Array, old: Array) -> Array:
-    """The new numbers of a lane if its step was taken."""
-    return jnp.where(taken, new, old)

@@ -150,17 +150,28 @@ def march_with_tangents(
         y, seen = march(several, count, (*moved, *pushed), watched, (*fixed, *drifts), multiple)
         return y[: sizes.moved], seen, tuple(_rows(y[sizes.moved :], sizes.moved))
 
-    def one(tangent: Numbers, row: Numbers) -> Any:
-        go = lambda y, x: march(step, count, y, watched, x, multiple, whole)
-        return jax.jvp(go, (tuple(moved), tuple(fixed)), (tangent, row))
-
     filled = [tuple(jnp.zeros_like(x) if d is None else d for x, d in zip(fixed, row, strict=True)) for row in along]
+    go = lambda start: march(step, count, start[0], watched, start[1], multiple, whole)
+    pushed = list(zip(map(tuple, tangents), filled, strict=True))
+    y, after, seen = with_tangents(go, (tuple(moved), tuple(fixed)), pushed)
+    return y, seen, after
+
+
+def with_tangents(move: Callable[[Any], Any], start: Any, tangents: Sequence[Any]) -> tuple[Any, tuple[Any, ...], Any]:
+    """`move(start)`, which is where that leads and what is seen on the way, differentiated along each of the tangents.
+
+    **Returns:** where it leads, the tangents there, what is seen.
+    """
+    if not tangents:
+        end, seen = move(start)
+        return end, (), seen
+    along = lambda tangent: jax.jvp(move, (start,), (tangent,), has_aux=True)
     if len(tangents) == 1:  # without the extra axis the compiled loops are nearly twice as fast
-        (y, seen), (after, _) = one(tuple(tangents[0]), filled[0])
-        return y, seen, (after,)
-    stacked = [tuple(map(jnp.stack, zip(*rows, strict=True))) for rows in (tangents, filled)]
-    (y, seen), (after, _) = jax.vmap(one, out_axes=((None, None), 0))(*stacked)
-    return y, seen, tuple(tuple(x[i] for x in after) for i in range(len(tangents)))
+        end, after, seen = along(tangents[0])
+        return end, (after,), seen
+    stacked = jax.tree.map(lambda *x: jnp.stack(x), *tangents)
+    end, after, seen = jax.vmap(along, out_axes=(None, 0, None))(stacked)
+    return end, tuple(jax.tree.map(lambda x: x[i], after) for i in range(len(tangents))), seen
 
 
 def _rows(numbers: Sequence[Any], size: int) -> Iterator[Numbers]:

@@ -2,7 +2,7 @@
 
 import abc
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -10,15 +10,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Int
+from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._explicit import ClassicalRK4
 from ._kernel import REVOLUTION, can_be_kernel, steps_through
+from ._march import with_tangents
 from ._newmark import NewmarkBeta
-from ._results import RESULTS
+from ._results import RESULTS, outcome_code
 from ._rosenbrock import Rodas3, Rodas4
 
 
@@ -34,6 +35,36 @@ class Stretch(NamedTuple):
     result: RESULTS
     error: Scalar = math.nan
     """How far the end moves with half as many steps, in units of the system's scale; NaN where that was not tried."""
+
+
+Tangents = tuple[State, ...]
+
+
+class Moved(NamedTuple):
+    """A lane after a revolution; or many, their axis last."""
+
+    y: State
+    tangents: Tangents
+    peak: Scalar
+    """Largest excursion on the way."""
+    outcome: Int[Array, "*lanes"]
+    level: Int[Array, "*lanes"]
+    """Which of the method's step counts is worth trying next."""
+    error: Float[Array, "*lanes"]
+    """How far off the end would be with half as many steps, in units of the scale; NaN where that was not tried."""
+    half: Tangents
+    """The tangent vectors with half as many steps; none where that was not tried."""
+
+
+def moved_by(advance: Callable[[Any], Stretch], start: Any, tangents: Sequence[Any]) -> Moved:
+    """One lane moved by `advance` from its start, the tangent vectors there by the derivative of that."""
+
+    def move(start: Any) -> tuple[State, tuple[Any, ...]]:
+        stretch = advance(start)
+        return stretch.y, (jnp.asarray(stretch.peak), outcome_code(stretch.result), jnp.asarray(stretch.error))
+
+    y, after, (peak, code, error) = with_tangents(move, start, tangents)
+    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error, ())
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -71,18 +102,15 @@ class AbstractMethod(eqx.Module):
         """Go one `parts`-th of a revolution from state `y` at `phase`; `scale` is the magnitude of the components."""
 
 
-def _worse(first: RESULTS, second: RESULTS) -> RESULTS:
-    """The first thing that went wrong."""
-    return RESULTS.where(first == RESULTS.successful, second, first)  # pyright: ignore[reportReturnType]
-
-
 def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
     """What to say of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
-    # What is known to be well is not promoted: that takes ten small programs.
-    return state if result is dfx.RESULTS.successful else _worse(RESULTS.promote(result), state)  # pyright: ignore
+    if result is dfx.RESULTS.successful:  # what is known to be well is not promoted: that takes ten small programs
+        return state  # pyright: ignore
+    before = RESULTS.promote(result)
+    return RESULTS.where(before == RESULTS.successful, state, before)  # pyright: ignore
 
 
 def run_steps(
@@ -216,30 +244,21 @@ class AdaptiveSteps(AbstractMethod):
 
 
 # `scan_kind="lax"`: outside `diffeqsolve`, diffrax's own solvers are differentiable in forward mode only with this.
+_EXPLICIT: dict[str, Any] = {"scan_kind": "lax"}
 # Newton instead of diffrax's VeryChord, which with equal steps calls it divergence when it starts at the solution.
-def _implicit(solver: Any) -> Callable[[], dfx.AbstractSolver]:
-    return lambda: solver(scan_kind="lax", root_finder=optx.Newton(rtol=1e-8, atol=1e-8))
-
-
-_FIXED: dict[str, Callable[[], dfx.AbstractSolver]] = {
-    "rodas3": Rodas3,
-    "rodas4": Rodas4,
-    "newmark": NewmarkBeta,
-    "rk4": lambda: ClassicalRK4(scan_kind="lax"),
-    "tsit5": lambda: dfx.Tsit5(scan_kind="lax"),
-    "kvaerno3": _implicit(dfx.Kvaerno3),
-    "kvaerno5": _implicit(dfx.Kvaerno5),
-    "kencarp4": _implicit(dfx.KenCarp4),
+_IMPLICIT: dict[str, Any] = {"scan_kind": "lax", "root_finder": optx.Newton(rtol=1e-8, atol=1e-8)}
+_SOLVERS: dict[str, tuple[type[dfx.AbstractSolver], dict[str, Any]]] = {
+    "rodas3": (Rodas3, {}),
+    "rodas4": (Rodas4, {}),
+    "newmark": (NewmarkBeta, {}),
+    "rk4": (ClassicalRK4, _EXPLICIT),
+    "tsit5": (dfx.Tsit5, _EXPLICIT),
+    "kvaerno3": (dfx.Kvaerno3, _IMPLICIT),
+    "kvaerno5": (dfx.Kvaerno5, _IMPLICIT),
+    "kencarp4": (dfx.KenCarp4, _IMPLICIT),
 }
-_ADAPTIVE: dict[str, Callable[[], dfx.AbstractAdaptiveSolver]] = {
-    "rodas3": Rodas3,
-    "rodas4": Rodas4,
-    "rk4": ClassicalRK4,
-    "tsit5": dfx.Tsit5,
-    "kvaerno3": dfx.Kvaerno3,
-    "kvaerno5": dfx.Kvaerno5,
-    "kencarp4": dfx.KenCarp4,
-}
+"""By name, with the options that equal steps need."""
+_ADAPTIVE = {name: kind for name, (kind, _) in _SOLVERS.items() if issubclass(kind, dfx.AbstractAdaptiveSolver)}
 DEFAULT_SOLVER = "rk4"
 DEFAULT_STEPS = 1024
 
@@ -249,9 +268,10 @@ def make_fixed(solver: str, steps: int) -> FixedSteps:
 
     **Raises:** `ValueError` for a name that is not known.
     """
-    if solver not in _FIXED:
-        raise ArgumentError("solver", said=f"must be one of {', '.join(_FIXED)}, but '{solver}' was given.")
-    return FixedSteps(_FIXED[solver](), steps)
+    if solver not in _SOLVERS:
+        raise ArgumentError("solver", said=f"must be one of {', '.join(_SOLVERS)}, but '{solver}' was given.")
+    kind, options = _SOLVERS[solver]
+    return FixedSteps(kind(**options), steps)
 
 
 def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: float | None = None) -> AbstractMethod:

@@ -14,12 +14,12 @@ import jax.numpy as jnp
 from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Bool, Float, Int
 
+from .._recent import split
 from .._types import Scalar, State
 from ..models import ESCAPE
-from ._controlled import ControlledSteps, Levels, Pieces, climb, nowhere, run_level
+from ._controlled import ControlledSteps, Levels, climb, nowhere, run_level
 from ._kernel import KernelSolver, can_be_kernel, steps_through
-from ._method import FixedSteps, Stretch, result_at
-from ._moved import Moved, Tangents, moved_by
+from ._method import FixedSteps, Moved, Stretch, Tangents, moved_by, result_at
 from ._results import outcome_code
 from ._strobe import StrobeMap
 
@@ -62,40 +62,31 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
 
 def _pushed_from_outside(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Drift | None]) -> Moved:
     """The same by a method that is no plain formula, whatever it does."""
-    numbers, rest = eqx.partition(strobe.field, eqx.is_inexact_array)
-    row, form = jax.tree.flatten(numbers)
+    form, row = split(strobe.field, eqx.is_inexact_array)
 
-    def move(y: State, row: list[Any]) -> tuple[State, Stretch]:
-        field = eqx.combine(jax.tree.unflatten(form, row), rest)
-        stretch = eqx.tree_at(lambda s: s.field, strobe, field)(y)
-        return stretch.y, stretch
+    def advance(start: tuple[State, list[Any]]) -> Stretch:
+        y, row = start
+        return eqx.tree_at(lambda s: s.field, strobe, form.filled(row))(y)
 
     zero = list(map(jnp.zeros_like, row))
     filled = [[z if d is None else d for z, d in zip(zero, drift or zero, strict=True)] for drift in drifts]
-    stacked = [jax.tree.map(lambda *x: jnp.stack(x), *rows) for rows in (tangents, filled)]
-    along = lambda t, d: jax.jvp(move, (y, row), (t, d), has_aux=True)
-    y, after, seen = jax.vmap(along, out_axes=(None, 0, None))(*stacked)
-    columns = tuple(tuple(c[i] for c in after) for i in range(len(tangents)))
-    peak, code = jnp.asarray(seen.peak), outcome_code(seen.result)
-    return Moved(y, columns, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(seen.error), ())
+    return moved_by(advance, (y, row), list(zip(tangents, filled, strict=True)))
 
 
 def _controlled(strobe: StrobeMap, y: State, tangents: Tangents, level: Any) -> Moved:
     """A lane one revolution on; under `jax.vmap`, lanes that ask for the same level are packed together."""
-    numbers, rest = eqx.partition(strobe, eqx.is_array)
-    row, form = jax.tree.flatten(numbers)
-    remake = lambda row: eqx.combine(jax.tree.unflatten(form, row), rest)
+    form, row = split(strobe, eqx.is_array)
 
     @custom_vmap
     def run(row: list[Any], y: Any, tangents: Any, level: Any) -> Moved:
         lane = jax.tree.map(lambda x: x[None], (y, tangents, level))
-        return jax.tree.map(lambda x: x[0], _lanes(remake, row, [False] * len(row), *lane))
+        return jax.tree.map(lambda x: x[0], _lanes(form.filled, row, [False] * len(row), *lane))
 
     @run.def_vmap
     def rule(size: int, batched: Any, row: list[Any], y: Any, tangents: Any, level: Any) -> Any:
         spread = lambda x, is_lanes: x if is_lanes else jnp.broadcast_to(x, (size, *x.shape))
         lanes = jax.tree.map(spread, (y, tangents, level), tuple(batched[1:]))
-        moved = _lanes(remake, row, batched[0], *lanes)
+        moved = _lanes(form.filled, row, batched[0], *lanes)
         return moved, jax.tree.map(lambda _: True, moved)
 
     return run(row, *jax.tree.map(jnp.asarray, (y, tangents, level)))
@@ -116,9 +107,8 @@ def _lanes(
     def attempt(levels: Levels, i: Array, mine: Bool[Array, " lanes"]) -> Moved:
         def one(row: Sequence[Any], y: State, tangents: Tangents) -> Moved:
             strobe = remake(row)
-            return moved_by(
-                run_level(method, levels, i, Pieces(strobe.field, strobe.system, strobe.scale)), y, tangents
-            )
+            pieces = (strobe.field, strobe.system, strobe.scale)
+            return moved_by(run_level(method, levels, i, pieces), y, tangents)
 
         return _packed(one, mine, row, own, y, tangents)
 

@@ -7,7 +7,7 @@ The field's linearisation does the solve: for a second-order system it eliminate
 """
 
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, TypeAlias
+from typing import Any, ClassVar, NamedTuple
 
 import diffrax as dfx
 import jax
@@ -114,9 +114,6 @@ def rosenbrock_step(
     return combine(y0, tableau.m, stages), combine(zero, tableau.e, stages), near.value, h
 
 
-_SolverState: TypeAlias = None
-
-
 class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     """A Rosenbrock method on an `AbstractField`, which travels as the `args` of `diffrax.diffeqsolve`."""
 
@@ -126,15 +123,14 @@ class AbstractRosenbrock(dfx.AbstractAdaptiveSolver):
     )
     tableau: ClassVar[RosenbrockTableau]
 
-    def init(self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any) -> _SolverState:
+    def init(self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any) -> None:
         del terms, t0, t1, y0
         if not isinstance(args, AbstractField):
             raise ArgumentError("args", said="must be the field to integrate, but it is not an `AbstractField`.")
-        return None
 
     def step(
-        self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any, solver_state: _SolverState, made_jump: Any
-    ) -> tuple[Any, Any, dict[str, Any], _SolverState, dfx.RESULTS]:
+        self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any, solver_state: None, made_jump: Any
+    ) -> tuple[Any, Any, dict[str, Any], None, dfx.RESULTS]:
         del terms, solver_state, made_jump
         h = t1 - t0
         y1, error, rate0, _ = rosenbrock_step(self.tableau, args, t0, lambda _: h, y0, computed_once)

@@ -98,9 +98,14 @@ def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> S
     return tuple(jnp.asarray(c, dtype=float) for c in y0)
 
 
-def _check(speed: float, revolutions: int, samples: int, discard: int = 0) -> None:
+def _check(speed: float, revolutions: int, samples: int, discard: int) -> None:
     if not (np.isfinite(speed) and speed > 0):
         raise ArgumentError("speed", said=f"must be positive and finite, but {speed} rad/s was given.")
+    require_counts(revolutions, samples, discard)
+
+
+def require_counts(revolutions: int, samples: int, discard: int) -> None:
+    """**Raises:** `ValueError` for what no history can have."""
     if revolutions < 1 or samples < 1 or discard < 0:
         raise ArgumentError(
             "revolutions",

@@ -185,27 +185,18 @@ def _filled(form: Any, arrays: list[Any]) -> Any:
 
 def _program_at(path: pathlib.Path) -> tuple[Any, Any] | None:
     """The program that was kept there and the form of its result; None where there is none that can be used."""
-    made = _read(path)
-    if made is None:
-        return None
-    try:
-        program, form = export.deserialize(bytearray(made[0])), made[1]
-        _filled(form, list(range(len(program.out_avals))))
-    except Exception:  # what reads the bytes of a stranger may raise anything
-        return None
-    return program, form
-
-
-def _read(path: pathlib.Path) -> tuple[bytes, Any] | None:
-    """What was kept there; nothing where it cannot be read."""
     try:
         if not path.is_file():  # a pipe would be waited for
             return None
         digest, whole = path.read_bytes().split(b"\n", 1)
-        form, program = whole.split(b"\n", 1)
-        return (program, json.loads(form)) if digest == _digest(whole) else None
-    except (OSError, ValueError):
+        if digest != _digest(whole):
+            return None
+        form, serialized = whole.split(b"\n", 1)
+        program, form = export.deserialize(bytearray(serialized)), json.loads(form)
+        _filled(form, list(range(len(program.out_avals))))
+    except Exception:  # what reads the bytes of a stranger may raise anything
         return None
+    return program, form
 
 
 def _digest(whole: bytes) -> bytes:

@@ -66,7 +66,5 @@ def averages(
     require_x64()
     method = controlled() if error is None else controlled(error)
     begin = lambda part: _averages_chunk(Designs.of(systems), method, read, jnp.asarray(revolutions), part)
-    alive = np.all(np.isfinite(states), axis=1)
-    mean, largest = run_parts(begin, speeds, which, np.where(alive[:, None], states, 0.0))
-    blank = lambda x: np.where(alive[:, None], np.moveaxis(x, -1, 0), np.nan)
-    return blank(mean), blank(largest)
+    mean, largest = run_parts(begin, speeds, which, states)
+    return mean, largest

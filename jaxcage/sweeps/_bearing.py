@@ -1,6 +1,7 @@
 """Sweeps of the whole bearing over shaft speeds, from several starts and for several designs."""
 
 import concurrent.futures
+import functools
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -32,8 +33,8 @@ from ..integrate import (
 )
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
-from ._engine import Progress, cores
-from ._speed import checked_speeds, versions
+from ._engine import Progress, alike, cores, workers
+from ._speed import checked_speeds, require_lengths, versions
 
 
 CHUNKS = (8, 16, 32, 48, 64, 80, 96)
@@ -129,29 +130,23 @@ def sweep_bearings(
     speed = checked_speeds(speeds)
     models = list(models)
     require_bearings(models, starts, discard, revolutions, blocks, exponents)
-    table = _Table.of(models, speed, starts)
+    table = _Table(models, speed, starts)
     lanes, block = table.which.size, revolutions // blocks
     size = min(CHUNKS, key=lambda size: (-(-lanes // (size * cores())) * (size + CALL), size))
-    chunks = [
-        np.arange(lanes)[np.argsort(table.lane_speed, kind="stable")][i : i + size] for i in range(0, lanes, size)
-    ]
-    counted = _Counted(progress, lanes, discard + revolutions)
+    chunks = np.split(np.argsort(table.lane_speed, kind="stable"), range(size, lanes, size))
+    counted = _counted(progress, lanes, discard + revolutions)
     if exponent_revolutions < 1:
         raise ArgumentError("exponent_revolutions", said=f"must be at least 1, but {exponent_revolutions} was given.")
     followed = min(blocks, max(2, -(-exponent_revolutions // block))) if exponents else 0
 
     def run(chunk: np.ndarray) -> dict[str, Any]:
         padded = np.concatenate([chunk, np.repeat(chunk[-1:], size - chunk.size)])
-        found = _followed(*table.taken(padded), discard, [block] * blocks, followed, tolerance, counted.of(chunk.size))
+        done = functools.partial(counted, chunk.size)
+        found = _followed(*table.taken(padded), discard, [block] * blocks, followed, tolerance, done)
         return jax.tree.map(lambda x: x[: chunk.size], found)
 
-    with concurrent.futures.ThreadPoolExecutor(cores() if jax.default_backend() == "cpu" else 1) as pool:
-        futures = [pool.submit(run, chunk) for chunk in chunks]
-        try:
-            parts = [future.result() for future in futures]
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with concurrent.futures.ThreadPoolExecutor(workers()) as pool:
+        parts = list(pool.map(run, chunks))  # an exception cancels what has not begun
     back = np.argsort(np.concatenate(chunks))
     found = jax.tree.map(lambda *x: np.concatenate(x)[back], *parts)
     found["outcome"] = np.where(
@@ -189,12 +184,7 @@ def require_bearings(
             raise ArgumentError("model", said="must have a dynamic inner ring, but its `ring_motion` is quasi_static.")
         if model.film.model == "finite_length":
             raise ArgumentError("model", said="must have a short film, but its film is of finite_length.")
-    if discard < 0 or revolutions < 1:
-        raise ArgumentError(
-            "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
-        )
-    if blocks < 1 or revolutions % blocks:
-        raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
+    require_lengths(discard, revolutions, blocks)
     if exponents not in (0, 1):
         raise ArgumentError("exponents", said=f"must be 0 or 1, but {exponents} was given.")
     if isinstance(starts, int):
@@ -216,23 +206,18 @@ def require_bearings(
             )
 
 
-class _Counted:
-    """Samples done, told as lanes."""
+def _counted(progress: Progress | None, lanes: int, revolutions: int) -> Callable[[int, int], None]:
+    """To be called with how many of the lanes have gone on by how many samples; it tells them as lanes done."""
+    whole, done, lock = lanes * revolutions * SAMPLES, 0, threading.Lock()
 
-    def __init__(self, progress: Progress | None, lanes: int, revolutions: int):
-        self.progress, self.lanes, self.whole = progress, lanes, lanes * revolutions * SAMPLES
-        self.done, self.lock = 0, threading.Lock()
+    def add(some: int, samples: int) -> None:
+        nonlocal done
+        with lock:
+            done += some * samples
+            if progress is not None:
+                progress(lanes * done // whole, lanes)
 
-    def of(self, lanes: int) -> Callable[[int], None]:
-        """To be called with samples done of so many lanes."""
-
-        def add(samples: int) -> None:
-            with self.lock:
-                self.done += lanes * samples
-                if self.progress is not None:
-                    self.progress(self.lanes * self.done // self.whole, self.lanes)
-
-        return add
+    return add
 
 
 @eqx.filter_jit
@@ -252,54 +237,34 @@ def _starts(model: BearingModel, speeds: Float[Array, " speeds"], place: Float[A
 class _Table:
     """Laws, magnitudes and initial states of all lanes: designs, then speeds, then starts."""
 
-    def __init__(self, at: Any, own: list[bool], scale: BearingState, begin: BearingState, speed: np.ndarray):
-        designs, starts = len(at), begin.bodies.shape[0] // (len(at) * speed.size)
-        self.which = np.repeat(np.arange(designs), speed.size * starts)
-        self.at_speed = np.tile(np.repeat(np.arange(speed.size), starts), designs)
-        self.lane_speed = speed[self.at_speed]
-        self.at, self.own, self.scale, self.begin = at, own, scale, begin
-        self.rolling = np.array(
-            [at[d].rolling_cage_speed[s] for d, s in zip(self.which, self.at_speed, strict=True)], dtype=float
-        )
-
-    @classmethod
-    def of(cls, models: list[BearingModel], speed: np.ndarray, starts: Starts) -> "_Table":
+    def __init__(self, models: list[BearingModel], speed: np.ndarray, starts: Starts):
         """**Raises:** `ValueError` for designs that differ in more than their numbers."""
-        arrays = [
-            jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, model)
-            for model in models
-        ]
-        rests = [eqx.partition(model, eqx.is_array)[1] for model in arrays]
-        if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
-            raise ArgumentError("models", said="must hold bearings that differ in their numbers only.")
-        several = jnp.asarray(np.append(speed, 1.1 * speed[0]))  # the last one shows what depends on speed
-        laws, scales = zip(*(_laws(model, several) for model in arrays), strict=True)
-        to_numpy = lambda tree: jax.tree.map(np.asarray, tree)
-        at = [to_numpy(law) for law in laws]
-        own = [len(models) > 1 or bool(x[0] != x[-1]) for x in jax.tree.leaves(at[0])]
-        many = np.asarray(speed)
+        models = alike(models, "models", "bearings")
         begun = CAGE_STARTS[:starts] if isinstance(starts, int) else starts
-        at_all = lambda x: np.broadcast_to(np.asarray(x), (many.size, *np.shape(x)))
+        self.which = np.repeat(np.arange(len(models)), speed.size * len(begun))
+        self.at_speed = np.tile(np.repeat(np.arange(speed.size), len(begun)), len(models))
+        self.lane_speed = speed[self.at_speed]
+        several = jnp.asarray(np.append(speed, 1.1 * speed[0]))  # the last one shows what depends on speed
+        laws = [_laws(model, several) for model in models]
+        self.at, self.scale = jax.tree.map(lambda *x: np.stack(x), *laws)  # designs, then speeds
+        self.own = [len(models) > 1 or bool(x[0, 0] != x[0, -1]) for x in jax.tree.leaves(self.at)]
+        self.rolling = self.at.rolling_cage_speed[self.which, self.at_speed]
+        at_all = lambda x: np.broadcast_to(np.asarray(x), (speed.size, *np.shape(x)))
 
         def begin_with(model: BearingModel, start: BearingState | CagePlace) -> BearingState:
             if isinstance(start, BearingState):
                 return jax.tree.map(at_all, start)
-            return to_numpy(_starts(model, jnp.asarray(many), jnp.asarray(start, dtype=float)))
+            return _starts(model, jnp.asarray(speed), jnp.asarray(start, dtype=float))
 
-        states = [[begin_with(model, start) for start in begun] for model in arrays]
         rows = lambda *x: np.stack(x, axis=1).reshape(-1, *x[0].shape[1:])  # speeds, then starts
-        begin = jax.tree.map(lambda *x: np.concatenate(x), *(jax.tree.map(rows, *of_model) for of_model in states))
-        scale = jax.tree.map(lambda *x: np.stack(x), *(to_numpy(s) for s in scales))
-        return cls(at, own, scale, begin, speed)
+        states = [jax.tree.map(rows, *(begin_with(model, start) for start in begun)) for model in models]
+        self.begin = jax.tree.map(lambda *x: np.concatenate(x), *states)
 
     def taken(self, lanes: np.ndarray) -> tuple[BearingAtSpeed, BearingState, BearingState]:
         """Of some lanes, lanes last."""
         which, at_speed = self.which[lanes], self.at_speed[lanes]
-        of_designs, tree = [jax.tree.leaves(at) for at in self.at], jax.tree.structure(self.at[0])
-        leaves = [
-            np.stack([row[i] for row in of_designs])[which, at_speed] if mine else of_designs[0][i][0]
-            for i, mine in enumerate(self.own)
-        ]
+        leaves, tree = jax.tree.flatten(self.at)
+        leaves = [x[which, at_speed] if mine else x[0, 0] for x, mine in zip(leaves, self.own, strict=True)]
         last = lambda x: jnp.asarray(np.moveaxis(x, 0, -1))
         scale = jax.tree.map(lambda x: last(x[which, at_speed]), self.scale)
         begin = jax.tree.map(lambda x: last(x[lanes]), self.begin)

@@ -92,13 +92,10 @@ def run_up_down_designs(
         state = np.asarray(seen[-1].last).T
         if progress is not None:
             progress(n + 1, speed.size)
-    found, how = [], settings_of(chosen)
-    for i, one in enumerate(systems):
-        up, down = (_stacked([tuple(x[..., 2 * i + j] for x in o) for o in seen]) for j in (0, 1))
-        make = lambda parts, one=one: assemble(one, speed, how, plan, parts, (speed.size, 1))
-        found.append(Hysteresis(make(up), make(tuple(x[..., ::-1] for x in down))))
-    return found
+    parts, how = [np.stack(column, axis=-1) for column in zip(*seen, strict=True)], settings_of(chosen)
 
+    def one_way(i: int, lane: int, order: int) -> Sweep:
+        mine = tuple(x[..., lane, ::order] for x in parts)
+        return assemble(systems[i], speed, how, plan, mine, (speed.size, 1))
 
-def _stacked(rows: list[tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
-    return tuple(np.stack(column, axis=-1) for column in zip(*rows, strict=True))
+    return [Hysteresis(one_way(i, 2 * i, 1), one_way(i, 2 * i + 1, -1)) for i in range(len(systems))]

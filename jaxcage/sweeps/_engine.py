@@ -71,10 +71,8 @@ class Designs(eqx.Module):
         """**Raises:** `ValueError` for systems that differ in more than their numbers."""
         if len(systems) == 1:
             return cls(systems[0], 1)
-        arrays, rests = zip(*(eqx.partition(_numbers(s), eqx.is_array) for s in systems), strict=True)
-        if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
-            raise ArgumentError("systems", said="must hold systems that differ in their numbers only.")
-        return cls(eqx.combine(jax.tree.map(lambda *x: jnp.stack(x), *arrays), rests[0]), len(systems))
+        stacked = lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0]
+        return cls(jax.tree.map(stacked, *alike(systems, "systems", "systems")), len(systems))
 
     def strobe(self, method: AbstractMethod, lane: Part) -> StrobeMap:
         """The strobe map of a lane."""
@@ -84,9 +82,17 @@ class Designs(eqx.Module):
         return strobe_map(systems, lane.speed, stated(method))
 
 
-def _numbers(system: AbstractForcedSystem) -> AbstractForcedSystem:
-    """All numbers as arrays: a parameter may be a Python number in one design and an array in another."""
-    return jax.tree.map(lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x, system)
+def alike(designs: Sequence[Any], name: str, kind: str) -> list[Any]:
+    """Designs with all numbers as arrays: a parameter may be a Python number in one and an array in another.
+
+    **Raises:** `ValueError` for designs that differ in more than their numbers.
+    """
+    number = lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x
+    found = [jax.tree.map(number, design) for design in designs]
+    rests = [eqx.filter(design, eqx.is_array, inverse=True) for design in found]
+    if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
+        raise ArgumentError(name, said=f"must hold {kind} that differ in their numbers only.")
+    return found
 
 
 def cores() -> int:
@@ -94,7 +100,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
-def _workers() -> int:
+def workers() -> int:
     """Chunks that run at a time."""
     return cores() if jax.default_backend() == "cpu" else 1
 
@@ -120,21 +126,14 @@ def _in_chunks(
     blocks = np.split(lanes, range(BLOCK, lanes.size, BLOCK))
     chunks = max(-(-lanes.size // size), min(least, len(blocks)))
     parts = [np.concatenate(blocks[i::chunks]) for i in range(chunks)]
-    with concurrent.futures.ThreadPoolExecutor(_workers()) as pool:
-        futures = [pool.submit(lambda p: [np.asarray(x) for x in work(_padded(p, size))], part) for part in parts]
-        try:
-            for future, part in zip(futures, parts, strict=True):
-                future.result()
-                report(part.size)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    run = lambda part: [np.asarray(x)[..., : part.size] for x in work(_padded(part, size))]
+    results = []
+    with concurrent.futures.ThreadPoolExecutor(workers()) as pool:
+        for part, found in zip(parts, pool.map(run, parts), strict=True):  # an exception cancels what has not begun
+            results.append(found)
+            report(part.size)
     back = np.argsort(np.concatenate(parts))
-    columns = zip(*(future.result() for future in futures), strict=True)
-    return tuple(
-        np.concatenate([x[..., : part.size] for x, part in zip(column, parts, strict=True)], axis=-1)[..., back]
-        for column in columns
-    )
+    return tuple(np.concatenate(column, axis=-1)[..., back] for column in zip(*results, strict=True))
 
 
 def run_parts(
@@ -143,9 +142,13 @@ def run_parts(
     which: Int[np.ndarray, " lanes"],
     y0: Float[np.ndarray, "lanes dim"],
 ) -> tuple[np.ndarray, ...]:
-    """`work` on all lanes, chunk by chunk on all cores."""
+    """`work` on all lanes, chunk by chunk on all cores: results with the lanes first, NaN where one begins nowhere."""
+    alive = np.all(np.isfinite(y0), axis=1)
+    y0 = np.where(alive[:, None], y0, 0.0)
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    return _in_chunks(begin, np.arange(speed.size), chunk_size(speed.size))
+    found = _in_chunks(begin, np.arange(speed.size), chunk_size(speed.size))
+    each = lambda x: alive.reshape(-1, *[1] * (x.ndim - 1))
+    return tuple(np.where(each(x), np.moveaxis(x, -1, 0), np.nan) for x in found)
 
 
 def _part(speed: np.ndarray, which: np.ndarray, y: np.ndarray, lane: np.ndarray) -> Part:
@@ -187,9 +190,8 @@ def run_lanes(
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
     lanes, dim = y0.shape
-    if not isinstance(systems, Designs):
-        systems = Designs.of(list(systems) if isinstance(systems, Sequence) else [systems])
-    designs = systems
+    systems = systems if isinstance(systems, Sequence | Designs) else [systems]
+    designs = systems if isinstance(systems, Designs) else Designs.of(systems)
     which = np.zeros(lanes, int) if which is None else which
     size = chunk_size(lanes) if size is None else size
     plan = Plan(*map(int, plan))
@@ -214,12 +216,12 @@ def run_lanes(
         got = _settle_chunk(designs, method, alone, limit, _part(speed, which, begun, lane))
         return *got.y, got.outcome, got.level, got.error
 
-    *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0), _workers())
+    *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0), workers())
     settled = np.stack(y, axis=-1).reshape(lanes, dim)
 
     def follow(lane: np.ndarray) -> Observation:
         rest = [jnp.asarray(x) for x in (np.where(lane < 0, 1, outcome[lane]), level[lane], error[lane])]
         return _observe_chunk(designs, method, lengths, room, _part(speed, which, settled, lane), *rest)
 
-    seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1), _workers()))
+    seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1), workers()))
     return seen._replace(strobe=seen.strobe[room.keep - plan.keep :], growth=seen.growth[: plan.blocks])

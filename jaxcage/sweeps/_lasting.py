@@ -4,7 +4,6 @@ Before the horizon some leave chaos for good: what they were on is a transient, 
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
@@ -27,24 +26,6 @@ CALM = -1.0
 """Growth that stands for that of a lane which has settled on a periodic orbit, and is not followed."""
 
 
-class Lasting(NamedTuple):
-    """What became of lanes by the horizon."""
-
-    escape: Float[np.ndarray, " lanes"]
-    """Revolutions of the whole run after which a lane is calm: infinity for chaos at the horizon, NaN for a failure."""
-    horizon: int
-
-
-def blocks_to(horizon: int, after: int) -> int:
-    """Blocks from the end of the observed revolutions to the horizon, and those that confirm an escape."""
-    return -(-max(horizon - after, 0) // LIFE_BLOCK) + CONFIRM
-
-
-def unsettled(label: Shaped[np.ndarray, " lanes"]) -> Int[np.ndarray, " some"]:
-    """Lanes that must be followed: chaotic ones, and those of which nothing is known."""
-    return np.flatnonzero(np.isin(label, ("chaotic", "undecided")))
-
-
 def follow(
     label: Shaped[np.ndarray, " lanes"],
     seen: Observation,
@@ -52,7 +33,7 @@ def follow(
     scale: Float[np.ndarray, "lanes dim"],
     horizon: int,
     run: Callable[[Plan, Int[np.ndarray, " some"], Float[np.ndarray, "some dim"]], Observation],
-) -> Lasting:
+) -> tuple[Float[np.ndarray, " lanes"], int]:
     """Follow the lanes that are not settled, and put where they end in place of what was `seen` of them.
 
     They are run on in stages of `STAGE` blocks; one that has closed on a periodic orbit by the end of a stage, its
@@ -60,12 +41,16 @@ def follow(
 
     **Arguments:** labels; what was seen by which plan; scale of each lane's state; horizon [revolutions of the whole
     run]; `run(plan, lanes, states)` runs lanes on from their states.
+
+    **Returns:** revolutions of the whole run after which a lane is calm, infinity for chaos at the horizon, NaN for a
+    failure; the horizon, in whole blocks.
     """
     early = _coarse(np.asarray(seen.growth)[:, 0], plan.block)
-    blocks = blocks_to(horizon, plan.discard + plan.block * plan.blocks)
+    observed = plan.discard + plan.block * plan.blocks
+    blocks = -(-(horizon - observed) // LIFE_BLOCK) + CONFIRM  # to the horizon, and those that confirm an escape
     late = np.full((blocks, label.size), CALM)
     calm = np.ones(label.size, dtype=bool)
-    active = unsettled(label)
+    active = np.flatnonzero(np.isin(label, ("chaotic", "undecided")))
     for first in range(0, blocks, STAGE):
         if not active.size:
             break
@@ -82,7 +67,7 @@ def follow(
     failed = np.asarray(seen.outcome) != 0
     times, end = escape_times(np.concatenate([early, late]).T, calm, LIFE_BLOCK, failed=failed)
     begin = plan.discard + plan.block * plan.blocks % LIFE_BLOCK
-    return Lasting(begin + times, begin + end)
+    return begin + times, begin + end
 
 
 def _put(

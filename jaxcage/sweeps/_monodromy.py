@@ -52,6 +52,5 @@ def monodromy(
     place = np.zeros(speed.size, int) if which is None else np.asarray(which, int)
     designs, chosen = Designs.of(systems), controlled() if method is None else method
     image, matrix, outcome = run_parts(lambda part: _monodromy_chunk(designs, chosen, part), speed, place, state)
-    image, matrix = np.moveaxis(image, -1, 0), np.moveaxis(matrix, -1, 0)
     ok = (outcome == 0)[:, None]
     return np.where(ok, image, np.nan), np.where(ok[..., None], matrix, np.nan)

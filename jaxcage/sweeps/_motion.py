@@ -57,11 +57,9 @@ def samples(
     """
     require_x64()
     method = controlled() if error is None else controlled(error)
-    alive = np.all(np.isfinite(states), axis=1)
     begin = lambda part: _samples_chunk(Designs.of(systems), method, jnp.zeros(revolutions), part)
-    seen, off = run_parts(begin, speeds, which, np.where(alive[:, None], states, 0.0))
-    known = alive & (off <= float(method.tolerance))
-    return np.where(known[:, None, None], np.moveaxis(seen, -1, 0), np.nan)
+    seen, off = run_parts(begin, speeds, which, states)
+    return np.where((off <= float(method.tolerance))[:, None, None], seen, np.nan)
 
 
 @dataclasses.dataclass(frozen=True)

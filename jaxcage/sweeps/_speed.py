@@ -58,16 +58,21 @@ def checked_speeds(speeds: float | Float[Array, " speeds"] | Float[np.ndarray, "
 
 
 def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
+    require_lengths(discard, revolutions, blocks)
+    if not 0 <= exponents <= dimension:
+        allowed = f"at most {dimension}" if exponents > 0 else "at least 0"
+        raise ArgumentError("exponents", said=f"must be {allowed}, but {exponents} was given.")
+    return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
+
+
+def require_lengths(discard: int, revolutions: int, blocks: int) -> None:
+    """**Raises:** `ValueError` for what no sweep can have."""
     if discard < 0 or revolutions < 1:
         raise ArgumentError(
             "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
         )
-    if not 0 <= exponents <= dimension:
-        allowed = f"at most {dimension}" if exponents > 0 else "at least 0"
-        raise ArgumentError("exponents", said=f"must be {allowed}, but {exponents} was given.")
-    if revolutions % blocks:
+    if blocks < 1 or revolutions % blocks:
         raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
-    return Plan(discard, revolutions // blocks, blocks, min(keep, revolutions), exponents)
 
 
 def require_persist(persist: int, discard: int, exponents: int, blocks: int) -> None:
@@ -208,11 +213,10 @@ def sweep_designs(
         return [dataclasses.replace(s, confirmed=rounds) for s in found]
     label = _labelled(found).label
     scale = np.concatenate([np.repeat(s.scale, shape[1], axis=0) for s in found])
-    lasting = follow(label, seen, plan, scale, horizon, lambda plan, lanes, y: run(plan, lanes, chosen, y))
-    escapes = np.split(lasting.escape, len(systems))
+    escape, end = follow(label, seen, plan, scale, horizon, lambda plan, lanes, y: run(plan, lanes, chosen, y))
     return [
-        dataclasses.replace(s, escape=e.reshape(shape), horizon=lasting.horizon, confirmed=rounds)
-        for s, e in zip(each_system(seen), escapes, strict=True)
+        dataclasses.replace(s, escape=e.reshape(shape), horizon=end, confirmed=rounds)
+        for s, e in zip(each_system(seen), np.split(escape, len(systems)), strict=True)
     ]
 
 
