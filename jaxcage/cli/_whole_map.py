@@ -22,7 +22,6 @@ from ._whole import SWEEPING, shaft_speeds
 
 LOAD, LIGHTEST = "load", 0.05
 """Of its own load, the lowest one of a map over the load."""
-MEASURES = ("cage_slip", "friction_power_W", "exponent")
 CELLS = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_wear_mm3_per_h", "eccentricity_mean", "exponent")
 
 

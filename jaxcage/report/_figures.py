@@ -148,10 +148,8 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
 
 
 def _alone(width: float, height: float, draw: Callable[[Axes], Axes]) -> Figure:
-    from ..plotting._style import dress
-
     figure = new_figure(width, height)
-    draw(dress(figure.subplots()))
+    draw(figure.subplots())
     return figure
 
 

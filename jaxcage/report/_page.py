@@ -103,7 +103,7 @@ def _context(
         "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage "
         f"({span[0] / ratio:.0f} to {span[1] / ratio:.0f} rpm of the shaft)"
         + (", quick report: no gradients, a coarser sweep" if findings.quick else ""),
-        "summary": [*_summary(findings, assessed), *_of_the_unknown(findings, chances, left)],
+        "summary": [*_summary(findings, assessed), *_of_the_unknown(chances, left)],
         "known_tables": [both(t) for t in _known_tables(findings, assessed, chances)],
         "known_notes": [] if chances is None else chances_notes(chances),
         "key_figures": [(name, units.in_text(value)) for name, value in _key_figures(findings)],
@@ -179,7 +179,7 @@ def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     return said
 
 
-def _of_the_unknown(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -> list[str]:
+def _of_the_unknown(chances: Ensemble | None, left: Sequence[str]) -> list[str]:
     """What the zones are worth where values are not known, or are those of another bearing."""
     said = []
     if chances is not None:
