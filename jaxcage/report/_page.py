@@ -155,6 +155,9 @@ _SECTIONS = {
 }
 
 
+_STATES = {"inside": "inside", "close": "close to", "clear": "clear of", "unknown": "not known for"}
+
+
 def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     swept = findings.sweep
     chaotic, loss = len(findings.zones.zones), len(findings.loss.zones)
@@ -168,10 +171,7 @@ def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     if calm is not None:
         said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
     for j in assessed:
-        states = [f"{v.state} of {'chaotic' if k == 'chaotic' else k} zones" for k, v in j.verdicts.items()]
-        words = {"inside of": "inside", "close of": "close to", "clear of": "clear of", "unknown of": "not known for"}
-        for old, new in words.items():
-            states = [s.replace(old, new) for s in states]
+        states = [f"{_STATES[v.state]} {kind} zones" for kind, v in j.verdicts.items()]
         said.append(f"{_with_shaft(findings, j.at)}: {', '.join(states)}.")
     said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
     if np.any(swept.failed):
