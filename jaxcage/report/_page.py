@@ -11,7 +11,6 @@ import jinja2
 import numpy as np
 
 from .._parameters import parameter_info, parameters
-from ..analysis import Zone
 from ..bearing import design_rule_violations
 from ..io import ShownUnits
 from ..studies import Ensemble
@@ -25,7 +24,7 @@ from ._readings import readings_words
 from ._sources import parameter_rows, shown
 from ._statics import statics_table
 from ._table import Table, in_units, number, with_shaft
-from ._zone_tables import transient_tables, zones_table
+from ._zone_tables import transient_tables, zone_span, zones_table
 
 
 TEMPLATES = Path(__file__).parent
@@ -218,7 +217,7 @@ def calmest(findings: Findings) -> tuple[float, float] | None:
     """The widest range of the sweep [rpm] outside all zones, transient chaos included; None if there is none."""
     first, last = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
     taken = sorted(
-        _ends(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones, *findings.zones.transient)
+        zone_span(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones, *findings.zones.transient)
     )
     free, at = [], first
     for low, high in taken:
@@ -226,11 +225,6 @@ def calmest(findings: Findings) -> tuple[float, float] | None:
         at = max(at, high)
     low, high = max([*free, (at, last)], key=lambda pair: pair[1] - pair[0])
     return (low, high) if high > low else None
-
-
-def _ends(zone: Zone, first: float, last: float) -> tuple[float, float]:
-    low = first if zone.onset is None else zone.onset.speed_rpm
-    return low, (last if zone.exit is None else zone.exit.speed_rpm)
 
 
 def _key_figures(findings: Findings) -> list[tuple[str, str]]:
