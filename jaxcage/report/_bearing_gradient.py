@@ -29,12 +29,8 @@ def bearing_gradient_document(found: BearingGradient) -> dict[str, Any]:
     for name, each in found.statistics.items():
         by = {}
         for i, direction in enumerate(each.directions):
-            by[direction] = {
-                "elasticity": each.elasticity[i],
-                "elasticity_error": each.elasticity_error[i],
-                "by_relative_change": each.by_relative_change[i],
-                "by_relative_change_error": each.by_relative_change_error[i],
-            }
+            told = chosen(each, "elasticity elasticity_error by_relative_change by_relative_change_error")
+            by[direction] = {what: values[i] for what, values in told.items()}
             if "+" not in direction:
                 slope, error = found.slope(name, direction)
                 by[direction] |= {"slope_per_SI_unit": slope, "slope_error_per_SI_unit": error}

@@ -1,5 +1,6 @@
 """Chances of chaos as documents, tables and sentences."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -38,17 +39,15 @@ def chances_document(found: Ensemble) -> dict[str, Any]:
 def chances_table(name: str, found: Ensemble) -> Table:
     """Stretches of speeds with one verdict, and the chances within them."""
     low, high = found.interval
-    verdict, rows, first = found.verdict, [], 0
+    verdicts, rows = found.verdict, []
     lost = len(found.place) - found.counts[1]
-    for i in range(1, len(verdict) + 1):
-        if i == len(verdict) or verdict[i] != verdict[first]:
-            part = slice(first, i)
-            p = found.chance[part]
-            chance = _span(p[np.isfinite(p)])
-            bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
-            ends = number(float(found.rpm[first])), number(float(found.rpm[i - 1]))
-            rows.append((*ends, verdict_words(verdict[first]), chance, bar, _counts(lost[part])))
-            first = i
+    for verdict, places in itertools.groupby(range(len(verdicts)), key=verdicts.__getitem__):
+        part = list(places)
+        p = found.chance[part]
+        chance = _span(p[np.isfinite(p)])
+        bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
+        ends = (number(float(found.rpm[i])) for i in (part[0], part[-1]))
+        rows.append((*ends, verdict_words(verdict), chance, bar, _counts(lost[part])))
     title = f"Chance of chaos of {name}, {found.place.shape[0]} draws from {len(found.unknowns)} ranges [rpm]"
     return Table(title, ("from", "to", "verdict", "chance", "95 % bars", "draws that failed"), rows, ("from", "to"))
 
@@ -94,7 +93,7 @@ def unknowns_table(found: Ensemble) -> Table:
     shares = {c.label: c.share for c in found.clues()}
     each = list(zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True))
     rows = [
-        (u.label, range_words(u.range, unit), _share(shares.get(u.label)), source)
+        (u.label, range_words(u.range, unit), f"{shares[u.label]:.0%}" if u.label in shares else "-", source)
         for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
     ]
     return Table("What is not known", ("value", "range", "of the verdict", "measure"), rows)
@@ -104,10 +103,6 @@ def range_words(found: Range, unit: str) -> str:
     """The ends of a range with their unit."""
     low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
     return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
-
-
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0%}"
 
 
 def chances_tables(name: str, found: Ensemble) -> list[Table]:

@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from ..io import ShownUnits
 from ..orbits import Sensitivity
 from ..plotting import (
-    Style,
     add_shaft_axes,
     chance_of_chaos,
     elasticity_bars,
@@ -209,11 +208,8 @@ def picture_of(key: str, figure: Figure, alt: str, caption: str) -> Picture:
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (96 * float(x) for x in figure.get_size_inches())
-    light, dark = (_address(restyle(figure, style)) for style in _STYLES)
+    light, dark = (_address(restyle(figure, style)) for style in ("light", "dark"))
     return Picture(key, alt, caption, light, dark, round(width), round(height))
-
-
-_STYLES: tuple[Style, Style] = ("light", "dark")
 
 
 def _address(figure: Figure) -> str:

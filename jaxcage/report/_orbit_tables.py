@@ -10,7 +10,7 @@ from .._types import Scalar
 from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
-from ._table import Table, number
+from ._table import Table, chosen, number
 from ._zone_tables import SPEEDS, partner_of, published_cell, published_document, published_zones, zone_document
 
 
@@ -31,10 +31,7 @@ def pairs(multipliers: Sequence[complex] | np.ndarray) -> list[list[float]]:
 def point_document(point: Point, branch: int | None) -> dict[str, Any]:
     """A bifurcation for programs."""
     return {
-        "kind": point.kind,
-        "speed_rpm": point.speed_rpm,
-        "error_rpm": point.error_rpm,
-        "steps": point.steps,
+        **chosen(point, "kind speed_rpm error_rpm steps"),
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
         "criticality": point.criticality or None,
@@ -63,15 +60,10 @@ def stretch_document(stretch: Stretch, found: SynchronousOrbits) -> dict[str, An
     """A stable stretch for programs."""
     lower, upper = end_kinds(stretch, found)
     return {
-        "lower_rpm": stretch.lower_rpm,
-        "upper_rpm": stretch.upper_rpm,
+        **chosen(stretch, "lower_rpm upper_rpm"),
         "lower_kind": lower,
         "upper_kind": upper,
-        "branch": stretch.branch,
-        "confirmed": stretch.confirmed,
-        "family": stretch.family,
-        "met": stretch.met,
-        "met_first": stretch.met_first,
+        **chosen(stretch, "branch confirmed family met met_first"),
     }
 
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._parameters import parameter_info, parameter_paths, parameters
-from ..analysis import Sweep
 from ..orbits import Sensitivity
 from ..reproduction import compare_edges
 from ._findings import Findings
@@ -85,9 +84,10 @@ def checks_table(findings: Findings) -> Table:
     swept, found = findings.sweep, findings.found
     edges = [e for zone in findings.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     exact = f"{sum(e.basis != 'statistical' for e in edges)} of {len(edges)}" if not findings.quick else "not tried"
+    changed = ", then ".join(f"{each.changed} of {each.lanes}" for each in swept.confirmed)
     rows = [
         ("simulations that failed", f"{int(np.sum(swept.failed))} of {swept.outcome.size}"),
-        ("labels that changed when confirmed by finer steps", _confirmed(swept) or "none confirmed"),
+        ("labels that changed when confirmed by finer steps", changed or "none confirmed"),
         ("largest error of a revolution, of the clearance", f"{np.max(swept.error[~swept.failed], initial=0.0):.0e}"),
         ("simulations that went beyond eps = 1, where surfaces would overlap", str(int(np.sum(swept.peak > 1)))),
         ("simulations of which it is undecided what they do", str(int(np.sum(swept.label == "undecided")))),
@@ -100,10 +100,6 @@ def checks_table(findings: Findings) -> Table:
         rows.append(("gradients against the scaling of units, largest relative residual", f"{worst:.0e}"))
         rows.append(("edges whose gradient is not to be trusted", ", ".join(lost) or "none"))
     return Table("Checks of this report", ("check", "result"), rows)
-
-
-def _confirmed(swept: Sweep) -> str:
-    return ", then ".join(f"{each.changed} of {each.lanes}" for each in swept.confirmed)
 
 
 def published_table(findings: Findings) -> Table | None:
