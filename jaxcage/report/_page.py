@@ -27,10 +27,6 @@ from ._table import Table, in_units, number, with_shaft
 from ._zone_tables import transient_tables, zone_span, zones_table
 
 
-TEMPLATES = Path(__file__).parent
-"""Folder of the pages' templates."""
-
-
 @dataclasses.dataclass(frozen=True)
 class Assessed:
     """An operating speed with what each kind of zone says of it."""
@@ -72,13 +68,21 @@ def page(
     case); the command line that asked for it; what draws from its ranges do (None: all is known); values that are
     still those of the template, by dotted name; units of tables and figures, if not mm and the like.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
     assessed = assess(findings, operating)
-    return environment.get_template("page.html.j2").render(
-        _context(findings, assessed, table, command, chances, left, units or ShownUnits())
+    return rendered(
+        "page.html.j2", **_context(findings, assessed, table, command, chances, left, units or ShownUnits())
     )
+
+
+def rendered(template: str, **context: Any) -> str:
+    """A page made of a template and what it holds, with the date of today."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    return environment.get_template(template).render(context, date=datetime.date.today().isoformat())
 
 
 def _context(
@@ -132,7 +136,6 @@ def _context(
         "provenance": provenance_table(findings),
         "version": swept.settings.get("version_jaxcage", ""),
         "command": command,
-        "date": datetime.date.today().isoformat(),
     }
     there = {"operating": bool(assessed), "map": "map" in drawn, "gradients": bool(slopes)}
     there |= {"statics": statics is not None, "known": chances is not None}
