@@ -8,7 +8,6 @@
 | `_slopes`        | how every exact edge answers to the design                                  |
 | `_lasting`       | how edges of lasting chaos answer to the design, with error bars           |
 | `_bearing_gradient` | how the whole bearing's slip, wear and power answer to the design, with error bars |
-| `_bearing_design` | the whole bearing before and after a search                                |
 | `_bearing_page`  | the page of a whole bearing                                                 |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
@@ -19,16 +18,12 @@
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
 | `_narrowed`      | ranges that measurements narrowed                                           |
 | `_compare`       | two designs side by side                                                    |
-| `_design_tables` | designs and their tolerances                                                |
+| `_design_tables` | designs before and after a search, and their tolerances                     |
 | `_paper_tables`  | the paper's results beside ours                                             |
 | `_page_tables`   | tables that no command prints                                               |
 | `_page`          | the page                                                                    |
 """
 
-from ._bearing_design import (
-    before_and_after_table as before_and_after_table,
-    changed_parameters_table as changed_parameters_table,
-)
 from ._bearing_gradient import (
     bearing_gradient_document as bearing_gradient_document,
     bearing_gradient_table as bearing_gradient_table,
@@ -61,8 +56,10 @@ from ._compare import (
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (
     bearing_budget_table as bearing_budget_table,
+    before_and_after_table as before_and_after_table,
     before_and_after_tables as before_and_after_tables,
     budget_table as budget_table,
+    changed_parameters_table as changed_parameters_table,
     optima_table as optima_table,
     parameters_table as parameters_table,
     sobol_document as sobol_document,
