@@ -13,7 +13,7 @@
 | `_map`           | edges in two parameters, exponents over both                                |
 | `_statics`       | statics and the impact of a roller as tables                                |
 | `_operating`     | operating speeds against zones                                              |
-| `_sources`       | every parameter with its unit and where its value comes from                |
+| `_sources`       | every parameter with its unit and where its value comes from, readings      |
 | `_findings`      | everything that a page shows, computed                                      |
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
 | `_narrowed`      | ranges that measurements narrowed                                           |
@@ -122,11 +122,6 @@ from ._paper_tables import (
     readings_table as readings_table,
     two_zones_table as two_zones_table,
 )
-from ._readings import (
-    readings_document as readings_document,
-    readings_words as readings_words,
-    short_readings as short_readings,
-)
 from ._slopes import (
     EXIT as EXIT,
     FIRST as FIRST,
@@ -142,7 +137,12 @@ from ._slopes import (
     source_notes as source_notes,
     to_be_turned as to_be_turned,
 )
-from ._sources import parameter_rows as parameter_rows
+from ._sources import (
+    parameter_rows as parameter_rows,
+    readings_document as readings_document,
+    readings_words as readings_words,
+    short_readings as short_readings,
+)
 from ._statics import (
     displacements as displacements,
     impact_document as impact_document,

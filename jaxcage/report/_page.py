@@ -20,8 +20,7 @@ from ._findings import Findings
 from ._operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict
 from ._orbit_tables import coexisting_notes, edge_table, loss_table
 from ._page_tables import at_speeds_table, checks_table, provenance_table, published_table, slope_tables
-from ._readings import readings_words
-from ._sources import parameter_rows, shown
+from ._sources import parameter_rows, readings_words, shown
 from ._statics import statics_table
 from ._table import Table, in_units, number, with_shaft
 from ._zone_tables import transient_tables, zone_span, zones_table

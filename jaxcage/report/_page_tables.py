@@ -12,9 +12,8 @@ from ..orbits import Sensitivity
 from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
-from ._readings import readings_words
 from ._slopes import FIRST
-from ._sources import shown
+from ._sources import readings_words, shown
 from ._table import Table, number
 
 
