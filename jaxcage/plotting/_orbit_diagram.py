@@ -162,14 +162,14 @@ def sweep_figure(
     return figure
 
 
-def legend_below(figure: Figure, *axes: Axes) -> None:
+def legend_below(figure: Figure, *axes: Axes, ncols: int = 5) -> None:
     """One legend for all axes beneath them, where it hides no point."""
     entries = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     place = "outside lower center"
-    enlarge_dots(figure.legend(entries.values(), entries.keys(), loc=place, ncols=5, frameon=False, fontsize=9))
+    enlarge_dots(figure.legend(entries.values(), entries.keys(), loc=place, ncols=ncols, frameon=False, fontsize=9))
 
 
 def zoomed_diagram(sweep: Sweep, first_rpm: float, last_rpm: float, component: int = 1, ax: Axes | None = None) -> Axes:

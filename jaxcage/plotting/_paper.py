@@ -60,10 +60,7 @@ def _diagrams(runs: Runs, pair: tuple[str, str], zoom: tuple[float, float] | Non
     cells = figure.subplots(2, 1, sharex=True)
     for case, ax in zip(pair, cells, strict=True):
         swept, published = runs.sweeps[case], PUBLISHED_CASES[case]
-        if zoom is None:
-            orbit_diagram(swept, 1, ax)
-        else:
-            zoomed_diagram(swept, *zoom, 1, ax)
+        orbit_diagram(swept, 1, ax, limits_rpm=zoom)
         mark_published(ax, published, text=False)
         oil, gap = f"VG{published.viscosity_grade:g}", f"gap {published.guidance_gap_mm} mm"
         text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} um, {oil}; dotted, published edges"
