@@ -12,10 +12,10 @@ from ..bearing import FIGURE_AXES, PUBLISHED_CASES
 from ..forces import PocketImpact, approach_speed, impact_history
 from ..reproduction import SECTION_RPM, ReadingResult, Runs
 from ..sweeps import rpm
-from ._impact import impact_forces
 from ._marks import mark_published
 from ._orbit_diagram import orbit_diagram, zoomed_diagram
 from ._section import strobe_section
+from ._statics import impact_forces
 from ._style import GREY, new_figure
 
 
