@@ -1,7 +1,6 @@
 """Slip, power lost, largest exponent and state of a whole bearing over its shaft's speed and a parameter."""
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -32,8 +31,7 @@ def bearing_map(job: Job[MapOptions], model: BearingModel) -> Report:
     speeds = shaft_speeds(job, model, options.columns or 2)
     spaced = np.geomspace if axis.name == LOAD and axis.lower > 0 else np.linspace
     values = spaced(axis.lower, axis.upper, options.rows or 2)
-    given: dict[str, Any] = job.given("starts discard revolutions")
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
+    given = job.given("starts discard revolutions tolerance")
     lanes = speeds.size * values.size * given["starts"]
     job.require(Demand(lanes, given["discard"] + given["revolutions"], 2e4 * lanes, rate=SWEEPING))
     try:
@@ -77,15 +75,24 @@ def _axis(job: Job[MapOptions], model: BearingModel) -> Axis:
         raise InputError(f"Option --y must be one of {', '.join(known)}, but '{name}' was given.")
     if (options.rows or 0) < 2:
         raise InputError(f"Option --rows must be at least 2 for a whole bearing, but {options.rows} was given.")
+    ends = given_ends(job, parameter_info(model)[name].unit)
+    if name == LOAD:
+        ends.setdefault("lower", LIGHTEST * float(model.load))
+    return parameter_axis(model, name, **ends)
+
+
+def given_ends(job: Job[MapOptions], unit: str) -> dict[str, float]:
+    """The ends of a map's range that are given, in `unit`.
+
+    **Raises:** `ArgumentError` for what is no number, or has another unit.
+    """
     ends = {}
     for end, text in job.given("lower upper").items():
         try:
-            ends[end] = None if text is None else to_si(text, parameter_info(model)[name].unit)
+            ends[end] = to_si(text, unit)
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
-    if name == LOAD and ends["lower"] is None:
-        ends["lower"] = LIGHTEST * float(model.load)
-    return parameter_axis(model, name, **ends)
+    return ends
 
 
 def _outcomes(found: list[BearingSweep]) -> list[str]:

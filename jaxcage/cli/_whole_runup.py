@@ -1,7 +1,6 @@
 """A whole bearing run up and down again: slip, eccentricity, whirl and power both ways."""
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,6 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
     turning = float(model.rolling_cage_speed(float(np.mean(speeds)))) / (2 * np.pi)
     revolutions = int(2 * turning * (speeds[-1] - speeds[0]) / rate) + (options.discard or 0)
     job.require(Demand(8, revolutions, 1e6, rate=2 * SWEEPING))
-    given: dict[str, Any] = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with job.computing():
         found = bearing_up_down(
             model,
@@ -39,7 +37,7 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
             steps=options.windows or 2,
             settle=options.discard or 0,
             starts=STARTS,
-            **given,
+            **job.given("tolerance"),
         )
     if found.up.failed.all() and found.down.failed.all():
         raise NoResult("All steps of the ramp failed.")

@@ -68,17 +68,14 @@ def swept(job: Job[Any], model: BearingModel, speeds: np.ndarray) -> BearingSwee
     options = job.options
     lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
     job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
-    given: dict[str, Any] = job.given("discard revolutions")
-    given |= {"exponents": getattr(options, "exponents", 1)}
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
     with job.computing("sweep") as say:
         found = sweep_bearing(
             model,
             speeds,
             starts=STARTS,
+            **job.given("discard revolutions tolerance"),
             blocks=blocks_of(options.revolutions),
             progress=partial(say, ""),
-            **given,
         )
     if found.failed.all():
         raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
