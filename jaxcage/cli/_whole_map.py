@@ -49,7 +49,8 @@ def bearing_map(job: Job[MapOptions], model: BearingModel) -> Report:
     figure = bearing_map_figure(found, values * axis.factor, label, title, logarithmic=spaced is np.geomspace)
     job.listed("figure", job.saved(figure, job.path(f"{stem}.png")))
     job.columns(_columns(found, values, axis), detail=stem)
-    counts = {name: sum(int((each.outcome == name).sum()) for each in found) for name in _outcomes(found)}
+    names, numbers = np.unique([each.outcome for each in found], return_counts=True)
+    counts = dict(zip(names.tolist(), numbers.tolist(), strict=True))
     document = {
         "y": axis.name,
         "shaft_speed_rpm": found[0].rpm,
@@ -93,10 +94,6 @@ def given_ends(job: Job[MapOptions], unit: str) -> dict[str, float]:
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
     return ends
-
-
-def _outcomes(found: list[BearingSweep]) -> list[str]:
-    return sorted({name for each in found for name in each.outcome.ravel().tolist()})
 
 
 def _mean(values: np.ndarray) -> np.ndarray:

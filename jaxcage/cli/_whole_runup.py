@@ -8,7 +8,7 @@ from .._errors import NoResult
 from ..models import BearingModel
 from ..plotting import bearing_ramp_figure
 from ..report import Table, number
-from ..sweeps import BearingRamp, BearingUpDown, bearing_up_down, rpm
+from ..sweeps import BearingUpDown, bearing_up_down, rpm
 from ._job import Job
 from ._limits import Demand
 from ._options import RunUpOptions
@@ -59,22 +59,19 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
 
 def _table(title: str, found: BearingUpDown) -> Table:
     slip = lambda way, i: f"{100 * way.cage_slip[i]:.2f} ± {100 * way.cage_slip_error[i]:.2f}"
+    ways = found.up, found.down
     rows = [
         (
             f"{found.rpm[i]:.0f}",
-            *(slip(way, i) for way in _ways(found)),
-            *(number(way.eccentricity[i], 3) for way in _ways(found)),
-            *(number(way.friction_power_W[i], 1) for way in _ways(found)),
+            *(slip(way, i) for way in ways),
+            *(number(way.eccentricity[i], 3) for way in ways),
+            *(number(way.friction_power_W[i], 1) for way in ways),
             "differs" if found.apart[i] else "",
         )
         for i in range(found.rpm.size)
     ]
     heads = ("slip up [%]", "slip down [%]", "eps up", "eps down", "lost up [W]", "lost down [W]", "hysteresis")
     return Table(title, ("shaft [rpm]", *heads), rows)
-
-
-def _ways(found: BearingUpDown) -> tuple[BearingRamp, BearingRamp]:
-    return found.up, found.down
 
 
 def _note(found: BearingUpDown) -> str:
