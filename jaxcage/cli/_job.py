@@ -194,8 +194,8 @@ class Job(Generic[Given]):
         return self.folder / f"{self.command}_{self.name}{ending}"
 
     def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> None:
-        """Write a figure with shaft speeds under its cage speeds, and list it under `key`."""
-        if self.name:
+        """Write a figure, of a cage with shaft speeds under its cage speeds, and list it under `key`."""
+        if self.whole is None:
             add_shaft_axes(figure, self.ratio)
         self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
 

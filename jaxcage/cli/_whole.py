@@ -82,7 +82,7 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     with job.computing():
         found = examined(job.name, at, options.revolutions, options.discard, options.tolerance)
     run, history = found.run, found.history
-    job.listed("figure", job.saved(found.figure, job.path(f"{at.ending}.png")))
+    job.figure(found.figure, detail=at.ending)
     job.columns(_columns(history), detail=at.ending)
     if options.animate:
         with job.written("animation", job.path(f"{at.ending}.gif")) as path:

@@ -57,7 +57,7 @@ def bearings_compared(job: Job[CompareOptions], model: BearingModel) -> Report:
         if each.failed.all():
             raise NoResult(f"All lanes of {name} failed ({', '.join(np.unique(each.outcome))}).")
     figure = bearings_beside(names, found)
-    job.listed("figure", job.saved(figure, job.path(f"_{names[1]}.png")))
+    job.figure(figure, detail=f"_{names[1]}")
     changed = report.differences([model, other])
     zones = [bearing_zones(each) for each in found]
     document = {

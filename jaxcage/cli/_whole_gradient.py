@@ -32,7 +32,7 @@ def bearing_gradients(job: Job[GradientOptions], model: BearingModel) -> Report:
             **given,
         )
     title = f"{at.title(job.name)}: elasticities"
-    job.listed("figure", job.saved(statistic_bars(found, title), job.path(f"{at.ending}.png")))
+    job.figure(statistic_bars(found, title), detail=at.ending)
     document = {**at.document, **report.bearing_gradient_document(found)}
     notes = [
         "Elasticity: relative change of a mean by that of a parameter, with its standard error; "

@@ -47,7 +47,7 @@ def bearing_map(job: Job[MapOptions], model: BearingModel) -> Report:
     title = f"{job.name}: over the shaft's speed and {axis.name.replace('_', ' ')}, {length} of the cage"
     label = f"{axis.name.replace('_', ' ').capitalize()}{f' [{axis.unit}]' if axis.unit else ''}"
     figure = bearing_map_figure(found, values * axis.factor, label, title, logarithmic=spaced is np.geomspace)
-    job.listed("figure", job.saved(figure, job.path(f"{stem}.png")))
+    job.figure(figure, detail=stem)
     job.columns(_columns(found, values, axis), detail=stem)
     names, numbers = np.unique([each.outcome for each in found], return_counts=True)
     counts = dict(zip(names.tolist(), numbers.tolist(), strict=True))

@@ -42,7 +42,7 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
     if found.up.failed.all() and found.down.failed.all():
         raise NoResult("All steps of the ramp failed.")
     title = f"{job.name}: run-up and run-down, {options.rate:g} rpm/s of the shaft, {float(model.load):g} N"
-    job.listed("figure", job.saved(bearing_ramp_figure(found, title), job.path(".png")))
+    job.figure(bearing_ramp_figure(found, title))
     ways = {way: dataclasses.asdict(getattr(found, way)) for way in ("up", "down")}
     columns = {f"{name} {way}": x for way, fields in ways.items() for name, x in fields.items()}
     job.columns({"shaft speed [rpm]": found.rpm, **columns, "differs": found.apart})

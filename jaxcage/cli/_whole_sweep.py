@@ -40,7 +40,7 @@ def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
     found = swept(job, model, speeds)
     title = f"{job.name}, {float(model.load):g} N, {options.discard} + {options.revolutions} revolutions of the cage"
     found_zones = bearing_zones(found)
-    job.listed("figure", job.saved(bearing_sweep_figure(found, title, found_zones), job.path(".png")))
+    job.figure(bearing_sweep_figure(found, title, found_zones))
     job.listed("data", save_bearing_sweep(job.folder / f"sweep_{job.name}.zarr", found, model))
     outcomes = dict(sorted(collections.Counter(found.outcome.ravel().tolist()).items()))
     document = {
