@@ -111,9 +111,8 @@ class _Range(Options):
     """Last cage speed [rpm]."""
 
     def check(self) -> None:
-        mixed = getattr(self.first, "whose", None) != getattr(
-            self.last, "whose", None
-        )  # not before the bearing is read
+        # Speeds of cage and shaft are not compared before the bearing is read.
+        mixed = getattr(self.first, "whose", None) != getattr(self.last, "whose", None)
         if self.last <= self.first and not mixed:
             between = f"{self.first:g} to {self.last:g} rpm"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")

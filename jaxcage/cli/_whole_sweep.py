@@ -98,18 +98,14 @@ def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
 
 def zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
     """Stretches of speed in which the cage does the same."""
-    rows = [
-        (
-            f"{zone.low_rpm:.0f} to {zone.high_rpm:.0f}",
-            " or ".join(zone.states),
-            "chaotic" if zone.chaotic else "not known to be chaotic",
-            f"{zone.exponent:.2f} ± {zone.exponent_error:.2f}",
-            str(zone.speeds),
-        )
-        for zone in found
-    ]
-    heads = ("shaft [rpm]", "state of the cage", "exponent says", "exponent", "speeds")
-    return Table(f"Zones of {name}, each edge halfway between two speeds of the sweep", heads, rows)
+    columns = {
+        "shaft [rpm]": "{0.low_rpm:.0f} to {0.high_rpm:.0f}",
+        "state of the cage": lambda zone: " or ".join(zone.states),
+        "exponent says": lambda zone: "chaotic" if zone.chaotic else "not known to be chaotic",
+        "exponent": "{0.exponent:.2f} ± {0.exponent_error:.2f}",
+        "speeds": "{.speeds}",
+    }
+    return Table.of(f"Zones of {name}, each edge halfway between two speeds of the sweep", columns, found)
 
 
 def sweep_table(title: str, found: BearingSweep) -> Table:

@@ -77,18 +77,11 @@ def _rollers(model: BearingModel, run: BearingRun, history: BearingHistory, samp
     radius = MM * run.rollers[sample, 2]
     angle, half = history.roller_angle[sample], MM * float(model.bearing.roller_diameter) / 2
     heaviest = max(float(history.inner_load.max()), 1e-9)
-    found: list[Artist] = []
-    for r, psi, load in zip(radius, angle, history.inner_load[sample], strict=True):
-        found.append(
-            Circle(
-                (r * np.cos(psi), r * np.sin(psi)),
-                half,
-                facecolor=to_rgba(BLUE, 0.08 + 0.6 * load / heaviest),
-                edgecolor=BLACK,
-                linewidth=0.7,
-            )
-        )
-    return found
+    shade = lambda load: to_rgba(BLUE, 0.08 + 0.6 * load / heaviest)
+    return [
+        Circle((r * np.cos(psi), r * np.sin(psi)), half, facecolor=shade(load), edgecolor=BLACK, linewidth=0.7)
+        for r, psi, load in zip(radius, angle, history.inner_load[sample], strict=True)
+    ]
 
 
 def _bars(model: BearingModel, run: BearingRun, sample: int) -> list[Artist]:

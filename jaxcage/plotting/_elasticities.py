@@ -31,7 +31,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     """
     if not sensitivities:
         raise ArgumentError("sensitivities", said="must hold at least one sensitivity, but it is empty.")
-    names = _largest(sensitivities, most)
+    names = largest_first(sensitivities, most)
     count = len(sensitivities)
     ax = axes_or_new(ax, 9.0, 1.2 + len(names) * (0.1 + 0.125 * count))
     thick = 0.8 / count
@@ -63,8 +63,8 @@ def readable(name: str) -> str:
     return name.replace(".", " ").replace("_", " ")
 
 
-def _largest(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
-    """Names of the parameters, in order from the top."""
+def largest_first(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
+    """Names of the parameters that move edges most, in order from the top."""
     largest: dict[str, float] = {}
     for s in sensitivities:
         for name, value in s.elasticity.items():

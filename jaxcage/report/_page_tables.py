@@ -9,10 +9,10 @@ import numpy as np
 
 from .._parameters import parameter_info, parameter_paths, parameters
 from ..orbits import Sensitivity
+from ..plotting._elasticities import largest_first
 from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
-from ._slopes import FIRST
 from ._sources import readings_words, shown
 from ._table import Table, number
 
@@ -62,15 +62,10 @@ def with_full_names(findings: Findings, slopes: Sensitivity) -> Sensitivity:
 
 
 def _slope_table(findings: Findings, title: str, edges: dict[str, Sensitivity]) -> Table:
-    largest: dict[str, float] = {}
-    for s in edges.values():
-        for name, change in s.elasticity.items():
-            largest[name] = max(largest.get(name, 0.0), abs(change) if np.isfinite(change) else 0.0)
-    rest = sorted((n for n in largest if n not in FIRST and largest[n] > 0), key=lambda n: -largest[n])
     info, value = parameter_info(findings.model), parameters(findings.model)
     short = {".".join(path): name for name, path in parameter_paths(findings.model).items()}
     rows = []
-    for name in [*FIRST, *rest][:MOST]:
+    for name in largest_first(list(edges.values()), MOST):
         unit, number_ = shown(float(value[short[name]]), info[short[name]].unit)
         cells = (f"{s.elasticity[name]:+.3f}".replace("-", "−") for s in edges.values())
         rows.append((name.replace("_", " ").replace(".", " "), f"{number_:.4g} {unit}".strip(), *cells))
@@ -108,17 +103,15 @@ def published_table(findings: Findings) -> Table | None:
         *compare_edges(findings.published, findings.loss.zones, "synchronous-loss"),
         *compare_edges(findings.published, findings.zones.zones, "chaotic"),
     ]
-    rows = [
-        (
-            row.edge,
-            row.kind,
-            number(row.published_rpm),
-            number(row.ours_rpm, nothing="none"),
-            "-" if row.error_percent is None else f"{row.error_percent:+.1f} %".replace("-", "−"),
-        )
-        for row in compared
-    ]
-    return Table("Against the published edges [rpm]", ("edge", "kind", "published", "here", "difference"), rows)
+    off = lambda row: "-" if row.error_percent is None else f"{row.error_percent:+.1f} %".replace("-", "−")
+    columns = {
+        "edge": "{.edge}",
+        "kind": "{.kind}",
+        "published": lambda row: number(row.published_rpm),
+        "here": lambda row: number(row.ours_rpm, nothing="none"),
+        "difference": off,
+    }
+    return Table.of("Against the published edges [rpm]", columns, compared)
 
 
 def provenance_table(findings: Findings) -> Table:
