@@ -5,9 +5,8 @@
 | `_table`         | tables of texts                                                             |
 | `_zone_tables`   | chaotic zones beside published ones                                         |
 | `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
-| `_slopes`        | how every exact edge answers to the design                                  |
+| `_slopes`        | how exact edges, and slip, wear and power of a whole bearing, answer to the design |
 | `_lasting`       | how edges of lasting chaos answer to the design, with error bars           |
-| `_bearing_gradient` | how the whole bearing's slip, wear and power answer to the design, with error bars |
 | `_bearing_page`  | the page of a whole bearing                                                 |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
@@ -16,7 +15,7 @@
 | `_sources`       | every parameter with its unit and where its value comes from, readings      |
 | `_findings`      | everything that a page shows, computed                                      |
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
-| `_narrowed`      | ranges that measurements narrowed                                           |
+| `_chances`       | chances of chaos, and ranges that measurements narrowed                     |
 | `_compare`       | two designs side by side                                                    |
 | `_design_tables` | designs before and after a search, and their tolerances                     |
 | `_paper_tables`  | the paper's results beside ours                                             |
@@ -24,10 +23,6 @@
 | `_page`          | the page                                                                    |
 """
 
-from ._bearing_gradient import (
-    bearing_gradient_document as bearing_gradient_document,
-    bearing_gradient_table as bearing_gradient_table,
-)
 from ._bearing_page import (
     Section as Section,
     bearing_page as bearing_page,
@@ -39,7 +34,10 @@ from ._chances import (
     chances_notes as chances_notes,
     chances_table as chances_table,
     chances_tables as chances_tables,
+    measured_table as measured_table,
     measures as measures,
+    narrowed_document as narrowed_document,
+    narrowed_table as narrowed_table,
     operating_chances as operating_chances,
     unknowns_table as unknowns_table,
     verdict_table as verdict_table,
@@ -93,11 +91,6 @@ from ._map import (
     parameter_axis as parameter_axis,
     speed_axis as speed_axis,
 )
-from ._narrowed import (
-    measured_table as measured_table,
-    narrowed_document as narrowed_document,
-    narrowed_table as narrowed_table,
-)
 from ._operating import (
     Operating as Operating,
     Verdict as Verdict,
@@ -126,6 +119,8 @@ from ._slopes import (
     EXIT as EXIT,
     FIRST as FIRST,
     ONSET as ONSET,
+    bearing_gradient_document as bearing_gradient_document,
+    bearing_gradient_table as bearing_gradient_table,
     edge_slopes as edge_slopes,
     elasticities_table as elasticities_table,
     gradient_document as gradient_document,
