@@ -213,14 +213,14 @@ def bearing_figure(
     figure = new_figure(12.0, 11.0 if spectra else 8.0)
     grid = figure.add_gridspec(4 if spectra else 3, 2, height_ratios=(2.4, 1, 1, 1)[: 4 if spectra else 3])
     worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
-    bearing_drawing(model, run, history, worst, dress(figure.add_subplot(grid[0, 0])))
-    cage_orbit(history, dress(figure.add_subplot(grid[0, 1])))
-    slip_around(circumference, dress(figure.add_subplot(grid[1, 0])))
-    pocket_force_around(circumference, dress(figure.add_subplot(grid[1, 1])))
-    force_over_time(history, dress(figure.add_subplot(grid[2, :])))
+    bearing_drawing(model, run, history, worst, figure.add_subplot(grid[0, 0]))
+    cage_orbit(history, figure.add_subplot(grid[0, 1]))
+    slip_around(circumference, figure.add_subplot(grid[1, 0]))
+    pocket_force_around(circumference, figure.add_subplot(grid[1, 1]))
+    force_over_time(history, figure.add_subplot(grid[2, :]))
     labels = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
     for i, (name, spectrum) in enumerate(spectra.items()):
-        ax = marked_spectrum(spectrum, orders, labels.get(name, name), dress(figure.add_subplot(grid[3, i])))
+        ax = marked_spectrum(spectrum, orders, labels.get(name, name), figure.add_subplot(grid[3, i]))
         if i == 0 and (legend := ax.get_legend()) is not None:
             legend.remove()
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)

@@ -44,7 +44,7 @@ def draw_beside(
     """Orbit diagram and exponents of each design in a column of two axes."""
     limits = []
     for column, (name, found) in enumerate(zip(names, swept, strict=True)):
-        above, below = (dress(ax) for ax in cells[:, column])
+        above, below = cells[:, column]
         orbit_diagram(found, 1, above)
         exponent_strip(found, below)
         limits.append((above.get_ylim(), below.get_ylim()))

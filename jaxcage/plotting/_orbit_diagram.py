@@ -18,7 +18,6 @@ from ._style import (
     VERMILION,
     axes_or_new,
     dots,
-    dress,
     enlarge_dots,
     new_figure,
     padded_limits,
@@ -150,7 +149,7 @@ def sweep_figure(
     figure = new_figure(9.5, 6.4)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 1))
     orbit_diagram(sweep, component, above)
-    exponent_strip(sweep, dress(below))
+    exponent_strip(sweep, below)
     for ax in (above, below):
         shade_zones(ax, zones)
         if published is not None:
