@@ -403,7 +403,7 @@ def bearing_animation(
     last = np.arange(len(history.time))[-history.samples - 1 :]
     frames = last[:: max(1, -(-len(last) // 96))]
     figure = Figure(figsize=(5.0, 5.2), layout="constrained", dpi=100)
-    ax = dress(figure.subplots())
+    ax = figure.subplots()
 
     def draw(sample: int) -> list[Artist]:
         ax.clear()

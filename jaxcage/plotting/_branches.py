@@ -63,11 +63,6 @@ def words(kind: str) -> str:
     return f"{kind.replace('branch-p', 'branch p')} ({mark_of(kind).short})" if kind in MARKS else kind
 
 
-def period_colour(periods: int) -> str:
-    """Colour of the branches of period-`periods` orbits; long periods share one."""
-    return PERIOD_COLOURS.get(periods, GREEN)
-
-
 def branch_diagram(
     branches: Sequence[Branch],
     component: int = 1,
@@ -159,7 +154,7 @@ def _share(branch: Branch, point: Point) -> float:
 
 
 def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-    colour = period_colour(periods)
+    colour = PERIOD_COLOURS.get(periods, GREEN)  # long periods share one
     light = lighter(colour)
     styles = (
         ("stable", {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}),

@@ -24,11 +24,6 @@ from ._style import (
 )
 
 
-def _kind(labels: np.ndarray) -> np.ndarray:
-    """Labels with all periods taken together."""
-    return np.where(np.char.startswith(labels, "periodic"), "periodic", labels)
-
-
 def orbit_diagram(
     sweep: Sweep,
     component: int = 1,
@@ -48,7 +43,8 @@ def orbit_diagram(
     chosen = (sweep.rpm >= low) & (sweep.rpm <= high)
     points = sweep.strobe[chosen, :, :, component] * quantity(name).factor
     speeds = np.broadcast_to(sweep.rpm[chosen, None, None], points.shape)
-    kind = _kind(sweep.label[chosen])
+    labels = sweep.label[chosen]
+    kind = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)  # all periods together
     size = 1.8 if np.sum(chosen) > 150 else 2.5
     for label, colour in KIND_COLOURS.items():
         lanes = kind == label
