@@ -105,7 +105,8 @@ def _source(
         for start in (path[:n] for n in range(len(path), 0, -1)):
             if start in _PUBLISHED:
                 return _PUBLISHED[start]
-        return "default" if _is_default(model, path, field) else "identified, not printed"
+        own = field.default is not dataclasses.MISSING and bool(get(model, path) == field.default)
+        return "default" if own else "identified, not printed"
     here: Any = table
     for name in path:
         here = here.get(name) if isinstance(here, Mapping) else None
@@ -123,11 +124,6 @@ def _source(
 def _replaced(table: Mapping[str, Any]) -> set[str]:
     """Parts of the base that another law takes the place of."""
     return {part for part, given in table.items() if isinstance(given, Mapping) and "kind" in given}
-
-
-def _is_default(model: CageModel | BearingModel, path: tuple[str, ...], field: dataclasses.Field) -> bool:
-    default = field.default
-    return default is not dataclasses.MISSING and bool(get(model, path) == default)
 
 
 def readings_document(model: CageModel) -> dict[str, str]:
