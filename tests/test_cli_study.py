@@ -200,11 +200,11 @@ def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     edge = Curve("fold", "speed", "guidance_gap", line, height, *rest, ("range", "range"), "zone 1 onset")
     monkeypatch.setattr(_label_map, "_curves", lambda *_: ([edge], {"zone 2 onset": "a branch point"}))
     stages: list[bool] = []
-    write = _label_map._Files.write
+    write = _label_map._write
     monkeypatch.setattr(
-        _label_map._Files,
-        "write",
-        lambda self, found: (write(self, found), stages.append(self.job.path(f"{self.stem}.png").exists()))[0],
+        _label_map,
+        "_write",
+        lambda job, *given: (write(job, *given), stages.append(job.path("_speed_guidance_gap_labels.png").exists()))[0],
     )
     small = [*MAP, "--adaptive", "--first", "3000", "--last", "9000", "--out", str(tmp_path)]
     got = document(capsys, *small)

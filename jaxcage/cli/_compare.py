@@ -26,7 +26,9 @@ def compare(job: Job[CompareOptions]) -> Report:
         return bearings_compared(job, job.whole)
     options, first = job.options, Subject(job.name, job.model, job.published, job.file)
     second = read_subject(options.other)
-    pair = [first, second._replace(name=_told_apart(first.name, second.name))]
+    if second.name == first.name:  # two files in two folders may have one
+        second = second._replace(name=f"{second.name}_second")
+    pair = [first, second]
     first_ratio, ratio = (float(s.model.bearing.cage_speed_ratio) for s in pair)
     wanted = [at.low_rpm for at in report.read_operating(options.at, first_ratio, job.speeds)]
     speeds, at = _speeds(rpm(options.first, options.last, options.count or 2) * 30 / np.pi, wanted)
@@ -79,11 +81,6 @@ def _speeds(even: np.ndarray, wanted: list[float]) -> tuple[np.ndarray, list[int
     new = [x for x, y in zip(wanted, near, strict=True) if abs(x - y) > 1e-6 * x]
     speeds = np.unique(np.concatenate([even, new]))
     return speeds, [int(np.argmin(np.abs(speeds - x))) for x in wanted]
-
-
-def _told_apart(first: str, second: str) -> str:
-    """The name of the second design: two files in two folders may have one name."""
-    return second if second != first else f"{second}_second"
 
 
 def _swept(job: Job[CompareOptions], one: Subject, speeds: np.ndarray, say: object) -> report.Compared:

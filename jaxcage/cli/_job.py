@@ -186,16 +186,16 @@ class Job(Generic[Given]):
         return save_figure(in_units(figure, self.units), path, self.options.style)
 
     def given(self, names: str) -> dict[str, Any]:
-        """Options that go to the library under their own names."""
-        return chosen(self.options, names)
+        """Options that go to the library under their own names, but for those that are left out: it knows what then."""
+        return {name: value for name, value in chosen(self.options, names).items() if value is not None}
 
     def path(self, ending: str) -> Path:
         """Where a file goes: named after the command and the case."""
         return self.folder / f"{self.command}_{self.name}{ending}"
 
     def figure(self, figure: Figure, key: str = "figure", detail: str = "") -> None:
-        """Write a figure with shaft speeds under its cage speeds, and list it under `key`."""
-        if self.name:
+        """Write a figure, of a cage with shaft speeds under its cage speeds, and list it under `key`."""
+        if self.whole is None:
             add_shaft_axes(figure, self.ratio)
         self.listed(key, self.saved(figure, self.path(f"{detail}.png")))
 
@@ -219,9 +219,8 @@ class Job(Generic[Given]):
 
     def text(self, text: str, path: Path, key: str) -> None:
         """Write a page, and list it under `key`."""
-        with replacing(path) as temporary:
+        with self.written(key, path) as temporary:
             temporary.write_text(text, encoding="utf-8")
-        self.listed(key, path)
 
     @contextlib.contextmanager
     def written(self, key: str, path: Path) -> Iterator[Path]:

@@ -2,12 +2,13 @@
 
 import json
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from .._errors import NoResult
-from ..io import configuration, replacing
+from ..io import configuration
 from ..orbits import Curve
 from ..plotting import stability_map
 from ..report import SPEED, Axis, follow_edges, shares_table
@@ -27,7 +28,7 @@ def label_map_of(job: Job[MapOptions], x: Axis, y: Axis, points: tuple[int, int]
     """Carry out `jaxcage map --points`."""
     options = job.options
     length = job.given("discard revolutions persist")
-    files = _Files(job, x, y, length)
+    job.files["data"] = None
     with job.computing("map", "lanes", ADVICE) as say:
         found = label_map(
             job.model,
@@ -39,11 +40,11 @@ def label_map_of(job: Job[MapOptions], x: Axis, y: Axis, points: tuple[int, int]
             **length,
             blocks=blocks_of(length["revolutions"]),
             method=job.method,
-            report=files.write,
+            report=partial(_write, job, x, y, length),
             stage=say,
         )
     curves, refused = ([], {}) if options.no_curves or x.name != SPEED else _curves(job, x, y)
-    files.draw(found, curves)
+    _draw(job, x, y, found, curves)
     counts = np.bincount(kinds(found.label)[found.grid.known], minlength=len(KINDS))
     document = {
         "x": x.name,
@@ -79,35 +80,30 @@ def _curves(job: Job[MapOptions], x: Axis, y: Axis) -> tuple[list[Curve], dict[s
         return follow_edges(job.model, loss.edges, x, y, job.asked, say)
 
 
-class _Files:
+def _write(job: Job[MapOptions], x: Axis, y: Axis, length: dict[str, int], found: LabelMap) -> None:
     """Figure and data of a map, written anew at every stage."""
+    _draw(job, x, y, found, [])
+    made = {"title": "jaxcage map", **length, "configuration": json.dumps(configuration(job.model))}
+    with job.written("data", job.path(f"{_stem(x, y)}.zarr")) as temporary:
+        found.dataset(job.model).assign_attrs(made).to_zarr(temporary, mode="w", consolidated=False)
 
-    def __init__(self, job: Job[MapOptions], x: Axis, y: Axis, length: dict[str, int]):
-        self.job, self.x, self.y, self.length = job, x, y, length
-        self.stem = f"_{x.name}_{y.name}_labels"
-        job.files["data"] = None
 
-    def write(self, found: LabelMap) -> None:
-        self.draw(found, [])
-        path, model = self.job.path(f"{self.stem}.zarr"), self.job.model
-        made = {"title": "jaxcage map", **self.length, "configuration": json.dumps(configuration(model))}
-        with replacing(path) as temporary:
-            found.dataset(model).assign_attrs(made).to_zarr(temporary, mode="w", consolidated=False)
-        self.job.listed("data", path)
+def _draw(job: Job[MapOptions], x: Axis, y: Axis, found: LabelMap, curves: Sequence[Curve]) -> None:
+    """The largest exponent in colours, what was left out filled from the nearest point."""
+    exponents = (found.x_value * x.factor, found.y_value, found.filled_exponent)
 
-    def draw(self, found: LabelMap, curves: Sequence[Curve]) -> None:
-        """The largest exponent in colours, what was left out filled from the nearest point."""
-        x, y = self.x, self.y
-        exponents = (found.x_value * x.factor, found.y_value, found.filled_exponent)
+    def draw(ax: Axes) -> None:
+        label = _words(y.name)
+        stability_map(curves, ax, exponents=exponents, y_unit=y.unit, y_factor=y.factor, y_label=label)
+        if x.name != SPEED:
+            ax.set_xlabel(f"{_words(x.name)} [{x.unit}]" if x.unit else _words(x.name))
 
-        def draw(ax: Axes) -> None:
-            label = _words(y.name)
-            stability_map(curves, ax, exponents=exponents, y_unit=y.unit, y_factor=y.factor, y_label=label)
-            if x.name != SPEED:
-                ax.set_xlabel(f"{_words(x.name)} [{x.unit}]" if x.unit else _words(x.name))
+    stride = "" if found.grid.stride == 1 else f", so far every {found.grid.stride} points"
+    job.draw(draw, (10.0, 6.0), f"{job.name}: largest exponent{stride}", detail=_stem(x, y))
 
-        stride = "" if found.grid.stride == 1 else f", so far every {found.grid.stride} points"
-        self.job.draw(draw, (10.0, 6.0), f"{self.job.name}: largest exponent{stride}", detail=self.stem)
+
+def _stem(x: Axis, y: Axis) -> str:
+    return f"_{x.name}_{y.name}_labels"
 
 
 def _words(name: str) -> str:

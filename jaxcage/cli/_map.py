@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 
 from .._errors import ArgumentError, InputError, NoResult
 from .._parameters import parameter_info, parameters
-from ..io import to_si
 from ..orbits import Curve
 from ..plotting import stability_map
 from ..report import SPEED, Axis, Exponents, Table, chosen, follow_edges, largest_exponents, parameter_axis, speed_axis
@@ -18,7 +17,7 @@ from ._label_map import label_map_of
 from ._options import MapOptions
 from ._orbits import require_edges, searched
 from ._show import Report
-from ._whole_map import bearing_map
+from ._whole_map import bearing_map, given_ends
 
 
 def map_of(job: Job[MapOptions]) -> Report:
@@ -65,13 +64,7 @@ def _axes(job: Job[MapOptions]) -> tuple[Axis, Axis]:
             raise InputError(f"Option {option} must be one of {', '.join(allowed)}, but '{given}' was given.")
     if options.x == options.y:
         raise InputError(f"Options --x and --y must be two different parameters, but both are {options.x}.")
-    unit, ends = parameter_info(job.model)[options.y].unit, {}
-    for name, text in job.given("lower upper").items():
-        try:
-            ends[name] = None if text is None else to_si(text, unit)
-        except ValueError as error:
-            raise ArgumentError(name, said=f"{error}.") from error
-    y = parameter_axis(job.model, options.y, **ends)
+    y = parameter_axis(job.model, options.y, **given_ends(job, parameter_info(job.model)[options.y].unit))
     return (
         speed_axis(rpm(options.first), rpm(options.last))
         if options.x == SPEED

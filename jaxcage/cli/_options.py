@@ -111,9 +111,8 @@ class _Range(Options):
     """Last cage speed [rpm]."""
 
     def check(self) -> None:
-        mixed = getattr(self.first, "whose", None) != getattr(
-            self.last, "whose", None
-        )  # not before the bearing is read
+        # Speeds of cage and shaft are not compared before the bearing is read.
+        mixed = getattr(self.first, "whose", None) != getattr(self.last, "whose", None)
         if self.last <= self.first and not mixed:
             between = f"{self.first:g} to {self.last:g} rpm"
             raise InputError(f"Option --last must be above --first, but the range is {between}.")
@@ -314,13 +313,10 @@ class MapOptions(SearchOptions):
         if 0 < self.persist <= discard:
             allowed = f"0 or above the {discard} of --discard"
             raise InputError(f"Option --persist must be {allowed}, but {self.persist} was given.")
-        if (self.x == "speed") != (self.speed is None):
-            wrong = (
-                f"must be given for a map over {self.x}"
-                if self.speed is None
-                else "goes with an --x that is not the speed"
-            )
-            raise InputError(f"Option --speed {wrong}.")
+        if self.x == "speed" and self.speed is not None:
+            raise InputError("Option --speed goes with an --x that is not the speed.")
+        if self.x != "speed" and self.speed is None:
+            raise InputError(f"Option --speed must be given for a map over {self.x}.")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -627,7 +623,7 @@ class UnknownsOptions(_Range, IntegrationOptions):
 
     def check(self) -> None:
         super().check()
-        if self.samples is not None and self.samples & (self.samples - 1):
+        if self.samples & (self.samples - 1):
             raise InputError(f"Option --samples must be a power of 2, but {self.samples} was given.")
 
 

@@ -156,16 +156,12 @@ def _check_corners(vary: Vary, model: CageModel | BearingModel) -> None:
         for name, how in vary.items()
         if name != SPEED
     }
-
-    def try_out(corner: dict[str, float]) -> None:
-        if isinstance(model, BearingModel):
-            whole_bearing_from(configuration(replace(model, **corner)))
-        else:
-            model_from(configuration(with_values(model, corner)))  # pyright: ignore[reportArgumentType]
-
     for values in itertools.islice(itertools.product(*ends.values()), MOST_CORNERS):
         corner = dict(zip(ends, map(float, values), strict=True))
         try:
-            try_out(corner)
+            if isinstance(model, BearingModel):
+                whole_bearing_from(configuration(replace(model, **corner)))
+            else:
+                model_from(configuration(with_values(model, corner)))  # pyright: ignore[reportArgumentType]
         except ValueError as error:
             raise InputError(f"Option --vary: {error}") from error

@@ -82,20 +82,21 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     with job.computing():
         found = examined(job.name, at, options.revolutions, options.discard, options.tolerance)
     run, history = found.run, found.history
-    job.listed("figure", job.saved(found.figure, job.path(f"{at.ending}.png")))
+    job.figure(found.figure, detail=at.ending)
     job.columns(_columns(history), detail=at.ending)
     if options.animate:
         with job.written("animation", job.path(f"{at.ending}.gif")) as path:
             bearing_animation(at.model, run, history, path)
+    places = dict(vars(found.circumference))
     document = {
         **at.document,
         **chosen(options, "revolutions discard"),
         **chosen(run, "outcome error estimate steps implicit_share"),
         **dataclasses.asdict(found.measures),
         "pocket_force_distribution_N": pocket_force_distribution(history),
-        "around": {"angle_deg": np.degrees(found.circumference.angle), **_without_angle(found.circumference)},
+        "around": {"angle_deg": np.degrees(places.pop("angle")), **places},
         "orders": found.orders,
-        "spectra": _lines(found.spectra, found.orders),
+        "spectra": {n: [vars(line) for line in named_lines(s, found.orders)] for n, s in found.spectra.items()},
     }
     said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
     stiff = f"; {100 * run.implicit_share:.0f} % by implicit steps" if run.implicit_share else ""
@@ -229,16 +230,6 @@ def _columns(history: BearingHistory) -> dict[str, np.ndarray]:
         values = getattr(history, name)
         found |= {f"{name}_{j + 1} [{unit}]": values[:, j] for j in range(values.shape[1])}
     return found
-
-
-def _without_angle(circumference: Around) -> dict[str, np.ndarray]:
-    values = {field.name: getattr(circumference, field.name) for field in dataclasses.fields(circumference)}
-    del values["angle"]
-    return values
-
-
-def _lines(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> dict[str, list[dict[str, Any]]]:
-    return {name: [vars(line) for line in named_lines(found, orders)] for name, found in spectra.items()}
 
 
 def _line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:

@@ -2,7 +2,6 @@
 
 import dataclasses
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -42,12 +41,15 @@ def bearings_compared(job: Job[CompareOptions], model: BearingModel) -> Report:
     speeds = shaft_speeds(job, model, options.count or 2)
     lanes, length = 2 * speeds.size * STARTS, options.discard + options.revolutions
     job.require(Demand(lanes, length, 2e4 * lanes + 600.0 * lanes * length, rate=SWEEPING))
-    given: dict[str, Any] = job.given("discard revolutions")
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
     with job.computing() as say:
         found = [
             sweep_bearing(
-                each, speeds, starts=STARTS, blocks=blocks_of(options.revolutions), progress=partial(say, name), **given
+                each,
+                speeds,
+                starts=STARTS,
+                **job.given("discard revolutions tolerance"),
+                blocks=blocks_of(options.revolutions),
+                progress=partial(say, name),
             )
             for name, each in zip(names, (model, other), strict=True)
         ]
@@ -55,7 +57,7 @@ def bearings_compared(job: Job[CompareOptions], model: BearingModel) -> Report:
         if each.failed.all():
             raise NoResult(f"All lanes of {name} failed ({', '.join(np.unique(each.outcome))}).")
     figure = bearings_beside(names, found)
-    job.listed("figure", job.saved(figure, job.path(f"_{names[1]}.png")))
+    job.figure(figure, detail=f"_{names[1]}")
     changed = report.differences([model, other])
     zones = [bearing_zones(each) for each in found]
     document = {

@@ -72,7 +72,7 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
         best = found.best.model
         rows, failed = before_and_after(model, best, fresh)
     title = at.title(job.name)
-    job.listed("figure", job.saved(bearing_design_figure(found, rows, title), job.path(f"{at.ending}.png")))
+    job.figure(bearing_design_figure(found, rows, title), detail=at.ending)
     kept.unlink(missing_ok=True)
     document = {
         **at.document,

@@ -19,8 +19,7 @@ def bearing_gradients(job: Job[GradientOptions], model: BearingModel) -> Report:
     """Carry out `jaxcage gradient` of a whole bearing."""
     options = job.options
     at = at_shaft_speed(job, model)
-    given = job.given("designs spread starts discard revolutions seed")
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
+    given = job.given("designs spread starts discard revolutions seed tolerance")
     lanes, length = options.designs * given["starts"], given["discard"] + given["revolutions"]
     job.require(Demand(lanes, length, 2e4 * lanes, rate=SWEEPING * (1 if options.chaos else 2)))
     with job.computing("designs") as say:
@@ -33,7 +32,7 @@ def bearing_gradients(job: Job[GradientOptions], model: BearingModel) -> Report:
             **given,
         )
     title = f"{at.title(job.name)}: elasticities"
-    job.listed("figure", job.saved(statistic_bars(found, title), job.path(f"{at.ending}.png")))
+    job.figure(statistic_bars(found, title), detail=at.ending)
     document = {**at.document, **report.bearing_gradient_document(found)}
     notes = [
         "Elasticity: relative change of a mean by that of a parameter, with its standard error; "

@@ -1,7 +1,6 @@
 """Slip, power lost, largest exponent and state of a whole bearing over its shaft's speed and a parameter."""
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from ._whole import SWEEPING, shaft_speeds
 
 LOAD, LIGHTEST = "load", 0.05
 """Of its own load, the lowest one of a map over the load."""
-MEASURES = ("cage_slip", "friction_power_W", "exponent")
 CELLS = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_wear_mm3_per_h", "eccentricity_mean", "exponent")
 
 
@@ -33,8 +31,7 @@ def bearing_map(job: Job[MapOptions], model: BearingModel) -> Report:
     speeds = shaft_speeds(job, model, options.columns or 2)
     spaced = np.geomspace if axis.name == LOAD and axis.lower > 0 else np.linspace
     values = spaced(axis.lower, axis.upper, options.rows or 2)
-    given: dict[str, Any] = job.given("starts discard revolutions")
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
+    given = job.given("starts discard revolutions tolerance")
     lanes = speeds.size * values.size * given["starts"]
     job.require(Demand(lanes, given["discard"] + given["revolutions"], 2e4 * lanes, rate=SWEEPING))
     try:
@@ -50,9 +47,10 @@ def bearing_map(job: Job[MapOptions], model: BearingModel) -> Report:
     title = f"{job.name}: over the shaft's speed and {axis.name.replace('_', ' ')}, {length} of the cage"
     label = f"{axis.name.replace('_', ' ').capitalize()}{f' [{axis.unit}]' if axis.unit else ''}"
     figure = bearing_map_figure(found, values * axis.factor, label, title, logarithmic=spaced is np.geomspace)
-    job.listed("figure", job.saved(figure, job.path(f"{stem}.png")))
+    job.figure(figure, detail=stem)
     job.columns(_columns(found, values, axis), detail=stem)
-    counts = {name: sum(int((each.outcome == name).sum()) for each in found) for name in _outcomes(found)}
+    names, numbers = np.unique([each.outcome for each in found], return_counts=True)
+    counts = dict(zip(names.tolist(), numbers.tolist(), strict=True))
     document = {
         "y": axis.name,
         "shaft_speed_rpm": found[0].rpm,
@@ -78,19 +76,24 @@ def _axis(job: Job[MapOptions], model: BearingModel) -> Axis:
         raise InputError(f"Option --y must be one of {', '.join(known)}, but '{name}' was given.")
     if (options.rows or 0) < 2:
         raise InputError(f"Option --rows must be at least 2 for a whole bearing, but {options.rows} was given.")
-    ends = {}
-    for end, text in job.given("lower upper").items():
-        try:
-            ends[end] = None if text is None else to_si(text, parameter_info(model)[name].unit)
-        except ValueError as error:
-            raise ArgumentError(end, said=f"{error}.") from error
-    if name == LOAD and ends["lower"] is None:
-        ends["lower"] = LIGHTEST * float(model.load)
+    ends = given_ends(job, parameter_info(model)[name].unit)
+    if name == LOAD:
+        ends.setdefault("lower", LIGHTEST * float(model.load))
     return parameter_axis(model, name, **ends)
 
 
-def _outcomes(found: list[BearingSweep]) -> list[str]:
-    return sorted({name for each in found for name in each.outcome.ravel().tolist()})
+def given_ends(job: Job[MapOptions], unit: str) -> dict[str, float]:
+    """The ends of a map's range that are given, in `unit`.
+
+    **Raises:** `ArgumentError` for what is no number, or has another unit.
+    """
+    ends = {}
+    for end, text in job.given("lower upper").items():
+        try:
+            ends[end] = to_si(text, unit)
+        except ValueError as error:
+            raise ArgumentError(end, said=f"{error}.") from error
+    return ends
 
 
 def _mean(values: np.ndarray) -> np.ndarray:

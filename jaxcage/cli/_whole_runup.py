@@ -1,7 +1,6 @@
 """A whole bearing run up and down again: slip, eccentricity, whirl and power both ways."""
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from .._errors import NoResult
 from ..models import BearingModel
 from ..plotting import bearing_ramp_figure
 from ..report import Table, number
-from ..sweeps import BearingRamp, BearingUpDown, bearing_up_down, rpm
+from ..sweeps import BearingUpDown, bearing_up_down, rpm
 from ._job import Job
 from ._limits import Demand
 from ._options import RunUpOptions
@@ -29,7 +28,6 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
     turning = float(model.rolling_cage_speed(float(np.mean(speeds)))) / (2 * np.pi)
     revolutions = int(2 * turning * (speeds[-1] - speeds[0]) / rate) + (options.discard or 0)
     job.require(Demand(8, revolutions, 1e6, rate=2 * SWEEPING))
-    given: dict[str, Any] = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with job.computing():
         found = bearing_up_down(
             model,
@@ -39,12 +37,12 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
             steps=options.windows or 2,
             settle=options.discard or 0,
             starts=STARTS,
-            **given,
+            **job.given("tolerance"),
         )
     if found.up.failed.all() and found.down.failed.all():
         raise NoResult("All steps of the ramp failed.")
     title = f"{job.name}: run-up and run-down, {options.rate:g} rpm/s of the shaft, {float(model.load):g} N"
-    job.listed("figure", job.saved(bearing_ramp_figure(found, title), job.path(".png")))
+    job.figure(bearing_ramp_figure(found, title))
     ways = {way: dataclasses.asdict(getattr(found, way)) for way in ("up", "down")}
     columns = {f"{name} {way}": x for way, fields in ways.items() for name, x in fields.items()}
     job.columns({"shaft speed [rpm]": found.rpm, **columns, "differs": found.apart})
@@ -61,22 +59,19 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
 
 def _table(title: str, found: BearingUpDown) -> Table:
     slip = lambda way, i: f"{100 * way.cage_slip[i]:.2f} ± {100 * way.cage_slip_error[i]:.2f}"
+    ways = found.up, found.down
     rows = [
         (
             f"{found.rpm[i]:.0f}",
-            *(slip(way, i) for way in _ways(found)),
-            *(number(way.eccentricity[i], 3) for way in _ways(found)),
-            *(number(way.friction_power_W[i], 1) for way in _ways(found)),
+            *(slip(way, i) for way in ways),
+            *(number(way.eccentricity[i], 3) for way in ways),
+            *(number(way.friction_power_W[i], 1) for way in ways),
             "differs" if found.apart[i] else "",
         )
         for i in range(found.rpm.size)
     ]
     heads = ("slip up [%]", "slip down [%]", "eps up", "eps down", "lost up [W]", "lost down [W]", "hysteresis")
     return Table(title, ("shaft [rpm]", *heads), rows)
-
-
-def _ways(found: BearingUpDown) -> tuple[BearingRamp, BearingRamp]:
-    return found.up, found.down
 
 
 def _note(found: BearingUpDown) -> str:

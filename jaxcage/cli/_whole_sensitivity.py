@@ -76,7 +76,7 @@ def bearing_shares(job: Job[SensitivityOptions], whole: BearingModel) -> Report:
     budgets = [] if found is None else [bearing_budget(found, of, relative / math.sqrt(3))]
     job.files["figure"] = None
     if found is not None:
-        job.listed("figure", job.saved(statistic_bars(found, f"{title}: elasticities"), job.path(f"{at.ending}.png")))
+        job.figure(statistic_bars(found, f"{title}: elasticities"), detail=at.ending)
     document = {
         **at.document,
         "of": of,

@@ -40,7 +40,7 @@ def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
     found = swept(job, model, speeds)
     title = f"{job.name}, {float(model.load):g} N, {options.discard} + {options.revolutions} revolutions of the cage"
     found_zones = bearing_zones(found)
-    job.listed("figure", job.saved(bearing_sweep_figure(found, title, found_zones), job.path(".png")))
+    job.figure(bearing_sweep_figure(found, title, found_zones))
     job.listed("data", save_bearing_sweep(job.folder / f"sweep_{job.name}.zarr", found, model))
     outcomes = dict(sorted(collections.Counter(found.outcome.ravel().tolist()).items()))
     document = {
@@ -68,17 +68,14 @@ def swept(job: Job[Any], model: BearingModel, speeds: np.ndarray) -> BearingSwee
     options = job.options
     lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
     job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
-    given: dict[str, Any] = job.given("discard revolutions")
-    given |= {"exponents": getattr(options, "exponents", 1)}
-    given |= {} if options.tolerance is None else {"tolerance": options.tolerance}
     with job.computing("sweep") as say:
         found = sweep_bearing(
             model,
             speeds,
             starts=STARTS,
+            **job.given("discard revolutions tolerance"),
             blocks=blocks_of(options.revolutions),
             progress=partial(say, ""),
-            **given,
         )
     if found.failed.all():
         raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
@@ -101,18 +98,14 @@ def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
 
 def zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
     """Stretches of speed in which the cage does the same."""
-    rows = [
-        (
-            f"{zone.low_rpm:.0f} to {zone.high_rpm:.0f}",
-            " or ".join(zone.states),
-            "chaotic" if zone.chaotic else "not known to be chaotic",
-            f"{zone.exponent:.2f} ± {zone.exponent_error:.2f}",
-            str(zone.speeds),
-        )
-        for zone in found
-    ]
-    heads = ("shaft [rpm]", "state of the cage", "exponent says", "exponent", "speeds")
-    return Table(f"Zones of {name}, each edge halfway between two speeds of the sweep", heads, rows)
+    columns = {
+        "shaft [rpm]": "{0.low_rpm:.0f} to {0.high_rpm:.0f}",
+        "state of the cage": lambda zone: " or ".join(zone.states),
+        "exponent says": lambda zone: "chaotic" if zone.chaotic else "not known to be chaotic",
+        "exponent": "{0.exponent:.2f} ± {0.exponent_error:.2f}",
+        "speeds": "{.speeds}",
+    }
+    return Table.of(f"Zones of {name}, each edge halfway between two speeds of the sweep", columns, found)
 
 
 def sweep_table(title: str, found: BearingSweep) -> Table:

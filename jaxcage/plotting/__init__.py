@@ -10,19 +10,16 @@
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
 | `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
-| `_bearing_gradient` | elasticities of the whole bearing's statistics with their errors      |
-| `_bearing_design` | a search for a better whole bearing, and what it changed              |
-| `_impact`        | impact of a roller on a cage bar                                        |
-| `_statics`       | load of every roller                                                    |
+| `_statics`       | load of every roller, impact of one on a cage bar                       |
 | `_waterfall`     | spectra over speed                                                      |
 | `_branches`      | branches of periodic orbits over speed, alone or over an orbit diagram  |
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
-| `_elasticities`  | elasticities of edges as bars                                           |
+| `_elasticities`  | elasticities of edges, and of a whole bearing's statistics, as bars     |
 | `_zone_strip`    | zones of both kinds and operating speeds as bars                        |
 | `_chance`        | chance of chaos over speed with its error bars                          |
 | `_compare`       | two designs beside each other on one scale                              |
 | `_ramp`          | run-up and run-down                                                     |
-| `_design`        | a search for a better design, and what came of it                       |
+| `_design`        | a search for a better design or whole bearing, and what came of it      |
 | `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
 """
@@ -42,8 +39,6 @@ from ._bearing import (
     pocket_force_around as pocket_force_around,
     slip_around as slip_around,
 )
-from ._bearing_design import bearing_design_figure as bearing_design_figure
-from ._bearing_gradient import statistic_bars as statistic_bars
 from ._branches import (
     MARKS as MARKS,
     PERIOD_COLOURS as PERIOD_COLOURS,
@@ -55,18 +50,22 @@ from ._branches import (
 from ._chance import chance_of_chaos as chance_of_chaos
 from ._compare import over_speed as over_speed, sweeps_beside as sweeps_beside
 from ._design import (
+    bearing_design_figure as bearing_design_figure,
     design_figure as design_figure,
     design_history as design_history,
     trade_off_diagram as trade_off_diagram,
 )
-from ._elasticities import EDGE_COLOURS as EDGE_COLOURS, elasticity_bars as elasticity_bars
+from ._elasticities import (
+    EDGE_COLOURS as EDGE_COLOURS,
+    elasticity_bars as elasticity_bars,
+    statistic_bars as statistic_bars,
+)
 from ._history import (
     force_history as force_history,
     orbit as orbit,
     simulation_figure as simulation_figure,
     time_history as time_history,
 )
-from ._impact import impact_forces as impact_forces
 from ._in_units import in_units as in_units
 from ._marks import (
     mark_operating as mark_operating,
@@ -86,7 +85,7 @@ from ._ramp import ramp_figure as ramp_figure
 from ._section import START_COLOURS as START_COLOURS, strobe_section as strobe_section
 from ._shaft import add_shaft_axes as add_shaft_axes
 from ._stability_map import stability_map as stability_map
-from ._statics import load_bars as load_bars
+from ._statics import impact_forces as impact_forces, load_bars as load_bars
 from ._style import (
     BLACK as BLACK,
     BLUE as BLUE,

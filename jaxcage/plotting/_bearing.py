@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LogNorm, to_rgb, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, FancyArrowPatch, Patch, Polygon
 
@@ -52,7 +52,14 @@ def bearing_drawing(
     for spine in ax.spines.values():
         spine.set_visible(False)
     ax.set(xticks=[], yticks=[], aspect="equal")
-    for artist in _rings(model) + _moving(model, run, history, sample):
+    ring: dict[str, Any] = {"facecolor": GRID, "edgecolor": GREY, "linewidth": 0.8}
+    outside, raceway = MM * float(model.bearing.outside_diameter) / 2, MM * float(model.outer_radius)
+    ax.add_artist(Annulus((0, 0), outside, outside - raceway, **ring))
+    bore, raceway = MM * float(model.bearing.bore) / 2, MM * float(model.inner_radius)
+    x, y = MM * run.bodies[sample, 5:7]
+    ax.add_artist(Annulus((x, y), raceway, raceway - bore, **ring))
+    parts = _rollers(model, run, history, sample) + _bars(model, run, sample) + _arrows(model, run, history, sample)
+    for artist in parts:
         ax.add_artist(artist)
     half = 0.53 * MM * float(model.bearing.outside_diameter)
     ax.set(xlim=(-half, half), ylim=(-half, half))
@@ -66,43 +73,15 @@ def bearing_drawing(
     return ax
 
 
-def _rings(model: BearingModel) -> list[Artist]:
-    outside, raceway = MM * float(model.bearing.outside_diameter) / 2, MM * float(model.outer_radius)
-    return [Annulus((0, 0), outside, outside - raceway, facecolor=GRID, edgecolor=GREY, linewidth=0.8)]
-
-
-def _moving(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
-    bore, raceway = MM * float(model.bearing.bore) / 2, MM * float(model.inner_radius)
-    ring = MM * run.bodies[sample, 5:7]
-    found: list[Artist] = [
-        Annulus((ring[0], ring[1]), raceway, raceway - bore, facecolor=GRID, edgecolor=GREY, linewidth=0.8)
-    ]
-    found += _rollers(model, run, history, sample)
-    found += _bars(model, run, sample)
-    return found + _arrows(model, run, history, sample)
-
-
 def _rollers(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
     radius = MM * run.rollers[sample, 2]
     angle, half = history.roller_angle[sample], MM * float(model.bearing.roller_diameter) / 2
     heaviest = max(float(history.inner_load.max()), 1e-9)
-    found: list[Artist] = []
-    for r, psi, load in zip(radius, angle, history.inner_load[sample], strict=True):
-        found.append(
-            Circle(
-                (r * np.cos(psi), r * np.sin(psi)),
-                half,
-                facecolor=(*_rgb(BLUE), 0.08 + 0.6 * load / heaviest),
-                edgecolor=BLACK,
-                linewidth=0.7,
-            )
-        )
-    return found
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    r, g, b = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return r, g, b
+    shade = lambda load: to_rgba(BLUE, 0.08 + 0.6 * load / heaviest)
+    return [
+        Circle((r * np.cos(psi), r * np.sin(psi)), half, facecolor=shade(load), edgecolor=BLACK, linewidth=0.7)
+        for r, psi, load in zip(radius, angle, history.inner_load[sample], strict=True)
+    ]
 
 
 def _bars(model: BearingModel, run: BearingRun, sample: int) -> list[Artist]:
@@ -234,14 +213,14 @@ def bearing_figure(
     figure = new_figure(12.0, 11.0 if spectra else 8.0)
     grid = figure.add_gridspec(4 if spectra else 3, 2, height_ratios=(2.4, 1, 1, 1)[: 4 if spectra else 3])
     worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
-    bearing_drawing(model, run, history, worst, dress(figure.add_subplot(grid[0, 0])))
-    cage_orbit(history, dress(figure.add_subplot(grid[0, 1])))
-    slip_around(circumference, dress(figure.add_subplot(grid[1, 0])))
-    pocket_force_around(circumference, dress(figure.add_subplot(grid[1, 1])))
-    force_over_time(history, dress(figure.add_subplot(grid[2, :])))
+    bearing_drawing(model, run, history, worst, figure.add_subplot(grid[0, 0]))
+    cage_orbit(history, figure.add_subplot(grid[0, 1]))
+    slip_around(circumference, figure.add_subplot(grid[1, 0]))
+    pocket_force_around(circumference, figure.add_subplot(grid[1, 1]))
+    force_over_time(history, figure.add_subplot(grid[2, :]))
     labels = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
     for i, (name, spectrum) in enumerate(spectra.items()):
-        ax = marked_spectrum(spectrum, orders, labels.get(name, name), dress(figure.add_subplot(grid[3, i])))
+        ax = marked_spectrum(spectrum, orders, labels.get(name, name), figure.add_subplot(grid[3, i]))
         if i == 0 and (legend := ax.get_legend()) is not None:
             legend.remove()
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
@@ -285,9 +264,8 @@ def bearing_sweep_figure(found: BearingSweep, title: str = "", zones: Sequence[B
         for ax in axes.ravel():
             ax.axvspan(zone.low_rpm, zone.high_rpm, color=_state_colour(zone.states), alpha=0.1, linewidth=0, zorder=0)
     if zones and len(found.rpm) > 1:
-        shown = dict.fromkeys(" or ".join(zone.states).replace("_", " ") for zone in zones)
         colours = {" or ".join(zone.states).replace("_", " "): _state_colour(zone.states) for zone in zones}
-        patches = [Patch(color=colours[name], alpha=0.25, label=name) for name in shown]
+        patches = [Patch(color=colour, alpha=0.25, label=name) for name, colour in colours.items()]
         figure.legend(handles=patches, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
@@ -298,7 +276,7 @@ def _state_colour(states: Sequence[str]) -> str:
 
 
 def _pale(colour: str) -> tuple[float, float, float]:
-    r, g, b = (0.45 + 0.55 * x for x in _rgb(colour))
+    r, g, b = (0.45 + 0.55 * x for x in to_rgb(colour))
     return r, g, b
 
 
@@ -407,7 +385,7 @@ def over_shaft_speed(
     errors: Float[np.ndarray, "speeds starts"] | None = None,
 ) -> Axes:
     """A quantity of a sweep over the shaft's speed, a line for each start, with bars of one standard error."""
-    ax = axes_or_new(ax, 6.0, 3.2) if ax is None else dress(ax)
+    ax = axes_or_new(ax, 6.0, 3.2)
     for i, colour in zip(range(values.shape[1]), MARK_COLOURS, strict=False):
         bars = None if errors is None else np.where(np.isfinite(errors[:, i]), errors[:, i], 0.0)
         style: Any = dict(color=colour, linewidth=0.9, marker=".", markersize=5, elinewidth=0.7, label=f"start {i + 1}")
@@ -425,7 +403,7 @@ def bearing_animation(
     last = np.arange(len(history.time))[-history.samples - 1 :]
     frames = last[:: max(1, -(-len(last) // 96))]
     figure = Figure(figsize=(5.0, 5.2), layout="constrained", dpi=100)
-    ax = dress(figure.subplots())
+    ax = figure.subplots()
 
     def draw(sample: int) -> list[Artist]:
         ax.clear()

@@ -63,11 +63,6 @@ def words(kind: str) -> str:
     return f"{kind.replace('branch-p', 'branch p')} ({mark_of(kind).short})" if kind in MARKS else kind
 
 
-def period_colour(periods: int) -> str:
-    """Colour of the branches of period-`periods` orbits; long periods share one."""
-    return PERIOD_COLOURS.get(periods, GREEN)
-
-
 def branch_diagram(
     branches: Sequence[Branch],
     component: int = 1,
@@ -103,7 +98,8 @@ def branch_diagram(
     _mark_points(ax, special, component, quantity(name).factor)
     if label_points:
         _write_above(ax, [p for p in special if p.edge])
-    _legend_beneath(ax)
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
+    enlarge_dots(ax.legend(**place, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
     return label_speed(ax)
 
 
@@ -158,7 +154,7 @@ def _share(branch: Branch, point: Point) -> float:
 
 
 def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-    colour = period_colour(periods)
+    colour = PERIOD_COLOURS.get(periods, GREEN)  # long periods share one
     light = lighter(colour)
     styles = (
         ("stable", {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}),
@@ -195,14 +191,8 @@ def _mark_points(ax: Axes, points: Sequence[Point], component: int, factor: floa
                 style |= {"markersize": 3.5, "markerfacecolor": "white", "markeredgewidth": 0.8, "zorder": 4.0}
             ax.plot(x, y, **style, label=words(kind) if edge else f"_{words(kind)}, hollow")
     if any(not p.edge for p in points):
-        style: dict[str, Any] = {
-            "marker": "o",
-            "linestyle": "none",
-            "color": GREY,
-            "markersize": 4.5,
-            "markerfacecolor": "white",
-        }
-        ax.plot([], [], **style, label="hollow: unstable on both sides")
+        style: dict[str, Any] = {"color": GREY, "markersize": 4.5, "markerfacecolor": "white"}
+        ax.plot([], [], "o", **style, label="hollow: unstable on both sides")
 
 
 def _write_above(ax: Axes, points: Iterable[Point]) -> None:
@@ -250,8 +240,3 @@ def move_apart(at: np.ndarray, gap: float, low: float, high: float) -> np.ndarra
     if at.size == 0:
         return at
     return np.clip(isotonic_regression(at - steps).x, low, max(low, high - steps[-1])) + steps
-
-
-def _legend_beneath(ax: Axes) -> None:
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
-    enlarge_dots(ax.legend(**place, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .._glossary import quantity
@@ -45,7 +44,7 @@ def draw_beside(
     """Orbit diagram and exponents of each design in a column of two axes."""
     limits = []
     for column, (name, found) in enumerate(zip(names, swept, strict=True)):
-        above, below = (dress(ax) for ax in cells[:, column])
+        above, below = cells[:, column]
         orbit_diagram(found, 1, above)
         exponent_strip(found, below)
         limits.append((above.get_ylim(), below.get_ylim()))
@@ -80,12 +79,6 @@ def over_speed(
             ax.plot(x, y, color=colour, linewidth=width, label=name)
         low, high = padded_limits(np.concatenate([np.asarray(y) for y in values]))
         ax.set(ylabel=label, ylim=(min(low, 0.0), high))
-    label_last(list(cells), np.concatenate([np.asarray(x) for x in rpm]))
+    label_speed(cells[-1]).set_xlim(float(min(map(np.min, rpm))), float(max(map(np.max, rpm))))
     cells[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(names), frameon=False, fontsize=9)
     return figure
-
-
-def label_last(cells: Sequence[Axes], rpm: np.ndarray) -> None:
-    """The speed axis under the last of some axes that share it."""
-    cells[-1].set_xlim(float(rpm.min()), float(rpm.max()))
-    label_speed(cells[-1])

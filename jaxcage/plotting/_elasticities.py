@@ -1,18 +1,22 @@
-"""How edges answer to the design: elasticities as bars."""
+"""How edges, and statistics of the whole bearing, answer to the design: elasticities as bars."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from .._errors import ArgumentError
+from ..design import BearingGradient
 from ..orbits import Sensitivity
-from ._style import BAND, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new
+from ._style import BAND, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, dress, new_figure
 
 
 FIRST = ("guidance_gap", "eccentricity")
 """The two quantities a designer asks for are always on top."""
 EDGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+ROW = 2
+"""Statistics side by side."""
 
 
 def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None, most: int = 12) -> Axes:
@@ -27,7 +31,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     """
     if not sensitivities:
         raise ArgumentError("sensitivities", said="must hold at least one sensitivity, but it is empty.")
-    names = _largest(sensitivities, most)
+    names = largest_first(sensitivities, most)
     count = len(sensitivities)
     ax = axes_or_new(ax, 9.0, 1.2 + len(names) * (0.1 + 0.125 * count))
     thick = 0.8 / count
@@ -59,8 +63,8 @@ def readable(name: str) -> str:
     return name.replace(".", " ").replace("_", " ")
 
 
-def _largest(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
-    """Names of the parameters, in order from the top."""
+def largest_first(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
+    """Names of the parameters that move edges most, in order from the top."""
     largest: dict[str, float] = {}
     for s in sensitivities:
         for name, value in s.elasticity.items():
@@ -91,3 +95,32 @@ def _room_for_text(sensitivities: Sequence[Sensitivity], names: Sequence[str]) -
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     room = 0.12 * (high - low) or 1.0
     return (low - room if low < 0 else -0.2 * room), (high + room if high > 0 else 0.2 * room)
+
+
+def statistic_bars(found: BearingGradient, title: str = "") -> Figure:
+    """A panel for each statistic that is not 0: elasticity by each direction, with bars of two standard errors."""
+    shown = [each for each in found.statistics.values() if each.value]
+    count = max(1, len(shown))
+    names = shown[0].directions if shown else ()
+    columns = min(ROW, count)
+    rows = -(-count // columns)
+    figure = new_figure(11.0 * columns / ROW, 1.0 + rows * (0.8 + 0.28 * len(names)))
+    axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    place = np.arange(len(names))
+    for ax, each, colour in zip(axes.ravel(), shown, EDGE_COLOURS * 2, strict=False):
+        dress(ax)
+        ax.barh(place, each.elasticity, height=0.7, color=colour, alpha=0.75, linewidth=0)
+        ax.errorbar(each.elasticity, place, xerr=2 * each.elasticity_error, fmt="none", ecolor=BLACK, elinewidth=1.1)
+        ax.axvline(0, color=BLACK, linewidth=0.8)
+        ax.grid(False, axis="y")
+        drifts = "" if each.settled else ", not settled"
+        ax.set_title(f"{readable(each.name)}: {each.value:.3g}{drifts}", fontsize=9, loc="left")
+    for ax in axes.ravel()[len(shown) :]:
+        ax.set_axis_off()
+    for ax in axes[:, 0]:
+        ax.set_yticks(place, [readable(name).replace("+", ",\n") for name in names], fontsize=8)
+        ax.set_ylim(len(names) - 0.5, -0.5)
+    for ax in axes[-1]:
+        ax.set_xlabel("Elasticity, with two standard errors", fontsize=9)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure

@@ -19,7 +19,6 @@ from ._style import (
     OWN_COLOURS,
     VERMILION,
     axes_or_new,
-    dress,
     new_figure,
     shown,
 )
@@ -107,10 +106,10 @@ def simulation_figure(
     """Orbit, time history and each force of a trajectory on one page."""
     figure = new_figure(11.5, 6.4)
     grid = figure.add_gridspec(3, 2, width_ratios=(1, 1.7))
-    history = dress(figure.add_subplot(grid[0, 1]))
-    across = dress(figure.add_subplot(grid[1, 1], sharex=history))
-    upward = dress(figure.add_subplot(grid[2, 1], sharex=history))
-    orbit(trajectory, clearance, dress(figure.add_subplot(grid[:, 0])))
+    history = figure.add_subplot(grid[0, 1])
+    across = figure.add_subplot(grid[1, 1], sharex=history)
+    upward = figure.add_subplot(grid[2, 1], sharex=history)
+    orbit(trajectory, clearance, figure.add_subplot(grid[:, 0]))
     time_history(trajectory, history).set_xlabel("")
     force_history(trajectory, forces, 0, across).set_xlabel("")
     force_history(trajectory, forces, 1, upward)

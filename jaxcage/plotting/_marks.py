@@ -4,21 +4,30 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from ..analysis import Zones
+from ..analysis import Zone, Zones
 from ..bearing import PublishedCase
 from ._style import BLACK, PURPLE, ZONE
+
+
+Span = tuple[float, float]
 
 
 def shade_zones(ax: Axes, zones: Zones) -> Axes:
     """Shade the chaotic zones; an open zone reaches to the end of the axis."""
     low, high = ax.get_xlim()
-    for i, zone in enumerate(zones.zones):
-        first = low if zone.onset is None else zone.onset.speed_rpm
-        last = high if zone.exit is None else zone.exit.speed_rpm
+    for i, (first, last) in enumerate(spans_of(zones.zones, (low, high))):
         label = "chaotic zone" if i == 0 else "_chaotic zone"
         ax.axvspan(first, last, color=ZONE, linewidth=0, zorder=0, label=label)
     ax.set_xlim(low, high)
     return ax
+
+
+def spans_of(zones: Sequence[Zone], limits: Span) -> list[Span]:
+    """Ends of zones; an open one reaches to the limit."""
+    return [
+        (limits[0] if z.onset is None else z.onset.speed_rpm, limits[1] if z.exit is None else z.exit.speed_rpm)
+        for z in zones
+    ]
 
 
 def published_edges(published: PublishedCase) -> dict[str, float]:

@@ -18,16 +18,10 @@ from ._style import (
     VERMILION,
     axes_or_new,
     dots,
-    dress,
     enlarge_dots,
     new_figure,
     padded_limits,
 )
-
-
-def _kind(labels: np.ndarray) -> np.ndarray:
-    """Labels with all periods taken together."""
-    return np.where(np.char.startswith(labels, "periodic"), "periodic", labels)
 
 
 def orbit_diagram(
@@ -49,7 +43,8 @@ def orbit_diagram(
     chosen = (sweep.rpm >= low) & (sweep.rpm <= high)
     points = sweep.strobe[chosen, :, :, component] * quantity(name).factor
     speeds = np.broadcast_to(sweep.rpm[chosen, None, None], points.shape)
-    kind = _kind(sweep.label[chosen])
+    labels = sweep.label[chosen]
+    kind = np.where(np.char.startswith(labels, "periodic"), "periodic", labels)  # all periods together
     size = 1.8 if np.sum(chosen) > 150 else 2.5
     for label, colour in KIND_COLOURS.items():
         lanes = kind == label
@@ -150,7 +145,7 @@ def sweep_figure(
     figure = new_figure(9.5, 6.4)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 1))
     orbit_diagram(sweep, component, above)
-    exponent_strip(sweep, dress(below))
+    exponent_strip(sweep, below)
     for ax in (above, below):
         shade_zones(ax, zones)
         if published is not None:
@@ -162,14 +157,14 @@ def sweep_figure(
     return figure
 
 
-def legend_below(figure: Figure, *axes: Axes) -> None:
+def legend_below(figure: Figure, *axes: Axes, ncols: int = 5) -> None:
     """One legend for all axes beneath them, where it hides no point."""
     entries = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     place = "outside lower center"
-    enlarge_dots(figure.legend(entries.values(), entries.keys(), loc=place, ncols=5, frameon=False, fontsize=9))
+    enlarge_dots(figure.legend(entries.values(), entries.keys(), loc=place, ncols=ncols, frameon=False, fontsize=9))
 
 
 def zoomed_diagram(sweep: Sweep, first_rpm: float, last_rpm: float, component: int = 1, ax: Axes | None = None) -> Axes:

@@ -12,10 +12,10 @@ from ..bearing import FIGURE_AXES, PUBLISHED_CASES
 from ..forces import PocketImpact, approach_speed, impact_history
 from ..reproduction import SECTION_RPM, ReadingResult, Runs
 from ..sweeps import rpm
-from ._impact import impact_forces
 from ._marks import mark_published
 from ._orbit_diagram import orbit_diagram, zoomed_diagram
 from ._section import strobe_section
+from ._statics import impact_forces
 from ._style import GREY, new_figure
 
 
@@ -60,10 +60,7 @@ def _diagrams(runs: Runs, pair: tuple[str, str], zoom: tuple[float, float] | Non
     cells = figure.subplots(2, 1, sharex=True)
     for case, ax in zip(pair, cells, strict=True):
         swept, published = runs.sweeps[case], PUBLISHED_CASES[case]
-        if zoom is None:
-            orbit_diagram(swept, 1, ax)
-        else:
-            zoomed_diagram(swept, *zoom, 1, ax)
+        orbit_diagram(swept, 1, ax, limits_rpm=zoom)
         mark_published(ax, published, text=False)
         oil, gap = f"VG{published.viscosity_grade:g}", f"gap {published.guidance_gap_mm} mm"
         text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} um, {oil}; dotted, published edges"

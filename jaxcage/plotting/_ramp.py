@@ -4,7 +4,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..sweeps import RampUpDown
-from ._orbit_diagram import label_speed
+from ._orbit_diagram import label_speed, legend_below
 from ._style import BLUE, GREY, VERMILION, ZONE, dress, new_figure
 
 
@@ -25,8 +25,7 @@ def ramp_figure(found: RampUpDown, title: str = "") -> Figure:
     below.axhline(1.0, color=GREY, linewidth=0.8, linestyle="--", label="land touches the rib's circle")
     below.set_xlim(float(min(found.up.rpm[0], found.down.rpm[0])), float(max(found.up.rpm[-1], found.down.rpm[-1])))
     label_speed(below)
-    entries = {label: h for ax in (above, below) for h, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    legend_below(figure, above, below, ncols=4)
     figure.suptitle(title, fontsize=11)
     return figure
 

@@ -133,13 +133,13 @@ def shown(name: str, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]
     return np.asarray(values) * quantity(name).factor
 
 
-def padded_limits(values: np.ndarray, margin: float = 0.05) -> tuple[float, float]:
+def padded_limits(values: np.ndarray) -> tuple[float, float]:
     """Limits that hold every finite value with a margin; (-1, 1) if there is none."""
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return -1.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    pad = margin * (high - low) or 0.1 * abs(high) or 1.0
+    pad = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
     return low - pad, high + pad
 
 

@@ -6,11 +6,9 @@ from matplotlib.axes import Axes
 
 from ..analysis import Zone
 from ..bearing import PublishedCase
+from ._marks import Span, spans_of
 from ._orbit_diagram import label_speed
 from ._style import BLUE, GREY, PURPLE, VERMILION, axes_or_new
-
-
-Span = tuple[float, float]
 
 
 def zone_strip(
@@ -30,8 +28,8 @@ def zone_strip(
     if operating:
         rows.append(("operating", PURPLE, list(operating)))
     rows += [
-        ("synchronous loss", BLUE, _spans(loss, limits_rpm)),
-        ("chaotic", VERMILION, _spans(chaotic, limits_rpm)),
+        ("synchronous loss", BLUE, spans_of(loss, limits_rpm)),
+        ("chaotic", VERMILION, spans_of(chaotic, limits_rpm)),
     ]
     if published is not None:
         ends = [(published.zone_1_onset_rpm, published.zone_1_exit_rpm), (published.zone_2_onset_rpm, limits_rpm[1])]
@@ -53,10 +51,3 @@ def zone_strip(
     ax.grid(False, axis="y")
     ax.spines[["left"]].set_visible(False)
     return label_speed(ax)
-
-
-def _spans(zones: Sequence[Zone], limits: Span) -> list[Span]:
-    return [
-        (limits[0] if z.onset is None else z.onset.speed_rpm, limits[1] if z.exit is None else z.exit.speed_rpm)
-        for z in zones
-    ]

@@ -5,34 +5,24 @@
 | `_table`         | tables of texts                                                             |
 | `_zone_tables`   | chaotic zones beside published ones                                         |
 | `_orbit_tables`  | bifurcations, stable stretches, synchronous-loss zones                      |
-| `_slopes`        | how every exact edge answers to the design                                  |
+| `_slopes`        | how exact edges, and slip, wear and power of a whole bearing, answer to the design |
 | `_lasting`       | how edges of lasting chaos answer to the design, with error bars           |
-| `_bearing_gradient` | how the whole bearing's slip, wear and power answer to the design, with error bars |
-| `_bearing_design` | the whole bearing before and after a search                                |
 | `_bearing_page`  | the page of a whole bearing                                                 |
 | `_contact`       | exact edges whose orbit touches the land                                    |
 | `_map`           | edges in two parameters, exponents over both                                |
 | `_statics`       | statics and the impact of a roller as tables                                |
 | `_operating`     | operating speeds against zones                                              |
-| `_sources`       | every parameter with its unit and where its value comes from                |
+| `_sources`       | every parameter with its unit and where its value comes from, readings      |
 | `_findings`      | everything that a page shows, computed                                      |
 | `_figures`       | the page's figures as SVG, for light and dark screens                       |
-| `_narrowed`      | ranges that measurements narrowed                                           |
+| `_chances`       | chances of chaos, and ranges that measurements narrowed                     |
 | `_compare`       | two designs side by side                                                    |
-| `_design_tables` | designs and their tolerances                                                |
+| `_design_tables` | designs before and after a search, and their tolerances                     |
 | `_paper_tables`  | the paper's results beside ours                                             |
 | `_page_tables`   | tables that no command prints                                               |
 | `_page`          | the page                                                                    |
 """
 
-from ._bearing_design import (
-    before_and_after_table as before_and_after_table,
-    changed_parameters_table as changed_parameters_table,
-)
-from ._bearing_gradient import (
-    bearing_gradient_document as bearing_gradient_document,
-    bearing_gradient_table as bearing_gradient_table,
-)
 from ._bearing_page import (
     Section as Section,
     bearing_page as bearing_page,
@@ -44,7 +34,10 @@ from ._chances import (
     chances_notes as chances_notes,
     chances_table as chances_table,
     chances_tables as chances_tables,
+    measured_table as measured_table,
     measures as measures,
+    narrowed_document as narrowed_document,
+    narrowed_table as narrowed_table,
     operating_chances as operating_chances,
     unknowns_table as unknowns_table,
     verdict_table as verdict_table,
@@ -61,8 +54,10 @@ from ._compare import (
 from ._contact import contact_notes as contact_notes, touching as touching
 from ._design_tables import (
     bearing_budget_table as bearing_budget_table,
+    before_and_after_table as before_and_after_table,
     before_and_after_tables as before_and_after_tables,
     budget_table as budget_table,
+    changed_parameters_table as changed_parameters_table,
     optima_table as optima_table,
     parameters_table as parameters_table,
     sobol_document as sobol_document,
@@ -96,11 +91,6 @@ from ._map import (
     parameter_axis as parameter_axis,
     speed_axis as speed_axis,
 )
-from ._narrowed import (
-    measured_table as measured_table,
-    narrowed_document as narrowed_document,
-    narrowed_table as narrowed_table,
-)
 from ._operating import (
     Operating as Operating,
     Verdict as Verdict,
@@ -125,15 +115,12 @@ from ._paper_tables import (
     readings_table as readings_table,
     two_zones_table as two_zones_table,
 )
-from ._readings import (
-    readings_document as readings_document,
-    readings_words as readings_words,
-    short_readings as short_readings,
-)
 from ._slopes import (
     EXIT as EXIT,
     FIRST as FIRST,
     ONSET as ONSET,
+    bearing_gradient_document as bearing_gradient_document,
+    bearing_gradient_table as bearing_gradient_table,
     edge_slopes as edge_slopes,
     elasticities_table as elasticities_table,
     gradient_document as gradient_document,
@@ -145,7 +132,12 @@ from ._slopes import (
     source_notes as source_notes,
     to_be_turned as to_be_turned,
 )
-from ._sources import parameter_rows as parameter_rows
+from ._sources import (
+    parameter_rows as parameter_rows,
+    readings_document as readings_document,
+    readings_words as readings_words,
+    short_readings as short_readings,
+)
 from ._statics import (
     displacements as displacements,
     impact_document as impact_document,

@@ -1,16 +1,14 @@
 """What was found of a whole bearing as one page of HTML that needs nothing from outside."""
 
 import dataclasses
-import datetime
 from collections.abc import Mapping, Sequence
 
-import jinja2
 from matplotlib.figure import Figure
 
 from .._parameters import parameter_info, parameters
 from ..models import BearingModel
 from ._figures import Picture, picture_of
-from ._page import TEMPLATES
+from ._page import rendered
 from ._sources import shown
 from ._table import Table
 
@@ -38,20 +36,17 @@ def bearing_page(title: str, subtitle: str, sections: Sequence[Section], version
 
     **Arguments:** title; what stands beneath it; parts; version of the package; the command line that asked for it.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
     drawn: dict[str, Picture] = {
         key: picture_of(key, figure, words, words) for s in sections for key, (figure, words) in s.figures.items()
     }
-    return environment.get_template("bearing_page.html.j2").render(
+    return rendered(
+        "bearing_page.html.j2",
         title=title,
         subtitle=subtitle,
         sections=sections,
         pictures=drawn,
         version=version,
         command=command,
-        date=datetime.date.today().isoformat(),
     )
 
 

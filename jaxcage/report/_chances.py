@@ -1,13 +1,14 @@
-"""Chances of chaos as documents, tables and sentences."""
+"""Chances of chaos, and ranges that measurements narrowed, as documents, tables and sentences."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..design import SobolIndices
-from ..io import Range
-from ..studies import Band, Clue, Ensemble, verdict_of
+from ..io import Measurement, Range
+from ..studies import Band, Clue, Ensemble, Narrowed, verdict_of
 from ._operating import Operating
 from ._table import Table, number
 
@@ -38,17 +39,15 @@ def chances_document(found: Ensemble) -> dict[str, Any]:
 def chances_table(name: str, found: Ensemble) -> Table:
     """Stretches of speeds with one verdict, and the chances within them."""
     low, high = found.interval
-    verdict, rows, first = found.verdict, [], 0
+    verdicts, rows = found.verdict, []
     lost = len(found.place) - found.counts[1]
-    for i in range(1, len(verdict) + 1):
-        if i == len(verdict) or verdict[i] != verdict[first]:
-            part = slice(first, i)
-            p = found.chance[part]
-            chance = _span(p[np.isfinite(p)])
-            bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
-            ends = number(float(found.rpm[first])), number(float(found.rpm[i - 1]))
-            rows.append((*ends, verdict_words(verdict[first]), chance, bar, _counts(lost[part])))
-            first = i
+    for verdict, places in itertools.groupby(range(len(verdicts)), key=verdicts.__getitem__):
+        part = list(places)
+        p = found.chance[part]
+        chance = _span(p[np.isfinite(p)])
+        bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
+        ends = (number(float(found.rpm[i])) for i in (part[0], part[-1]))
+        rows.append((*ends, verdict_words(verdict), chance, bar, _counts(lost[part])))
     title = f"Chance of chaos of {name}, {found.place.shape[0]} draws from {len(found.unknowns)} ranges [rpm]"
     return Table(title, ("from", "to", "verdict", "chance", "95 % bars", "draws that failed"), rows, ("from", "to"))
 
@@ -94,7 +93,7 @@ def unknowns_table(found: Ensemble) -> Table:
     shares = {c.label: c.share for c in found.clues()}
     each = list(zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True))
     rows = [
-        (u.label, range_words(u.range, unit), _share(shares.get(u.label)), source)
+        (u.label, range_words(u.range, unit), f"{shares[u.label]:.0%}" if u.label in shares else "-", source)
         for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
     ]
     return Table("What is not known", ("value", "range", "of the verdict", "measure"), rows)
@@ -104,10 +103,6 @@ def range_words(found: Range, unit: str) -> str:
     """The ends of a range with their unit."""
     low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
     return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
-
-
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0%}"
 
 
 def chances_tables(name: str, found: Ensemble) -> list[Table]:
@@ -190,3 +185,41 @@ def verdict_table(name: str, shares: SobolIndices, sources: Mapping[str, str]) -
     }
     title = f"Sobol indices of the chaotic share of {name}, {shares.evaluations} draws"
     return Table.of(title, columns, sorted(shares.total, key=lambda n: -shares.total[n]))
+
+
+def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[str, Any]:
+    """For programs."""
+    ends = lambda r: [r.lower, r.upper]
+    pairs = zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True)
+    return {
+        "draws": found.draws,
+        "stages": found.stages,
+        "accepted": found.accepted,
+        "measurements": [
+            {"what": str(m), "off_by_tolerances": float(off)} for m, off in zip(measured, found.nearest, strict=True)
+        ],
+        "ranges": {
+            u.label: {"before": ends(u.range), "after": ends(r), "share": float(share), "narrowed": bool(worth)}
+            for u, r, share, worth in pairs
+        },
+    }
+
+
+def measured_table(found: Narrowed, measured: Sequence[Measurement]) -> Table:
+    """How near the best draw comes to each measurement."""
+    rows = [
+        (m.quantity, number(m.cage_rpm), m.words or "-", f"{off:.2g}")
+        for m, off in zip(measured, found.nearest, strict=True)
+    ]
+    columns = ("measured", "cage [rpm]", "value", "off")
+    return Table("Measurements, and how far the nearest draw is off [tolerances]", columns, rows, ("cage [rpm]",))
+
+
+def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
+    """Each range before and after, with the unit of each value by its label."""
+    ends = lambda label, r: range_words(r, units[label])
+    rows = [
+        (u.label, ends(u.label, u.range), ends(u.label, r) if worth else "as it was", f"{share:.0%}")
+        for u, r, share, worth in zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True)
+    ]
+    return Table("Ranges", ("value", "before", "after", "left of it"), rows)

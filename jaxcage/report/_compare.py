@@ -167,21 +167,19 @@ def compared_zones_table(pair: Sequence[Compared]) -> Table:
 
 def at_speeds_compared(pair: Sequence[Compared], at: Sequence[int]) -> Table:
     """Both designs at some of the speeds, a row of each under the other."""
-    rows = []
-    for i in at:
-        for one in pair:
-            shaft = one.rpm[i] / float(one.model.bearing.cage_speed_ratio)
-            rows.append(
-                (
-                    number(shaft),
-                    number(one.rpm[i]),
-                    one.name,
-                    one.labels(i),
-                    f"{one.exponent[i]:+.3f}" if math.isfinite(one.exponent[i]) else "-",
-                    number(1e3 * one.size[i], 3),
-                    number(one.loads["peak land force"][i], 1),
-                    number(one.loads["wear load"][i], 2),
-                )
-            )
+    rows = [
+        (
+            number(one.rpm[i] / float(one.model.bearing.cage_speed_ratio)),
+            number(one.rpm[i]),
+            one.name,
+            one.labels(i),
+            f"{one.exponent[i]:+.3f}" if math.isfinite(one.exponent[i]) else "-",
+            number(1e3 * one.size[i], 3),
+            number(one.loads["peak land force"][i], 1),
+            number(one.loads["wear load"][i], 2),
+        )
+        for i in at
+        for one in pair
+    ]
     columns = ("shaft [rpm]", "cage [rpm]", "design", "starts are", "exponent", "orbit [mm]", "land peak [N]")
     return Table("At chosen speeds", (*columns, "wear load [N m/s]"), rows)

@@ -1,11 +1,13 @@
 """Designs and their tolerances as tables."""
 
-from collections.abc import Mapping
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import parameter_info, parameters
-from ..design import BearingBudget, Optimised, SobolIndices, ToleranceBudget, TradeOff
-from ..models import CageModel
+from ..design import BearingBudget, BeforeAfter, Optimised, SobolIndices, ToleranceBudget, TradeOff
+from ..models import BearingModel, CageModel
 from ._table import Table, chosen, number
 
 
@@ -15,11 +17,7 @@ MOST = 8
 
 def parameters_table(name: str, model: CageModel, found: Optimised, document: Mapping[str, Any]) -> Table:
     """What was varied, what it costs and what it brings, before and after; `document` is the command's."""
-    info, bounds, before = parameter_info(model), document["vary"], parameters(model)
-    rows = [
-        (n, info[n].unit, f"{float(before[n]):.4g}", f"{value:.4g}", " to ".join(f"{b:.4g}" for b in bounds[n]))
-        for n, value in found.best.values.items()
-    ]
+    varied = changed_parameters_table(name, model, found, document["vary"])
     said = (
         ("cost", "cost", "", ".3f"),
         ("chaotic_rpm", "chaotic", "rpm", ".0f"),
@@ -29,10 +27,40 @@ def parameters_table(name: str, model: CageModel, found: Optimised, document: Ma
         ("film_drag_power_W", "film drag power", "W", ".4g"),
         ("balance_grade_mm_per_s", "balance grade G", "mm/s", ".3g"),
     )
-    for key, what, unit, form in said:
-        then, now = (format(value, form) for value in document[key].values())
-        rows.append((what, unit, then, now, ""))
-    return Table(f"Design of {name}", ("parameter", "unit", "before", "after", "bounds"), rows)
+    rows = [(what, unit, *(format(x, form) for x in document[key].values()), "") for key, what, unit, form in said]
+    return dataclasses.replace(varied, rows=[*varied.rows, *rows])
+
+
+def changed_parameters_table(
+    title: str, model: CageModel | BearingModel, found: Optimised, vary: Mapping[str, tuple[float, float]]
+) -> Table:
+    """What was varied, before and after, in SI units."""
+    info, before = parameter_info(model), parameters(model)
+    rows = [
+        (n, info[n].unit, f"{float(before[n]):.4g}", f"{value:.4g}", " to ".join(f"{b:.4g}" for b in vary[n]))
+        for n, value in found.best.values.items()
+    ]
+    return Table(f"Design of {title}", ("parameter", "unit", "before", "after", "bounds"), rows)
+
+
+def before_and_after_table(rows: Sequence[BeforeAfter], block: int) -> Table:
+    """Every statistic before and after with its standard error; peaks are the largest of `block` revolutions."""
+    with_error = lambda value, error: f"{value:.4g} ± {error:.1g}" if error else f"{value:.4g}"
+
+    def change(row: BeforeAfter) -> str:
+        if not row.before:
+            return "-"
+        share, error = 100 * row.change / row.before, 100 * row.change_error / abs(row.before)
+        return f"{share:+.1f} ± {error:.1f} %" if error and math.isfinite(error) else f"{share:+.1f} %"
+
+    columns = {
+        "measure": "{0.name}",
+        "unit": "{0.unit}",
+        "before": lambda row: with_error(row.before, row.before_error),
+        "after": lambda row: with_error(row.after, row.after_error),
+        "change": change,
+    }
+    return Table.of(f"Before and after, from the same starts; peaks of {block} revolutions", columns, rows)
 
 
 def optima_table(found: Optimised) -> Table:

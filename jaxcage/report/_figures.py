@@ -13,9 +13,9 @@ from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
 from ..io import ShownUnits
+from ..models import CageModel
 from ..orbits import Sensitivity
 from ..plotting import (
-    Style,
     add_shaft_axes,
     chance_of_chaos,
     elasticity_bars,
@@ -31,7 +31,7 @@ from ..plotting import (
     zone_strip,
 )
 from ..studies import Ensemble
-from ._findings import MAP_PARAMETER, Findings
+from ._findings import MAP_PARAMETER, Findings, Map
 from ._operating import Operating
 from ._page_tables import with_full_names
 from ._slopes import to_be_turned
@@ -126,7 +126,13 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
             "inside the unit circle; how one leaves it tells what follows.",
         )
     if findings.map is not None:
-        yield picture("map", _map(findings, spans), *_map_words(findings))
+        curves = " The lines are its edges, solved for." if findings.map.curves else ""
+        yield picture(
+            "map",
+            _map(findings.model, findings.map, spans),
+            f"Stability map of {name}: largest exponent over cage speed and guidance gap.",
+            f"Largest exponent per revolution over speed and guidance gap (red: chaotic). Dotted: this design.{curves}",
+        )
     edges = [s for n, s in findings.slopes.items() if s.trusted and n in findings.loss.edges]
     trusted = [with_full_names(findings, s) for s in to_be_turned(findings.model, edges)]
     if trusted:
@@ -148,10 +154,8 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
 
 
 def _alone(width: float, height: float, draw: Callable[[Axes], Axes]) -> Figure:
-    from ..plotting._style import dress
-
     figure = new_figure(width, height)
-    draw(dress(figure.subplots()))
+    draw(figure.subplots())
     return figure
 
 
@@ -169,9 +173,7 @@ def _bars(slopes: Sequence[Sensitivity], ax: Axes) -> Axes:
     return ax
 
 
-def _map(findings: Findings, spans: list[tuple[float, float]]) -> Figure:
-    chart = findings.map
-    assert chart is not None
+def _map(model: CageModel, chart: Map, spans: list[tuple[float, float]]) -> Figure:
     name = MAP_PARAMETER.replace("_", " ").capitalize()
     figure = _alone(
         9.5,
@@ -186,19 +188,9 @@ def _map(findings: Findings, spans: list[tuple[float, float]]) -> Figure:
         ),
     )
     ax = figure.axes[0]
-    ax.axhline(float(findings.model.guidance_gap) * chart.axis.factor, color="#000000", linewidth=1.0, linestyle=":")
+    ax.axhline(float(model.guidance_gap) * chart.axis.factor, color="#000000", linewidth=1.0, linestyle=":")
     mark_operating(ax, spans)
     return figure
-
-
-def _map_words(findings: Findings) -> tuple[str, str]:
-    chart = findings.map
-    assert chart is not None
-    curves = " The lines are its edges, solved for." if chart.curves else ""
-    return (
-        f"Stability map of {findings.name}: largest exponent over cage speed and guidance gap.",
-        f"Largest exponent per revolution over speed and guidance gap (red: chaotic). Dotted: this design.{curves}",
-    )
 
 
 def _picture(cage_speed_ratio: float, units: ShownUnits, key: str, figure: Figure, alt: str, caption: str) -> Picture:
@@ -211,11 +203,8 @@ def picture_of(key: str, figure: Figure, alt: str, caption: str) -> Picture:
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (96 * float(x) for x in figure.get_size_inches())
-    light, dark = (_address(restyle(figure, style)) for style in _STYLES)
+    light, dark = (_address(restyle(figure, style)) for style in ("light", "dark"))
     return Picture(key, alt, caption, light, dark, round(width), round(height))
-
-
-_STYLES: tuple[Style, Style] = ("light", "dark")
 
 
 def _address(figure: Figure) -> str:

@@ -51,10 +51,6 @@ def crisis_table(name: str, crises: Mapping[str, CrisisEdge]) -> Table:
     return Table.of(title, columns, crises.items(), ("crisis [rpm]", "95 % interval [rpm]"))
 
 
-def _range(low: float, high: float) -> str:
-    return f"{low:.0f} to {high:.0f}"
-
-
 def _elasticity_columns(edges: Mapping[str, AbstractStatisticalEdge]) -> dict[str, Any]:
     rows = {name: _elasticities(edge) for name, edge in edges.items()}
     of = lambda n: lambda item: _with_error(*rows[item[0]][n]) if _shown(item[1]) else "-"

@@ -10,6 +10,7 @@ import numpy as np
 from .._errors import ArgumentError
 from ..analysis import Edge, Sweep, Zone, Zones
 from ..io import Whose, split_owner, to_si
+from ._zone_tables import zone_span
 
 
 CLOSE = 0.05
@@ -103,7 +104,7 @@ def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:
     if at.low_rpm < rpm[0] - 1e-6 or at.high_rpm > rpm[-1] + 1e-6:
         return Verdict("unknown", f"not swept: the sweep goes from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm")
     found = _verdict(at, zones.zones)
-    dying = [z for z in zones.transient if _low(z) <= at.high_rpm and at.low_rpm <= _high(z)]
+    dying = [z for z in zones.transient if _meets(at, z)]
     if dying and found.state != "inside":
         lives = [life * 60 / at.low_rpm for z in dying for life in z.life or ()]
         often = f", mean life up to {max(lives):.2g} s after each disturbance" if lives else ""
@@ -125,7 +126,7 @@ def loss_verdict(at: Operating, zones: Sequence[Zone], lower_rpm: float, upper_r
 
 
 def _verdict(at: Operating, zones: Sequence[Zone]) -> Verdict:
-    inside = [str(i) for i, z in enumerate(zones, start=1) if _low(z) <= at.high_rpm and at.low_rpm <= _high(z)]
+    inside = [str(i) for i, z in enumerate(zones, start=1) if _meets(at, z)]
     numbers = f"zone{'s' if len(inside) > 1 else ''} {' and '.join(inside)}"
     where = f"in {numbers}" if inside else "outside all zones"
     edges = [
@@ -140,18 +141,15 @@ def _verdict(at: Operating, zones: Sequence[Zone]) -> Verdict:
     away = _distance(at, edge)
     percent = 100 * away / (at.high_rpm if edge.speed_rpm > at.high_rpm else at.low_rpm)
     near = away <= edge.uncertainty_rpm or percent < 100 * CLOSE
-    if inside and not any(_low(z) <= at.low_rpm and at.high_rpm <= _high(z) for z in zones):
+    if inside and not any(low <= at.low_rpm and at.high_rpm <= high for low, high in map(zone_span, zones)):
         where = f"partly {where}"
     state = "inside" if inside else "close" if near else "clear"
     return Verdict(state, where, f"{name}, {edge}".replace("+-", "±"), edge.speed_rpm, away, percent)
 
 
-def _low(zone: Zone) -> float:
-    return -math.inf if zone.onset is None else zone.onset.speed_rpm
-
-
-def _high(zone: Zone) -> float:
-    return math.inf if zone.exit is None else zone.exit.speed_rpm
+def _meets(at: Operating, zone: Zone) -> bool:
+    low, high = zone_span(zone)
+    return low <= at.high_rpm and at.low_rpm <= high
 
 
 def _distance(at: Operating, edge: Edge) -> float:

@@ -10,8 +10,8 @@ from .._types import Scalar
 from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
-from ._table import Table, number
-from ._zone_tables import SPEEDS, Span, published_zones, zone_document
+from ._table import Table, chosen, number
+from ._zone_tables import SPEEDS, partner_of, published_cell, published_document, published_zones, zone_document
 
 
 AT_LIMIT_RPM = 1e-6
@@ -31,10 +31,7 @@ def pairs(multipliers: Sequence[complex] | np.ndarray) -> list[list[float]]:
 def point_document(point: Point, branch: int | None) -> dict[str, Any]:
     """A bifurcation for programs."""
     return {
-        "kind": point.kind,
-        "speed_rpm": point.speed_rpm,
-        "error_rpm": point.error_rpm,
-        "steps": point.steps,
+        **chosen(point, "kind speed_rpm error_rpm steps"),
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
         "criticality": point.criticality or None,
@@ -63,15 +60,10 @@ def stretch_document(stretch: Stretch, found: SynchronousOrbits) -> dict[str, An
     """A stable stretch for programs."""
     lower, upper = end_kinds(stretch, found)
     return {
-        "lower_rpm": stretch.lower_rpm,
-        "upper_rpm": stretch.upper_rpm,
+        **chosen(stretch, "lower_rpm upper_rpm"),
         "lower_kind": lower,
         "upper_kind": upper,
-        "branch": stretch.branch,
-        "confirmed": stretch.confirmed,
-        "family": stretch.family,
-        "met": stretch.met,
-        "met_first": stretch.met_first,
+        **chosen(stretch, "branch confirmed family met met_first"),
     }
 
 
@@ -97,10 +89,7 @@ def orbits_document(
         "close_below_rpm": loss.close_below_rpm,
         "zones": [zone_document(zone) for zone in loss.zones],
         "edges": [edge_document(edge, found, loss) for edge in loss.edges],
-        "published": [
-            {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
-            for i, (onset, exit_) in enumerate(published_zones(published), start=1)
-        ],
+        "published": published_document(published),
         "missed": found.missed,
         "unsettled": found.unsettled,
         "unexplained": [point_document(p, branch_of(found, p)) for p in found.unexplained],
@@ -123,14 +112,14 @@ def stretch_table(name: str, found: SynchronousOrbits) -> Table:
 def loss_table(name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None) -> Table:
     """Synchronous-loss zones, each published (chaotic) zone beside the one it shares most speeds with [rpm]."""
     spans = published_zones(published)
-    partner = [_partner(span, loss.zones) for span in spans]
+    partner = [partner_of(span, loss.zones) for span in spans]
     rows = []
     for i, zone in enumerate(loss.zones):
-        beside = [_span_cell(span) for span, k in zip(spans, partner, strict=True) if k == i]
-        rows.append((str(i + 1), *_zone_cells(zone), ", ".join(beside) or "-"))
+        beside = [span for span, k in zip(spans, partner, strict=True) if k == i]
+        rows.append((str(i + 1), *_zone_cells(zone), published_cell(beside)))
     for span in (span for span, k in zip(spans, partner, strict=True) if k is None):
         met = span[0] <= found.upper_rpm and (span[1] is None or span[1] >= found.lower_rpm)
-        rows.append(("-", "not found" if met else "not searched", *4 * ("-",), _span_cell(span)))
+        rows.append(("-", "not found" if met else "not searched", *4 * ("-",), published_cell([span])))
     title = f"Synchronous-loss zones of {name} [rpm], closed below {number(loss.close_below_rpm)} rpm"
     columns = ("zone", "onset", "by", "exit", "by", "width", "published chaos")
     return Table(title, columns, rows or [("none", *6 * ("-",))], SPEEDS)
@@ -146,20 +135,6 @@ def _zone_cells(zone: Zone) -> list[str]:
 def edge_cell(edge: Edge) -> str:
     """A located edge with its error."""
     return f"{number(edge.speed_rpm, 2)} ± {error_cell(edge.uncertainty_rpm)}"
-
-
-def _span_cell(span: Span) -> str:
-    return number(span[0]) + (" and up" if span[1] is None else f" to {span[1]:.0f}")
-
-
-def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
-    """The zone that shares most speeds with a published one; None if none does."""
-    top = math.inf if span[1] is None else span[1]
-    low = [-math.inf if z.onset is None else z.onset.speed_rpm for z in zones]
-    high = [math.inf if z.exit is None else z.exit.speed_rpm for z in zones]
-    shared = [min(b, top) - max(a, span[0]) for a, b in zip(low, high, strict=True)]
-    best = max(range(len(shared)), key=shared.__getitem__, default=None)
-    return best if best is not None and shared[best] > 0 else None
 
 
 def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:

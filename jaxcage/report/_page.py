@@ -11,7 +11,6 @@ import jinja2
 import numpy as np
 
 from .._parameters import parameter_info, parameters
-from ..analysis import Zone
 from ..bearing import design_rule_violations
 from ..io import ShownUnits
 from ..studies import Ensemble
@@ -21,15 +20,10 @@ from ._findings import Findings
 from ._operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict
 from ._orbit_tables import coexisting_notes, edge_table, loss_table
 from ._page_tables import at_speeds_table, checks_table, provenance_table, published_table, slope_tables
-from ._readings import readings_words
-from ._sources import parameter_rows, shown
+from ._sources import parameter_rows, readings_words, shown
 from ._statics import statics_table
 from ._table import Table, in_units, number, with_shaft
-from ._zone_tables import transient_tables, zones_table
-
-
-TEMPLATES = Path(__file__).parent
-"""Folder of the pages' templates."""
+from ._zone_tables import transient_tables, zone_span, zones_table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,13 +67,21 @@ def page(
     case); the command line that asked for it; what draws from its ranges do (None: all is known); values that are
     still those of the template, by dotted name; units of tables and figures, if not mm and the like.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
     assessed = assess(findings, operating)
-    return environment.get_template("page.html.j2").render(
-        _context(findings, assessed, table, command, chances, left, units or ShownUnits())
+    return rendered(
+        "page.html.j2", **_context(findings, assessed, table, command, chances, left, units or ShownUnits())
     )
+
+
+def rendered(template: str, **context: Any) -> str:
+    """A page made of a template and what it holds, with the date of today."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    return environment.get_template(template).render(context, date=datetime.date.today().isoformat())
 
 
 def _context(
@@ -103,7 +105,7 @@ def _context(
         "subtitle": f"Cage of a cylindrical roller bearing, {span[0]:.0f} to {span[1]:.0f} rpm of the cage "
         f"({span[0] / ratio:.0f} to {span[1] / ratio:.0f} rpm of the shaft)"
         + (", quick report: no gradients, a coarser sweep" if findings.quick else ""),
-        "summary": [*_summary(findings, assessed), *_of_the_unknown(findings, chances, left)],
+        "summary": [*_summary(findings, assessed), *_of_the_unknown(chances, left)],
         "known_tables": [both(t) for t in _known_tables(findings, assessed, chances)],
         "known_notes": [] if chances is None else chances_notes(chances),
         "key_figures": [(name, units.in_text(value)) for name, value in _key_figures(findings)],
@@ -133,7 +135,6 @@ def _context(
         "provenance": provenance_table(findings),
         "version": swept.settings.get("version_jaxcage", ""),
         "command": command,
-        "date": datetime.date.today().isoformat(),
     }
     there = {"operating": bool(assessed), "map": "map" in drawn, "gradients": bool(slopes)}
     there |= {"statics": statics is not None, "known": chances is not None}
@@ -155,6 +156,9 @@ _SECTIONS = {
 }
 
 
+_STATES = {"inside": "inside", "close": "close to", "clear": "clear of", "unknown": "not known for"}
+
+
 def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     swept = findings.sweep
     chaotic, loss = len(findings.zones.zones), len(findings.loss.zones)
@@ -168,10 +172,7 @@ def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     if calm is not None:
         said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
     for j in assessed:
-        states = [f"{v.state} of {'chaotic' if k == 'chaotic' else k} zones" for k, v in j.verdicts.items()]
-        words = {"inside of": "inside", "close of": "close to", "clear of": "clear of", "unknown of": "not known for"}
-        for old, new in words.items():
-            states = [s.replace(old, new) for s in states]
+        states = [f"{_STATES[v.state]} {kind} zones" for kind, v in j.verdicts.items()]
         said.append(f"{_with_shaft(findings, j.at)}: {', '.join(states)}.")
     said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
     if np.any(swept.failed):
@@ -179,7 +180,7 @@ def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     return said
 
 
-def _of_the_unknown(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -> list[str]:
+def _of_the_unknown(chances: Ensemble | None, left: Sequence[str]) -> list[str]:
     """What the zones are worth where values are not known, or are those of another bearing."""
     said = []
     if chances is not None:
@@ -218,7 +219,7 @@ def calmest(findings: Findings) -> tuple[float, float] | None:
     """The widest range of the sweep [rpm] outside all zones, transient chaos included; None if there is none."""
     first, last = float(findings.sweep.rpm[0]), float(findings.sweep.rpm[-1])
     taken = sorted(
-        _ends(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones, *findings.zones.transient)
+        zone_span(z, first, last) for z in (*findings.loss.zones, *findings.zones.zones, *findings.zones.transient)
     )
     free, at = [], first
     for low, high in taken:
@@ -226,11 +227,6 @@ def calmest(findings: Findings) -> tuple[float, float] | None:
         at = max(at, high)
     low, high = max([*free, (at, last)], key=lambda pair: pair[1] - pair[0])
     return (low, high) if high > low else None
-
-
-def _ends(zone: Zone, first: float, last: float) -> tuple[float, float]:
-    low = first if zone.onset is None else zone.onset.speed_rpm
-    return low, (last if zone.exit is None else zone.exit.speed_rpm)
 
 
 def _key_figures(findings: Findings) -> list[tuple[str, str]]:

@@ -8,14 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._parameters import parameter_info, parameter_paths, parameters
-from ..analysis import Sweep
 from ..orbits import Sensitivity
+from ..plotting._elasticities import largest_first
 from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
-from ._readings import readings_words
-from ._slopes import FIRST
-from ._sources import shown
+from ._sources import readings_words, shown
 from ._table import Table, number
 
 
@@ -64,15 +62,10 @@ def with_full_names(findings: Findings, slopes: Sensitivity) -> Sensitivity:
 
 
 def _slope_table(findings: Findings, title: str, edges: dict[str, Sensitivity]) -> Table:
-    largest: dict[str, float] = {}
-    for s in edges.values():
-        for name, change in s.elasticity.items():
-            largest[name] = max(largest.get(name, 0.0), abs(change) if np.isfinite(change) else 0.0)
-    rest = sorted((n for n in largest if n not in FIRST and largest[n] > 0), key=lambda n: -largest[n])
     info, value = parameter_info(findings.model), parameters(findings.model)
     short = {".".join(path): name for name, path in parameter_paths(findings.model).items()}
     rows = []
-    for name in [*FIRST, *rest][:MOST]:
+    for name in largest_first(list(edges.values()), MOST):
         unit, number_ = shown(float(value[short[name]]), info[short[name]].unit)
         cells = (f"{s.elasticity[name]:+.3f}".replace("-", "−") for s in edges.values())
         rows.append((name.replace("_", " ").replace(".", " "), f"{number_:.4g} {unit}".strip(), *cells))
@@ -85,9 +78,10 @@ def checks_table(findings: Findings) -> Table:
     swept, found = findings.sweep, findings.found
     edges = [e for zone in findings.zones.zones for e in (zone.onset, zone.exit) if e is not None]
     exact = f"{sum(e.basis != 'statistical' for e in edges)} of {len(edges)}" if not findings.quick else "not tried"
+    changed = ", then ".join(f"{each.changed} of {each.lanes}" for each in swept.confirmed)
     rows = [
         ("simulations that failed", f"{int(np.sum(swept.failed))} of {swept.outcome.size}"),
-        ("labels that changed when confirmed by finer steps", _confirmed(swept) or "none confirmed"),
+        ("labels that changed when confirmed by finer steps", changed or "none confirmed"),
         ("largest error of a revolution, of the clearance", f"{np.max(swept.error[~swept.failed], initial=0.0):.0e}"),
         ("simulations that went beyond eps = 1, where surfaces would overlap", str(int(np.sum(swept.peak > 1)))),
         ("simulations of which it is undecided what they do", str(int(np.sum(swept.label == "undecided")))),
@@ -102,10 +96,6 @@ def checks_table(findings: Findings) -> Table:
     return Table("Checks of this report", ("check", "result"), rows)
 
 
-def _confirmed(swept: Sweep) -> str:
-    return ", then ".join(f"{each.changed} of {each.lanes}" for each in swept.confirmed)
-
-
 def published_table(findings: Findings) -> Table | None:
     if findings.published is None:
         return None
@@ -113,17 +103,15 @@ def published_table(findings: Findings) -> Table | None:
         *compare_edges(findings.published, findings.loss.zones, "synchronous-loss"),
         *compare_edges(findings.published, findings.zones.zones, "chaotic"),
     ]
-    rows = [
-        (
-            row.edge,
-            row.kind,
-            number(row.published_rpm),
-            number(row.ours_rpm, nothing="none"),
-            "-" if row.error_percent is None else f"{row.error_percent:+.1f} %".replace("-", "−"),
-        )
-        for row in compared
-    ]
-    return Table("Against the published edges [rpm]", ("edge", "kind", "published", "here", "difference"), rows)
+    off = lambda row: "-" if row.error_percent is None else f"{row.error_percent:+.1f} %".replace("-", "−")
+    columns = {
+        "edge": "{.edge}",
+        "kind": "{.kind}",
+        "published": lambda row: number(row.published_rpm),
+        "here": lambda row: number(row.ours_rpm, nothing="none"),
+        "difference": off,
+    }
+    return Table.of("Against the published edges [rpm]", columns, compared)
 
 
 def provenance_table(findings: Findings) -> Table:

@@ -1,10 +1,13 @@
-"""How every exact edge answers to the design, as documents and as tables."""
+"""How every exact edge, and with standard errors statistics of the whole bearing, answer to the design, as documents
+and as tables.
+"""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from .._parameters import EXTRA, parameter_info, parameters
+from ..design import BearingGradient, StatisticGradient
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
@@ -162,3 +165,36 @@ def source_notes(explained: Explained) -> list[str]:
         else:
             notes.append(f"Chaotic {name}: coincides with the {source.kind} at {source.speed_rpm:.2f} rpm")
     return notes
+
+
+def bearing_gradient_table(title: str, found: BearingGradient) -> Table:
+    """A row for each statistic: its mean, and its elasticities."""
+    first = next(iter(found.statistics.values()))
+    rows = [
+        (each.name, f"{each.value:.4g} ± {each.value_error:.1g}", *_cells(each), f"{number(100 * each.explained)} %")
+        for each in found.statistics.values()
+    ]
+    names = [name.replace("_", " ").replace("+", ", ") for name in first.directions]
+    return Table(title, ("statistic", "mean", *names, "explained"), rows)
+
+
+def _cells(each: StatisticGradient) -> list[str]:
+    if not each.value:
+        return ["-"] * len(each.directions)
+    return [f"{x:+.3f} ± {e:.3f}" for x, e in zip(each.elasticity, each.elasticity_error, strict=True)]
+
+
+def bearing_gradient_document(found: BearingGradient) -> dict[str, Any]:
+    """Everything for programs: derivatives by the logarithm of each direction, elasticities, slopes of single ones."""
+    rows = {}
+    for name, each in found.statistics.items():
+        by = {}
+        for i, direction in enumerate(each.directions):
+            told = chosen(each, "elasticity elasticity_error by_relative_change by_relative_change_error")
+            by[direction] = {what: values[i] for what, values in told.items()}
+            if "+" not in direction:
+                slope, error = found.slope(name, direction)
+                by[direction] |= {"slope_per_SI_unit": slope, "slope_error_per_SI_unit": error}
+        rows[name] = chosen(each, "unit value value_error drift drift_error settled explained") | {"by": by}
+    length = chosen(found, "pairs failed inaccurate starts discard revolutions spread")
+    return length | {"parameters": found.values, "statistics": rows}

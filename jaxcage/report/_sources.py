@@ -1,10 +1,12 @@
-"""Every parameter of a model with its unit, and where its value comes from."""
+"""Every parameter of a model with its unit, where its value comes from, and how the model reads what the paper leaves
+open, which is said beside everything that rests on it.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .._parameters import EXTRA, get, walk
+from .._parameters import EXTRA, get, readings_of, walk
 from ..io import UNIT, ShownUnits, is_range
 from ..models import BearingModel, CageModel
 
@@ -28,6 +30,7 @@ _PUBLISHED = {
     ("lubricant",): "paper, Table 2, read as a grade",
 }
 """What the paper gives of a published case, the longest path first; all else it does not print."""
+_READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,7 +105,8 @@ def _source(
         for start in (path[:n] for n in range(len(path), 0, -1)):
             if start in _PUBLISHED:
                 return _PUBLISHED[start]
-        return "default" if _is_default(model, path, field) else "identified, not printed"
+        own = field.default is not dataclasses.MISSING and bool(get(model, path) == field.default)
+        return "default" if own else "identified, not printed"
     here: Any = table
     for name in path:
         here = here.get(name) if isinstance(here, Mapping) else None
@@ -122,6 +126,17 @@ def _replaced(table: Mapping[str, Any]) -> set[str]:
     return {part for part, given in table.items() if isinstance(given, Mapping) and "kind" in given}
 
 
-def _is_default(model: CageModel | BearingModel, path: tuple[str, ...], field: dataclasses.Field) -> bool:
-    default = field.default
-    return default is not dataclasses.MISSING and bool(get(model, path) == default)
+def readings_document(model: CageModel) -> dict[str, str]:
+    """The readings for programs."""
+    return {name: chosen for name, (chosen, _) in readings_of(model).items()}
+
+
+def readings_words(model: CageModel) -> str:
+    """The readings in one line: `radial clearance c = C_r/2 ("radial"), unbalance M e omega^2 ("physical")`."""
+    return ", ".join(f'{_READINGS[name]} {words} ("{chosen}")' for name, (chosen, words) in readings_of(model).items())
+
+
+def short_readings(model: CageModel) -> str:
+    """For titles of figures."""
+    gap = {"radial": "c = C_r/2", "as_printed": "c = C_r"}[model.clearance_reading]
+    return f"{gap}, {'physical' if model.unbalance == 'physical' else 'printed'} unbalance"

@@ -1,5 +1,7 @@
 """Zones found in a sweep beside the published ones, as document and as table."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from ..analysis import Edge, Zone, Zones
@@ -20,6 +22,14 @@ def published_zones(published: PublishedCase | None) -> list[Span]:
     return [
         (published.zone_1_onset_rpm, published.zone_1_exit_rpm),
         (published.zone_2_onset_rpm, None),
+    ]
+
+
+def published_document(published: PublishedCase | None) -> list[dict[str, Any]]:
+    """The published zones for programs."""
+    return [
+        {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
+        for i, (onset, exit_) in enumerate(published_zones(published), start=1)
     ]
 
 
@@ -53,10 +63,7 @@ def zones_document(name: str, zones: Zones, published: PublishedCase | None) -> 
         "zones": [zone_document(zone) for zone in zones.zones],
         "transient": [zone_document(zone) for zone in zones.transient],
         "synchronous": [zone_document(stretch) for stretch in zones.synchronous],
-        "published": [
-            {"zone": i, "onset_rpm": onset, "exit_rpm": exit_}
-            for i, (onset, exit_) in enumerate(published_zones(published), start=1)
-        ],
+        "published": published_document(published),
     }
 
 
@@ -65,15 +72,15 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     its own that says whether its speeds were swept at all [rpm].
     """
     spans = published_zones(published)
-    partner = {i: _partner(span, zones) for i, span in enumerate(spans)}
+    partner = [partner_of(span, zones.zones) for span in spans]
     rows, followed = [], int(zones.horizon > 0)
     for i, zone in enumerate(zones.zones):
-        beside = [spans[k] for k, found in partner.items() if found == i]
-        rows.append((str(i + 1), *_zone_cells(zone), *[_life_cell(zone)][:followed], _published_cell(beside)))
-    for span in (spans[k] for k, found in partner.items() if found is None):
+        beside = [span for span, found in zip(spans, partner, strict=True) if found == i]
+        rows.append((str(i + 1), *_zone_cells(zone), *[_life_cell(zone)][:followed], published_cell(beside)))
+    for span in (span for span, found in zip(spans, partner, strict=True) if found is None):
         missed = span[0] <= swept[1] and (span[1] is None or span[1] >= swept[0])
         why = "not found" if missed else "not swept"
-        rows.append(("-", why, *(4 + followed) * ("-",), _published_cell([span])))
+        rows.append(("-", why, *(4 + followed) * ("-",), published_cell([span])))
     if not rows:
         rows = [("none", *(6 + followed) * ("-",))]
     lasting = f", chaos that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
@@ -120,20 +127,23 @@ def _edge_cell(edge: Edge | None) -> str:
     )
 
 
-def _published_cell(spans: list[Span]) -> str:
+def published_cell(spans: list[Span]) -> str:
     """Onset and exit of the published zones; the paper gives the second no exit."""
     texts = (number(a) + (" and up" if b is None else f" to {b:.0f}") for a, b in spans)
     return ", ".join(texts) or "-"
 
 
-def _partner(span: Span, zones: Zones) -> int | None:
+def zone_span(zone: Zone, lowest: float = -math.inf, highest: float = math.inf) -> tuple[float, float]:
+    """Onset and exit of a zone [rpm], or what stands for an end that it does not have."""
+    return (
+        lowest if zone.onset is None else zone.onset.speed_rpm,
+        highest if zone.exit is None else zone.exit.speed_rpm,
+    )
+
+
+def partner_of(span: Span, zones: Sequence[Zone]) -> int | None:
     """The zone that shares most speeds with a published one; None if none does."""
-    onset, exit_ = span[0], float("inf") if span[1] is None else span[1]
-    best, widest = None, 0.0
-    for i, zone in enumerate(zones.zones):
-        low = 0.0 if zone.onset is None else zone.onset.speed_rpm
-        high = 1e9 if zone.exit is None else zone.exit.speed_rpm
-        shared = min(high, exit_) - max(low, onset)
-        if shared > widest:
-            best, widest = i, shared
-    return best
+    top = math.inf if span[1] is None else span[1]
+    shared = [min(high, top) - max(low, span[0]) for low, high in map(zone_span, zones)]
+    best = max(range(len(shared)), key=shared.__getitem__, default=None)
+    return best if best is not None and shared[best] > 0 else None
