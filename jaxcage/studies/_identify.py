@@ -15,11 +15,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod, controlled
+from ..integrate import AbstractMethod
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
-from ..sweeps import Progress, motions, sweep_designs
-from ._ensemble import ERROR, REVOLUTIONS, SETTLED, draw, sobol
+from ..sweeps import Progress, motions
+from ._ensemble import ERROR, draw, run_draws, sobol
 
 
 DRAWS = 128
@@ -168,20 +168,7 @@ def misses(
     right (0) or wrong (as far as anything counts)."""
     models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
-    found = sweep_designs(
-        models,
-        rpm * np.pi / 30,
-        starts=1,
-        discard=REVOLUTIONS,
-        revolutions=REVOLUTIONS,
-        confirm=False,
-        horizon=0,
-        blocks=20,
-        keep=32,
-        settled=SETTLED,
-        method=controlled(ERROR) if method is None else method,
-        progress=progress,
-    )
+    found = run_draws(models, rpm * np.pi / 30, method, progress)
     needed = any(m.quantity in ("orbit size", "whirl frequency") for m in measured)
     moved = motions(models, found, error=ERROR) if needed else []
     columns = []
