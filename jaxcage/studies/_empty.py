@@ -97,7 +97,7 @@ def _words(variable: Variable) -> dict[str, Any]:
 
 
 def _coordinates(study: AbstractStudy) -> dict[str, Any]:
-    plan, info = study.plan, parameter_info(study.subject)
+    plan, info = study.plan, parameter_info(study.system)
 
     def words(name: str) -> dict[str, str]:
         if name == OIL:
