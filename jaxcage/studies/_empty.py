@@ -67,7 +67,7 @@ def _write(path: Path, study: AbstractStudy) -> None:
             dtype=variable.kind,
             fill_value=np.nan if variable.kind == "float64" else PENDING,
             compressors=compressors(),
-            dimension_names=_dims(study, variable),
+            dimension_names=(*plan.axes, *variable.within),
             attributes=_words(variable),
         )
     group.create_group(FOLDER, attributes={"long_name": "digests of what is finished, by jaxcage.studies.check_study"})
@@ -82,10 +82,6 @@ def _write(path: Path, study: AbstractStudy) -> None:
         "files": describing(path),
     }
     write_entry(path / ABOUT, about)
-
-
-def _dims(study: AbstractStudy, variable: Variable) -> tuple[str, ...]:
-    return (*study.plan.axes, *variable.within)
 
 
 def _words(variable: Variable) -> dict[str, Any]:
