@@ -2,7 +2,7 @@
 
 | module      | responsibility                                                                |
 |-------------|-------------------------------------------------------------------------------|
-| `_vary`     | how a parameter is sampled                                                    |
+| `_vary`     | how parameters are sampled                                                    |
 | `_plan`     | what is varied, lanes and chunks                                              |
 | `_stored`   | what a store must know of a study                                             |
 | `_study`    | what is computed of a cage's lane, the same bits anywhere                     |
@@ -46,7 +46,6 @@ from ._ensemble import (
     chaotic_shares as chaotic_shares,
     draw as draw,
     ensemble as ensemble,
-    sobol as sobol,
     verdict_of as verdict_of,
 )
 from ._identify import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow
@@ -62,7 +61,7 @@ from ._study import (
     too_short as too_short,
     with_values as with_values,
 )
-from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance
+from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance, sobol as sobol
 from ._whole_study import WHOLE_TOLERANCE as WHOLE_TOLERANCE, BearingStudy as BearingStudy
 
 

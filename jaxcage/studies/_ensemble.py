@@ -18,6 +18,7 @@ from ..integrate import AbstractMethod, controlled
 from ..io import Unknown, check_together
 from ..models import CageModel
 from ..sweeps import Progress, sweep_designs
+from ._vary import sobol
 
 
 DRAWS, ENSEMBLE_SPEEDS = 64, 40
@@ -267,14 +268,6 @@ def chaotic_shares(
     found = run_draws(models, speeds, method, progress)
     shares = [float(np.nanmean(s.chaotic_share)) if not np.all(s.failed) else 0.0 for s in found]
     return np.array(shares).reshape(1, *place.shape[1:])
-
-
-def sobol(unknowns: int, draws: int, seed: int) -> Float[np.ndarray, "draws unknowns"]:
-    """Scrambled Sobol points."""
-    from scipy.stats import qmc
-
-    log2 = int(np.ceil(np.log2(draws)))
-    return qmc.Sobol(unknowns, rng=seed).random_base2(log2)[:draws]
 
 
 def _bands(found: Sequence[Sweep]) -> list[Band]:

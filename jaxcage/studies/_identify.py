@@ -19,7 +19,8 @@ from ..integrate import AbstractMethod
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
 from ..sweeps import Progress, motions
-from ._ensemble import ERROR, draw, run_draws, sobol
+from ._ensemble import ERROR, draw, run_draws
+from ._vary import sobol
 
 
 DRAWS = 128
