@@ -60,13 +60,8 @@ class Robust(AbstractObjective):
 
     def made(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Float[np.ndarray, "draws n"]:
         """Places of the made designs; beyond the bounds too."""
-        nominal = space.values(place)
-        return np.array(
-            [
-                [u.place(f * nominal[u.name]) for u, f in zip(space.unknowns, row, strict=True)]
-                for row in self.factors(space)
-            ]
-        )
+        made = self.factors(space) * list(space.values(place).values())
+        return np.array([[u.place(x) for u, x in zip(space.unknowns, row, strict=True)] for row in made])
 
     def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
         made = [self.made(space, np.asarray(place)) for place in places]
@@ -77,12 +72,7 @@ class Robust(AbstractObjective):
     def _over(self, space: DesignSpace, rows: list[Measured]) -> Measured:
         value, error = np.array([m.value for m in rows]), np.array([m.error for m in rows])
         counted = np.argsort(-np.nan_to_num(value, nan=np.inf))[: max(1, round(self.worst * len(rows)))]
-        move = np.array(
-            [
-                [f if u.scale == "linear" else 1.0 for u, f in zip(space.unknowns, row, strict=True)]
-                for row in self.factors(space)
-            ]
-        )
+        move = np.where([u.scale == "linear" for u in space.unknowns], self.factors(space), 1.0)
         slope = np.array([m.slope for m in rows]) * move
         doubt = np.array([m.slope_error for m in rows]) * move
         k = len(counted)
