@@ -165,7 +165,7 @@ def optimise(
     space = DesignSpace.of(system, vary)
     chosen = optax.adam(optax.cosine_decay_schedule(0.5, max(steps, 1), 0.1)) if optimiser is None else optimiser
     first = first_places(space, objective, starts, scouts, seed)
-    z = _unbounded(first)
+    z = np.log(first / (1 - first))
     with jax.numpy_dtype_promotion("standard"):  # optax mixes steps and numbers
         state = jax.vmap(chosen.init)(jnp.asarray(z))
     history: list[list[Step]] = [[] for _ in first]
@@ -224,10 +224,6 @@ def first_places(
         drawn = drawn[np.argsort(objective.values(space, drawn), kind="stable")]  # NaN comes last
     drawn = drawn[: starts - 1]
     return np.clip(np.vstack([own, drawn]), INSIDE, 1 - INSIDE)
-
-
-def _unbounded(place: np.ndarray) -> np.ndarray:
-    return np.log(place / (1 - place))
 
 
 def _step(place: np.ndarray, measured: Measured) -> Step:

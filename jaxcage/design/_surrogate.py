@@ -75,9 +75,8 @@ def surrogate_search(
     space = DesignSpace.of(system, vary)
     first = first_places(space, objective, starts, scouts, seed)
     searches = [SurrogateSearch(place, batch, (seed, i)) for i, place in enumerate(first)]
-    kept = None
-    if keep is not None:
-        kept = KeptSearch(keep, space, batches=batches, batch=batch, seed=seed, first=first.tolist())
+    about = {"batches": batches, "batch": batch, "seed": seed, "first": first.tolist()}
+    kept = None if keep is None else KeptSearch(keep, space, **about)
     known = None if kept is None else kept.load()
     told = [] if known is None else list(zip(known["places"], known["values"], strict=True))
     for number in range(batches):
