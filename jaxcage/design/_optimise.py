@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
+from .._sobol import sobol
 from ._kept import KeptSearch
 from ._objective import AbstractObjective, DesignSpace, Measured
 from ._unknowns import Design
@@ -217,9 +218,7 @@ def first_places(
     if scouts and scouts < starts - 1:
         raise ArgumentError("scouts", said=f"must be 0 or at least {starts - 1}, but {scouts} was given.")
     count = max(scouts, starts - 1)
-    from scipy.stats import qmc  # takes half a second to load
-
-    drawn = qmc.Sobol(len(own), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
+    drawn = sobol(len(own), max(count, 2), seed)[:count]
     if scouts and starts > 1:
         drawn = drawn[np.argsort(objective.values(space, drawn), kind="stable")]  # NaN comes last
     drawn = drawn[: starts - 1]

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._errors import ArgumentError, InputError
+from .._sobol import sobol
 from ._objective import AbstractObjective, DesignSpace, Measured
 
 
@@ -52,11 +53,9 @@ class Robust(AbstractObjective):
         """Made over nominal value of each parameter that varies."""
         if missing := [name for name in self.scatter if name not in space.names]:
             raise InputError(f"Scatter of `{missing[0]}` must be of one of {', '.join(space.names)}.")
-        from scipy.stats import qmc  # takes half a second to load
-
-        sample = qmc.Sobol(len(space.names), rng=self.seed).random_base2(int(np.ceil(np.log2(self.draws))))
+        sample = sobol(len(space.names), self.draws, self.seed)
         drawn = [self.scatter[n](q) if n in self.scatter else np.ones_like(q) for n, q in zip(space.names, sample.T)]
-        return np.array(drawn).T[: self.draws]
+        return np.array(drawn).T
 
     def made(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Float[np.ndarray, "draws n"]:
         """Places of the made designs; beyond the bounds too."""

@@ -2,7 +2,7 @@
 
 | module      | responsibility                                                                |
 |-------------|-------------------------------------------------------------------------------|
-| `_vary`     | how parameters are sampled                                                    |
+| `_vary`     | how a parameter is sampled                                                    |
 | `_plan`     | what is varied, lanes and chunks                                              |
 | `_stored`   | what a store must know of a study                                             |
 | `_study`    | what is computed of a cage's lane, the same bits anywhere                     |
@@ -23,6 +23,7 @@
 """
 
 from .._arguments import check_layer
+from .._sobol import sobol as sobol
 from ._adaptive import (
     UNKNOWN as UNKNOWN,
     AdaptiveGrid as AdaptiveGrid,
@@ -61,7 +62,7 @@ from ._study import (
     too_short as too_short,
     with_values as with_values,
 )
-from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance, sobol as sobol
+from ._vary import Between as Between, Spread as Spread, Tolerance as Tolerance
 from ._whole_study import WHOLE_TOLERANCE as WHOLE_TOLERANCE, BearingStudy as BearingStudy
 
 

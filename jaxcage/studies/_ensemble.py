@@ -13,12 +13,12 @@ from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
+from .._sobol import sobol
 from ..analysis import Sweep, zones
 from ..integrate import AbstractMethod, controlled
 from ..io import Unknown, check_together
 from ..models import CageModel
 from ..sweeps import Progress, sweep_designs
-from ._vary import sobol
 
 
 DRAWS, ENSEMBLE_SPEEDS = 64, 40

@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .._errors import ArgumentError
-from ._vary import Spread, sobol
+from .._sobol import sobol
+from ._vary import Spread
 
 
 SAMPLE, START = "sample", "start"

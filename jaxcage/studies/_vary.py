@@ -72,10 +72,3 @@ class Tolerance:
 
 
 Spread = Between | Tolerance
-
-
-def sobol(unknowns: int, draws: int, seed: int) -> Float[np.ndarray, "draws unknowns"]:
-    """Scrambled Sobol points between 0 and 1."""
-    from scipy.stats import qmc  # takes half a second to load
-
-    return qmc.Sobol(unknowns, rng=seed).random_base2(math.ceil(math.log2(draws)))[:draws]
