@@ -53,7 +53,7 @@ def about_store(path: Path) -> dict[str, Any]:
 def attributes_of(path: Path) -> dict[str, Any] | None:
     """Attributes of a store; None if they cannot be read."""
     try:
-        attributes = json.loads(read_bytes(path / "zarr.json"))["attributes"]
+        attributes = dict(json.loads(read_bytes(path / "zarr.json"))["attributes"])
         return attributes | {"study": json.loads(attributes.get("study", "{}"))}
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
