@@ -200,19 +200,19 @@ class Asked(Exception):
     """What a sweep was asked for, instead of one."""
 
 
-@pytest.mark.parametrize("place", ["_ensemble", "_identify"])
-def test_every_draw_starts_on_its_own_rib(monkeypatch: pytest.MonkeyPatch, place: str):
+@pytest.mark.parametrize("what", ["ensemble", "identify"])
+def test_every_draw_starts_on_its_own_rib(monkeypatch: pytest.MonkeyPatch, what: str):
     """Where contact begins earlier, the resting place of another draw lies inside the rib: a stiff one shoots the cage
     off at speeds that no steps follow."""
 
     def refuse(models: Any, speeds: Any, *, starts: Any, **options: Any) -> None:
         raise Asked(models, speeds, starts)
 
-    monkeypatch.setattr(f"jaxcage.studies.{place}.sweep_designs", refuse)
+    monkeypatch.setattr("jaxcage.studies._ensemble.sweep_designs", refuse)
     model = dataclasses.replace(jc.case("1a"), clearance_reading="radial")
     onset, speeds = Unknown("contact.onset", ("onset",), Range(0.85, 0.99)), jc.rpm(3000, 4000, 2)
     with pytest.raises(Asked) as asked:
-        if place == "_ensemble":
+        if what == "ensemble":
             ensemble(model, [onset], speeds, draws=8)
         else:
             identify(model, [onset], [Measurement("calm", 4000.0, 0.0, 0.0)], draws=16)

@@ -142,9 +142,5 @@ def cage_state(place: Float[np.ndarray, "n 2"], samples: int) -> str:
         return "circular"
     if len(place) <= samples:
         return "disordered"
-    return "locally_periodic" if _return(place, samples) < REPEATING else "disordered"
-
-
-def _return(place: Float[np.ndarray, "n 2"], samples: int) -> float:
-    """Mean distance between places one revolution apart."""
-    return float(np.hypot(*(place[samples:] - place[:-samples]).T).mean())
+    away = np.hypot(*(place[samples:] - place[:-samples]).T)  # from where it was a revolution before
+    return "locally_periodic" if np.mean(away) < REPEATING else "disordered"

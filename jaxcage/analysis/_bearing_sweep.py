@@ -10,14 +10,14 @@ from .._errors import ArgumentError
 from ..integrate import OUTCOMES
 from ..models.whole import LEDGER
 from ._bearing_measures import cage_state, measure
+from ._labels import scatter
 
 
-LandPower = "land_power_W"
 AVERAGED = (
     "cage_slip",
     "pocket_force_mean_sum_N",
     "friction_power_W",
-    LandPower,
+    "land_power_W",
     "pocket_impulse_N_s",
     "land_impulse_N_s",
     "pocket_wear_mm3_per_h",
@@ -98,20 +98,12 @@ class BearingSweep:
 
 
 STATISTIC_UNITS: dict[str, str] = {
-    LandPower: "W",
+    "land_power_W": "W",
     "pocket_force_peak_N": "N",
     "land_force_peak_N": "N",
     **{field.name: field.metadata["unit"] for field in dataclasses.fields(BearingSweep) if field.name in AVERAGED},
 }
 """Units of what `BearingSweep.block_means` has."""
-
-
-def scatter(blocks: Float[np.ndarray, "*lanes blocks"]) -> Float[np.ndarray, "*lanes"]:
-    """Standard error of the mean of blocks; infinite for a single one."""
-    count = blocks.shape[-1]
-    if count < 2:
-        return np.full(blocks.shape[:-1], np.inf)
-    return np.std(blocks, axis=-1, ddof=1) / np.sqrt(count)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,7 +159,7 @@ def summed_up(
         "cage_slip": shaped(1 - 2 * np.pi * block / time / rolling[:, None]),
         "pocket_force_mean_sum_N": of_blocks("pocket_force"),
         "friction_power_W": shaped(sum(record.integrals[name] for name in losses) / time),
-        LandPower: shaped((record.integrals["film"] + record.integrals["land_contact"]) / time),
+        "land_power_W": shaped((record.integrals["film"] + record.integrals["land_contact"]) / time),
         "pocket_impulse_N_s": shaped(record.integrals["pocket_force"] / block),
         "land_impulse_N_s": shaped(record.integrals["land_force"] / block),
         "pocket_wear_mm3_per_h": worn * of_blocks("pocket_rubbing"),

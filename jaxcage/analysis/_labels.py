@@ -36,6 +36,14 @@ def closing_period(
     return period
 
 
+def scatter(blocks: Float[np.ndarray, "..."], axis: int = -1) -> Float[np.ndarray, "..."]:
+    """Standard error of the mean of blocks along an axis; infinite for a single one."""
+    count = blocks.shape[axis]
+    if count < 2:
+        return np.full(np.delete(blocks.shape, axis), np.inf)
+    return np.std(blocks, axis=axis, ddof=1) / np.sqrt(count)
+
+
 def label_lanes(
     outcome: Int[np.ndarray, "*lanes"],
     period: Int[np.ndarray, "*lanes"],

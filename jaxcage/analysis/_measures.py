@@ -18,6 +18,7 @@ from .._recent import jitted
 from ..forces import Force
 from ..integrate import Trajectory
 from ..models import FORCES, CageModel
+from ._bearing_measures import measure
 
 
 BATCH = 256
@@ -139,45 +140,41 @@ def winding(
     return float(turned[-1] - turned[0]), int(np.sum(doubted))
 
 
-def _measure(unit: str, text: str) -> Any:
-    return dataclasses.field(metadata={"unit": unit, "text": text})
-
-
 @dataclasses.dataclass(frozen=True)
 class OrbitMeasures:
     """Measures of one orbit of the cage centre in its rib; printed, a table with units."""
 
-    whirl_ratio: float = _measure("1", "whirl speed about the mean centre / cage speed")
+    whirl_ratio: float = measure("1", "whirl speed about the mean centre / cage speed")
     """Mean angular velocity about the mean centre over the mean cage speed, positive in the sense
     of rotation; NaN where the centre moves by less than the run's error, or runs through its mean. 1 is synchronous,
     near 0.5 oil whirl."""
-    rib_whirl_ratio: float = _measure("1", "whirl speed about the rib centre / cage speed")
+    rib_whirl_ratio: float = measure("1", "whirl speed about the rib centre / cage speed")
     """The same about the rib centre: 0 for an orbit that does not go around it, NaN for one that runs through it."""
-    rms: float = _measure("m", "rms displacement about the mean")
+    rms: float = measure("m", "rms displacement about the mean")
     """Root of the mean square distance from the mean centre [m]."""
-    peak_displacement: float = _measure("m", "largest displacement about the mean")
+    peak_displacement: float = measure("m", "largest displacement about the mean")
     """[m], at the samples."""
-    largest_eps: float = _measure("1", "largest eccentricity ratio")
+    largest_eps: float = measure("1", "largest eccentricity ratio")
     """At any step of the integration; above 1 the surfaces overlap."""
-    minimum_film_thickness: float = _measure("m", "smallest film thickness")
+    minimum_film_thickness: float = measure("m", "smallest film thickness")
     """c (1 - eps) at the largest eps, not below 0 [m]."""
-    velocity_scatter: float = _measure("1", "scatter of the centre's speed / mean speed")
+    velocity_scatter: float = measure("1", "scatter of the centre's speed / mean speed")
     """Standard deviation of |v| over its mean (Ghaisas et al. 2004): small is steady; 0 for a
     circle, NaN where the centre stands still."""
-    peak_contact_force: float = _measure("N", "largest land contact force")
+    peak_contact_force: float = measure("N", "largest land contact force")
     """[N], at the samples."""
-    mean_contact_force: float = _measure("N", "mean land contact force")
+    mean_contact_force: float = measure("N", "mean land contact force")
     """Mean of |F_contact| [N]."""
-    contact_impulse: float = _measure("N s", "land contact impulse per revolution")
+    contact_impulse: float = measure("N s", "land contact impulse per revolution")
     """Integral of |F_contact| over the time of a revolution [N s]; wear of the lands follows it."""
-    peak_impact_force: float = _measure("N", "largest impact force")
+    peak_impact_force: float = measure("N", "largest impact force")
     """[N], at the samples."""
-    impact_impulse: float = _measure("N s", "impact impulse per revolution")
+    impact_impulse: float = measure("N s", "impact impulse per revolution")
     """Integral of |F_impact| over the time of a revolution [N s]; wear of the pockets follows it
     (Archard)."""
-    drag_power: float = _measure("W", "power to shear the film")
+    drag_power: float = measure("W", "power to shear the film")
     """Mean of `film_drag_power` [W]."""
-    film_power: float = _measure("W", "power the film takes from the centre's motion")
+    film_power: float = measure("W", "power the film takes from the centre's motion")
     """Mean of -F_film . v [W]; negative where the rotation drives the whirl through the film."""
 
     def __str__(self) -> str:
@@ -189,10 +186,6 @@ class OrbitMeasures:
         return "\n".join(lines)
 
     _repr_html_ = notebook_html
-
-
-def _magnitude(force: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-    return np.hypot(force[:, 0], force[:, 1])
 
 
 def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
@@ -222,14 +215,14 @@ def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
         return float(2 * np.pi * np.mean(f / speed))
 
     centre = np.sum(weights[:, None] * position, axis=0)
-    away = _magnitude(position - centre)
-    pace = _magnitude(velocity)
+    away = np.hypot(*(position - centre).T)
+    pace = np.hypot(*velocity.T)
     phase = float(trajectory.tau[-1] - trajectory.tau[0])
     paced = np.mean(pace) > STILL * c * np.mean(speed)
-    eps = _magnitude(position) / c
+    eps = np.hypot(*position.T) / c
     largest = max(float(np.max(eps)), trajectory.peak)
     forces = cage_forces(model, trajectory)
-    contact, impact = _magnitude(forces["contact"]), _magnitude(forces["impact"])
+    contact, impact = (np.hypot(*forces[name].T) for name in ("contact", "impact"))
     return OrbitMeasures(
         whirl_ratio=whirl(centre),
         rib_whirl_ratio=whirl(np.zeros(2)),

@@ -89,7 +89,7 @@ def orthonormalise(tangents: Tangents) -> tuple[Tangents, Float[Array, " exponen
         norm = jnp.sqrt(sum(a * a for a in u))
         done.append(tuple(a / norm for a in u))
         logs.append(jnp.log(norm))
-    return tuple(done), jnp.stack(logs)
+    return tuple(done), jnp.stack(logs) if logs else jnp.zeros(0)
 
 
 def _advance(strobe: StrobeMap, lane: Lane, tangents: Tangents = ()) -> tuple[Lane, Tangents, Tangents]:
@@ -142,41 +142,27 @@ def observe(strobe: StrobeMap, lane: Lane, lengths: Lengths, room: Room) -> Obse
     dim = len(lane.y)
     observed = lengths.block * lengths.blocks
     lane = lane._replace(peak=jnp.asarray(strobe.system.excursion(lane.y), dtype=float))
-    ring = jnp.zeros((room.keep, dim))
+    ring, zero = jnp.zeros((room.keep, dim)), jnp.zeros(room.exponents)
+    sums = jnp.zeros((room.blocks + 1, room.exponents))
 
-    def record(ring: Array, n: Array, lane: Lane) -> Array:
-        return jax.lax.dynamic_update_index_in_dim(ring, jnp.stack(lane.y), n % room.keep, 0)
+    def follow(n: Array, carry: tuple) -> tuple:
+        # Revolutions n < 0 only align the tangent vectors; their growth goes to the extra row of `sums`.
+        lane, ring, tangents, total, doubt, sums = carry
+        lane, *pushed = _advance(strobe, lane, tangents)
+        runs = lane.outcome == 0
+        (tangents, logs), (_, rough) = (
+            orthonormalise(jax.tree.map(lambda t: jnp.where(runs, t, 1.0), each)) for each in pushed
+        )
+        total = total + jnp.where(runs, logs, jnp.nan)
+        doubt = doubt + jnp.where(n < 0, 0.0, logs - rough)
+        row = jnp.where(n < 0, room.blocks, n // lengths.block)
+        sums = jax.lax.dynamic_update_index_in_dim(sums, total, row, 0)
+        total = jnp.where((n + 1) % lengths.block == 0, zero, total)
+        ring = jax.lax.dynamic_update_index_in_dim(ring, jnp.stack(lane.y), jnp.maximum(n, 0) % room.keep, 0)
+        return lane, ring, tangents, total, doubt, sums
 
-    if room.exponents == 0:
-
-        def watch(n: Array, carry: tuple) -> tuple:
-            lane, ring = carry
-            lane = _advance(strobe, lane)[0]
-            return lane, record(ring, n, lane)
-
-        lane, ring = jax.lax.fori_loop(0, observed, watch, (lane, ring))
-        growth, doubt = jnp.zeros((room.blocks, 0)), jnp.zeros(0)
-    else:
-        zero = jnp.zeros(room.exponents)
-        sums = jnp.zeros((room.blocks + 1, room.exponents))
-
-        def follow(n: Array, carry: tuple) -> tuple:
-            # Revolutions n < 0 only align the tangent vectors; their growth goes to the extra row of `sums`.
-            lane, ring, tangents, total, doubt, sums = carry
-            lane, *pushed = _advance(strobe, lane, tangents)
-            runs = lane.outcome == 0
-            (tangents, logs), (_, rough) = (
-                orthonormalise(jax.tree.map(lambda t: jnp.where(runs, t, 1.0), each)) for each in pushed
-            )
-            total = total + jnp.where(runs, logs, jnp.nan)
-            doubt = doubt + jnp.where(n < 0, 0.0, logs - rough)
-            row = jnp.where(n < 0, room.blocks, n // lengths.block)
-            sums = jax.lax.dynamic_update_index_in_dim(sums, total, row, 0)
-            total = jnp.where((n + 1) % lengths.block == 0, zero, total)
-            return lane, record(ring, jnp.maximum(n, 0), lane), tangents, total, doubt, sums
-
-        carry = (lane, ring, start_tangents(dim, room.exponents), zero, zero, sums)
-        lane, ring, _, _, doubt, sums = jax.lax.fori_loop(-lengths.align, observed, follow, carry)
-        growth, doubt = sums[:-1] / lengths.block.astype(float), doubt / observed.astype(float)
+    carry = (lane, ring, start_tangents(dim, room.exponents), zero, zero, sums)
+    lane, ring, _, _, doubt, sums = jax.lax.fori_loop(-lengths.align, observed, follow, carry)
+    growth, doubt = sums[:-1] / lengths.block.astype(float), doubt / observed.astype(float)
     strobe_states = jnp.roll(ring, -(observed % room.keep), axis=0)
     return Observation(strobe_states, growth, jnp.stack(lane.y), lane.peak, lane.outcome, lane.error, doubt)

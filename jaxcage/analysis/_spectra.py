@@ -239,10 +239,7 @@ def waterfall(
             method=method,
         )
         outcomes.append(run.outcome)
-        failed = run.outcome != "successful"
-        row = np.full(size, np.nan)
-        if not failed:
-            row = order_spectrum(run, component, window=window).amplitude[:size]
-        rows.append(row)
+        fine = run.outcome == "successful"
+        rows.append(order_spectrum(run, component, window=window).amplitude[:size] if fine else np.full(size, np.nan))
     order = np.arange(size) / revolutions
     return Waterfall(np.asarray(speeds, dtype=float), order, np.stack(rows), tuple(outcomes), window)

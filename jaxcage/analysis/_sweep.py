@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import OUTCOMES
-from ._labels import closing_period, label_lanes, too_few_revolutions
+from ._labels import closing_period, label_lanes, scatter, too_few_revolutions
 from ._transients import Survival, survival
 
 
@@ -95,10 +95,7 @@ class Sweep:
     @property
     def standard_error(self) -> Float[np.ndarray, "speeds starts exponents"]:
         """Standard error of the exponents from the scatter of the blocks, and what the steps add to it."""
-        blocks = self.block_growth.shape[2]
-        if blocks < 2:
-            return np.full(self.exponents.shape, np.inf)
-        return np.hypot(np.std(self.block_growth, axis=2, ddof=1) / np.sqrt(blocks), self.doubt)
+        return np.hypot(scatter(self.block_growth, axis=2), self.doubt)
 
     @property
     def failed(self) -> Shaped[np.ndarray, "speeds starts"]:

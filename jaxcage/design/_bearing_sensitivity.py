@@ -32,11 +32,6 @@ def bearing_measure(name: str) -> tuple[str, ...]:
     return BEARING_MEASURES[name]
 
 
-def unit_of(name: str) -> str:
-    """Of a measure."""
-    return STATISTIC_UNITS[bearing_measure(name)[0]]
-
-
 def bearing_sensitivity(
     model: BearingModel,
     vary: Mapping[str, tuple[float, float]],
@@ -56,8 +51,6 @@ def bearing_sensitivity(
 
     **Raises:** `ValueError` for samples that are no power of 2, a measure that there is not, designs that fail.
     """
-    if samples < 2 or samples & (samples - 1):
-        raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
     space = DesignSpace.of(model, vary)
     objective = BearingObjective(runs, dict.fromkeys(bearing_measure(measure), 1.0))
     halves: list[np.ndarray] = []
@@ -113,13 +106,14 @@ def bearing_budget(found: BearingGradient, measure: str, relative: float) -> Bea
     """
     if not relative >= 0:
         raise ArgumentError("relative", said=f"must be at least 0, but {relative:g} was given.")
-    if missing := [name for name in bearing_measure(measure) if name not in found.statistics]:
+    summed = bearing_measure(measure)
+    if missing := [name for name in summed if name not in found.statistics]:
         raise ArgumentError("found", said=f"must have the statistic {missing[0]}.")
-    parts = [found.statistics[name] for name in bearing_measure(measure)]
+    parts, unit = [found.statistics[name] for name in summed], STATISTIC_UNITS[summed[0]]
     value, names = sum(part.value for part in parts), parts[0].directions
     slope = np.sum([part.by_relative_change for part in parts], axis=0)
     error = np.sum([part.by_relative_change_error for part in parts], axis=0)
     named = lambda row: dict(zip(names, row.tolist(), strict=True))
     elasticity = slope / value if value else np.full(len(names), np.nan)
     deviation = named(relative * np.abs(slope))
-    return BearingBudget(measure, unit_of(measure), value, deviation, named(relative * error), named(elasticity))
+    return BearingBudget(measure, unit, value, deviation, named(relative * error), named(elasticity))

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from scipy.special import expit, ndtri
 
 from .._errors import ArgumentError
+from .._sobol import sobol
 from ..analysis import CHAOS_THRESHOLD
 from ..integrate import AbstractMethod
 from ..sweeps import rpm, sweep_designs
@@ -132,11 +133,7 @@ class ChaosMeasure(AbstractObjective):
 
     def _directions(self, n: int) -> Float[np.ndarray, "pairs n"]:
         """Evenly spread over a normal distribution, the same at every design."""
-        pairs = self.cloud // 2
-        from scipy.stats import qmc  # takes half a second to load
-
-        sample = qmc.Sobol(n, rng=self.seed).random_base2(int(np.ceil(np.log2(pairs))))[:pairs]
-        return ndtri(np.clip(sample, 1e-3, 1 - 1e-3))
+        return ndtri(np.clip(sobol(n, self.cloud // 2, self.seed), 1e-3, 1 - 1e-3))
 
     def _plane(self, around: np.ndarray, found: np.ndarray, drawn: np.ndarray) -> Measured:
         """Value and slope from pairs of opposite designs, with errors by the bootstrap over pairs."""

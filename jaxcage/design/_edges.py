@@ -11,7 +11,7 @@ from .._errors import ArgumentError
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..orbits import Point
-from ._objective import AbstractObjective, DesignSpace, Measured
+from ._objective import AbstractExact, DesignSpace, Measured
 from ._tracked import TrackedEdges
 from ._width import SolvedEdge, ZoneWidth
 
@@ -53,7 +53,7 @@ class FollowedEdges:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class EdgeSum(AbstractObjective):
+class EdgeSum(AbstractExact):
     """A weighted sum of edges [rpm], such as the width between two."""
 
     edges: FollowedEdges
@@ -65,26 +65,18 @@ class EdgeSum(AbstractObjective):
         if missing := [name for name in self.weights if name not in self.edges.names]:
             raise ValueError(f"Edge `{missing[0]}` must be one of {', '.join(self.edges.names)}.")
 
-    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
+    def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Measured:
         weights = np.array([self.weights.get(name, 0.0) for name in self.edges.names])
-        measured = []
-        for place in places:
-            speeds, slopes = self.edges.at(space, place)
-            lost = [name for name, s, w in zip(self.edges.names, speeds, weights, strict=True) if w and np.isnan(s)]
-            here = weights != 0
-            measured.append(
-                Measured(
-                    self.constant + float(weights[here] @ speeds[here]),
-                    0.0,
-                    weights[here] @ slopes[here],
-                    np.zeros(len(space.unknowns)),
-                    f"lost: {', '.join(lost)}" if lost else "ok",
-                )
-            )
-        return measured
-
-    def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
-        return np.array([m.value for m in self.measure(space, places)])
+        speeds, slopes = self.edges.at(space, place)
+        lost = [name for name, s, w in zip(self.edges.names, speeds, weights, strict=True) if w and np.isnan(s)]
+        here = weights != 0
+        return Measured(
+            self.constant + float(weights[here] @ speeds[here]),
+            0.0,
+            weights[here] @ slopes[here],
+            np.zeros(len(space.unknowns)),
+            f"lost: {', '.join(lost)}" if lost else "ok",
+        )
 
 
 @overload
@@ -132,7 +124,7 @@ def _no_edge(known: Iterable[str], zone: int) -> ArgumentError:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class EdgeClearance(AbstractObjective):
+class EdgeClearance(AbstractExact):
     """Distance of operating speeds from the nearest edge [rpm], with its sign turned: small is far away.
 
     The nearest is taken by a soft minimum over edges and speeds, of `softness` [rpm].
@@ -143,19 +135,13 @@ class EdgeClearance(AbstractObjective):
     """Speeds, or the two ends of a range."""
     softness: float = 100.0
 
-    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
-        measured = []
-        for place in places:
-            speeds, slopes = self.edges.at(space, place)
-            lost = [name for name, s in zip(self.edges.names, speeds, strict=True) if np.isnan(s)]
-            apart = speeds[None] - np.asarray(self.operating_rpm, dtype=float)[:, None]
-            nearness = np.exp(-(np.abs(apart) - np.nanmin(np.abs(apart))) / self.softness)
-            total = nearness.sum()
-            value = self.softness * np.log(total) - np.nanmin(np.abs(apart))
-            slope = np.einsum("se,en->n", -nearness / total * np.sign(apart), slopes)
-            status = f"lost: {', '.join(lost)}" if lost else "ok"
-            measured.append(Measured(float(value), 0.0, slope, np.zeros(len(space.unknowns)), status))
-        return measured
-
-    def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
-        return np.array([m.value for m in self.measure(space, places)])
+    def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Measured:
+        speeds, slopes = self.edges.at(space, place)
+        lost = [name for name, s in zip(self.edges.names, speeds, strict=True) if np.isnan(s)]
+        apart = speeds[None] - np.asarray(self.operating_rpm, dtype=float)[:, None]
+        nearness = np.exp(-(np.abs(apart) - np.nanmin(np.abs(apart))) / self.softness)
+        total = nearness.sum()
+        value = self.softness * np.log(total) - np.nanmin(np.abs(apart))
+        slope = np.einsum("se,en->n", -nearness / total * np.sign(apart), slopes)
+        status = f"lost: {', '.join(lost)}" if lost else "ok"
+        return Measured(float(value), 0.0, slope, np.zeros(len(space.unknowns)), status)

@@ -166,7 +166,7 @@ def fit_edges(
     solution = optx.least_squares(residuals, solver, z0, max_steps=max_steps, throw=False)
     place = np.asarray(jax.nn.sigmoid(solution.value))
     converged = bool(solution.result == optx.RESULTS.successful)
-    return _report(systems, unknowns, measured, tracked, place, converged)
+    return _report(tracked, measured, place, converged)
 
 
 def _check(
@@ -193,15 +193,8 @@ def _check(
             raise ValueError(f"Start of `{u.name}` must lie between {u.lower} and {u.upper}, but {given} was given.")
 
 
-def _report(
-    systems: Mapping[str, AbstractForcedSystem],
-    unknowns: Sequence[Unknown],
-    measured: Sequence[MeasuredEdge],
-    tracked: TrackedEdges,
-    place: np.ndarray,
-    converged: bool,
-) -> Fit:
-    found = tracked(place)
+def _report(tracked: TrackedEdges, measured: Sequence[MeasuredEdge], place: np.ndarray, converged: bool) -> Fit:
+    found, unknowns = tracked(place), tracked.unknowns
     sigma = np.array([e.uncertainty_rpm for e in measured])
     unit = np.array([u.span if u.scale == "log" else 1.0 for u in unknowns])
     rows = np.nan_to_num(found.slope) / sigma[:, None]
@@ -225,7 +218,7 @@ def _report(
         chi_square=float(np.sum(off**2)),
         solves=tracked.solves,
         status="an edge is lost" if lost else "converged" if converged else "not converged",
-        models=with_values(systems, unknowns, place),
+        models=with_values(tracked.systems, unknowns, place),
     )
 
 

@@ -1,5 +1,7 @@
 """What a search saw as its best, chosen anew by a finer objective."""
 
+import dataclasses
+
 import numpy as np
 
 from ._objective import AbstractObjective
@@ -31,13 +33,10 @@ def judged(found: Optimised[Design], objective: AbstractObjective, among: int = 
     values = objective.values(space, np.array([own, *(s.place for steps in picked for s in steps)]))
     nothing = (np.nan,) * own.size
     itself = Step(tuple(own.tolist()), float(values[0]), np.nan, nothing, nothing)
-    optima, first = [], 1
+    optima, others = [], iter(values[1:].tolist())
     for o, steps in zip(found.optima, picked, strict=True):
-        of = [itself]
-        for step, value in zip(steps, values[first:], strict=False):
-            of.append(Step(step.place, float(value), np.nan, step.slope, step.slope_error))
-        first += len(steps)
-        best = min(of, key=lambda s: np.nan_to_num(s.value, nan=np.inf))
+        finer = [dataclasses.replace(s, value=x, error=np.nan) for s, x in zip(steps, others, strict=False)]
+        best = min([itself, *finer], key=lambda s: np.nan_to_num(s.value, nan=np.inf))
         optima.append(ended_at(space, best, o.history, "nothing better found" if best is itself else o.status))
     return Optimised.of(space, optima), float(values[0])
 

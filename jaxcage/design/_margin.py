@@ -9,11 +9,11 @@ from scipy.special import logsumexp, softmax
 from .._errors import ArgumentError
 from ..integrate import AbstractMethod
 from ..orbits import LeadingMultiplier, leading_multiplier
-from ._objective import AbstractObjective, DesignSpace, Measured
+from ._objective import AbstractExact, DesignSpace, Measured
 
 
 @dataclasses.dataclass(eq=False)
-class StabilityMargin(AbstractObjective):
+class StabilityMargin(AbstractExact):
     """The largest |multiplier| of the synchronous orbit over a speed range, less 1: below 0 it is stable throughout.
 
     It is defined, and has a slope, whether the orbit is stable or not, and so guides a design also where a zone is
@@ -34,12 +34,6 @@ class StabilityMargin(AbstractObjective):
             raise ArgumentError("guesses", said=f"must hold a state for each speed, but there are {given}.")
         self._known: dict[bytes, tuple[np.ndarray, list[LeadingMultiplier]]] = {}
 
-    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
-        return [self._measure(space, place) for place in places]
-
-    def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
-        return np.array([m.value for m in self.measure(space, places)])
-
     def multipliers(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> list[LeadingMultiplier]:
         """At each speed."""
         key = place.tobytes()
@@ -57,7 +51,7 @@ class StabilityMargin(AbstractObjective):
             self._known[key] = (place.copy(), found)
         return self._known[key][1]
 
-    def _measure(self, space: DesignSpace, place: np.ndarray) -> Measured:
+    def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Measured:
         found, zero = self.multipliers(space, place), np.zeros(len(space.unknowns))
         size = np.array([m.size for m in found])
         if not np.all(np.isfinite(size)):

@@ -101,6 +101,20 @@ class AbstractObjective(abc.ABC):
         return _Sum(((-1.0, self),))
 
 
+class AbstractExact(AbstractObjective):
+    """An objective that is had from one design after the other, its value and slope together."""
+
+    @abc.abstractmethod
+    def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Measured:
+        """Value and slope at a place."""
+
+    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
+        return [self.at(space, place) for place in places]
+
+    def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
+        return np.array([self.at(space, place).value for place in places])
+
+
 @dataclasses.dataclass(frozen=True)
 class _Sum(AbstractObjective):
     """Weighted objectives; their errors are taken as independent."""

@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
+from .._sobol import sobol
 from ._kept import KeptSearch
 from ._objective import AbstractObjective, DesignSpace, Measured
 from ._unknowns import Design
@@ -165,7 +166,7 @@ def optimise(
     space = DesignSpace.of(system, vary)
     chosen = optax.adam(optax.cosine_decay_schedule(0.5, max(steps, 1), 0.1)) if optimiser is None else optimiser
     first = first_places(space, objective, starts, scouts, seed)
-    z = _unbounded(first)
+    z = np.log(first / (1 - first))
     with jax.numpy_dtype_promotion("standard"):  # optax mixes steps and numbers
         state = jax.vmap(chosen.init)(jnp.asarray(z))
     history: list[list[Step]] = [[] for _ in first]
@@ -217,17 +218,11 @@ def first_places(
     if scouts and scouts < starts - 1:
         raise ArgumentError("scouts", said=f"must be 0 or at least {starts - 1}, but {scouts} was given.")
     count = max(scouts, starts - 1)
-    from scipy.stats import qmc  # takes half a second to load
-
-    drawn = qmc.Sobol(len(own), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
+    drawn = sobol(len(own), max(count, 2), seed)[:count]
     if scouts and starts > 1:
         drawn = drawn[np.argsort(objective.values(space, drawn), kind="stable")]  # NaN comes last
     drawn = drawn[: starts - 1]
     return np.clip(np.vstack([own, drawn]), INSIDE, 1 - INSIDE)
-
-
-def _unbounded(place: np.ndarray) -> np.ndarray:
-    return np.log(place / (1 - place))
 
 
 def _step(place: np.ndarray, measured: Measured) -> Step:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._errors import ArgumentError, InputError
+from .._sobol import sobol
 from ._objective import AbstractObjective, DesignSpace, Measured
 
 
@@ -52,21 +53,14 @@ class Robust(AbstractObjective):
         """Made over nominal value of each parameter that varies."""
         if missing := [name for name in self.scatter if name not in space.names]:
             raise InputError(f"Scatter of `{missing[0]}` must be of one of {', '.join(space.names)}.")
-        from scipy.stats import qmc  # takes half a second to load
-
-        sample = qmc.Sobol(len(space.names), rng=self.seed).random_base2(int(np.ceil(np.log2(self.draws))))
+        sample = sobol(len(space.names), self.draws, self.seed)
         drawn = [self.scatter[n](q) if n in self.scatter else np.ones_like(q) for n, q in zip(space.names, sample.T)]
-        return np.array(drawn).T[: self.draws]
+        return np.array(drawn).T
 
     def made(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Float[np.ndarray, "draws n"]:
         """Places of the made designs; beyond the bounds too."""
-        nominal = space.values(place)
-        return np.array(
-            [
-                [u.place(f * nominal[u.name]) for u, f in zip(space.unknowns, row, strict=True)]
-                for row in self.factors(space)
-            ]
-        )
+        made = self.factors(space) * list(space.values(place).values())
+        return np.array([[u.place(x) for u, x in zip(space.unknowns, row, strict=True)] for row in made])
 
     def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
         made = [self.made(space, np.asarray(place)) for place in places]
@@ -77,12 +71,7 @@ class Robust(AbstractObjective):
     def _over(self, space: DesignSpace, rows: list[Measured]) -> Measured:
         value, error = np.array([m.value for m in rows]), np.array([m.error for m in rows])
         counted = np.argsort(-np.nan_to_num(value, nan=np.inf))[: max(1, round(self.worst * len(rows)))]
-        move = np.array(
-            [
-                [f if u.scale == "linear" else 1.0 for u, f in zip(space.unknowns, row, strict=True)]
-                for row in self.factors(space)
-            ]
-        )
+        move = np.where([u.scale == "linear" for u in space.unknowns], self.factors(space), 1.0)
         slope = np.array([m.slope for m in rows]) * move
         doubt = np.array([m.slope_error for m in rows]) * move
         k = len(counted)

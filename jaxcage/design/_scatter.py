@@ -88,8 +88,6 @@ def global_sensitivity(
     **Raises:** `ValueError` for samples that are no power of 2, or an objective that could not be had somewhere.
     """
     space = DesignSpace.of(system, vary)
-    if samples < 2 or samples & (samples - 1):
-        raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
 
     def evaluate(x: np.ndarray) -> np.ndarray:
         found = np.array(objective.values(space, x.T))
@@ -106,7 +104,12 @@ def sobol_of(
     evaluate: Callable[[np.ndarray], np.ndarray], names: Sequence[str], *, samples: int, seed: int = 0
 ) -> SobolIndices:
     """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values; all of
-    them 0 if it does not vary."""
+    them 0 if it does not vary.
+
+    **Raises:** `ValueError` for samples that are no power of 2.
+    """
+    if samples < 2 or samples & (samples - 1):
+        raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
     from scipy.stats import DegenerateDataWarning, sobol_indices, uniform  # takes half a second to load
 
     values: list[np.ndarray] = []

@@ -56,15 +56,10 @@ class Candidate:
 class _Target:
     """What one case should do at the speeds of the grid."""
 
-    measured: tuple[MeasuredEdge, ...]
+    measured: Sequence[MeasuredEdge]
     chaotic: np.ndarray
     width: np.ndarray
     """Relative width of the speeds' cells, d log(speed)."""
-    edges: int
-
-    @classmethod
-    def of(cls, edges: Sequence[MeasuredEdge], rpm: np.ndarray) -> "_Target":
-        return cls(tuple(edges), inside_zones(edges, rpm), np.gradient(np.log(rpm)), len(edges))
 
     def wrong(self, found: Sweep, by: str) -> float:
         """How far a sweep is from what was measured."""
@@ -94,7 +89,7 @@ class _Target:
         chaos = (lasted * np.clip((exponent - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1)).max(axis=1)
         chaos = np.where(np.isfinite(chaos), chaos, 1.0 - self.chaotic)
         changes = np.sum(np.abs(np.diff(chaos))) - np.sum(np.abs(np.diff(self.chaotic.astype(float))))
-        return float(self.width @ np.abs(self.chaotic - chaos) / self.edges + NEEDLESS * max(changes, 0.0))
+        return float(self.width @ np.abs(self.chaotic - chaos) / len(self.measured) + NEEDLESS * max(changes, 0.0))
 
 
 def screen(
@@ -148,7 +143,8 @@ def screen(
     edges = {case: of_case(measured, case) for case in systems}
     if empty := [case for case, own in edges.items() if not own]:
         raise ArgumentError("measured", said=f"must hold an edge of every case, but none of {', '.join(empty)}.")
-    targets = {case: _Target.of(own, rpm) for case, own in edges.items()}
+    width = np.gradient(np.log(rpm))
+    targets = {case: _Target(own, inside_zones(own, rpm), width) for case, own in edges.items()}
     tried: list[Candidate] = []
 
     def scores(places: Float[np.ndarray, "designs unknowns"]) -> np.ndarray:

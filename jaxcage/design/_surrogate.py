@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._sobol import sobol
 from ._kept import KeptSearch
 from ._objective import AbstractObjective, DesignSpace
 from ._optimise import Optimised, Step, first_places, optimum_of
@@ -75,9 +76,8 @@ def surrogate_search(
     space = DesignSpace.of(system, vary)
     first = first_places(space, objective, starts, scouts, seed)
     searches = [SurrogateSearch(place, batch, (seed, i)) for i, place in enumerate(first)]
-    kept = None
-    if keep is not None:
-        kept = KeptSearch(keep, space, batches=batches, batch=batch, seed=seed, first=first.tolist())
+    about = {"batches": batches, "batch": batch, "seed": seed, "first": first.tolist()}
+    kept = None if keep is None else KeptSearch(keep, space, **about)
     known = None if kept is None else kept.load()
     told = [] if known is None else list(zip(known["places"], known["values"], strict=True))
     for number in range(batches):
@@ -97,12 +97,10 @@ class SurrogateSearch:
     """One search, asked for places and told what was found there; what it asks for follows from what it was told."""
 
     def __init__(self, start: Float[np.ndarray, " n"], batch: int, seed: tuple[int, ...]):
-        from scipy.stats import qmc  # takes half a second to load
-
         n = len(start)
         self.seed, self.batch = seed, batch
         spread = -(-(2 * n + 4) // batch) * batch
-        self.first = qmc.Sobol(n, rng=np.random.default_rng(seed)).random_base2(int(np.ceil(np.log2(spread))))[:spread]
+        self.first = sobol(n, spread, np.random.default_rng(seed))
         self.first[0] = start
         self.places, self.values = np.empty((0, n)), np.empty(0)
         self.region, self.luck = FIRST, 0
@@ -128,7 +126,7 @@ class SurrogateSearch:
     def _candidates(self, lengths: Float[np.ndarray, " n"], rng: np.random.Generator) -> Places:
         """Places in the region, wide in parameters that do little; half of their parameters are as in the best design,
         which is in its middle."""
-        from scipy.stats import qmc
+        from scipy.stats import qmc  # takes half a second to load
 
         middle = self.places[int(np.argmin(_known(self.values)))]
         half = 0.5 * self.region * np.clip(lengths / np.exp(np.mean(np.log(lengths))), 0.3, 3.0)

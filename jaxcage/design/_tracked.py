@@ -71,11 +71,8 @@ class TrackedEdges:
         """The edges at `place`, followed from the nearest place at which all were found."""
         place = np.asarray(place, dtype=float)
         key = place.tobytes()
-        if key not in self._known:
-            self._known[key] = self._go(place)
-        return self._known[key]
-
-    def _go(self, place: np.ndarray) -> Edges:
+        if key in self._known:
+            return self._known[key]
         near = min(self._anchors, key=lambda a: float(np.sum((a.place - place) ** 2)))
         follow = lambda case, last, slope: self._follow(case, last, slope, near.place, place, HALVINGS)
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:  # an edge keeps one core busy
@@ -91,6 +88,7 @@ class TrackedEdges:
                 for now, s in zip(near.last, found, strict=True)
             ]
             self._anchors.append(_Anchor(place, last, edges.slope))
+        self._known[key] = edges
         return edges
 
     def _follow(

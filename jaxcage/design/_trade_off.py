@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
+from .._sobol import sobol
 from ..models import AbstractForcedSystem
 from ._objective import AbstractObjective, DesignSpace
 
@@ -61,10 +62,8 @@ def trade_off(
     """
     if not objectives:
         raise ArgumentError("objectives", said="must hold at least one, but it is empty.")
-    from scipy.stats import qmc  # takes half a second to load
-
     space = DesignSpace.of(system, vary)
-    points = qmc.Sobol(len(space.names), rng=seed).random_base2(int(np.ceil(np.log2(designs))))[:designs]
+    points = sobol(len(space.names), designs, seed)
     places = points if beside is None else np.vstack([points, beside])
     values = np.column_stack([objective.values(space, places) for objective in objectives.values()])
     return TradeOff(tuple(objectives), space, places, values)

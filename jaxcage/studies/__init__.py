@@ -23,6 +23,7 @@
 """
 
 from .._arguments import check_layer
+from .._sobol import sobol as sobol
 from ._adaptive import (
     UNKNOWN as UNKNOWN,
     AdaptiveGrid as AdaptiveGrid,
@@ -46,7 +47,6 @@ from ._ensemble import (
     chaotic_shares as chaotic_shares,
     draw as draw,
     ensemble as ensemble,
-    sobol as sobol,
     verdict_of as verdict_of,
 )
 from ._identify import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow

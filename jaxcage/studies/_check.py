@@ -42,18 +42,21 @@ def about_store(path: Path) -> dict[str, Any]:
                 f"The store '{path}' is of format {about.get('format')}, and this version of jaxcage reads {FORMAT}."
             )
         return about
-    try:
-        attributes = json.loads(read_bytes(path / "zarr.json"))["attributes"]
-        if "fingerprint" in attributes and "store_format" not in attributes:
-            raise OldStore(path)
-        ours = "store_format" in attributes
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        if isinstance(error, OldStore):
-            raise
-        ours = (path / ABOUT).parent.is_dir()
-    if ours:
+    attributes = attributes_of(path)
+    if attributes is not None and "fingerprint" in attributes and "store_format" not in attributes:
+        raise OldStore(path)
+    if (path / ABOUT).parent.is_dir() if attributes is None else "store_format" in attributes:
         raise DamagedStore(path, ABOUT)
     raise FileNotFoundError(f"There is no study at '{path}'.")
+
+
+def attributes_of(path: Path) -> dict[str, Any] | None:
+    """Attributes of a store; None if they cannot be read."""
+    try:
+        attributes = dict(json.loads(read_bytes(path / "zarr.json"))["attributes"])
+        return attributes | {"study": json.loads(attributes.get("study", "{}"))}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -67,7 +67,7 @@ def _write(path: Path, study: AbstractStudy) -> None:
             dtype=variable.kind,
             fill_value=np.nan if variable.kind == "float64" else PENDING,
             compressors=compressors(),
-            dimension_names=_dims(study, variable),
+            dimension_names=(*plan.axes, *variable.within),
             attributes=_words(variable),
         )
     group.create_group(FOLDER, attributes={"long_name": "digests of what is finished, by jaxcage.studies.check_study"})
@@ -84,10 +84,6 @@ def _write(path: Path, study: AbstractStudy) -> None:
     write_entry(path / ABOUT, about)
 
 
-def _dims(study: AbstractStudy, variable: Variable) -> tuple[str, ...]:
-    return (*study.plan.axes, *variable.within)
-
-
 def _words(variable: Variable) -> dict[str, Any]:
     words: dict[str, Any] = {"long_name": variable.text, "units": variable.unit}
     if not variable.names:
@@ -97,7 +93,7 @@ def _words(variable: Variable) -> dict[str, Any]:
 
 
 def _coordinates(study: AbstractStudy) -> dict[str, Any]:
-    plan, info = study.plan, parameter_info(study.subject)
+    plan, info = study.plan, parameter_info(study.system)
 
     def words(name: str) -> dict[str, str]:
         if name == OIL:

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
+from .._sobol import sobol
 from ..analysis import Sweep, zones
 from ..integrate import AbstractMethod, controlled
 from ..io import Unknown, check_together
@@ -209,7 +210,7 @@ def ensemble(
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
     place = sobol(len(unknowns), draws, seed)
-    found = _run(draw(model, unknowns, place), speeds, discard, revolutions, blocks, method, progress)
+    found = run_draws(draw(model, unknowns, place), speeds, method, progress, discard, revolutions, blocks)
     info = parameter_info(model)
     return Ensemble(
         tuple(unknowns),
@@ -225,14 +226,14 @@ def ensemble(
     )
 
 
-def _run(
+def run_draws(
     models: Sequence[CageModel],
     speeds: Float[np.ndarray, " speeds"],
-    discard: int,
-    revolutions: int,
-    blocks: int,
     method: AbstractMethod | None,
     progress: Progress | None,
+    discard: int = REVOLUTIONS,
+    revolutions: int = REVOLUTIONS,
+    blocks: int = 20,
 ) -> list[Sweep]:
     """Every design once at every speed, from its own conventional start: where the cage of one rests on its rib, that
     of another with an earlier contact would be pressed into it, and be shot off."""
@@ -264,17 +265,9 @@ def chaotic_shares(
     """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
     flat = place.reshape(len(unknowns), -1)
     models = draw(model, unknowns, flat.T)
-    found = _run(models, speeds, REVOLUTIONS, REVOLUTIONS, 20, method, progress)
+    found = run_draws(models, speeds, method, progress)
     shares = [float(np.nanmean(s.chaotic_share)) if not np.all(s.failed) else 0.0 for s in found]
     return np.array(shares).reshape(1, *place.shape[1:])
-
-
-def sobol(unknowns: int, draws: int, seed: int) -> Float[np.ndarray, "draws unknowns"]:
-    """Scrambled Sobol points."""
-    from scipy.stats import qmc
-
-    log2 = int(np.ceil(np.log2(draws)))
-    return qmc.Sobol(unknowns, rng=seed).random_base2(log2)[:draws]
 
 
 def _bands(found: Sequence[Sweep]) -> list[Band]:

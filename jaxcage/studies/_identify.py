@@ -15,11 +15,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod, controlled
+from .._sobol import sobol
+from ..integrate import AbstractMethod
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
-from ..sweeps import Progress, motions, sweep_designs
-from ._ensemble import ERROR, REVOLUTIONS, SETTLED, draw, sobol
+from ..sweeps import Progress, motions
+from ._ensemble import ERROR, draw, run_draws
 
 
 DRAWS = 128
@@ -108,7 +109,8 @@ def narrow(
         far_off = np.mean(_counted(missed), axis=1)
         enough = met.sum() >= KEPT * draws
         last = enough or stage == stages
-        chosen = met if last and (enough or met.sum() >= FEW) else far_off <= np.sort(far_off)[_quarter(draws)]
+        worst_kept = np.sort(far_off)[math.ceil(KEPT * draws) - 1]
+        chosen = met if last and (enough or met.sum() >= FEW) else far_off <= worst_kept
         lower, upper = _closed(place[chosen], lower, upper)
         if last:
             best = missed[np.argmin(far_off)]
@@ -119,10 +121,6 @@ def narrow(
 def _counted(missed: np.ndarray) -> np.ndarray:
     """How much a miss counts: itself where it is small, and never more than `FAR`."""
     return FAR * (1 - 1 / (1 + missed / FAR))
-
-
-def _quarter(draws: int) -> int:
-    return math.ceil(KEPT * draws) - 1
 
 
 def _closed(place: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -168,20 +166,7 @@ def misses(
     right (0) or wrong (as far as anything counts)."""
     models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
-    found = sweep_designs(
-        models,
-        rpm * np.pi / 30,
-        starts=1,
-        discard=REVOLUTIONS,
-        revolutions=REVOLUTIONS,
-        confirm=False,
-        horizon=0,
-        blocks=20,
-        keep=32,
-        settled=SETTLED,
-        method=controlled(ERROR) if method is None else method,
-        progress=progress,
-    )
+    found = run_draws(models, rpm * np.pi / 30, method, progress)
     needed = any(m.quantity in ("orbit size", "whirl frequency") for m in measured)
     moved = motions(models, found, error=ERROR) if needed else []
     columns = []

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .._errors import ArgumentError
+from .._sobol import sobol
 from ._vary import Spread
 
 
@@ -91,10 +92,7 @@ class Plan:
         """The samples [SI]: scrambled Sobol points, taken through the distribution of each parameter."""
         if not self.sampled:
             return {}
-        from scipy.stats import qmc  # takes half a second to load
-
-        power = max(0, math.ceil(math.log2(self.samples)))
-        places = qmc.Sobol(len(self.sampled), rng=self.seed).random_base2(power)[: self.samples]
+        places = sobol(len(self.sampled), self.samples, self.seed)
         return {name: spread.at(places[:, i]) for i, (name, spread) in enumerate(self.sampled.items())}
 
     @functools.cached_property

@@ -1,6 +1,6 @@
 """Runs a study: chunk after chunk of its lanes into a store, in this process or on a cluster, from where it stopped."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -15,7 +15,7 @@ from ..models.whole import CAGE_STARTS
 from ..sweeps import Progress
 from ._plan import LANES, Plan
 from ._store import Store, open_study
-from ._stored import AbstractStudy, Results
+from ._stored import AbstractStudy
 from ._study import Study
 from ._vary import Spread
 from ._whole_study import WHOLE_LANES, WHOLE_TOLERANCE, BearingStudy
@@ -81,8 +81,13 @@ def study(
     without dask.
     """
     require_x64()
-    plan = make_study_plan(system, vary, samples, seed, starts, lanes)
-    if isinstance(system, BearingModel):
+    whole = isinstance(system, BearingModel)
+    sampled: dict[str, Spread] = {name: how for name, how in vary.items() if isinstance(how, Spread)}
+    grid = {name: np.asarray(x, dtype=float) for name, x in vary.items() if name not in sampled}
+    own = len(CAGE_STARTS if whole else system.starts(1.0)) if starts is None else starts
+    most = (WHOLE_LANES if whole else LANES) if lanes is None else lanes
+    plan = Plan(grid, sampled, samples, seed, own, most)
+    if whole:
         if strobe or method is not None:
             raise ArgumentError("strobe", "method", said="must be left out for a whole bearing.")
         error = WHOLE_TOLERANCE if tolerance is None else tolerance
@@ -94,23 +99,6 @@ def study(
         about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)
     run_study(about, store, shard, executor, scheduler, workers, progress)
     return open_study(store)
-
-
-def make_study_plan(
-    system: AbstractForcedSystem | BearingModel,
-    vary: Vary,
-    samples: int,
-    seed: int,
-    starts: int | None,
-    lanes: int | None,
-) -> Plan:
-    """The plan that the arguments of `study` describe."""
-    sampled: dict[str, Spread] = {name: how for name, how in vary.items() if isinstance(how, Spread)}
-    grid = {name: np.asarray(x, dtype=float) for name, x in vary.items() if name not in sampled}
-    whole = isinstance(system, BearingModel)
-    own = len(CAGE_STARTS if whole else system.starts(1.0)) if starts is None else starts
-    most = (WHOLE_LANES if whole else LANES) if lanes is None else lanes
-    return Plan(grid, sampled, samples, seed, own, most)
 
 
 def run_study(
@@ -128,12 +116,6 @@ def run_study(
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
     if executor not in ("local", "dask"):
         raise ArgumentError("executor", said=f"must be local or dask, but {executor!r} was given.")
-    if executor == "dask":
-        from ._dask import chunks_on_dask as computed  # needs an extra
-
-        compute = lambda chunks: computed(about, chunks, scheduler, workers)
-    else:
-        compute = lambda chunks: _chunks_here(about, chunks)
     store = Store(path, about)
     part = range(about.plan.chunks)[i - 1 :: n]
     mine, pending = set(part), store.pending(part)
@@ -141,7 +123,13 @@ def run_study(
     done, total = sum(size[c] for c in mine - set(pending)), sum(size.values())
     report = progress or (lambda done, total: None)
     report(done, total)
-    for chunk, results in compute(pending):
+    if executor == "dask":
+        from ._dask import chunks_on_dask  # needs an extra
+
+        computed = chunks_on_dask(about, pending, scheduler, workers)
+    else:
+        computed = ((chunk, about.chunk(chunk)) for chunk in pending)
+    for chunk, results in computed:
         store.write(chunk, results)
         done += size[chunk]
         report(done, total)
@@ -150,8 +138,3 @@ def run_study(
         raise RuntimeError(f"{len(left & mine)} of {len(mine)} chunks did not come back.")
     if not left:
         store.tidy()
-
-
-def _chunks_here(about: AbstractStudy, chunks: Iterable[int]) -> Iterator[tuple[int, Results]]:
-    for chunk in chunks:
-        yield chunk, about.chunk(chunk)

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._errors import ArgumentError
-from ..io import read_bytes
-from ._check import DamagedStore, OldStore, about_store
+from ._check import DamagedStore, OldStore, about_store, attributes_of
 from ._empty import create, mend
 from ._manifest import damage, damaged_metadata, entry_of, make_way, read_entry, write_entry
 from ._stored import AbstractStudy, Results
@@ -143,12 +142,12 @@ def _same(path: Path, study: AbstractStudy) -> Mapping[str, Any]:
     except OldStore as error:
         raise OtherStudy("store", said=f"{refused} {error}") from error
     except (FileNotFoundError, DamagedStore) as error:
-        about, theirs = None, _claimed(path, study)
+        about, theirs = None, _claimed(path)
         if theirs is None:
             raise OtherStudy("store", said=f"{refused} '{path}' is neither.") from error
     if theirs != study.fingerprint:
         described = json.loads(json.dumps(study.describe()))
-        different = _differences(_attributes_of(path).get("study"), described)
+        different = _differences((attributes_of(path) or {}).get("study"), described)
         several = [name for name in different if name not in ("model", "integration")] or different
         what = ", ".join(several) or "its lanes"
         other = f"'{path}' holds another study, which differs in {what}: choose another folder."
@@ -159,21 +158,12 @@ def _same(path: Path, study: AbstractStudy) -> Mapping[str, Any]:
     return about
 
 
-def _claimed(path: Path, study: AbstractStudy) -> str | None:
+def _claimed(path: Path) -> str | None:
     """Whose study a store without a manifest is, by its attributes or any chunk that is left."""
-    found = _attributes_of(path).get("fingerprint")
+    found = (attributes_of(path) or {}).get("fingerprint")
     chunks = (path / "manifest" / "chunks").glob("*")
     entries = (read_entry(each) for each in chunks)
     return found or next((e["fingerprint"] for e in entries if e and "fingerprint" in e), None)
-
-
-def _attributes_of(path: Path) -> dict[str, Any]:
-    """Attributes of a store, as far as they can be read."""
-    try:
-        attributes = json.loads(read_bytes(path / "zarr.json"))["attributes"]
-        return attributes | {"study": json.loads(attributes.get("study", "{}"))}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return {}
 
 
 def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:

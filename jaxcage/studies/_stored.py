@@ -8,7 +8,6 @@ import json
 from importlib.metadata import version
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 
 from ._fingerprint import fingerprint, package_digest, platform_traits
@@ -41,16 +40,13 @@ class Variable:
 class AbstractStudy(abc.ABC):
     """Lanes over any parameters, and what to compute in each of them."""
 
+    system: Any
+    """What has the parameters that are varied."""
     plan: Plan
     discard: int
     revolutions: int
     speed_text: str = "cage speed"
     """In words."""
-
-    @property
-    @abc.abstractmethod
-    def subject(self) -> eqx.Module:
-        """What has the parameters that are varied."""
 
     @property
     @abc.abstractmethod

@@ -74,11 +74,6 @@ class Study(AbstractStudy):
         return make_plan(self.discard, self.revolutions, self.blocks, keep, self.exponents, self.system.dimension)
 
     @property
-    def subject(self) -> AbstractForcedSystem:
-        """The system."""
-        return self.system
-
-    @property
     def law(self) -> dict[str, Any]:
         """System and method."""
         return {"model": self.system, "integration": self.method}

@@ -54,11 +54,6 @@ class BearingStudy(AbstractStudy):
         require_bearings([self.system], self.plan.starts, self.discard, self.revolutions, self.blocks, self.exponents)
 
     @property
-    def subject(self) -> BearingModel:
-        """The bearing."""
-        return self.system
-
-    @property
     def law(self) -> dict[str, Any]:
         """The bearing."""
         return {"model": self.system}
