@@ -88,13 +88,14 @@ def parameter(
 ) -> Any:
     """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
 
-    `kind` says who knows it, `within` in which range an unknown one lies, `source` what to measure.
+    `kind` says who knows it, `within` in which range one lies that is unknown, `source` what to measure.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    info = ParameterInfo(unit, lower, upper, text, kind, within, source or SOURCES[kind])
+    who: Kind = "unknown" if within else kind
+    info = ParameterInfo(unit, lower, upper, text, who, within, source or SOURCES[who])
     return eqx.field(converter=functools.partial(_leaf_of, info), metadata={"parameter": info}, **kwargs)
 
 
