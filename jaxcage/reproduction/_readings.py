@@ -122,11 +122,10 @@ def try_readings(
         read = reading.model(models[reading.case])
         ratio = reading.cage_per_printed(read)
         grid = ratio * rpm(*ZONE_RANGE_RPM, speeds)
-        starts = [tuple(float(c) for c in read.starts(float(grid[0]))[0])] if reading.first_start_only else None
         found = sweep(
             read,
             grid,
-            starts=starts,
+            starts=1 if reading.first_start_only else None,
             discard=discard,
             revolutions=revolutions,
             confirm=reading.confirm,

@@ -84,18 +84,17 @@ def run_all(
     observed = section_revolutions - SECTION_REVOLUTIONS[0]
     blocks = max(n for n in range(1, 21) if observed % n == 0)
     omega = np.array([rpm(SECTION_RPM)])
-    first = [tuple(float(c) for c in model.starts(float(omega[0]))[0]) for model in models.values()]
     sections = {
         name: sweep_designs(
             [model],
             omega,
-            starts=[start],
+            starts=1,
             discard=SECTION_REVOLUTIONS[0],
             revolutions=observed,
             blocks=blocks,
             keep=observed,
         )[0]
-        for (name, model), start in zip(models.items(), first, strict=True)
+        for name, model in models.items()
     }
     return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections, diagrams)
 
