@@ -312,9 +312,8 @@ def replace(module: M, **values: PyTree) -> M:
             _require_range(name, value, fields[leaves[name]].metadata["parameter"])
     if exchanged := {name: values[name] for name in parts if name in values}:
         module = _with_parts(module, exchanged)
-    changed = [name for name in leaves if name in values and name not in parts]
-    if changed:
-        module = with_values(module, {name: values[name] for name in changed})
+    if changed := {name: values[name] for name in leaves if name in values and name not in parts}:
+        module = with_values(module, changed)
     # Last, and those of the module itself at once: what is checked is what was asked for, and not a half of it.
     own = {name: values[name] for name, path in choices.items() if name in values and len(path) == 1}
     module = dataclasses.replace(module, **own) if own else _checked(module)
