@@ -97,7 +97,6 @@ class LandContact(eqx.Module):
         1e-12,
         1e-5,
         "half width over which contact sets in and film coefficients saturate",
-        kind="fixed",
         default=2e-7,
     )
 

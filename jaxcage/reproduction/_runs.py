@@ -18,7 +18,6 @@ from ._observer import OBSERVERS, Observer, observed_zones
 SECTION_RPM = 8500.0
 SECTION_REVOLUTIONS = (4, 4000)
 """Fig. 9: strobe points from the first to the second of these revolutions."""
-Report = Callable[[str, int, int], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +51,7 @@ def run_all(
     section_revolutions: int = SECTION_REVOLUTIONS[1],
     orbits: bool = True,
     observers: Sequence[Observer] = OBSERVERS,
-    report: Report | None = None,
+    report: Callable[[str, int, int], None] | None = None,
 ) -> Runs:
     """Sweep every case over the published range from three starts, find its synchronous orbits, read its diagrams as
     the paper may have done, and run fig. 9."""
