@@ -85,9 +85,7 @@ def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
             raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
 
 
-@functools.lru_cache(maxsize=1024)
-def _signature(f: Callable[..., Any]) -> inspect.Signature:
-    return inspect.signature(f)
+_signature = functools.lru_cache(maxsize=1024)(inspect.signature)
 
 
 def options(annotation: Any) -> tuple[Any, ...]:

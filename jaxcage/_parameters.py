@@ -88,13 +88,14 @@ def parameter(
 ) -> Any:
     """A differentiable leaf of a module, with `unit` (SI) and the closed range `[lower, upper]` users may give.
 
-    `kind` says who knows it, `within` in which range an unknown one lies, `source` what to measure.
+    `kind` says who knows it, `within` in which range one lies that is unknown, `source` what to measure.
 
     **Raises:** `ValueError` for a unit that is not made of 1, rad, K, kg, m, s, N, Pa.
     """
     if unit != UNKNOWN:
         unit_dimensions(unit)
-    info = ParameterInfo(unit, lower, upper, text, kind, within, source or SOURCES[kind])
+    who: Kind = "unknown" if within else kind
+    info = ParameterInfo(unit, lower, upper, text, who, within, source or SOURCES[who])
     return eqx.field(converter=functools.partial(_leaf_of, info), metadata={"parameter": info}, **kwargs)
 
 
@@ -311,9 +312,8 @@ def replace(module: M, **values: PyTree) -> M:
             _require_range(name, value, fields[leaves[name]].metadata["parameter"])
     if exchanged := {name: values[name] for name in parts if name in values}:
         module = _with_parts(module, exchanged)
-    changed = [name for name in leaves if name in values and name not in parts]
-    if changed:
-        module = with_values(module, {name: values[name] for name in changed})
+    if changed := {name: values[name] for name in leaves if name in values and name not in parts}:
+        module = with_values(module, changed)
     # Last, and those of the module itself at once: what is checked is what was asked for, and not a half of it.
     own = {name: values[name] for name, path in choices.items() if name in values and len(path) == 1}
     module = dataclasses.replace(module, **own) if own else _checked(module)

@@ -117,16 +117,12 @@ class _LoadCase(eqx.Module):
         play = self.bearing.radial_clearance / 2 + self.seat
         return (excess + play) / jnp.max(self.cosines)
 
-    def approaches(self, excess: Array) -> Array:
-        """delta_s cos(psi) - G_r/2 of every roller [m], without cancellation at the nearest one."""
+    def raceway_loads(self, excess: Array) -> tuple[Array, Array]:
+        """Q_i and Q_o of every roller [N], by delta_s cos(psi) - G_r/2 without cancellation at the nearest one."""
+        stiffness = self.bearing.raceway_stiffness
         ratio = self.cosines / jnp.max(self.cosines)
         play = self.bearing.radial_clearance / 2 + self.seat
-        return self.seat + excess * ratio - play * (1 - ratio)
-
-    def raceway_loads(self, excess: Array) -> tuple[Array, Array]:
-        """Q_i and Q_o of every roller [N]."""
-        stiffness = self.bearing.raceway_stiffness
-        approaches = self.approaches(excess)
+        approaches = self.seat + excess * ratio - play * (1 - ratio)
         return raceway_loads_of_all(approaches, stiffness, stiffness, self.centrifugal)
 
 

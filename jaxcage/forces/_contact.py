@@ -69,7 +69,6 @@ class LandContact(eqx.Module):
         1e4,
         1e12,
         "line-contact stiffness of all lands together",
-        kind="unknown",
         within=(2e8, 2e10),
         source="press the land on its rib: force over approach",
     )
@@ -78,7 +77,6 @@ class LandContact(eqx.Module):
         0.5,
         0.999,
         "eccentricity ratio at which the contact begins",
-        kind="unknown",
         within=(0.9, 0.99),
         source="roughness of land and rib over the clearance",
     )
@@ -87,7 +85,6 @@ class LandContact(eqx.Module):
         0.05,
         1.0,
         "coefficient of restitution at the approach speed",
-        kind="unknown",
         within=(0.3, 1.0),
         source="drop the cage on its rib: height of the rebound",
         default=1.0,
@@ -100,7 +97,6 @@ class LandContact(eqx.Module):
         1e-12,
         1e-5,
         "half width over which contact sets in and film coefficients saturate",
-        kind="fixed",
         default=2e-7,
     )
 

@@ -34,7 +34,6 @@ class SynchronousImpact(eqx.Module):
         0.0,
         1e5,
         "amplitude A at the reference speed",
-        kind="unknown",
         within=(5.0, 300.0),
         source="once-a-revolution part of the acceleration of the cage, at one speed",
     )
@@ -43,7 +42,6 @@ class SynchronousImpact(eqx.Module):
         0.0,
         4.0,
         "power n of speed; 20/19 for a Hertz impact on a stiff bar",
-        kind="unknown",
         within=(1.0, 2.0),
         source="once-a-revolution part of the acceleration of the cage, at two speeds",
     )

@@ -84,9 +84,8 @@ class _System(NamedTuple):
     def solve(self, wet: Bool[Array, "stations k"]) -> Nodes:
         """The pressure where `wet`, zero elsewhere."""
         rows = wet[..., None]
-        blocks = (jnp.where(rows, b, 0.0) for b in (self.lower, self.upper))
         middle = jnp.where(rows, self.middle, jnp.eye(self.middle.shape[-1])[None])
-        lower, upper = blocks
+        lower, upper = (jnp.where(rows, b, 0.0) for b in (self.lower, self.upper))
         return solve_ring(lower, middle, upper, jnp.where(wet, self.source, 0.0)[..., None])[..., 0]
 
     def excess(self, p: Nodes) -> Nodes:

@@ -29,7 +29,6 @@ class ElasticRib(eqx.Module):
         1.0,
         1e12,
         "rib stiffness K_O",
-        kind="unknown",
         within=(5e6, 5e8),
         source="tap the outer ring in its seat: the frequency it answers with",
     )
@@ -38,7 +37,6 @@ class ElasticRib(eqx.Module):
         0.0,
         1e8,
         "rib damping B_O",
-        kind="unknown",
         within=(50.0, 5e3),
         source="tap the outer ring in its seat: how fast the answer decays",
     )
@@ -47,7 +45,6 @@ class ElasticRib(eqx.Module):
         0.0,
         1e24,
         "cubic rib stiffness K_O3",
-        kind="unknown",
         within=(0.0, 1e16),
         source="push the outer ring in its seat: force over way",
         default=0.0,

@@ -21,7 +21,7 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, get_args
 
 import equinox as eqx
 
@@ -40,15 +40,6 @@ from ._template import Subject, left_as_written
 from ._units import printable, shown
 
 
-_READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
-    ("bearing", "designation"): lambda given: _designated(given),
-    ("lubricant", "grade"): lambda given: vg(_grade(given)),
-}
-"""Keys by which a table starts from a ready-made module."""
-
-
-SUBJECTS: dict[str, Subject] = {"cage": "cage", "bearing": "bearing"}
-"""What key `model` may be: the cage in its land, or the whole bearing."""
 M = TypeVar("M", CageModel, BearingModel)
 
 Ranges = dict[tuple[str, ...], tuple[Range, tuple[str, ...]]]
@@ -155,9 +146,9 @@ def subject_of(source: str | Path | Mapping[str, Any]) -> Subject:
             raise ConfigError(f"File '{source}': {error}") from error
     base = source.get("base")
     given = source.get("model", "bearing" if isinstance(base, str) and base in WHOLE_BEARINGS else "cage")
-    if not isinstance(given, str) or given not in SUBJECTS:
-        raise ConfigError(f"`model` must be one of {', '.join(SUBJECTS)}, but is {shown(given)}.")
-    return SUBJECTS[given]
+    if given not in get_args(Subject):
+        raise ConfigError(f"`model` must be one of {', '.join(get_args(Subject))}, but is {shown(given)}.")
+    return given
 
 
 def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> CageModel:
@@ -170,9 +161,7 @@ def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) 
     require_x64()
     if subject_of(table) != "cage":
         raise ConfigError('`model` must be "cage" here, but a whole bearing is described.')
-    model = _made(CageModel, table, tuple(PUBLISHED_CASES), case, unknowns)
-    check_together(model)
-    return model
+    return _made(CageModel, table, tuple(PUBLISHED_CASES), case, unknowns)
 
 
 def whole_bearing_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> BearingModel:
@@ -185,9 +174,7 @@ def whole_bearing_from(table: Mapping[str, Any], unknowns: list[Unknown] | None 
     require_x64()
     if subject_of(table) != "bearing":
         raise ConfigError('`model` must be "bearing" here, but is "cage".')
-    model = _made(BearingModel, table, tuple(WHOLE_BEARINGS), whole_bearing, unknowns)
-    check_together(model)
-    return model
+    return _made(BearingModel, table, tuple(WHOLE_BEARINGS), whole_bearing, unknowns)
 
 
 def _made(
@@ -209,6 +196,7 @@ def _made(
     ranges: Ranges = {}
     model = _build(kind, rest, start, (), ranges)
     assert isinstance(model, kind)
+    check_together(model)
     if unknowns is not None:
         unknowns += _named(model, ranges)
     return model
@@ -302,8 +290,8 @@ def kind_name(module: eqx.Module) -> str:
 def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[str, ...]) -> eqx.Module:
     if "oscillator" in submodules(kind):
         arguments.setdefault("oscillator", PocketImpact())
-    required = [f.name for f in dataclasses.fields(kind) if _has_no_default(f)]
-    missing = [_dotted(path, name) for name in required if name not in arguments]
+    without = [f.name for f in dataclasses.fields(kind) if f.default is f.default_factory is dataclasses.MISSING]
+    missing = [_dotted(path, name) for name in without if name not in arguments]
     if missing:
         example = "nu2310" if kind is BearingModel else "1a"
         hint = "" if path else f', unless `base = "{example}"` or the like gives the rest'
@@ -316,10 +304,6 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
         return kind(**arguments)
     except ValueError as error:
         raise ConfigError(f"Table `{_dotted(path) or 'top level'}`: {error}") from error
-
-
-def _has_no_default(field: dataclasses.Field) -> bool:
-    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def _dotted(path: tuple[str, ...], name: str = "") -> str:
@@ -356,12 +340,19 @@ def _designated(given: Any) -> eqx.Module:
     return BEARINGS[given]()
 
 
-def _grade(given: Any) -> float:
+def _of_grade(given: Any) -> eqx.Module:
     if isinstance(given, bool) or not isinstance(given, int | float) or not 2 <= given <= 10000:
         raise ConfigError(
             f"`lubricant.grade` must be a number from 2 to 10000 (mm^2/s at 40 degC), but is {shown(given)}."
         )
-    return float(given)
+    return vg(float(given))
+
+
+_READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
+    ("bearing", "designation"): _designated,
+    ("lubricant", "grade"): _of_grade,
+}
+"""Keys by which a table starts from a ready-made module."""
 
 
 HEAVIEST = 8900.0

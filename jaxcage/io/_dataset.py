@@ -60,7 +60,8 @@ def to_dataset(sweep: Sweep, model: CageModel | None = None) -> "xr.Dataset":
         attrs=_attributes(sweep, model),
     )
     for name in dataset.variables:
-        _describe(dataset[name], {"exponents": "exponent"}.get(str(name), str(name)))
+        known = quantity("exponent" if name == "exponents" else str(name))
+        dataset[name].attrs |= {"long_name": known.text, "units": known.unit}
     dataset["outcome"].attrs |= _flags(OUTCOMES)
     dataset["label"].attrs |= _flags(labels.tolist())
     return dataset
@@ -90,11 +91,6 @@ def _attributes(sweep: Sweep, model: CageModel | None) -> dict[str, Any]:
         "settings": json.dumps(sweep.settings),
         **configured,
     }
-
-
-def _describe(variable: "xr.DataArray", name: str) -> None:
-    known = quantity(name)
-    variable.attrs |= {"long_name": known.text, "units": known.unit}
 
 
 def _flags(names: list[str] | tuple[str, ...]) -> dict[str, Any]:

@@ -7,16 +7,15 @@ import re
 import numpy as np
 from jaxtyping import Float
 
-from ._units import printable, to_si
+from ._units import NUMBER, printable, to_si
 
 
 DECADE = 10.0
 """A range that spans more is even in the logarithm: nobody who says 1e4 .. 1e6 means that it is hardly below 1e5."""
 SIGMAS = 3.0
 """Standard deviations from the best value to either end of a tolerance."""
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_LEFT = re.compile(rf"\s*(?:({_NUMBER})\s*\()?\s*({_NUMBER})\s*(.*?)\s*")
-_RIGHT = re.compile(rf"\s*({_NUMBER})\s*(\))?\s*(.*?)\s*")
+_LEFT = re.compile(rf"\s*(?:({NUMBER})\s*\()?\s*({NUMBER})\s*(.*?)\s*")
+_RIGHT = re.compile(rf"\s*({NUMBER})\s*(\))?\s*(.*?)\s*")
 _TOLERANCE = re.compile(r"\+-|±")
 
 

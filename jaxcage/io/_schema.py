@@ -4,13 +4,13 @@ options.
 
 import dataclasses
 import math
-import types
 import typing
 from collections.abc import Iterator
 from typing import Any
 
 import equinox as eqx
 
+from .._arguments import options
 from .._errors import InputError
 from .._parameters import ParameterInfo, allowed as must_be
 from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
@@ -37,9 +37,7 @@ def module_types(annotation: Any) -> tuple[type[eqx.Module], ...]:
     """The modules that a field's annotation admits: none for a number, several where there is a
     choice of laws.
     """
-    union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
-    members = typing.get_args(annotation) if union else (annotation,)
-    return tuple(m for m in members if isinstance(m, type) and issubclass(m, eqx.Module))
+    return tuple(m for m in options(annotation) if isinstance(m, type) and issubclass(m, eqx.Module))
 
 
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
@@ -62,22 +60,16 @@ def read_value(name: str, value: Any, field: dataclasses.Field) -> Any:
     **Raises:** `ConfigError`.
     """
     if "choice" in field.metadata:
-        return _read_choice(name, value, field.metadata["choice"])
+        if value not in field.metadata["choice"]:
+            offered = ", ".join(field.metadata["choice"])
+            raise ConfigError(f"`{name}` must be one of {offered}, but is {shown(value)}.")
+        return value
     if "count" in field.metadata:
-        return _read_count(name, value, *field.metadata["count"])
+        lower, upper = field.metadata["count"]
+        if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
+            raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {shown(value)}.")
+        return value
     return _read_number(name, value, field.metadata["parameter"])
-
-
-def _read_choice(name: str, value: Any, options: tuple[str, ...]) -> str:
-    if value not in options:
-        raise ConfigError(f"`{name}` must be one of {', '.join(options)}, but is {shown(value)}.")
-    return value
-
-
-def _read_count(name: str, value: Any, lower: int, upper: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
-        raise ConfigError(f"`{name}` must be a whole number from {lower} to {upper}, but is {shown(value)}.")
-    return value
 
 
 class Known(float):

@@ -8,12 +8,12 @@ from typing import Any
 
 from .._errors import InputError
 from ._files import replacing
+from ._units import NUMBER
 
 
 LONGEST = 31
 """Characters in the name of a sheet."""
 Rows = Sequence[Sequence[str]]
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 def write_tables(path: str | Path, tables: Sequence[tuple[str, Rows]]) -> Path:
@@ -59,7 +59,8 @@ def _write_workbook(path: Path, tables: Sequence[tuple[str, Rows]]) -> None:
 
 def _cell(text: str) -> Any:
     """A number where a text is nothing else."""
-    return float(text.replace("−", "-")) if _NUMBER.fullmatch(text.replace("−", "-")) else _safe(text)
+    plain = text.replace("−", "-")
+    return float(plain) if re.fullmatch(NUMBER, plain) else _safe(text)
 
 
 def _safe(text: str) -> str:

@@ -9,7 +9,7 @@ from string import Template
 from typing import Any, Literal
 
 from .._errors import InputError
-from ..forces import SynchronousImpact
+from .._parameters import parameters
 from ..models import case, whole_bearing
 
 
@@ -26,36 +26,14 @@ def template(subject: Subject = "cage") -> str:
     Dimensions stand in the text; what the paper does not print is filled in from the constants of its cases, and what
     is worked out for the whole bearing from that.
     """
-    file, numbers = ("template.toml", _of_the_cage()) if subject == "cage" else ("whole_template.toml", _of_the_whole())
+    if subject == "cage":
+        file, model = "template.toml", case("1a")
+    else:
+        file, model = "whole_template.toml", whole_bearing("nu2310")
     text = Path(__file__).with_name(file).read_text(encoding="utf-8")
-    words = {name: f"{float(value):.4g}" for name, value in numbers.items()}
-    filled = Template(text).substitute(words)
+    numbers = parameters(model) | {"land_width_mm": 1e3 * model.film.land_width}
+    filled = Template(text).substitute({name: f"{float(value):.4g}" for name, value in numbers.items()})
     return "\n".join(map(_aligned, filled.splitlines())) + "\n"
-
-
-def _of_the_cage() -> dict[str, Any]:
-    model = case("1a")
-    support, contact, impact = model.support, model.contact, model.impact
-    assert isinstance(impact, SynchronousImpact)
-    return {
-        "cage_mass": model.cage_mass,
-        "land_width": 1e3 * model.film.land_width,
-        "contact": contact.stiffness,
-        "onset": contact.onset,
-        "restitution": contact.restitution,
-        "stiffness_x": support.stiffness_x,
-        "stiffness_y": support.stiffness_y,
-        "damping": support.damping,
-        "cubic": support.cubic_stiffness,
-        "cross": support.cross_stiffness,
-        "amplitude": impact.amplitude,
-        "exponent": impact.exponent,
-    }
-
-
-def _of_the_whole() -> dict[str, Any]:
-    model = whole_bearing("nu2310")
-    return {"inertia": model.cage_inertia, "bar": model.pockets.pocket_stiffness}
 
 
 def left_as_written(table: Mapping[str, Any], subject: Subject = "cage") -> tuple[str, ...]:

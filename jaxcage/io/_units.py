@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 
 _SIZE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+NUMBER = rf"[-+]?{_SIZE}"
+_NUMBER_AND_UNIT = re.compile(rf"\s*({NUMBER})\s*(.*?)\s*")
 _UNIT = re.compile(r"[\w°µΩ%*/^().·⁻ +-]{1,60}")
 """What a unit is written with; pint takes a comment, a colon or a line end for nothing."""
 _COMMA = re.compile(r"\s*[-+]?\d*,\d")

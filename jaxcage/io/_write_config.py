@@ -27,16 +27,13 @@ def configuration(model: CageModel | BearingModel) -> dict[str, Any]:
 
 def _table(module: eqx.Module) -> dict[str, Any]:
     fields = list(values(type(module)))
-    table: dict[str, Any] = {f.name: _plain(getattr(module, f.name), "parameter" in f.metadata) for f in fields}
+    plain = lambda f: float(getattr(module, f.name)) if "parameter" in f.metadata else getattr(module, f.name)
+    table: dict[str, Any] = {f.name: plain(f) for f in fields}
     for name, options in submodules(type(module)).items():
         below = getattr(module, name)
         kind = {"kind": kind_name(below)} if len(options) > 1 else {}
         table[name] = kind | _table(below)
     return table
-
-
-def _plain(value: Any, is_parameter: bool) -> float | int | str:
-    return float(value) if is_parameter else value
 
 
 def toml_text(table: dict[str, Any], path: tuple[str, ...] = ()) -> str:

@@ -7,13 +7,9 @@ micrometres; with the fixed half film, the synchronous impact, a rigid rib and c
 """
 
 import dataclasses
-from typing import Literal, get_args
 
 from .._errors import ArgumentError
 from ..forces import UnbalanceReading
-
-
-ConstantsName = Literal["preliminary", "identified"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,6 +78,5 @@ def constants(name: str) -> Constants:
     **Raises:** `ValueError` that names the sets there are.
     """
     if name not in CONSTANTS:
-        known = ", ".join(get_args(ConstantsName))
-        raise ArgumentError("constants", said=f"must be one of {known}, but '{name}' was given.")
+        raise ArgumentError("constants", said=f"must be one of {', '.join(CONSTANTS)}, but '{name}' was given.")
     return CONSTANTS[name]

@@ -5,9 +5,9 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax.core import Tracer
 
 from .._errors import ArgumentError
+from ..bearing import is_concrete
 from ._cage import CageModel
 from ._system import AbstractForcedSystem
 
@@ -27,7 +27,7 @@ def require_speeds(system: AbstractForcedSystem, speeds: Any, name: str = "speed
 
     **Raises:** `ValueError`.
     """
-    if not isinstance(system, CageModel) or _is_traced((speeds, system.land_radius)):
+    if not isinstance(system, CageModel) or not is_concrete(*jax.tree.leaves((speeds, system.land_radius))):
         return
     highest, limit = float(np.max(np.asarray(speeds, dtype=float), initial=0.0)), fastest_speed(system)
     if highest > limit:
@@ -45,7 +45,7 @@ def require_known(function: str, instead: str, *arguments: object) -> None:
 
     **Raises:** `ValueError` that says what to call `instead`.
     """
-    if _is_traced(arguments):
+    if not is_concrete(*jax.tree.leaves(arguments)):
         raise ArgumentError(
             *("system", "speeds" if function == "sweep" else "speed"),
             said=(
@@ -53,10 +53,6 @@ def require_known(function: str, instead: str, *arguments: object) -> None:
                 f"cannot go over it: {instead}."
             ),
         )
-
-
-def _is_traced(arguments: object) -> bool:
-    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(arguments))
 
 
 INSTEAD = (

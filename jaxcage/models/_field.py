@@ -77,10 +77,6 @@ class AbstractLinearisation(eqx.Module):
         """Trace of the Jacobian."""
 
     @abc.abstractmethod
-    def times(self, u: State) -> State:
-        """Jacobian times a vector."""
-
-    @abc.abstractmethod
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         """r -> (shift I - J)^-1 r, factorised once."""
 
@@ -95,9 +91,6 @@ class DenseLinearisation(AbstractLinearisation):
     @property
     def divergence(self) -> Scalar:
         return _trace(self.jacobian)
-
-    def times(self, u: State) -> State:
-        return _times(self.jacobian, u)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         lu = lu_factor(_shifted(shift, self.jacobian))
@@ -117,10 +110,6 @@ class SecondOrderLinearisation(AbstractLinearisation):
     def divergence(self) -> Scalar:
         return _trace(self.a_v) / self.speed
 
-    def times(self, u: State) -> State:
-        rate = 1 / self.speed
-        return (*(rate * c for c in u[len(self.a_q) :]), *(rate * c for c in _pushed(self, u)))
-
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         rate = 1 / self.speed
         per_shift = 1 / shift
@@ -139,11 +128,6 @@ class SecondOrderLinearisation(AbstractLinearisation):
             return (*((r_q[i] + rate * u_v[i]) * per_shift for i in range(n)), *u_v)
 
         return solve
-
-
-def _pushed(near: SecondOrderLinearisation, u: State) -> State:
-    n = len(near.a_q)
-    return tuple(a + b for a, b in zip(_times(near.a_q, u[:n]), _times(near.a_v, u[n:]), strict=True))
 
 
 class AbstractField(eqx.Module):
@@ -201,12 +185,10 @@ class SecondOrderField(AbstractField):
         n = len(y) // 2
         q, v = y[:n], y[n:]
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
-        given = self.slopes(q, v)
-        if given is not None:
-            a_q, a_v = given
-        else:
-            a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
-            a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
+        a_q, a_v = self.slopes(q, v) or (
+            _columns(lambda z: self.acceleration(tau, z, v), q),
+            _columns(lambda z: self.acceleration(tau, q, z), v),
+        )
         return SecondOrderLinearisation(value, slope, a_q, a_v, self.speed)
 
     def slopes(self, q: State, v: State) -> tuple[Matrix, Matrix] | None:
@@ -235,7 +217,9 @@ def _second_order_rates_jvp(primals: Any, tangents: Any) -> Any:
     if given is None or all(c is None for c in y_dot):
         return eqx.filter_jvp(_rates, primals, tangents)
     moved = tuple(jnp.zeros(()) if c is None else c for c in y_dot)
-    slope = SecondOrderLinearisation((), (), given[0], given[1], field.speed).times(moved)
+    rate = 1 / field.speed
+    pushed = zip(_times(given[0], moved[:n]), _times(given[1], moved[n:]), strict=True)
+    slope = (*(rate * c for c in moved[n:]), *(rate * (a + b) for a, b in pushed))
     along = (field_dot, tau_dot)
     if all(x is None for x in jax.tree.leaves(along, is_leaf=lambda x: x is None)):
         return _rates(field, tau, y), slope
@@ -254,9 +238,6 @@ class ScaledLinearisation(AbstractLinearisation):
     @property
     def divergence(self) -> Scalar:
         return self.inner.divergence
-
-    def times(self, u: State) -> State:
-        return divide(self.inner.times(multiply(u, self.scale)), self.scale)
 
     def solver(self, shift: Scalar) -> Callable[[State], State]:
         solve = self.inner.solver(shift)

@@ -73,12 +73,30 @@ def _default_starts(dimension: int) -> tuple[State, ...]:
     return tuple(tuple(jnp.asarray(p[i % 4] * (1 + i // 4)) for i in range(dimension)) for p in patterns)
 
 
-def _scales(scale: float | tuple[float, ...], dimension: int) -> State:
-    values = scale if isinstance(scale, tuple) else (scale,) * dimension
-    return tuple(jnp.asarray(s, dtype=float) for s in values)
+class _UsersSystem(AbstractForcedSystem):
+    """What a user's function does not say: it is the same for first and second order."""
+
+    _scale: eqx.AbstractVar[float | tuple[float, ...]]
+    _starts: eqx.AbstractVar[tuple[tuple[float, ...], ...]]
+    _harmonics: eqx.AbstractVar[int]
+
+    @property
+    def harmonics(self) -> int:
+        return self._harmonics
+
+    def scale(self, speed: Scalar) -> State:
+        values = self._scale if isinstance(self._scale, tuple) else (self._scale,) * self.dimension
+        return tuple(jnp.asarray(s, dtype=float) for s in values)
+
+    def starts(self, speed: Scalar) -> tuple[State, ...]:
+        given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
+        return given or _default_starts(self.dimension)
+
+    def excursion(self, y: State) -> Scalar:
+        return 0.0
 
 
-class ForcedSystem(AbstractForcedSystem):
+class ForcedSystem(_UsersSystem):
     """A first-order system from a function `rates(tau, y, speed) -> dy/dt`, all tuples of scalars."""
 
     rates: Callable[[Scalar, State, Scalar], State]
@@ -107,28 +125,11 @@ class ForcedSystem(AbstractForcedSystem):
     def dimension(self) -> int:
         return self._dimension
 
-    @property
-    def harmonics(self) -> int:
-        return self._harmonics
-
     def at_speed(self, speed: Scalar) -> AbstractField:
         return FirstOrderField(_Bound(self.rates, speed, "The law `rates(tau, y, speed)`"), speed)
 
-    def scale(self, speed: Scalar) -> State:
-        del speed
-        return _scales(self._scale, self.dimension)
 
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
-        del speed
-        given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
-        return given or _default_starts(self.dimension)
-
-    def excursion(self, y: State) -> Scalar:
-        del y
-        return 0.0
-
-
-class ForcedOscillator(AbstractForcedSystem):
+class ForcedOscillator(_UsersSystem):
     """A second-order system from a function `acceleration(tau, q, v, speed) -> d2q/dt2`, all tuples of scalars.
 
     !!! example
@@ -165,25 +166,8 @@ class ForcedOscillator(AbstractForcedSystem):
     def dimension(self) -> int:
         return 2 * self.coordinates
 
-    @property
-    def harmonics(self) -> int:
-        return self._harmonics
-
     def at_speed(self, speed: Scalar) -> AbstractField:
         return SecondOrderField(_Bound(self.acceleration, speed, "The law `acceleration(tau, q, v, speed)`"), speed)
-
-    def scale(self, speed: Scalar) -> State:
-        del speed
-        return _scales(self._scale, self.dimension)
-
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
-        del speed
-        given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
-        return given or _default_starts(self.dimension)
-
-    def excursion(self, y: State) -> Scalar:
-        del y
-        return 0.0
 
 
 class _Bound(eqx.Module):

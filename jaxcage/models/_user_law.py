@@ -33,17 +33,14 @@ def components(what: str, law: Callable[..., State], *arguments: Any, number: in
         found = law(*arguments)
     shape = jnp.shape(arguments[1][0])
     wanted = f"{what} must return a tuple of {number} scalar{'s' if number > 1 else ''}, one for each component"
-    if isinstance(found, tuple | list):
-        shapes = [jnp.shape(part) for part in found]
-    elif isinstance(found, jax.Array | np.ndarray) and found.ndim > 0:
-        shapes = [found.shape[1:]] * found.shape[0]
-    else:
+    if not isinstance(found, tuple | list) and not (isinstance(found, jax.Array | np.ndarray) and found.ndim):
         raise InputError(f"{wanted}, but returned {_named(found)}: a single one is written `(a,)`.")
-    if len(shapes) != number:
-        raise InputError(f"{wanted}, but returned {len(shapes)}.")
-    if wrong := [each for each in shapes if each not in ((), shape)]:
+    parts = tuple(found)
+    if len(parts) != number:
+        raise InputError(f"{wanted}, but returned {len(parts)}.")
+    if wrong := [jnp.shape(part) for part in parts if jnp.shape(part) not in ((), shape)]:
         raise InputError(f"{wanted}, but one of them has shape {wrong[0]}.")
-    return tuple(found)
+    return parts
 
 
 def _named(found: Any) -> str:

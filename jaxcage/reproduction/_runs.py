@@ -18,7 +18,6 @@ from ._observer import OBSERVERS, Observer, observed_zones
 SECTION_RPM = 8500.0
 SECTION_REVOLUTIONS = (4, 4000)
 """Fig. 9: strobe points from the first to the second of these revolutions."""
-Report = Callable[[str, int, int], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +51,7 @@ def run_all(
     section_revolutions: int = SECTION_REVOLUTIONS[1],
     orbits: bool = True,
     observers: Sequence[Observer] = OBSERVERS,
-    report: Report | None = None,
+    report: Callable[[str, int, int], None] | None = None,
 ) -> Runs:
     """Sweep every case over the published range from three starts, find its synchronous orbits, read its diagrams as
     the paper may have done, and run fig. 9."""
@@ -83,18 +82,17 @@ def run_all(
     observed = section_revolutions - SECTION_REVOLUTIONS[0]
     blocks = max(n for n in range(1, 21) if observed % n == 0)
     omega = np.array([rpm(SECTION_RPM)])
-    first = [tuple(float(c) for c in model.starts(float(omega[0]))[0]) for model in models.values()]
     sections = {
         name: sweep_designs(
             [model],
             omega,
-            starts=[start],
+            starts=1,
             discard=SECTION_REVOLUTIONS[0],
             revolutions=observed,
             blocks=blocks,
             keep=observed,
         )[0]
-        for (name, model), start in zip(models.items(), first, strict=True)
+        for name, model in models.items()
     }
     return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections, diagrams)
 

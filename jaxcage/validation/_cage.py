@@ -25,6 +25,8 @@ DAMPING = "mean divergence, -2 B/M times the period, exact"
 SCIPY = "(16)-(27) in polar form in NumPy, film by quadrature of the pressure (26), integrated by SciPy's DOP853"
 
 RPM = math.pi / 30
+BEYOND_SPRINGS = "cubic_stiffness", "cubic_ratio", "cross_stiffness"
+"""What a support has beyond two springs and a damper."""
 
 
 def cage_comparisons() -> list[Comparison]:
@@ -34,7 +36,7 @@ def cage_comparisons() -> list[Comparison]:
 
 def _bare(**changes: float) -> CageModel:
     """A cage on linear springs without film, weight and impacts."""
-    none = dict.fromkeys(("gravity", "amplitude", "cubic_stiffness", "cubic_ratio", "cross_stiffness"), 0.0)
+    none = dict.fromkeys(("gravity", "amplitude", *BEYOND_SPRINGS), 0.0)
     return with_values(replace(case("1a"), unbalance="physical", **(none | changes)), {"land_width": 1e-7})
 
 
@@ -64,16 +66,8 @@ def _divergence() -> list[Comparison]:
 
 def _in_film(**changes: float) -> CageModel:
     """A cage in its film under its weight alone."""
-    names = (
-        "stiffness_x",
-        "stiffness_y",
-        "damping",
-        "cubic_stiffness",
-        "cubic_ratio",
-        "cross_stiffness",
-        "eccentricity",
-    )
-    return replace(case("1a"), gravity=9.81, amplitude=0.0, **(dict.fromkeys(names, 0.0) | changes))
+    none = dict.fromkeys(("stiffness_x", "stiffness_y", "damping", "eccentricity", "amplitude", *BEYOND_SPRINGS), 0.0)
+    return replace(case("1a"), gravity=9.81, **(none | changes))
 
 
 def _whirl() -> list[Comparison]:

@@ -2,14 +2,13 @@
 
 | module        | responsibility                                                              |
 |---------------|-----------------------------------------------------------------------------|
-| `_model`      | parameters                                                                  |
+| `_model`      | parameters; Archard's law for the cage                                      |
 | `_traction`   | Gupta's traction law, odd and smooth                                        |
 | `_raceway`    | line contacts with damping, and the energy they store                       |
 | `_pockets`    | bars of the cage under rollers, dry friction, stiffness of a bar            |
 | `_drag`       | drag and churning                                                           |
 | `_contacts`   | every contact of the rollers, one set of numbers for both bodies            |
 | `_guide`      | film and contact of the guiding land, on cage and ring                      |
-| `_wear`       | Archard's law for the cage                                                  |
 | `_state`      | state, what is integrated beside it                                         |
 | `_field`      | equations of motion at one shaft speed                                      |
 | `_energy`     | energy, angular momentum                                                    |
@@ -25,7 +24,7 @@ from ._energy import (
     potential_energy as potential_energy,
 )
 from ._field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
-from ._model import BearingModel as BearingModel, InnerRing as InnerRing
+from ._model import BearingModel as BearingModel, InnerRing as InnerRing, Wear as Wear
 from ._pockets import Pockets as Pockets, bar_stiffness as bar_stiffness
 from ._raceway import Raceways as Raceways
 from ._starts import (
@@ -45,4 +44,3 @@ from ._state import (
     Rollers as Rollers,
 )
 from ._traction import Traction as Traction, TractionCurve as TractionCurve
-from ._wear import Wear as Wear

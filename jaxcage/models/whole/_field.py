@@ -285,11 +285,7 @@ class BearingAtSpeed(eqx.Module):
 
     def __call__(self, state: BearingState) -> Rates:
         """Rates over time, of a quasi-static ring those of a state that is `settled`."""
-        return self.rates(state, self.forces(state))
-
-    def rates(self, state: BearingState, f: Forces) -> Rates:
-        """Rates over time at a state with these forces."""
-        rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+        f, rollers, cage = self.forces(state), Rollers(*state.rollers), Bodies(*state.bodies)
         assert f.land is not None
         alone = f._replace(land=None)
         roller_rates, passed = jax.vmap(self.roller_rates, in_axes=(0, None, 0))(rollers, cage, alone)
