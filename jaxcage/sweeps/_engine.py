@@ -129,9 +129,13 @@ def _in_chunks(
     run = lambda part: [np.asarray(x)[..., : part.size] for x in work(_padded(part, size))]
     results = []
     with concurrent.futures.ThreadPoolExecutor(workers()) as pool:
-        for part, found in zip(parts, pool.map(run, parts), strict=True):  # an exception cancels what has not begun
-            results.append(found)
-            report(part.size)
+        try:
+            for part, found in zip(parts, pool.map(run, parts), strict=True):
+                results.append(found)
+                report(part.size)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     back = np.argsort(np.concatenate(parts))
     return tuple(np.concatenate(column, axis=-1)[..., back] for column in zip(*results, strict=True))
 
