@@ -75,6 +75,7 @@ COMMANDS = (
         ("simulate 1a --speed 1e308", "--speed must be at most 1e+06 rpm, but 1e+308 was given"),
         ("sweep 1a --first 1e307 --last 1.7e308 --count 2", "must be at most 1e+06 rpm, but 1e+307 was given"),
         ("statics 1a --load heavy", 'is "heavy", which is not a number with a unit'),
+        ("compare 1a 1b --at abc", '--at must be speeds and ranges like "8500, 12000-15000 rpm", but "abc" was given'),
         ("sweep", "CASE"),
         ("spin 1a", "Unrecognized options: spin"),
         ("sweep 1a --sped 3", "Unrecognized options: --sped"),

@@ -632,6 +632,7 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
     """Two designs side by side on one scale: what differs, labels, zones, exponents, orbits, forces on the land; of two
     whole bearings slips, impulses, wear, power and states of the cage."""
 
+    called: ClassVar[Mapping[str, str]] = {"operating": "at"}
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"count": (126, 13)}
     of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "confirm", "horizon", "at")
 

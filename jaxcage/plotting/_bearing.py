@@ -366,8 +366,8 @@ def bearings_beside(names: Sequence[str], found: Sequence[BearingSweep]) -> Figu
     for ax, (measure, (label, factor)) in zip(axes.ravel(), panels.items(), strict=True):
         for name, each, colour in zip(names, found, MARK_COLOURS[::4] + MARK_COLOURS[1:4], strict=False):
             blocks = each.block_means[measure].reshape(each.speed.size, -1)
-            count = np.maximum(np.isfinite(blocks).sum(axis=1), 1)
-            mean, bars = np.nanmean(blocks, axis=1), np.nan_to_num(np.nanstd(blocks, axis=1) / np.sqrt(count))
+            freedom = np.maximum(np.isfinite(blocks).sum(axis=1) - 1, 1)
+            mean, bars = np.nanmean(blocks, axis=1), np.nan_to_num(np.nanstd(blocks, axis=1) / np.sqrt(freedom))
             style: Any = dict(color=colour, linewidth=1.0, marker=".", elinewidth=0.8, label=name)
             dress(ax).errorbar(each.rpm, factor * mean, factor * bars, **style)
         ax.set_ylabel(label)
