@@ -163,6 +163,14 @@ def doubling(over_force):
     return min(over_force.special, key=lambda p: abs(p.value - DOUBLING))
 
 
+def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found(doubling):
+    """Whatever the system's own value is: at a tenth of the force there is no such orbit to begin with."""
+    found = jc.branch(
+        double_well(0.1 * DOUBLING), doubling, "g", lower=0.9 * DOUBLING, upper=1.1 * DOUBLING, method=FINE
+    )
+    assert min(abs(p.value - DOUBLING) for p in found.special) < 1e-7
+
+
 def test_doubled_branch_has_twice_the_period(doubling):
     system = double_well()
     doubled = jc.orbits.doubled_branch(

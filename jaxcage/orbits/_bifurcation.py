@@ -14,12 +14,12 @@ from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
 from ..models import AbstractForcedSystem
-from ._by_name import SPEED, Parameter, value as value_of, with_value
+from ._by_name import SPEED, Parameter, with_value
 from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
-from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point
+from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, value_at
 from ._problem import Frame, Given, OrbitProblem, Prepared, across_orbit, frozen, is_traced, make_frame, returned
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
@@ -199,10 +199,7 @@ def _read_guess(
     spin, known_speed = False, speed
     if isinstance(guess, Orbit | Point):
         state, known_speed = guess.state, guess.speed
-        if isinstance(guess, Point) and guess.parameter == parameter:
-            at = guess.value
-        else:
-            at = value_of(system, known_speed, parameter)
+        at = value_at(guess, system, known_speed, parameter)
     elif isinstance(guess, tuple) and len(guess) == 2:
         state, at = guess
     else:

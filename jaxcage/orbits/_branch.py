@@ -16,7 +16,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod, Rodas4
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, follow, passes, take
-from ._by_name import SPEED, Parameter, value as value_of
+from ._by_name import SPEED, Parameter
 from ._follower import (
     Follower,
     Start,
@@ -30,7 +30,7 @@ from ._follower import (
 from ._located import Seen, account
 from ._normal_form import coefficients
 from ._orbit import NearOrbit, Orbit, guess_state
-from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point
+from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
 from ._problem import Frame, Given, across_orbit
 from ._steps import SETTLED
 
@@ -110,7 +110,7 @@ def branch(
         raise ArgumentError("upper", said=f"must be above `lower`, but they are {upper:g} and {lower:g}.")
     if isinstance(orbit, Orbit | Point):
         speed, periods = orbit.speed, int(orbit.periods)
-        state, at = orbit.state, value_of(system, speed, parameter)
+        state, at = orbit.state, value_at(orbit, system, speed, parameter)
     else:
         state, at = orbit
     known_speed = at if parameter == SPEED else speed
@@ -152,7 +152,7 @@ def branches(
     starts = []
     for system, orbit in zip(systems, orbits, strict=True):
         at = orbit.speed if speed is None else speed
-        starts.append((np.asarray(orbit.state), float(value_of(system, at, parameter))))
+        starts.append((np.asarray(orbit.state), float(value_at(orbit, system, at, parameter))))
     known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)

@@ -1,13 +1,17 @@
 """A bifurcation of a periodic orbit: solved for, met on a branch, or known from elsewhere."""
 
+from typing import Any
+
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..analysis import Edge
-from ._by_name import SPEED
+from ..models import AbstractForcedSystem
+from ._by_name import SPEED, Parameter, value as value_of
 from ._normal_form import criticality
 
 
@@ -139,3 +143,10 @@ class Point(eqx.Module):
         )
 
     _repr_html_ = notebook_html
+
+
+def value_at(orbit: Any, system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
+    """What a parameter is at an orbit: the system's own, but at a bifurcation the value at which it was found."""
+    if isinstance(orbit, Point) and orbit.parameter == parameter:
+        return jnp.asarray(orbit.value, dtype=float)
+    return value_of(system, speed, parameter)
