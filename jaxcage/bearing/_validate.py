@@ -12,8 +12,8 @@ from .._errors import ArgumentError
 from .._types import Scalar
 
 
-def is_concrete(*values: Scalar | Array) -> bool:
-    """Whether every one of `values` is a known number, or an array of them, so that Python may compare it."""
+def is_concrete(*values: object) -> bool:
+    """Whether none of `values` is traced, so that Python may compare them."""
     return not any(isinstance(value, Tracer) for value in values)
 
 
