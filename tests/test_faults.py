@@ -453,14 +453,16 @@ def _writes(node: ast.AST) -> bool:
 
 
 def test_every_file_is_put_in_place_whole():
-    """Whatever writes stands under `with replacing(...)`; the others do the same in their own way, and are tested."""
+    """Whatever writes stands under `with replacing(...)` or `job.written(...)`, which is made of it; the others do the
+    same in their own way, and are tested."""
     found = set()
     for name, path in SOURCES.items():
         tree = ast.parse(path.read_text())
         sheltered = {
             id(inside)
             for node in ast.walk(tree)
-            if isinstance(node, ast.With) and any(_called(item.context_expr) == "replacing" for item in node.items)
+            if isinstance(node, ast.With)
+            and any(_called(item.context_expr) in ("replacing", "written") for item in node.items)
             for inside in ast.walk(node)
         }
         found |= {(name, _called(n)) for n in ast.walk(tree) if _writes(n) and id(n) not in sheltered}
