@@ -45,7 +45,7 @@ class LeadingMultiplier(NamedTuple):
 @compiled
 def _moved(n: int, around: _Expansion) -> tuple[Array, Array]:
     """|mu|, and its derivatives by the numbers of the field."""
-    mu, right = jnp.linalg.eigvals(around.monodromy), jnp.linalg.eig(around.monodromy)[1]
+    mu, right = jnp.linalg.eig(around.monodromy)
     left = jnp.linalg.inv(right)  # in rows, with l r = 1
     i = jnp.argmax(jnp.abs(mu))
     closing = around.image_slope[:, :n] - jnp.eye(n)
