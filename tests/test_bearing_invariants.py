@@ -86,7 +86,8 @@ def scaled(factors):
     return outputs(replace(bearing, **values), 4450.0 * factors[0], 1256.6 * factors[1])
 
 
-@pytest.mark.parametrize("mode", [jax.jacfwd, pytest.param(jax.jacrev, marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_gradients_against_central_differences(mode):
     ones, step = jnp.ones(6), 1e-4
     gradient = jax.jit(mode(scaled))(ones)
@@ -147,6 +148,7 @@ class One(eqx.Module):
         return outputs(*arguments)[self.index]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("index, unit", [(0, "m"), (1, "N"), (2, "1")])
 def test_homogeneity_of_the_statics(index, unit):
     arguments = [jb.nu2310(), (4450.0, "N"), (1256.6, "rad/s")]

@@ -27,6 +27,7 @@ def law(name: str, folder: pathlib.Path) -> shooting.Rates:
     return shooting.compiled(folder, TASKS[name].law)
 
 
+@pytest.mark.wide
 @needs_compiler
 @pytest.mark.parametrize("name", TASKS)
 def test_equations_in_c_are_those_of_the_field(name: str, tmp_path: pathlib.Path):
@@ -47,6 +48,7 @@ def test_equations_in_c_are_those_of_the_field(name: str, tmp_path: pathlib.Path
     assert touching > 1 or name != "cage"
 
 
+@pytest.mark.wide
 @needs_compiler
 def test_shooting_finds_a_published_doubling(tmp_path: pathlib.Path):
     found = shooting.follow(law("duffing-doubling", tmp_path), START, DOUBLING.end / DOUBLING.begin)

@@ -414,7 +414,8 @@ QUIET = {
 }
 
 
-@pytest.mark.parametrize("name", wide_but(QUIET, "neutral saddle"))
+@pytest.mark.wide
+@pytest.mark.parametrize("name", QUIET)
 def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     branch = planted_branch(**QUIET[name])
     exact = planted_multipliers(branch, **QUIET[name])
@@ -427,7 +428,7 @@ def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     assert branch.special == ()
 
 
-@pytest.mark.parametrize("first", ["period-doubling", "branch-point"])
+@pytest.mark.parametrize("first", wide_but(["period-doubling", "branch-point"], "period-doubling"))
 def test_crossings_within_one_step_are_in_order(first):
     """One at p = 0.02 and one at 0.0201, with one orbit put between them: only the first is next to stable orbits."""
     places = [0.02, 0.0201] if first == "period-doubling" else [0.0201, 0.02]
@@ -451,6 +452,7 @@ def test_stable_orbits_within_one_step_are_found():
     assert np.array_equal(branch.stable, (branch.value > 0.02) & (branch.value < 0.0201)) and np.any(branch.stable)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "kind, block",
     [

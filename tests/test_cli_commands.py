@@ -132,6 +132,7 @@ def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert is_png(found["figure"])
 
 
+@pytest.mark.wide
 def test_simulation_that_fails_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     arguments = ["--speed", "2500", "--solver", "rk4", "--steps", "8", "--out", str(tmp_path)]
     assert main(["simulate", "1a", *arguments]) == 1

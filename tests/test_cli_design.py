@@ -94,6 +94,7 @@ def test_design_of_a_known_optimum(capsys: pytest.CaptureFixture[str], tmp_path:
     assert Path(front["figure"]).stat().st_size > 10_000 and Path(front["front"]).stat().st_size > 10_000
 
 
+@pytest.mark.wide
 def test_a_design_that_no_other_beats_stays(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -144,6 +144,7 @@ def test_misuse_gets_one_sentence(
     assert said in sentence and not (tmp_path / "out").exists()
 
 
+@pytest.mark.wide
 def test_stores_of_others_and_missing_dask_get_one_sentence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):

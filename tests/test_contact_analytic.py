@@ -24,6 +24,7 @@ def test_damping_number(restitution):
     assert abs(defect) < 1e-11
 
 
+@pytest.mark.wide
 def test_damping_number_near_elastic_contact():
     """chi = (3/2)(1 - e) + O((1 - e)^2), down to e = 1, with its slope."""
     assert abs(float(restitution_damping(1.0))) < 1e-12
@@ -144,6 +145,7 @@ def derivatives(f, order):
 WIDTH = 2e-7
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("joint", [-WIDTH, WIDTH])
 def test_smooth_plus_joins_with_three_continuous_derivatives(joint):
     h = 1e-6

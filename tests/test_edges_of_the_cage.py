@@ -63,7 +63,7 @@ def found():
     return Found()
 
 
-KINDS = wide_but(STATES, "period-doubling", "fold")
+KINDS = wide_but(STATES, "period-doubling")
 
 
 @pytest.mark.parametrize("kind", KINDS)

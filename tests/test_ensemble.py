@@ -261,6 +261,7 @@ def test_unknowns_names_the_measurement(
     assert "Case 1a must be a TOML file with ranges" in capsys.readouterr().err
 
 
+@pytest.mark.wide
 def test_the_page_shows_what_is_known_and_what_it_decides():
     at = read_operating("6500")
     text = page(findings(), at, table={"base": "1a"}, chances=by_stiffness(), left=("cage_mass",))

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range, wide_but
+from helpers import beyond_range
 
 from jaxcage import replace
 from jaxcage.analysis import (
@@ -157,6 +157,7 @@ def test_threshold_of_a_vanishing_load():
     np.testing.assert_allclose(np.diag(c.stiffness), [8 / np.pi, 4 / np.pi], rtol=1e-8)
 
 
+@pytest.mark.wide
 def test_smallest_threshold():
     chart = stability_chart(np.linspace(0.4, 0.5, 10001))
     place = np.argmin(chart.threshold)
@@ -219,7 +220,8 @@ def cage_in_film(**changes):
     return replace(case("1a", "preliminary"), **(dict.fromkeys(names, 0.0) | changes))
 
 
-@pytest.mark.parametrize("mass", wide_but([1e-3, 0.05, 0.15, 0.212], 0.15))
+@pytest.mark.wide
+@pytest.mark.parametrize("mass", [1e-3, 0.05, 0.15, 0.212])
 def test_cage_in_film_decays_below_its_whirl_speed_and_grows_above(mass):
     model = cage_in_film(cage_mass=mass)
     speed = film_whirl_speed(model)
@@ -286,6 +288,7 @@ def test_heavy_cage_on_a_weak_film_never_whirls():
         film_whirl_speed(full)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("rpm", [2500.0, 9000.0, 27500.0])
 @pytest.mark.parametrize("name", ["1a", "2b"])
 def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):

@@ -170,6 +170,7 @@ def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
     assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005
 
 
+@pytest.mark.wide
 def test_a_lane_that_is_not_to_run_costs_nothing_and_stays():
     strobe = strobe_map(MODEL, SPEEDS[0], controlled(3e-3, [("rk4", 128), ("rk4", 256), ("rk4", 512)]))
     state = tuple(map(jnp.asarray, HEALTHY))

@@ -174,6 +174,7 @@ def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageMode
     assert np.all(~crossed | ~well[:, -1] | (np.max(told, axis=1) > 1))
 
 
+@pytest.mark.wide
 def test_with_fine_steps_the_rib_turns_a_thrown_cage_back(model: jc.CageModel):
     """Nothing goes deeper than where the contact has taken all its energy; what has more than that is refused."""
     speed, y = _thrown()

@@ -84,6 +84,7 @@ def logarithm(combination, values):
     return sum(w * np.log(values[n]) for n, w in combination.weights.items())
 
 
+@pytest.mark.wide
 def test_exact_edges_give_back_the_planted_constants(located):
     """From constants that are off, to the combinations that the edges can know."""
     start = {"mass": 1.0, "damping": 0.3, "stiffness": 1.0, "cubic": 1.03, "gain": 0.99}
@@ -163,6 +164,7 @@ def test_combinations_of_a_known_matrix():
     assert np.all(np.isinf(np.diag(covariance)))
 
 
+@pytest.mark.wide
 def test_a_prior_fixes_what_the_edges_cannot(located):
     loose = [*BOUNDS[:4], jc.design.Unknown("gain", 0.25, 4.0, prior=(1.0, 0.02))]
     free = fitted(located, np.zeros(12))

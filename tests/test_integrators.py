@@ -71,9 +71,9 @@ def one_revolution(system, speed, chosen, start):
 @pytest.mark.parametrize(
     "kind, solver, order, steps",
     [
-        ("second order", Rodas3(), 3, (64, 128, 256)),
+        pytest.param("second order", Rodas3(), 3, (64, 128, 256), marks=pytest.mark.wide),
         ("second order", Rodas4(), 4, (64, 128, 256)),
-        ("second order", NewmarkBeta(), 2, (128, 256, 512)),
+        pytest.param("second order", NewmarkBeta(), 2, (128, 256, 512), marks=pytest.mark.wide),
         pytest.param("first order", Rodas3(), 3, (128, 256, 512), marks=pytest.mark.wide),
         pytest.param("first order", Rodas4(), 4, (256, 512, 1024), marks=pytest.mark.wide),
     ],
@@ -195,7 +195,7 @@ NAMED = {
 }
 
 
-@pytest.mark.parametrize("name", wide_but(NAMED, "rodas4", "newmark"))
+@pytest.mark.parametrize("name", wide_but(NAMED, "newmark"))
 def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
     steps, tolerance = NAMED[name]
     end = one_revolution(CAGE, SPEED, method(name, steps=steps), START)

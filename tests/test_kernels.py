@@ -258,6 +258,7 @@ def derivative(f, order):
     return f
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "kind, solver, order",
     [
@@ -293,6 +294,7 @@ def test_parts_and_whole_steps_are_chosen_by_size(monkeypatch):
         assert last.sizes.moved == {1: 8, 4: 3 * 16}[stages]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", ["rk4", "tsit5"])
 def test_a_loop_of_stages_watches_what_a_loop_of_steps_does(name):
     solver, speed = method(name, steps=8).solver, SPEEDS[2]
@@ -307,6 +309,7 @@ def test_a_loop_of_stages_watches_what_a_loop_of_steps_does(name):
     assert seen[0] > 0.9 and 0.2 < seen[1] < 0.2 + 20 * 0.02 * 1.001  # shortened near the land
 
 
+@pytest.mark.wide
 def test_lanes_with_counts_of_their_own_are_differentiated_by_parts(monkeypatch):
     monkeypatch.setattr(_march, "WHOLE", 0)
     image = on_a_line("duffing", ClassicalRK4(), False)
@@ -393,7 +396,7 @@ def test_first_order_systems_and_oscillators_run_as_kernels():
 
 @pytest.mark.parametrize("film", wide_but(["fixed_half", "full"], "fixed_half"))
 @pytest.mark.parametrize("cross", wide_but(["circulatory", "as_printed"], "as_printed"))
-@pytest.mark.parametrize("smoothing", [1e-9, 5e-6])
+@pytest.mark.parametrize("smoothing", wide_but([1e-9, 5e-6], 5e-6))
 def test_analytic_slopes_of_the_cage_against_autodiff(film, cross, smoothing):
     """Everywhere in the land, the middle too, where the film's smoothing rounds the line of centres off."""
     model = jc.replace(MODEL, supply_pressure=2e4, restitution=0.6, cross_cubic=1e9, **{"film.smoothing": smoothing})

@@ -215,6 +215,7 @@ def test_change_of_a_width_is_that_of_the_planted_edges(planted):
     assert np.mean(np.abs(z) < 2) > 0.85 and np.all(np.sqrt(np.mean(np.square(z), axis=0)) < 1.6)
 
 
+@pytest.mark.wide
 def test_gradient_command_of_lasting_zones(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted, few_draws
 ):
@@ -245,6 +246,7 @@ def test_gradient_command_of_lasting_zones(
     assert main(["gradient", "1a", "--zone", "1"]) == 2
 
 
+@pytest.mark.wide
 def test_a_planted_crisis_and_its_elasticities_lie_within_their_errors(planted, few_draws):
     held, z = 0, []
     for seed in range(4):
@@ -270,6 +272,7 @@ def test_a_life_that_grows_as_an_exponential_is_no_crisis(planted, few_draws):
     assert found.crisis().status.startswith(("no power law", "not told"))
 
 
+@pytest.mark.wide
 def test_a_crisis_that_the_power_law_does_not_fit_is_not_used(planted, few_draws):
     """Lanes that leave chaos ever later with the distance."""
     planted(1, power=-1.5)

@@ -167,6 +167,7 @@ def test_forces_vanish_in_sum_at_the_equilibrium():
     np.testing.assert_allclose(forces["weight"], np.tile([0.0, -MASS * 9.81], (5, 1)))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("impact", ["synchronous", pytest.param("roller_pass", marks=pytest.mark.slow)])
 def test_speed_of_each_sample_counts(impact):
     model = case("1a", "preliminary")

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers import wide_but
 
 import jaxcage as jc
 from benchmarks.missed import followed, judged
@@ -34,7 +35,9 @@ NEAR = {
 }
 
 
-@pytest.mark.parametrize("name", NEAR)
+@pytest.mark.parametrize(
+    "name", wide_but(NEAR, "lines that cross", "lines that pass", "pitchfork along the side that turns")
+)
 def test_branches_that_cross_and_branches_that_nearly_do(name):
     branch = followed(NEAR[name], jc.orbits.Steps())
     row = judged(NEAR[name], branch, branch)

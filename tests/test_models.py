@@ -151,7 +151,8 @@ def test_whirl_threshold_in_the_time_domain(film: str, share: float, grows: bool
     assert abs(turns[-1] - turns[0]) / (run.tau[-1] - run.tau[800]) == pytest.approx(0.5146, abs=0.01)
 
 
-@pytest.mark.parametrize("harmonics", [pytest.param(1, marks=pytest.mark.wide), 5])
+@pytest.mark.wide
+@pytest.mark.parametrize("harmonics", [1, 5])
 @pytest.mark.parametrize("name", ["rigid", "elastic", "roller-pass"])
 def test_harmonics_are_where_the_spectrum_of_the_forcing_ends(name: str, harmonics: int):
     model = MODELS[name]()

@@ -262,6 +262,7 @@ def cage_at_speeds(**options):
     return space, jc.design.chaotic_width(9000.0, 27500.0, 2, starts=2, **options)
 
 
+@pytest.mark.wide
 def test_a_design_is_judged_alike_whatever_it_is_swept_with():
     """Each design starts from its own states: those of a wide gap lie outside a narrow one."""
     space, width = cage_at_speeds(discard=3, revolutions=2, method=jc.method("rk4", steps=128))

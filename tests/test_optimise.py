@@ -135,12 +135,14 @@ def test_the_best_of_many_with_noise_is_chosen_anew():
     assert stays.best.values == pytest.approx({n: TRUTH[n] for n in VARY})
 
 
+@pytest.mark.wide
 def test_starts_that_lead_to_one_optimum_are_one():
     found = jc.optimise(double_well(), VARY, bowl(), starts=6, steps=200)
     assert [n for _, n in found.distinct] == [6]
     assert "6 starts led to 1 optima" in str(found)
 
 
+@pytest.mark.wide
 def test_several_optima_are_listed():
     """Two valleys, in the damping."""
     two = jc.design.Smooth(
@@ -153,6 +155,7 @@ def test_several_optima_are_listed():
     assert [n for _, n in found.distinct] == [2, 2]
 
 
+@pytest.mark.wide
 def test_scouts_find_the_deeper_valley():
     """One valley holds an eighth of the range and is the deeper; the slope from elsewhere leads away from it."""
 
@@ -229,6 +232,7 @@ def test_a_noisy_search_ends_within_its_error():
     assert found.status == "slope within its error" and len(found.history) == 3
 
 
+@pytest.mark.wide
 def test_sobol_indices_of_ishigami():
     """Ishigami and Homma's function, a = 7, b = 0.1: first 0.3139, 0.4424, 0, total 0.5576, 0.4424, 0.2437."""
     import jax.numpy as jnp

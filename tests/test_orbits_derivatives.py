@@ -64,6 +64,7 @@ FORWARD = jax.jit(jax.jacfwd(orbit_numbers))
 REVERSE = jax.jit(jax.jacrev(orbit_numbers))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", ORBITS)
 def test_jacobian_of_state_and_multipliers(name):
     theta, guess = ORBITS[name]

@@ -60,6 +60,7 @@ def test_no_orbit(name):
     assert int(orbit.iterations) <= 40
 
 
+@pytest.mark.wide
 def test_no_orbit_and_so_no_point():
     point = jc.bifurcation(well(c=1.0, k=0.0), "fold", ((0.1, 0.0), 1.0), method=METHOD)
     assert point.status == "no such point"

@@ -58,6 +58,7 @@ def agrees(ours, number: Number) -> bool:
     return bool(abs(ours - number.value) <= number.tolerance)
 
 
+@pytest.mark.wide
 def test_orbits_in_other_units_are_the_same():
     """Both wells of an oscillator, and in thousandths: Newton's method starts at its guess, not between the two."""
 
@@ -138,6 +139,7 @@ class VanDerPol(eqx.Module):
         return (u, self.mu * (1 - x * x) * u - x)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("mu", VAN_DER_POL)
 def test_limit_cycle_of_van_der_pol(mu):
     period, log_multiplier = VAN_DER_POL[mu]
@@ -365,6 +367,7 @@ def test_period_doubling_of_a_planted_driven_orbit(speed, at, inside):
     assert abs(point.angle - np.pi) < 1e-8
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("turn", [0.0, 0.5, 1.0])
 def test_torus_bifurcation_of_a_planted_driven_orbit(turn):
     """(-1)^(2 turn) exp((a +- i b) T)."""

@@ -233,6 +233,7 @@ class Sticking(eqx.Module):
         return (-x - 10.0 * jnp.tanh(u / self.width) + jnp.cos(tau),)
 
 
+@pytest.mark.wide
 def test_where_bounded_forces_are_too_stiff_for_runge_kutta_the_orbit_is_found_all_the_same():
     """Explicit steps chatter about rest, but nothing overflows: what they close on, if anything, moves with the steps.
     The mass creeps with tanh(u / width) = cos(tau) / 10, but for terms of order width squared."""

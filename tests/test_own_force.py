@@ -199,6 +199,7 @@ def test_a_unit_that_is_none_is_refused_where_it_is_declared():
 # --- what acts, and what is measured ---------------------------------------------------------
 
 
+@pytest.mark.wide
 def test_forces_and_moments_of_a_run_name_it(tmp_path: Path):
     run = jc.simulate(OWN, SPEED, revolutions=1, samples=16, method=METHOD)
     forces, moments = jc.analysis.cage_forces(OWN, run), jc.analysis.cage_moments(OWN, run)

@@ -88,6 +88,7 @@ def test_long_limit_in_closed_form(cavitation: str, eps: float):
     np.testing.assert_allclose(2 * at(20.0) - at(10.0), expected, rtol=0, atol=0.005 * size)
 
 
+@pytest.mark.wide
 def test_squeeze_of_a_long_film_in_closed_form():
     """Full film, no rotation: -12 pi eps'/(1 - eps^2)^(3/2) in units of mu R L (R/c)^2."""
     r, v = jnp.asarray([0.5, 0.0]), jnp.asarray([0.1, 0.0])
@@ -115,6 +116,7 @@ def test_short_film_is_off_by_the_square_of_the_slenderness():
     assert whole[1] / whole[0] == pytest.approx(4, rel=0.01) and whole[2] / whole[1] == pytest.approx(4, rel=0.01)
 
 
+@pytest.mark.wide
 def test_error_of_the_short_film_at_the_lands_of_the_published_bearing():
     """The table in the docstring of `short_film_excess`, at radius 46 mm."""
     excess = jax.jit(jax.vmap(lambda e, lam: 100 * short_film_excess(e, lam, stations=1024, profiles=1)))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers import slow_but, wide_but
+from helpers import slow_but
 
 from jaxcage.validation import (
     DUFFING_DOUBLINGS,
@@ -59,7 +59,8 @@ def test_load_integral_against_a_sum(zone: float):
 BRACKETS = {1: (0.262, 0.27), 2: (0.285, 0.288), 4: (0.2908, 0.2912), 8: (0.29196, 0.29205)}
 
 
-@pytest.mark.parametrize("periods", wide_but(BRACKETS, 1))
+@pytest.mark.wide
+@pytest.mark.parametrize("periods", BRACKETS)
 def test_shooting_finds_the_doublings_of_the_table(periods: int):
     _, number = DUFFING_DOUBLINGS[periods]
     found = doubling(lambda g: duffing(0.3, g, 1.2), periods, BRACKETS[periods], (1.0, 0.0))

@@ -106,6 +106,7 @@ def runaway(tau, q, v, speed):
     return (jnp.where(speed > 4, 1e3 * q[0] ** 3, -q[0]),)
 
 
+@pytest.mark.wide
 def test_waterfall_leaves_failed_speeds_nan():
     result = waterfall(ForcedOscillator(runaway, coordinates=1), np.array([3.0, 5.0]), revolutions=4, discard=4)
     assert result.outcome[0] == "successful" != result.outcome[1]

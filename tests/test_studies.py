@@ -63,7 +63,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return store
 
 
-@pytest.mark.parametrize("places", [((1, 1),), pytest.param(((0, 0), (0, 2)), marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("places", [((1, 1),), ((0, 0), (0, 2))])
 def test_lanes_are_those_of_a_sweep(whole: Path, places: tuple[tuple[int, int], ...]):
     """Labels and exponents of lanes, against sweeps of one system at a time, whose programs hold it as constants."""
     found = jc.open_study(whole)

@@ -164,6 +164,7 @@ def test_speckle_beside_an_edge_leaves_the_edge_sharp():
     assert np.sum(grid.known[:100]) <= 0.3 * 100 * SIDE
 
 
+@pytest.mark.wide
 def test_chaos_must_persist_if_asked():
     """Starts found chaotic are judged again after more revolutions, all others stay as they were."""
     system = jc.ForcedOscillator(Ueda(jnp.array(7.5)), coordinates=1)

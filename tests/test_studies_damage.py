@@ -58,6 +58,7 @@ def computed(bench: faults.Bench, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return done
 
 
+@pytest.mark.wide
 def test_random_faults(bench: faults.Bench):
     """A sample of `python -m benchmarks.faults`."""
     dice = random.Random(7)
@@ -85,8 +86,9 @@ def other(bench: faults.Bench):
     process.close()
 
 
+@pytest.mark.wide
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the other process makes children")
-@pytest.mark.parametrize("lives, steps", [(3, 8), pytest.param(12, 20, marks=pytest.mark.wide)])
+@pytest.mark.parametrize("lives, steps", [(3, 8), (12, 20)])
 def test_any_life_of_a_store(bench: faults.Bench, other: Other, tmp_path: Path, lives: int, steps: int):
     """Started, killed, damaged, resumed, read, by two processes, in any order."""
     few = settings(

@@ -215,7 +215,8 @@ def solve_14(impact, roller, v0, times):
 
 # Where the contact closes within a step, p^(10/9) costs a fixed-step method order: the errors below
 # belong to the default 511 x 4 steps, and to 16 times as many.
-@pytest.mark.parametrize("samples, tolerance", [(512, 3e-4), pytest.param(4089, 1e-5, marks=pytest.mark.wide)])
+@pytest.mark.wide
+@pytest.mark.parametrize("samples, tolerance", [(512, 3e-4), (4089, 1e-5)])
 def test_impact_against_scipy(samples, tolerance):
     h = history(samples=samples, substeps=4 if samples == 512 else 8)
     q, y = solve_14(IMPACT, ROLLER, SPEED, np.asarray(h.time))
@@ -335,6 +336,7 @@ def truncated(omega, harmonics=24):
     return tau, force, spectrum / tau.size, np.fft.irfft(kept, tau.size, axis=1)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_pulse_train_has_the_spectrum_of_the_superposed_pulses(omega):
     _, force, spectrum, _ = truncated(omega)
@@ -354,6 +356,7 @@ def test_pulse_train_has_the_spectrum_of_the_superposed_pulses(omega):
     np.testing.assert_allclose(found, sine, atol=1e-4 * peak)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_pulse_train_force_is_the_superposition_of_shifted_pulses(omega):
     tau, force, _, kept = truncated(omega)
@@ -470,6 +473,7 @@ def test_an_impact_that_cannot_be_resolved_is_not_a_number():
     assert np.all(np.isnan(jax.jit(lambda play: jnp.stack(pulse_spectrum(law, 900.0, Z, ROLLER, play)))(1e-6)))
 
 
+@pytest.mark.wide
 def test_roller_pass_reaches_the_cage_with_the_half_angle_of_the_loaded_zone():
     law = RollerPassImpact(oscillator=IMPACT)
     model, cage = cage_with(impact=law)

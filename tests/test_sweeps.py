@@ -36,6 +36,7 @@ def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
         assert np.array_equal(whole.block_growth[i::2], piece.block_growth)
 
 
+@pytest.mark.wide
 def test_kept_states_are_the_last_ones_in_order():
     long = raw_sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=20, method=FAST)
     short = raw_sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=7, method=FAST)
@@ -115,6 +116,7 @@ def test_number_of_exponents_does_not_change_the_first():
     assert np.allclose(b.exponents.sum(-1), -0.1 * 2 * np.pi / b.speed[:, None], rtol=0, atol=1e-6)
 
 
+@pytest.mark.wide
 def test_lanes_that_settle_early_are_what_they_are_when_run_on():
     """Ueda's oscillator: periodic lanes stop, with the orbit they are on to the end; chaotic ones have an exponent."""
     speeds = np.linspace(0.8, 1.4, 40)

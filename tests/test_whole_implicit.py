@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import wide_but
 from reference import WholeBearing
 from scipy.integrate import solve_ivp
 from test_whole_motion import energy_and_momentum
@@ -38,9 +37,8 @@ def parts_of(row, n):
     return Parts(row[: 5 * n].reshape(5, n).T, row[5 * n :])
 
 
-@pytest.mark.parametrize(
-    ("kind", "over_angle"), wide_but([(k, o) for k in KINDS for o in (True, False)], ("inner", True))
-)
+@pytest.mark.wide
+@pytest.mark.parametrize(("kind", "over_angle"), [(k, o) for k in KINDS for o in (True, False)])
 def test_arrow_is_the_dense_jacobian(kind, over_angle):
     """Its products and solutions against a matrix made of all directional derivatives, for either variable."""
     model = jc.replace(jc.whole_bearing("nu2310"), **KINDS[kind])
@@ -90,6 +88,7 @@ def stiff():
     return model, start._replace(bodies=start.bodies.at[:2].set(place))
 
 
+@pytest.mark.wide
 def test_order_of_a_step(stiff):
     """Twice the steps make a sixteenth of the error, or less: of the state, and of the energies that are integrated
     beside it once steps are as short as the film's damping."""
@@ -129,6 +128,7 @@ def test_tangents_of_a_step(stiff):
         np.testing.assert_allclose(tangent, differences, rtol=1e-5, atol=1e-5 * np.abs(differences).max())
 
 
+@pytest.mark.wide
 def test_a_stiff_arc(stiff):
     """Implicit steps reach what explicit ones and SciPy's LSODA on the second implementation do, in far fewer."""
     model, start = stiff
@@ -153,6 +153,7 @@ def test_a_stiff_arc(stiff):
         assert np.max(np.abs(end - done.y[:, -1])) < 1e-4 < 1e-2 < np.max(np.abs(end - begin / size))
 
 
+@pytest.mark.wide
 def test_energy_of_implicit_steps(stiff):
     """What the shaft gives is lost or stored, to 1e-8 of what is lost."""
     model, start = stiff

@@ -117,6 +117,7 @@ def _same(found, expected, tolerance):
         np.testing.assert_allclose(found.bodies[part], np.asarray(expected.bodies)[part], rtol=0, atol=room)
 
 
+@pytest.mark.wide
 def test_rollers_know_of_each_other_through_cage_and_ring_only():
     """The arrow: rates of a roller do not depend on another roller, so that a linear solve costs O(Z)."""
     model = bearing()
@@ -145,6 +146,7 @@ def test_twice_the_rollers_cost_twice_as_much():
     assert 1.5 < flops[1] / flops[0] < 2.2
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("base", ["mass", "length", "time"])
 def test_other_units_give_the_same_motion(base):
     """Every declared unit is right, and no number with a unit is hidden in the formulas."""

@@ -57,6 +57,7 @@ def moving(model, **parts):
     return BearingState.of(Rollers(*rollers), bodies, parts.get("angle", 0.0))
 
 
+@pytest.mark.wide
 def test_a_start_without_load_is_that_of_next_to_none():
     none, little = (rolling_start(bearing(load=load), SPEED) for load in (0.0, 1e-2))
     np.testing.assert_allclose(none.rollers, little.rollers, rtol=1e-6, atol=1e-9)
@@ -71,6 +72,7 @@ def run():
     return model, start, jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=3e-7)
 
 
+@pytest.mark.wide
 def test_energy(run):
     """What the shaft gives is lost in contacts or stored, over a revolution."""
     model, start, ran = run
@@ -151,6 +153,7 @@ def test_rollers_that_do_not_slip():
     np.testing.assert_allclose(orbit, SPEED * (r - h_i) / (r * (1 + h_i / h_o)), rtol=1e-8)
 
 
+@pytest.mark.wide
 def test_cage_speed_under_load_without_friction():
     """R_i omega_i/(2 (R_o - D/2)) to 1e-4, (omega_i/2)(1 - D/d_m) to 1e-3 only."""
     model = bearing(**NO_LAND, gravity=0.0, pocket_friction=0.0, eccentricity=0.0)
@@ -213,6 +216,7 @@ def test_static_load():
         assert upward == pytest.approx(4450 + gravity * float(model.ring.ring_mass), rel=1e-9)
 
 
+@pytest.mark.wide
 def test_bounces():
     """Off a bar and off the outer raceway, both by ln[(1 + chi)/(1 - chi e)] = chi (1 + e) with chi = 1.5 alpha v0.
 

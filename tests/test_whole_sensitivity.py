@@ -52,6 +52,7 @@ def by_law(monkeypatch: pytest.MonkeyPatch):
     return noise
 
 
+@pytest.mark.wide
 def test_shares_of_a_sum(by_law):
     """A sum of 30 u and 10 v: nine tenths and one tenth of the variance, and nothing together."""
     found, scatter = bearing_sensitivity(jc.whole_bearing("nu2310"), VARY, BearingRuns(SPEED), "wear", samples=128)
@@ -59,6 +60,7 @@ def test_shares_of_a_sum(by_law):
     assert found.total == pytest.approx(found.first, abs=0.03) and scatter == 0 and found.evaluations == 512
 
 
+@pytest.mark.wide
 def test_scatter_is_what_no_parameter_has(by_law):
     """A constant with scatter is nothing but scatter; wear has a variance of (30^2 + 10^2)/12 without."""
     by_law[""], model = 3.0, jc.whole_bearing("nu2310")

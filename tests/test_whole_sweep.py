@@ -61,6 +61,7 @@ def along():
     return BearingState(jnp.asarray(numbers.normal(size=(5, 13))), jnp.asarray(numbers.normal(size=9)), jnp.zeros(2))
 
 
+@pytest.mark.wide
 def test_a_lane_is_a_simulation(start):
     """From one state over an eighth of a revolution, both by tight steps."""
     model = bearing()
@@ -82,6 +83,7 @@ def test_a_lane_is_a_simulation(start):
     np.testing.assert_allclose(place, run.bodies[k // 2 : k + 1 : k // 2, :2] / float(model.clearance), atol=1e-6)
 
 
+@pytest.mark.wide
 def test_growth_is_that_of_the_distance_of_two_runs(start):
     """Over an eighth of a revolution, the logarithm of the tangent's length against runs a little apart."""
     model, direction = bearing(), along()
@@ -96,6 +98,7 @@ def test_growth_is_that_of_the_distance_of_two_runs(start):
     assert float(block.growth[0]) == pytest.approx(expected, abs=2e-3)
 
 
+@pytest.mark.wide
 def test_growth_is_that_of_any_tangent_vector_however_long(start):
     """A vector whose squares are no numbers any more, as at low speed and light load, grows like a short one."""
     model = bearing()
@@ -107,6 +110,7 @@ def test_growth_is_that_of_any_tangent_vector_however_long(start):
     assert grown[1] == pytest.approx(grown[0], rel=1e-9) and abs(grown[0]) > 0.05
 
 
+@pytest.mark.wide
 def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     """Beside a cage that hardly turns, and one that starts with no number, a lane is bit for bit what it is alone."""
     model = bearing()
@@ -122,6 +126,7 @@ def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     assert float(block.growth[0]) == float(block_alone.growth[0]) and np.isfinite(float(block.growth[0]))
 
 
+@pytest.mark.wide
 def test_a_way_in_two_parts_is_the_same_way(start):
     """To a sample by way of a third of it; a lane whose way is 0 stays, and takes no step."""
     model = bearing()
@@ -165,6 +170,7 @@ def test_slow_shafts_run_through():
     assert found.outcome[0, 0] == "successful" and found.error[0, 0] < 0.05 and found.exponent[0, 0] > 50
 
 
+@pytest.mark.wide
 def test_rollers_have_no_names():
     """With a balanced cage, a start with its rollers and its angle moved on by one pocket is the same motion."""
     model = bearing(eccentricity=0.0)
@@ -179,6 +185,7 @@ def test_rollers_have_no_names():
     np.testing.assert_allclose(np.asarray(block.peaks)[:, 0], np.asarray(block.peaks)[:, 1], rtol=1e-6)
 
 
+@pytest.mark.wide
 def test_exponents_of_the_last_revolutions():
     """Followed over four of 16, all else over all; means are those of a run that follows them from the beginning."""
     options: Any = dict(starts=1, discard=0, revolutions=16, blocks=16, tolerance=1e-4)

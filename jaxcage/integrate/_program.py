@@ -25,6 +25,11 @@ CONTROL_FLOW = {"while", "scan", "cond"}
 STAYS_CALL = "evaluated_often"
 """Name of a function under `jax.jit` that a program calls several times: it is differentiated once for all of them."""
 
+_variables = lambda atoms: {v for v in atoms if not isinstance(v, jex.core.Literal)}
+_read = lambda equation: _variables(equation.invars)
+_identity = lambda x: id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
+"""What two numbers must have in common to be the same one."""
+
 
 class Sizes(NamedTuple):
     """How many numbers of each kind a step has."""
@@ -127,15 +132,6 @@ def _inlined(jaxpr: Any, consts: Sequence[Any], *args: Any, seen: dict[Any, Any]
     return [read(v) for v in jaxpr.outvars]
 
 
-def _identity(x: Any) -> Any:
-    """What two numbers must have in common to be the same one."""
-    return id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
-
-
-def _variables(atoms: Sequence[Any]) -> set[Any]:
-    return {v for v in atoms if not isinstance(v, jex.core.Literal)}
-
-
 def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
     """Those of the equations that what is wanted follows from, in their order."""
     reached = _variables(wanted)
@@ -179,7 +175,3 @@ def pieces(program: Program, largest: int, late: Sequence[bool] = ()) -> list[An
         given = in_order([jaxpr.invars, *(e.outvars for e in jaxpr.eqns[:first])], read)
         parts.append(jaxpr.replace(eqns=part, invars=given, outvars=in_order([e.outvars for e in part], later)))
     return parts
-
-
-def _read(equation: Any) -> set[Any]:
-    return _variables(equation.invars)
