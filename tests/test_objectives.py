@@ -309,8 +309,10 @@ def test_sobol_indices_say_when_they_are_not_to_be_believed():
     known = dict(first_interval=dict(gap=(0.4, 0.6)), total_interval=dict(gap=(0.5, 0.7)))
     sure = jc.design.SobolIndices(**row(0.5, 0.6), **known, evaluations=192, samples=64)
     assert sure.doubtful == () and sure.warning is None and sure.samples_wanted == 64
-    above = dataclasses.replace(sure, **row(0.5, 1.19))
-    assert above.doubtful == ("gap",) and "between 0 and 1" in str(above.warning)
+    above = dataclasses.replace(sure, **row(0.5, 1.19), total_interval=dict(gap=(1.08, 1.31)))
+    assert above.doubtful == ("gap",) and "between 0 and 1" in str(above.warning) and above.samples_wanted == 128
+    below = dataclasses.replace(sure, **row(-0.002, 0.24), first_interval=dict(gap=(-0.06, 0.05)))
+    assert below.doubtful == ()
     wide = dataclasses.replace(sure, first_interval=dict(gap=(-0.1, 1.1)))  # 1.2 wide: 16 times the samples for .3
     assert wide.doubtful == ("gap",) and wide.samples_wanted == 1024 and "1024 base samples" in str(wide)
     none = dataclasses.replace(sure, total_interval=dict(gap=(float("nan"), float("nan"))))

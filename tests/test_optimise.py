@@ -247,6 +247,7 @@ def test_sobol_indices_of_ishigami():
     got = jc.design.global_sensitivity(double_well(), vary, jc.design.Smooth(ishigami), samples=4096)
     assert list(got.first.values()) == pytest.approx([0.3139, 0.4424, 0.0], abs=0.02)
     assert list(got.total.values()) == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
+    assert jc.design.global_sensitivity(double_well(), vary, jc.design.Smooth(ishigami), samples=4096) == got
     for name in names:
         assert got.first_interval[name][0] <= got.first[name] <= got.first_interval[name][1]
 

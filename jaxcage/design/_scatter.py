@@ -36,19 +36,22 @@ class SobolIndices:
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Parameters of which an index lies outside 0 to 1, or has an interval wider than itself and than `NARROW`, or
-        none: then so few samples differ that some of the bootstrap's are all alike."""
+        """Parameters of which an index has an interval all outside 0 to 1, or wider than itself and than `NARROW`, or
+        none: then so few samples differ that some of the bootstrap's are all alike. One a little below 0, with an
+        interval that reaches 0, is what an index of 0 looks like."""
         rows = [(self.first, self.first_interval), (self.total, self.total_interval)]
-        bad = lambda value, pair: not (0 <= value <= 1 and pair[1] - pair[0] <= max(abs(value), NARROW))
+        bad = lambda value, pair: not (pair[0] <= 1 and pair[1] >= 0 and pair[1] - pair[0] <= max(abs(value), NARROW))
         return tuple(n for n in self.first if any(bad(value[n], pair[n]) for value, pair in rows))
 
     @property
     def samples_wanted(self) -> int:
         """Base samples, a power of 2, by which all intervals should be no wider than `NARROW`: widths fall with the
-        root of their number. Where one has no interval, it is taken as 1 wide."""
+        root of their number. Where one has no interval, it is taken as 1 wide. Twice as many at least if any is in
+        doubt."""
+        least = 2 * self.samples if self.doubtful else self.samples
         widths = [b - a for pairs in (self.first_interval, self.total_interval) for a, b in pairs.values()]
         widest = max(NARROW, *(1.0 if math.isnan(w) else w for w in widths))
-        return max(self.samples, 1 << math.ceil(math.log2(self.samples * (widest / NARROW) ** 2)))
+        return max(least, 1 << math.ceil(math.log2(self.samples * (widest / NARROW) ** 2)))
 
     @property
     def warning(self) -> str | None:
@@ -110,34 +113,35 @@ def sobol_of(
     """
     if samples < 2 or samples & (samples - 1):
         raise ArgumentError("samples", said=f"must be a power of 2, but {samples} was given.")
-    from scipy.stats import DegenerateDataWarning, sobol_indices, uniform  # takes half a second to load
+    from scipy.stats import DegenerateDataWarning, bootstrap, sobol_indices, uniform  # takes half a second to load
 
     values: list[np.ndarray] = []
 
-    def kept(x: np.ndarray) -> np.ndarray:
-        values.append(evaluate(x))
-        return values[-1]
+    def indices(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values[:] = f_A, f_B, f_AB
+        return _shares(f_A, f_B, f_AB)
 
+    number = samples * (len(names) + 2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = sobol_indices(func=kept, n=samples, dists=[uniform()] * len(names), rng=seed)
-        number = samples * (len(names) + 2)
-        if all(np.ptp(v) == 0 and v.flat[0] == values[0].flat[0] for v in values):
+        found = sobol_indices(func=evaluate, n=samples, dists=[uniform()] * len(names), method=indices, rng=seed)
+        if all(np.all(v == values[0].flat[0]) for v in values):
             none, nowhere = dict.fromkeys(names, 0.0), dict.fromkeys(names, (0.0, 0.0))
             return SobolIndices(none, none, nowhere, nowhere, number, samples)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegenerateDataWarning)  # of what has no influence at all
-            spread = found.bootstrap(confidence_level=0.95)
+            drawn = lambda rows: np.stack(_shares(*(v[..., rows] for v in values)))[..., 0]
+            spread = bootstrap([np.arange(samples)], drawn, vectorized=False, rng=seed).confidence_interval
     named = lambda row: dict(zip(names, np.ravel(row).tolist(), strict=True))
-    ends = lambda ci: zip(np.ravel(ci.low).tolist(), np.ravel(ci.high).tolist(), strict=True)
-    pairs = lambda ci: dict(zip(names, ends(ci), strict=True))
-    return SobolIndices(
-        named(found.first_order),
-        named(found.total_order),
-        pairs(spread.first_order.confidence_interval),
-        pairs(spread.total_order.confidence_interval),
-        number,
-        samples,
-    )
+    pairs = lambda k: dict(zip(names, zip(spread.low[k].tolist(), spread.high[k].tolist(), strict=True), strict=True))
+    return SobolIndices(named(found.first_order), named(found.total_order), pairs(0), pairs(1), number, samples)
+
+
+def _shares(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First and total indices by the estimators (b) and (f) of table 2 in Saltelli et al., Comput. Phys. Commun. 181
+    (2010) 259: of values at two sets of samples, shape (1, samples), and at the first with one column of the second,
+    shape (names, 1, samples). SciPy's own bootstrap of them cannot be seeded."""
+    variance = np.var([a, b], axis=(0, -1))
+    return np.mean(b * (mixed - a), axis=-1) / variance, 0.5 * np.mean((a - mixed) ** 2, axis=-1) / variance
 
 
 @dataclasses.dataclass(frozen=True)
