@@ -57,17 +57,14 @@ def run_all(
     the paper may have done, and run fig. 9."""
     say = report or (lambda what, done, total: None)
     grid = rpm(*PUBLISHED_SPEED_RANGE_RPM, speeds)
-    swept = dict(
-        zip(
-            models,
-            sweep_designs(
-                list(models.values()),
-                grid,
-                discard=discard,
-                revolutions=revolutions,
-                progress=lambda done, total: say("sweeps", done, total),
-            ),
-            strict=True,
+    by_name = lambda found: dict(zip(models, found, strict=True))
+    swept = by_name(
+        sweep_designs(
+            list(models.values()),
+            grid,
+            discard=discard,
+            revolutions=revolutions,
+            progress=lambda done, total: say("sweeps", done, total),
         )
     )
     loss: dict[str, LossZones] = {}
@@ -77,24 +74,20 @@ def run_all(
         loss[name] = loss_zones(found)
     say("diagrams", 0, 1)
     seen = observed_zones(list(models.values()), grid, observers)
-    diagrams = {observer: dict(zip(models, found, strict=True)) for observer, found in seen.items()}
+    diagrams = {observer: by_name(found) for observer, found in seen.items()}
     say("strobe sections", 0, 1)
     observed = section_revolutions - SECTION_REVOLUTIONS[0]
     blocks = max(n for n in range(1, 21) if observed % n == 0)
-    omega = np.array([rpm(SECTION_RPM)])
-    sections = {
-        name: sweep_designs(
-            [model],
-            omega,
-            starts=1,
-            discard=SECTION_REVOLUTIONS[0],
-            revolutions=observed,
-            blocks=blocks,
-            keep=observed,
-        )[0]
-        for name, model in models.items()
-    }
-    return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, sections, diagrams)
+    sections = sweep_designs(
+        list(models.values()),
+        np.array([rpm(SECTION_RPM)]),
+        starts=1,
+        discard=SECTION_REVOLUTIONS[0],
+        revolutions=observed,
+        blocks=blocks,
+        keep=observed,
+    )
+    return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, by_name(sections), diagrams)
 
 
 def edges_of(runs: Runs, name: str) -> list[ComparedEdge]:
