@@ -229,7 +229,6 @@ def test_a_lane_that_fails_spoils_no_other(swept):
         assert np.all(np.isnan(bad)) and np.all(np.isfinite(good))
 
 
-@pytest.mark.wide
 def test_measures_of_a_sweep_are_those_of_a_run(swept):
     """Over a revolution from the same state; two runs drift apart in it, but their means do not."""
     model, starts, both = swept

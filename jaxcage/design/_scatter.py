@@ -122,8 +122,9 @@ def sobol_of(
         return _shares(f_A, f_B, f_AB)
 
     number = samples * (len(names) + 2)
+    how: Any = dict(n=samples, dists=[uniform()] * len(names), method=indices, rng=seed)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = sobol_indices(func=evaluate, n=samples, dists=[uniform()] * len(names), method=indices, rng=seed)
+        found = sobol_indices(func=evaluate, **how)
         if all(np.all(v == values[0].flat[0]) for v in values):
             none, nowhere = dict.fromkeys(names, 0.0), dict.fromkeys(names, (0.0, 0.0))
             return SobolIndices(none, none, nowhere, nowhere, number, samples)
