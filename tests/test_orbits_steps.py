@@ -177,7 +177,8 @@ def test_branch_takes_more_steps_where_the_stop_is_touched():
     branch = jc.branch(stop(), jc.periodic_orbit(stop(), 2.5), lower=0.5, upper=3.0)
     highest = np.array([np.max(np.abs(s)) for s in branch.state])
     assert branch.steps.min() <= 512 and branch.steps.max() >= 2048
-    assert np.all(branch.error < 1e-5) and highest.size > 20
+    # Stated is three times the difference that steps are chosen by.
+    assert np.all(branch.error < 3e-5) and highest.size > 20
     points = [p for p in branch.special if p.status == "converged"]
     assert points and len(points) == len(branch.special)
     for p in points:
