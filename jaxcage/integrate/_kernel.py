@@ -19,19 +19,20 @@ from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
 from ._explicit import Stages, chosen, explicit_step
 from ._march import is_elementary, march_with_tangents
+from ._newmark import NewmarkBeta
 from ._program import Numbers, Sizes
 from ._rosenbrock import AbstractRosenbrock, computed_once, rosenbrock_step
 
 
 REVOLUTION = 2 * math.pi
-KernelSolver = AbstractRosenbrock | dfx.AbstractERK
+KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
 
 
 def can_be_kernel(solver: Any) -> bool:
     """Whether a step of `solver` is a plain formula: ours, and explicit methods with the first stage last."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
-    return isinstance(solver, AbstractRosenbrock)
+    return isinstance(solver, AbstractRosenbrock | NewmarkBeta)
 
 
 NEARNESS = 0.2
@@ -79,8 +80,8 @@ class _CalledField(AbstractField):
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
-    phase and the length of the step; fixed the first phase, the step, the phase at the end, and the numbers of (field,
-    system, scale)."""
+    phase and the length of the step, by Newmark's method the largest defect that is left; fixed the first phase, the
+    step, the phase at the end, and the numbers of (field, system, scale)."""
 
     solver: KernelSolver
     structure: Form
@@ -97,8 +98,10 @@ class KernelStep:
         return KernelStage(Stages.of(self.solver.tableau), self.structure, self.abrupt)  # pyright: ignore
 
     def watched(self, phase: Any) -> Numbers:
-        """What is watched, at the beginning: the excursion, the phase and the length of the step."""
+        """What is watched, at the beginning: the excursion, the phase and the length of the step, or the defect."""
         zero = jnp.zeros(())
+        if isinstance(self.solver, NewmarkBeta):
+            return zero, zero
         return (zero, zero + phase, zero) if self.abrupt else (zero,)
 
     def __call__(self, i: Any, moved: State, watched: Numbers, fixed: Numbers) -> tuple[State, Numbers]:
@@ -107,6 +110,9 @@ class KernelStep:
         field = _CalledField(self.structure, tuple(numbers))
         peak, *clock = watched
         t0 = clock[0] if self.abrupt else phase + i * h
+        if isinstance(self.solver, NewmarkBeta):
+            y, left = self.solver.advance(self.structure.filled(numbers)[0], t0, t0 + h, moved)
+            return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), jnp.maximum(*clock, left))
 
         def size(rate: State) -> Scalar:
             return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
@@ -178,7 +184,8 @@ def kernel_step(
     """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
     watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
     structure, numbers = split((field, *watching), eqx.is_inexact_array)
-    step = KernelStep(solver, structure, system.abrupt(scale, scale) is not None)
+    abrupt = system.abrupt(scale, scale) is not None and not isinstance(solver, NewmarkBeta)  # its steps are equal
+    step = KernelStep(solver, structure, abrupt)
     plain = not any(eqx.is_array(x[1]) for x in structure.rest if x is not None)
     if plain and all(jnp.ndim(x) == 0 for x in numbers):
         part = step.stage or step  # of several parts one says it for all
@@ -200,14 +207,15 @@ def steps_through(
     phase: Any = 0.0,
     parts: Any = 1,
     multiple: int = 1,
-) -> tuple[State, Scalar, tuple[State, ...]]:
+) -> tuple[State, Scalar, dfx.RESULTS, tuple[State, ...]]:
     """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
 
     **Arguments:** solver; steps of a revolution; field, system and its scale; state; tangent vectors, and for each of
     them the tangents of the field's numbers, None where there are none; phase and part; a number that the steps of a
     part are known to be a multiple of.
 
-    **Returns:** the state after it, the largest excursion on the way, the tangent vectors.
+    **Returns:** the state after it, the largest excursion on the way, whether Newton's method converged everywhere
+    where the steps need it, the tangent vectors.
     """
     step, numbers = kernel_step(solver, field, system, scale)
     count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
@@ -226,5 +234,8 @@ def steps_through(
         # A lane that is lost ends the loop: it is far out, or its phase is NaN.
         through = lambda c: (c[1][1] < end) & (c[1][0] <= ESCAPE)
         carry = jax.lax.while_loop(through, lambda c: go(c, more, 1), carry)
-    y, (peak, *_), after = carry
-    return y, peak, tuple(after)
+    y, (peak, *others), after = carry
+    result = dfx.RESULTS.successful
+    if isinstance(solver, NewmarkBeta):
+        result = dfx.RESULTS.where(others[0] <= 1, result, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
+    return y, peak, result, tuple(after)

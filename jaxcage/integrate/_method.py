@@ -134,7 +134,7 @@ def run_steps(
         multiple = math.gcd(steps // parts, 4)
     pieces = (field, system, scale)
     if can_be_kernel(solver):
-        y, peak, _ = steps_through(
+        y, peak, result, _ = steps_through(
             solver,  # pyright: ignore[reportArgumentType]
             steps,
             *pieces,
@@ -143,7 +143,7 @@ def run_steps(
             parts=parts,
             multiple=multiple or 1,
         )
-        return Stretch(y, peak, result_at(dfx.RESULTS.successful, y, peak, ESCAPE))
+        return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
     return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), *pieces, y, phase)
 
 

@@ -55,8 +55,9 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
     if not (isinstance(method, FixedSteps) and can_be_kernel(method.solver)):
         return _pushed_from_outside(strobe, y, tangents, drifts)
     solver = cast(KernelSolver, method.solver)
-    y, peak, after = steps_through(solver, method.steps, strobe.field, strobe.system, strobe.scale, y, tangents, drifts)
-    code = outcome_code(result_at(dfx.RESULTS.successful, y, peak, ESCAPE))
+    pieces = (strobe.field, strobe.system, strobe.scale)
+    y, peak, result, after = steps_through(solver, method.steps, *pieces, y, tangents, drifts)
+    code = outcome_code(result_at(result, y, peak, ESCAPE))
     return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(jnp.nan), ())
 
 
