@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 from jaxcage import replace
 from jaxcage.integrate import (
+    RESULTS,
     FixedSteps,
     NewmarkBeta,
     Rodas3,
@@ -141,6 +142,27 @@ def test_newmark_does_not_damp():
     assert float(jnp.hypot(end[0], end[1])) == pytest.approx(1.0, abs=1e-10)
     phase = 2 * steps * np.arctan(np.pi / steps)  # of 2 pi: tan(w h / 2) = h / 2
     np.testing.assert_allclose(end, [np.cos(phase), -np.sin(phase)], atol=1e-8)
+
+
+def test_newmark_says_where_it_has_not_converged():
+    """One Newton iteration is enough at rest and not in motion; the lane beside it is none the worse."""
+    one = FixedSteps(NewmarkBeta(max_iterations=1), 16)
+    free = ForcedOscillator(lambda tau, q, v, speed: (-q[0] - q[0] ** 3,), coordinates=1)
+    run = lambda method: jax.vmap(lambda x: strobe_map(free, 1.0, method)((x, jnp.zeros(()))))
+    start = jnp.array([0.0, 1.0])
+    few, many = run(one)(start), run(FixedSteps(NewmarkBeta(), 16))(start)
+    assert [bool(x) for x in few.result == RESULTS.successful] == [True, False]
+    assert [bool(x) for x in few.result == RESULTS.nonlinear_divergence] == [False, True]
+    assert bool(jnp.all(many.result == RESULTS.successful))
+
+
+def test_derivative_of_a_revolution_by_newmark():
+    strobe = strobe_map(SECOND_ORDER, 1.3, method("newmark", steps=32))
+    start = stacked(SECOND_ORDER.starts(1.3)[0])
+    turn = jax.jit(lambda y: stacked(strobe(tuple(y)).y))
+    step = 1e-6 * jnp.eye(start.size)
+    differences = jax.vmap(lambda e: (turn(start + e) - turn(start - e)) / 2e-6)(step).T
+    np.testing.assert_allclose(jax.jit(jax.jacfwd(turn))(start), differences, rtol=1e-6, atol=1e-7)
 
 
 # --- adaptive steps --------------------------------------------------------------------------

@@ -80,7 +80,7 @@ class _CalledField(AbstractField):
 @dataclasses.dataclass(frozen=True)
 class KernelStep:
     """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
-    phase and the length of the step, by Newmark's method the largest defect that is left; fixed the first phase, the
+    phase and the length of the step, by Newmark's method by how much a defect was too large; fixed the first phase, the
     step, the phase at the end, and the numbers of (field, system, scale)."""
 
     solver: KernelSolver
@@ -111,8 +111,8 @@ class KernelStep:
         peak, *clock = watched
         t0 = clock[0] if self.abrupt else phase + i * h
         if isinstance(self.solver, NewmarkBeta):
-            y, left = self.solver.advance(self.structure.filled(numbers)[0], t0, t0 + h, moved)
-            return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), jnp.maximum(*clock, left))
+            y, excess = self.solver.advance(self.structure.filled(numbers)[0], t0, t0 + h, moved)
+            return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), jnp.maximum(clock[0], excess))
 
         def size(rate: State) -> Scalar:
             return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
@@ -214,8 +214,8 @@ def steps_through(
     them the tangents of the field's numbers, None where there are none; phase and part; a number that the steps of a
     part are known to be a multiple of.
 
-    **Returns:** the state after it, the largest excursion on the way, whether Newton's method converged everywhere
-    where the steps need it, the tangent vectors.
+    **Returns:** the state after it, the largest excursion on the way, whether the steps' own iteration converged, the
+    tangent vectors.
     """
     step, numbers = kernel_step(solver, field, system, scale)
     count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
@@ -237,5 +237,5 @@ def steps_through(
     y, (peak, *others), after = carry
     result = dfx.RESULTS.successful
     if isinstance(solver, NewmarkBeta):
-        result = dfx.RESULTS.where(others[0] <= 1, result, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
+        result = dfx.RESULTS.where(others[0] <= 0, result, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
     return y, peak, result, tuple(after)

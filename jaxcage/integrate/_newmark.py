@@ -43,15 +43,15 @@ class NewmarkBeta(dfx.AbstractSolver):
         self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any, solver_state: None, made_jump: Any
     ) -> tuple[Any, None, dict[str, Any], None, Any]:
         del terms, solver_state, made_jump
-        y1, left = self.advance(args, t0, t1, y0)
-        result = dfx.RESULTS.where(left <= 1, dfx.RESULTS.successful, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
+        y1, excess = self.advance(args, t0, t1, y0)
+        result = dfx.RESULTS.where(excess <= 0, dfx.RESULTS.successful, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
         return y1, None, dict(y0=y0, y1=y1), None, result
 
     def func(self, terms: Any, t0: Any, y0: Any, args: Any) -> Any:
         return terms.vf(t0, y0, args)
 
     def advance(self, field: AbstractField, t0: Scalar, t1: Scalar, y0: State) -> tuple[State, Scalar]:
-        """The state at the end of the step, and what Newton's method left of its defect, in units of what it may.
+        """The state at the end of the step, and by how much the defect that is left is too large.
 
         The iterations are as many for all lanes and written out: a step is then a plain formula, one kernel.
         """
@@ -88,4 +88,4 @@ class NewmarkBeta(dfx.AbstractSolver):
 
         left = jnp.sqrt(sum(c * c for c in defect(v1)))
         size = jnp.sqrt(sum(a * a + (b - a) ** 2 for a, b in zip(v0, v1, strict=True)))
-        return (*positions(v1), *v1), left / (self.tolerance * size)
+        return (*positions(v1), *v1), left - self.tolerance * size

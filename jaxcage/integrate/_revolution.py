@@ -7,7 +7,6 @@ together, so that the work is that of the lanes which ask for it, whatever their
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
-import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
