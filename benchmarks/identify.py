@@ -1,10 +1,10 @@
-"""Planted constants of the cage, found again from 12 noisy edges: how often the 95 % intervals hold the truth.
+"""Planted constants of the cage, found again from 24 noisy edges: how often the 95 % intervals hold the truth.
 
     python -m benchmarks.identify [--draws 20]
 
-The upper end of zone 1 of case 1a is a period doubling. It is followed to twelve cages that differ in guidance gap and
-eccentricity, as a test rig would have them, and measured there with 1 % noise. Six constants are sought; the cage is
-weighed, and the contact, the oil and gravity are known. Of every unknown a guess is known beforehand, wrong by 20 %
+Zone 1 of case 1a begins and ends with a period doubling. Both are followed to twelve cages that differ in guidance gap
+and eccentricity, as a test rig would have them, and measured there with 1 % noise. Six constants are sought; the cage
+is weighed, and the contact, the oil and gravity are known. Of every unknown a guess is known beforehand, wrong by 20 %
 (one standard deviation, drawn anew each time). Every draw starts at the truth: what is tested is the least-squares fit
 and its intervals, not the search for the valley (`jaxcage.design.screen`).
 """
@@ -33,6 +33,8 @@ NOISE, GUESS = 0.01, 0.2
 """Relative standard deviations of the measured edges, and of what is known of the constants beforehand."""
 DESIGNS = [(gap * 1e-3, e * 1e-6) for gap in (0.43, 0.45, 0.47) for e in (19, 22, 25, 28)]
 """Guidance gap and eccentricity of each cage [m]."""
+EDGES = {"zone 1 onset": (8000, 9000), "zone 1 exit": (12000, 13000)}
+"""Speeds [rpm] between which case 1a has the period doubling in question."""
 SUBSTEPS = 8
 
 
@@ -43,9 +45,9 @@ def planted(model: jc.CageModel) -> tuple[list[jc.design.Unknown], dict[str, flo
     return [jc.design.Unknown(n, v / 4, v * 4, sets=UNKNOWNS[n]) for n, v in truth.items()], truth
 
 
-def followed(model: jc.CageModel) -> dict[tuple[float, float], jc.orbits.Sensitivity]:
-    """The period doubling in every design, from that of case 1a, each from the nearest that is known."""
-    orbits = jc.synchronous_orbits(model, float(jc.rpm(12000)), float(jc.rpm(13000)), count=21, discard=1500)
+def followed(model: jc.CageModel, low: float, high: float) -> dict[tuple[float, float], jc.orbits.Sensitivity]:
+    """The period doubling of case 1a between two speeds [rpm] in every design, each from the nearest that is known."""
+    orbits = jc.synchronous_orbits(model, float(jc.rpm(low)), float(jc.rpm(high)), count=21, discard=1500)
     first = next(p for p in orbits.edges if p.kind == "period-doubling")
     here = (float(model.guidance_gap), float(model.eccentricity))
     found = {here: jc.sensitivity(model, first)}
@@ -71,14 +73,12 @@ def main() -> None:
     jc.keep_compiled_programs()
     model = jc.case("1a")
     unknowns, truth = planted(model)
-    edges = followed(model)
-    for (gap, e), edge in edges.items():
-        print(f"{1e3 * gap:.2f} mm {1e6 * e:3.0f} um {edge.value_rpm:10.2f} rpm, {edge.status}", flush=True)
-    names = {d: f"{1e3 * d[0]:.2f} mm, {1e6 * d[1]:.0f} um" for d in edges}
-    models = {names[d]: jc.replace(model, guidance_gap=d[0], eccentricity=d[1]) for d in edges}
-    points = [
-        jc.orbits.Point("period-doubling", float(jc.rpm(s.value_rpm)), np.asarray(s.state)) for s in edges.values()
-    ]
+    edges = [(d, name, s) for name, speeds in EDGES.items() for d, s in followed(model, *speeds).items()]
+    for (gap, e), name, edge in edges:
+        print(f"{1e3 * gap:.2f} mm {1e6 * e:3.0f} um {name} {edge.value_rpm:10.2f} rpm, {edge.status}", flush=True)
+    names = {d: f"{1e3 * d[0]:.2f} mm, {1e6 * d[1]:.0f} um" for d in DESIGNS}
+    models = {names[d]: jc.replace(model, guidance_gap=d[0], eccentricity=d[1]) for d in DESIGNS}
+    points = [jc.orbits.Point("period-doubling", float(jc.rpm(s.value_rpm)), np.asarray(s.state)) for *_, s in edges]
     rng, fits, began = np.random.default_rng(0), [], time.perf_counter()
     for draw in range(options.draws):
         noise, wrong = rng.normal(size=len(edges)), rng.normal(size=len(unknowns))
@@ -87,8 +87,8 @@ def main() -> None:
             for u, n in zip(unknowns, wrong, strict=True)
         ]
         measured = [
-            jc.design.MeasuredEdge(names[d], "zone 1 exit", s.value_rpm * (1 + NOISE * n), NOISE * s.value_rpm)
-            for (d, s), n in zip(edges.items(), noise, strict=True)
+            jc.design.MeasuredEdge(names[d], name, s.value_rpm * (1 + NOISE * n), NOISE * s.value_rpm)
+            for (d, name, s), n in zip(edges, noise, strict=True)
         ]
         fit = jc.fit_edges(models, guessed, measured, points, start=truth)
         fits.append(fit)

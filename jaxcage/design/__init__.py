@@ -5,7 +5,7 @@
 | `_unknowns` | constants to be found: bounds, scales, the models that they make              |
 | `_measured` | edges from a test rig or a publication                                        |
 | `_screen`   | the global stage of identification: chaos where it was measured               |
-| `_tracked`  | exact edges as differentiable functions of the unknowns                       |
+| `_tracked`  | exact edges and their derivatives as functions of the unknowns                |
 | `_fit`      | the local stage: least squares on exact edges, what the data do and do not fix |
 | `_objective`| design space, objectives that add up, any differentiable function of a design |
 | `_smooth`   | manufacturing cost, measures of regular motion                                |

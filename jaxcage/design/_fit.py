@@ -8,11 +8,8 @@ combinations of unknowns that the edges fix, well or not at all: on a logarithmi
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
@@ -21,7 +18,7 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ..orbits import Point
 from ._measured import MeasuredEdge
-from ._tracked import TrackedEdges, differentiable
+from ._tracked import TrackedEdges
 from ._unknowns import Unknown, check_unknowns, values_at, with_values
 
 
@@ -30,7 +27,11 @@ IDENTIFIED_BELOW = 0.10
 """A combination counts as identified if its 95 % interval reaches at most so far to either side, relatively."""
 AT_BOUND = 1e-3
 LOST = 1e9
-"""Speed [rpm] that stands for an edge which is gone: no step of the optimiser that leads there is taken."""
+"""Standard deviations that stand for an edge which is gone: no step of the optimiser that leads there is taken."""
+TOLERANCE = 1e-6
+"""Relative change of the places, and of the sum of squares, at which the search ends."""
+STEPS_TOO_SHORT = 3
+"""Status of scipy's search where the sum of squares might still fall."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,6 +144,8 @@ def fit_edges(
     **Raises:** `ValueError` for edges that are chaotic, of a case that is not there, or without a point; unknowns that
     no case has; a start out of bounds.
     """
+    from scipy.optimize import least_squares  # takes a quarter of a second to load
+
     require_x64()
     check_unknowns(systems, unknowns)
     _check(systems, unknowns, measured, points, start)
@@ -152,21 +155,25 @@ def fit_edges(
     if not np.all(np.isfinite(tracked(first).rpm)):
         gone = [f"{e.case} {e.name}" for e, w in zip(measured, tracked(first).rpm, strict=True) if not np.isfinite(w)]
         raise ArgumentError("points", said=f"must be bifurcations at `start`, but of {', '.join(gone)} none was found.")
-    speeds = differentiable(tracked, len(measured), len(unknowns), LOST)
-    target, sigma = (jnp.array([getattr(e, n) for e in measured]) for n in ("rpm", "uncertainty_rpm"))
-    expected = [(i, *u.prior_place) for i, u in enumerate(unknowns) if u.prior_place is not None]
+    lost = []
 
-    def residuals(z: Array, _: None) -> Array:
-        place = jax.nn.sigmoid(z)  # keeps the unknowns within their bounds
-        prior = [(place[i] - mean) / deviation for i, mean, deviation in expected]
-        return jnp.concatenate([(speeds(place) - target) / sigma, jnp.asarray(prior, dtype=float).reshape(-1)])
+    def residuals(place: np.ndarray) -> np.ndarray:
+        off, _ = _misfit(tracked, measured, place)
+        lost.append(not np.all(np.isfinite(off)))
+        return np.nan_to_num(off, nan=LOST)
 
-    solver = optx.LevenbergMarquardt(rtol=1e-6, atol=1e-6)
-    z0 = jnp.log(jnp.asarray(first) / (1 - jnp.asarray(first)))
-    solution = optx.least_squares(residuals, solver, z0, max_steps=max_steps, throw=False)
-    place = np.asarray(jax.nn.sigmoid(solution.value))
-    converged = bool(solution.result == optx.RESULTS.successful)
-    return _report(tracked, measured, place, converged)
+    slopes = lambda place: np.nan_to_num(_misfit(tracked, measured, place)[1])
+    end = least_squares(
+        residuals,
+        first,
+        slopes,  # pyright: ignore[reportArgumentType]
+        bounds=(0.0, 1.0),
+        xtol=TOLERANCE,
+        ftol=TOLERANCE,
+        max_nfev=max_steps,
+    )
+    shortened = any(lost) and end.status == STEPS_TOO_SHORT
+    return _report(tracked, measured, end.x, bool(end.success) and not shortened)
 
 
 def _check(
@@ -193,17 +200,23 @@ def _check(
             raise ValueError(f"Start of `{u.name}` must lie between {u.lower} and {u.upper}, but {given} was given.")
 
 
+def _misfit(
+    tracked: TrackedEdges, measured: Sequence[MeasuredEdge], place: Float[np.ndarray, " unknowns"]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Found less measured in standard deviations, and its derivatives; rows of prior knowledge below those of edges."""
+    found, sigma = tracked(place), np.array([e.uncertainty_rpm for e in measured])
+    priors = [(i, *u.prior_place) for i, u in enumerate(tracked.unknowns) if u.prior_place is not None]
+    off = (found.rpm - np.array([e.rpm for e in measured])) / sigma
+    off = np.append(off, [(place[i] - mean) / deviation for i, mean, deviation in priors])
+    rows = [np.eye(len(place))[i] / deviation for i, _, deviation in priors]
+    return off, np.vstack([found.slope / sigma[:, None], *rows])
+
+
 def _report(tracked: TrackedEdges, measured: Sequence[MeasuredEdge], place: np.ndarray, converged: bool) -> Fit:
     found, unknowns = tracked(place), tracked.unknowns
-    sigma = np.array([e.uncertainty_rpm for e in measured])
     unit = np.array([u.span if u.scale == "log" else 1.0 for u in unknowns])
-    rows = np.nan_to_num(found.slope) / sigma[:, None]
-    off = (found.rpm - np.array([e.rpm for e in measured])) / sigma
-    for i, u in enumerate(unknowns):
-        if u.prior_place is not None:
-            mean, deviation = u.prior_place
-            rows = np.vstack([rows, np.eye(len(unknowns))[i] / deviation])
-            off = np.append(off, (place[i] - mean) / deviation)
+    off, rows = _misfit(tracked, measured, place)
+    rows = np.nan_to_num(rows)
     covariance, combinations = determined(rows / unit, [u.name for u in unknowns])
     deviation = np.sqrt(np.diag(covariance)) / unit  # of the place
     ends = [np.clip(place + s * NORMAL_95 * deviation, 0, 1) for s in (-1, 1)]

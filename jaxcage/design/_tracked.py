@@ -7,13 +7,11 @@ the new constants in as many parts as it needs. The derivatives come from the im
 import concurrent.futures
 import dataclasses
 import os
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -115,26 +113,3 @@ class TrackedEdges:
         return self._follow(
             case, nearer, slope_in_place(self.unknowns, half.derivative, middle), middle, place, halvings - 1
         )
-
-
-def differentiable(edges: Callable[[np.ndarray], Edges], m: int, n: int, lost: float) -> Callable[[Array], Array]:
-    """Edge speeds [rpm] as a JAX function with an exact derivative; an edge that is lost is `lost` with no slope."""
-
-    def values(place: Any) -> np.ndarray:
-        found = edges(np.asarray(place)).rpm
-        return np.where(np.isfinite(found), found, lost)
-
-    def slopes(place: Any) -> np.ndarray:
-        return np.nan_to_num(edges(np.asarray(place)).slope)
-
-    @jax.custom_jvp
-    def speeds(place: Array) -> Array:
-        return jax.pure_callback(values, jax.ShapeDtypeStruct((m,), float), place)
-
-    @speeds.defjvp
-    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
-        (place,), (move,) = primals, tangents
-        matrix = jax.pure_callback(slopes, jax.ShapeDtypeStruct((m, n), float), place)
-        return speeds(place), jnp.asarray(matrix) @ move
-
-    return speeds
