@@ -7,13 +7,14 @@ import pytest
 from helpers import wide_but
 
 import jaxcage as jc
-from jaxcage.analysis import Edge, Zone
+from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.forces import cubic_stiffness
 from jaxcage.plotting import paper_figures
 from jaxcage.reproduction import (
     READINGS,
     Observer,
+    Runs,
     compare_edges,
     conclusions,
     marks,
@@ -88,6 +89,54 @@ def test_an_observer_reads_zones_off_a_diagram():
     assert drawn["brief"] == [()]  # eight points are no band
     ((found,),) = drawn["late"]
     assert found.onset is None and found.exit is not None and found.exit.speed_rpm == pytest.approx(13400)
+
+
+def by_hand(zones, speeds=8):
+    """Runs of all cases with the same zones, in which every lane drew the same points."""
+    grid = jc.rpm(2500, 27500, speeds)
+    points = np.random.default_rng(0).uniform(-1e-4, 1e-4, (speeds, 1, 40, 4))
+    lane = np.zeros((speeds, 1))
+    swept = jc.Sweep(
+        speed=grid,
+        strobe=points,
+        last=points[:, :, -1],
+        block_growth=np.full((speeds, 1, 2, 1), 0.1),
+        peak=lane + 0.9,
+        outcome=np.zeros((speeds, 1), dtype=np.int32),
+        error=lane,
+        doubt=lane[..., None],
+        scale=np.full((speeds, 4), 1e-4),
+        discard=0,
+        revolutions=40,
+        escape=lane + np.inf,
+        horizon=3000,
+    )
+    cases = lambda value: dict.fromkeys(PUBLISHED_CASES, value)
+    found = Zones(tuple(zones), (), 100.0, 500.0)
+    models = {name: jc.case(name) for name in PUBLISHED_CASES}
+    return Runs(models, cases(swept), cases(found), {}, cases(swept), {"reader": cases((zone(9000, None),))})
+
+
+def test_figures_of_the_paper_from_given_runs():
+    """Eight figures; of figs. 7 and 8 only the pairs whose two cases were run."""
+    runs = by_hand([zone(9000, 12000)])
+    drawn = dict(paper_figures(runs))
+    assert list(drawn) == ["fig5", "fig7a", "fig8a", "fig7b", "fig8b", "fig7c", "fig8c", "fig9"]
+    assert all(figure.axes for figure in drawn.values())
+    cells = drawn["fig7a"].axes
+    assert [ax.get_title(loc="left")[:8] for ax in cells] == ["Case 1a:", "Case 1b:"]
+    few = dataclasses.replace(runs, sweeps={"1a": runs.sweeps["1a"], "2a": runs.sweeps["2a"], "2b": runs.sweeps["2b"]})
+    assert [name for name, _ in paper_figures(few)] == ["fig5", "fig7b", "fig8b", "fig9"]
+
+
+def test_zones_of_every_kind_from_given_runs():
+    """What lasts is as given; at first, lanes whose exponent is .1 are chaotic at every speed."""
+    kinds = by_hand([zone(9000, 12000)]).zones_by_kind("1a")
+    assert list(kinds) == ["lasting", "at first", "reader"]
+    assert [len(found) for found in kinds.values()] == [1, 1, 1]
+    (at_first,) = kinds["at first"]
+    assert at_first.onset is None and at_first.exit is None and at_first.share == 1.0
+    assert kinds["lasting"][0].exit is not None and kinds["lasting"][0].exit.speed_rpm == 12000
 
 
 @pytest.fixture(scope="module")
