@@ -100,7 +100,8 @@ def main() -> None:
         held = sum(abs(o) <= c.half_width for o, c in zip(off, own))
         called = sum(c.identified for c in own)
         width = 100 * np.median([c.half_width for c in own])
-        print(f"+-{width:8.2f} %  identified in {called:2d}, holds the truth in {held:2d} of {len(fits)}   {own[0]}")
+        powers = str(own[0]).rpartition(":")[0]
+        print(f"+-{width:8.2f} %  identified in {called:2d}, holds the truth in {held:2d} of {len(fits)}   {powers}")
 
 
 if __name__ == "__main__":
