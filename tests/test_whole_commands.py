@@ -12,6 +12,7 @@ from test_whole_motion import SPEED, bearing
 import jaxcage as jc
 from jaxcage.analysis import bearing_zones
 from jaxcage.cli import _whole, _whole_page, main
+from jaxcage.plotting import bearing_ramp_figure
 from jaxcage.sweeps import BearingRamp, BearingUpDown, bearing_up_down
 
 
@@ -86,6 +87,9 @@ def test_hysteresis_is_beyond_the_errors():
     assert found.stretches == [(pytest.approx(3000), pytest.approx(5000))]
     loud = BearingUpDown(found.speed, 100.0, dataclasses.replace(up, cage_slip_error=np.full(5, 0.02)), down)
     assert not loud.apart.any() and loud.stretches == []
+    slip, *_ = bearing_ramp_figure(found).axes  # shaded half a step beyond the speeds
+    assert [(p.get_x(), p.get_width()) for p in slip.patches] == [(pytest.approx(2500), pytest.approx(3000))]
+    np.testing.assert_allclose(slip.containers[1].lines[0].get_ydata(), 100 * down.cage_slip)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from matplotlib.patches import Circle, FancyArrowPatch
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
+from jaxcage.analysis import around, bearing_history
 from jaxcage.integrate import (
     OUTCOMES,
     SAMPLES,
@@ -21,6 +23,7 @@ from jaxcage.integrate import (
     slowness,
 )
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
+from jaxcage.plotting import bearing_figure, bearing_map_figure, bearing_sweep_figure, bearings_beside
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
@@ -207,7 +210,7 @@ def swept():
     """A lane that fails, since its cage hardly turns, beside one that does not."""
     model = bearing(eccentricity=0.0)
     starts = [rolling_start(model, SPEED, 1), rolling_start(model, SPEED, turning=0.01)]
-    return model, starts, jc.sweep_bearing(model, SPEED, starts=starts, **SHORT)
+    return model, starts, jc.sweep_bearing(model, np.array([SPEED, 1.1 * SPEED]), starts=starts, **SHORT)
 
 
 @pytest.mark.wide
@@ -229,10 +232,16 @@ def test_a_lane_that_fails_spoils_no_other(swept):
         assert np.all(np.isnan(bad)) and np.all(np.isfinite(good))
 
 
-def test_measures_of_a_sweep_are_those_of_a_run(swept):
+@pytest.fixture(scope="module")
+def run(swept):
+    """The lane that does not fail by itself."""
+    model, starts, _ = swept
+    return jc.simulate_bearing(model, SPEED, revolutions=1, samples=SAMPLES, start=starts[0])
+
+
+def test_measures_of_a_sweep_are_those_of_a_run(swept, run):
     """Over a revolution from the same state; two runs drift apart in it, but their means do not."""
-    model, starts, both = swept
-    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=SAMPLES, start=starts[0])
+    model, _, both = swept
     expected = jc.bearing_measures(model, run, SPEED)
     assert both.cage_slip[0, 0] == pytest.approx(expected.cage_slip, abs=2e-4)
     assert both.eccentricity_mean[0, 0] == pytest.approx(expected.eccentricity_mean, rel=1e-2)
@@ -241,6 +250,38 @@ def test_measures_of_a_sweep_are_those_of_a_run(swept):
     assert both.eccentricity_std[0, 0] == pytest.approx(expected.eccentricity_std, rel=0.1)
     for name in ("pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h"):
         assert getattr(both, name)[0, 0] == pytest.approx(getattr(expected, name), rel=0.05)
+
+
+def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
+    """A line for each start, the numbers of the sweep on it; beside another bearing the mean of those that ended."""
+    _, _, both = swept
+    figure = bearing_sweep_figure(both, "two starts")
+    slip, power = figure.axes[0], figure.axes[3]
+    assert [len(ax.lines) for ax in figure.axes] == [2] * 6
+    np.testing.assert_allclose([line.get_ydata() for line in slip.lines], 100 * both.cage_slip.T)
+    assert list(power.lines[0].get_ydata()) == list(both.friction_power_W[:, 0])
+    beside = bearings_beside(["a", "b"], [both, both])
+    first, second = beside.axes[0].lines
+    assert first.get_ydata()[0] == second.get_ydata()[0] == pytest.approx(100 * both.cage_slip[0, 0])
+    over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
+    cells = over.axes[0].collections[0].get_array()
+    np.testing.assert_allclose(np.ravel(cells), 100 * np.tile(both.cage_slip[:, 0], 2))
+
+
+def test_the_bearing_is_drawn_to_scale(swept, run):
+    """Circles of the rollers' size at their places, an arrow for each force of note, at the sample of the largest."""
+    model, *_ = swept
+    history = bearing_history(model, run, SPEED)
+    figure = bearing_figure(model, run, history, around(history), {}, {})
+    drawing, (over_time,) = figure.axes[0], [ax for ax in figure.axes if ax.get_ylabel() == "Force [N]"]
+    rollers = [p for p in drawing.patches if isinstance(p, Circle)]
+    assert len(rollers) == 13 and {p.radius for p in rollers} == {500 * float(model.bearing.roller_diameter)}
+    worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
+    np.testing.assert_allclose([np.hypot(*p.center) for p in rollers], 1e3 * run.rollers[worst, 2])
+    forces = np.abs(history.pocket_force[worst])
+    arrows = [p for p in drawing.patches if isinstance(p, FancyArrowPatch)]
+    assert len(arrows) == np.sum(forces >= 0.01 * forces.max())
+    assert over_time.lines[0].get_ydata().max() == forces.max()
 
 
 def test_what_cannot_be_swept():
