@@ -262,10 +262,11 @@ def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
     assert list(power.lines[0].get_ydata()) == list(both.friction_power_W[:, 0])
     beside = bearings_beside(["a", "b"], [both, both])
     first, second = beside.axes[0].lines
-    assert first.get_ydata()[0] == second.get_ydata()[0] == pytest.approx(100 * both.cage_slip[0, 0])
+    for line in (first, second):
+        assert np.asarray(line.get_ydata())[0] == pytest.approx(100 * both.cage_slip[0, 0])
     over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
-    cells = over.axes[0].collections[0].get_array()
-    np.testing.assert_allclose(np.ravel(cells), 100 * np.tile(both.cage_slip[:, 0], 2))
+    cells = np.ravel(np.asarray(over.axes[0].collections[0].get_array(), float))
+    np.testing.assert_allclose(cells, 100 * np.tile(both.cage_slip[:, 0], 2))
 
 
 def test_the_bearing_is_drawn_to_scale(swept, run):
