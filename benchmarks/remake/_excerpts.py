@@ -97,16 +97,6 @@ def readings(runs: Sequence[Run]) -> str:
     return aligned([("reading", "chaotic", "zones", *EDGES), *body])
 
 
-def case_fits(runs: Sequence[Run]) -> str:
-    """Each case with the constants fitted to it alone, from `identify_nu2310.py --check`."""
-    rows = []
-    for run in runs:
-        name, rest = run.text.strip().split(": ", 1)
-        found = dict(re.findall(r"(zone \d \w+) (none|\S+ %)", rest))
-        rows.append((name, *(found[e] for e in EDGES), rest.split("; ")[1].split()[0]))
-    return aligned([("case fitted alone", *EDGES, "zones"), *rows])
-
-
 def lasting_fit(runs: Sequence[Run]) -> str:
     """Constants of the package beside those of a search on lasting chaos, case by case, from `identify_nu2310.py`."""
     whose, rows = ("package", "search"), []

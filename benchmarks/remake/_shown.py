@@ -67,12 +67,10 @@ SMALL = "--designs 32 --starts 16 --seeds 1 --discard 10 --revolutions 20"
 BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
 PAPER = "python -m benchmarks.bearing_paper"
 PAPER_PARTS = (("force", ""), ("support", " --revolutions 12 --discard 8"), ("cases", ""))
-CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
 SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
 SPEED = "python -m benchmarks"
 PAPER_FIGURE = {"experiments/reproduce_7a.png": "out/fig7a.png"}
 CHAOS = ("Chaotic zones of", "Transient chaos of")
-FIT = "python experiments/identify_nu2310.py --check --cases {0} --begin experiments/case_fits/{0}.json"
 CRISES = "jaxcage gradient 1a --lasting --first 9000 --last 12900 --count 40 --designs 32"
 CHECK = "python experiments/identify_nu2310.py --check"
 TRADE = "python experiments/identify_nu2310.py --trade-off --ledger experiments/lasting_search"
@@ -98,7 +96,6 @@ SHOWN = (
     Shown("studies-text", STUDIES, ["python -m benchmarks.study"]),
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
-    Shown("case-fits", REPRODUCTION, [FIT.format(c) for c in CASES], ex.case_fits),
     Shown("lasting-fit", REPRODUCTION, [CHECK, f"{CHECK} --ledger experiments/lasting_search.csv"], ex.lasting_fit),
     Shown("trade-off", REPRODUCTION, [f"{TRADE}.csv"], ex.printed),
     Shown("trade-off-physical", REPRODUCTION, [f"{TRADE}_physical.csv"], ex.printed),
