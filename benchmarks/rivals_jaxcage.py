@@ -13,8 +13,8 @@ from .problem import Problem, our_map
 class Jaxcage:
     """A solver by name with settings that are steps (whole numbers), tolerances, or None for the library's default.
 
-    The solver `controlled` is the library's own control of the steps in each revolution, its setting the error,
-    or the steps of a single rung.
+    The solver `controlled` is the library's own control of the steps in each revolution, its setting the error; a
+    whole number is the fixed number of Runge-Kutta steps that stands for its answer without any error.
     """
 
     lanes, revolutions, agree = 2048, 20, 1e-7
@@ -35,7 +35,7 @@ class Jaxcage:
         if self.solver is None or setting is None:
             return None
         if self.solver == "controlled":
-            return jc.controlled(setting) if isinstance(setting, float) else jc.controlled(ladder=[("rk4", setting)])
+            return jc.controlled(setting) if isinstance(setting, float) else jc.method("rk4", steps=setting)
         kind = "steps" if isinstance(setting, int) else "tolerance"
         return jc.method(self.solver, **{kind: setting})
 
