@@ -123,11 +123,10 @@ def start_tangents(dimension: int, exponents: int) -> Tangents:
     return orthonormalise(tuple(tuple(wave(i, d) for d in range(dimension)) for i in range(exponents)))[0]
 
 
-def settle(strobe: StrobeMap, y0: State, revolutions: Int[Array, ""], limit: Float[Array, ""]) -> Lane:
-    """Run a lane from `y0` without recording anything; one that starts further out than `limit` has failed."""
-    admitted = outcome_code(strobe.admit(y0, limit))
-    zero = jnp.zeros(())
-    lane = Lane(_blank(y0, admitted), zero, admitted, jnp.zeros((), jnp.int32), zero)
+def settle(strobe: StrobeMap, lane: Lane, revolutions: Int[Array, ""], limit: Float[Array, ""]) -> Lane:
+    """Run a lane without recording anything; one that starts further out than `limit` has failed."""
+    outcome = jnp.where(lane.outcome == 0, outcome_code(strobe.admit(lane.y, limit)), lane.outcome)
+    lane = lane._replace(y=_blank(lane.y, outcome), outcome=outcome)
     return jax.lax.fori_loop(0, revolutions, lambda _, c: _advance(strobe, c)[0], lane)
 
 

@@ -6,6 +6,7 @@ full size, so that the arithmetic of a lane does not depend on how many neighbou
 """
 
 import concurrent.futures
+import heapq
 import os
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -28,13 +29,21 @@ CHUNKS = (16, 32, 64, 128, 256, 384, 512)
 CALL = 32
 """What a call costs beside its lanes, in lanes."""
 
+LOOK = 16
+"""Revolutions after which lanes are dealt out anew."""
+
 Progress = Callable[[int, int], None]
 """Called with lanes done and lanes in all."""
 
 
 @compiled
-def _settle_chunk(designs: "Designs", method: AbstractMethod, revolutions: Array, limit: Array, part: "Part") -> Lane:
-    return over_lanes(lambda lane: settle(designs.strobe(method, lane), lane.y, revolutions, limit), part)
+def _settle_chunk(
+    designs: "Designs", method: AbstractMethod, revolutions: Array, limit: Array, part: "Part", *left: Array
+) -> Lane:
+    def one(lane: Part, *left: Array) -> Lane:
+        return settle(designs.strobe(method, lane), Lane(lane.y, jnp.zeros(()), *left), revolutions, limit)
+
+    return over_lanes(one, part, *left)
 
 
 @compiled
@@ -110,22 +119,40 @@ def _padded(lanes: np.ndarray, size: int) -> np.ndarray:
     return np.pad(lanes, (0, size - lanes.size), constant_values=-1)
 
 
+def _dealt(cost: Float[np.ndarray, " lanes"], size: int, least: int) -> list[Int[np.ndarray, " some"]]:
+    """Numbers of lanes in chunks that take about as long, `least` chunks at least if there are enough blocks of lanes.
+
+    Lanes that cost the same are packed into blocks of as many as are run together, so that a block costs what one of
+    them does. The dearest come first, each block into the chunk that has the least to do.
+    """
+    order = np.argsort(-cost, kind="stable")
+    alike = np.split(order, np.flatnonzero(np.diff(cost[order])) + 1)
+    blocks = [block for lanes in alike for block in np.split(lanes, range(BLOCK, lanes.size, BLOCK))]
+    chunks = max(-(-cost.size // size), min(least, len(blocks)))
+    parts, room = [[order[:0]] for _ in range(chunks)], [size] * chunks
+    load = [(0.0, i) for i in range(chunks)]  # of chunks with room, the least first
+    for block in blocks:
+        while block.size:
+            done, i = heapq.heappop(load)
+            taken, rest = np.split(block, [room[i]])
+            parts[i].append(taken)
+            room[i] -= taken.size
+            if room[i]:
+                heapq.heappush(load, (done + cost[block[0]], i))
+            block = rest
+    return [np.concatenate(part) for part in parts]
+
+
 def _in_chunks(
     work: Callable[[np.ndarray], Any],
-    lanes: np.ndarray,
+    cost: Float[np.ndarray, " lanes"],
     size: int,
     report: Callable[[int], None] = lambda _: None,
     least: int = 1,
 ) -> tuple[np.ndarray, ...]:
-    """`work` on `lanes`, chunk by chunk on all cores, in `least` chunks at least if there are enough blocks of lanes;
-    results in the order of their numbers.
-
-    Neighbours need about as many steps. They are dealt out to the chunks as many at a time as are run together: so the
-    few lanes that need the most share their blocks, and every chunk takes as long.
-    """
-    blocks = np.split(lanes, range(BLOCK, lanes.size, BLOCK))
-    chunks = max(-(-lanes.size // size), min(least, len(blocks)))
-    parts = [np.concatenate(blocks[i::chunks]) for i in range(chunks)]
+    """`work` on the numbers of lanes, chunk by chunk on all cores, in `least` chunks at least if there are enough
+    blocks of lanes; results in the order of the lanes."""
+    parts = _dealt(cost, size, least)
     run = lambda part: [np.asarray(x)[..., : part.size] for x in work(_padded(part, size))]
     results = []
     with concurrent.futures.ThreadPoolExecutor(workers()) as pool:
@@ -150,7 +177,7 @@ def run_parts(
     alive = np.all(np.isfinite(y0), axis=1)
     y0 = np.where(alive[:, None], y0, 0.0)
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    found = _in_chunks(begin, np.arange(speed.size), chunk_size(speed.size))
+    found = _in_chunks(begin, np.ones(speed.size), chunk_size(speed.size))
     each = lambda x: alive.reshape(-1, *[1] * (x.ndim - 1))
     return tuple(np.where(each(x), np.moveaxis(x, -1, 0), np.nan) for x in found)
 
@@ -200,32 +227,40 @@ def run_lanes(
     size = chunk_size(lanes) if size is None else size
     plan = Plan(*map(int, plan))
     first, watched = plan.discard - plan.align, plan.align + plan.block * plan.blocks
-    share = np.array([first, watched]) / (first + watched)
-    alone, limit = jnp.asarray(first), jnp.asarray(ESCAPE if onward else 1.0)
+    # How many steps each lane needs is seen after a few revolutions, and the lanes are dealt out again.
+    stages = [LOOK, first - LOOK] if first > 2 * LOOK and workers() > 1 else [first]
     lengths = Lengths(*map(jnp.asarray, (plan.align, plan.block, plan.blocks)))
     room = Room(_room(plan.keep), _room(plan.blocks), plan.exponents)
-    done = [0, 0]
+    work, done = stated(method).work, 0.0
 
-    def report(stage: int) -> Callable[[int], None]:
+    def report(revolutions: int) -> Callable[[int], None]:
         def add(count: int) -> None:
-            done[stage] += count
+            nonlocal done
+            done += count * revolutions / (first + watched)
             if progress is not None:
-                progress(int(np.dot(share, done) + 1e-9), lanes)
+                progress(int(done + 1e-9), lanes)
 
         return add
 
-    begun = np.vstack([y0, np.full(dim, np.nan)])  # a lane that begins nowhere has failed, and is not run
+    y, limit = y0, jnp.asarray(ESCAPE if onward else 1.0)
+    outcome, level, error = np.zeros(lanes, np.int32), np.zeros(lanes, np.int32), np.zeros(lanes)
 
-    def begin(lane: np.ndarray) -> tuple[Any, ...]:
-        got = _settle_chunk(designs, method, alone, limit, _part(speed, which, begun, lane))
-        return *got.y, got.outcome, got.level, got.error
+    def given(lane: np.ndarray) -> list[Any]:
+        """Lanes of a chunk as far as they are; of what fills it up nothing is asked."""
+        left = (np.where(lane < 0, 1, outcome[lane]), level[lane], error[lane])
+        return [_part(speed, which, y, lane), *map(jnp.asarray, left)]
 
-    *y, outcome, level, error = _in_chunks(begin, np.arange(lanes), size, report(0), workers())
-    settled = np.stack(y, axis=-1).reshape(lanes, dim)
+    def cost() -> np.ndarray:
+        return np.where(outcome == 0, work[level], 1.0)
 
-    def follow(lane: np.ndarray) -> Observation:
-        rest = [jnp.asarray(x) for x in (np.where(lane < 0, 1, outcome[lane]), level[lane], error[lane])]
-        return _observe_chunk(designs, method, lengths, room, _part(speed, which, settled, lane), *rest)
+    for revolutions in stages:
 
-    seen = Observation(*_in_chunks(follow, np.argsort(-level, kind="stable"), size, report(1), workers()))
+        def begin(lane: np.ndarray, count: int = revolutions, limit: Array = limit) -> tuple[Any, ...]:
+            got = _settle_chunk(designs, method, jnp.asarray(count), limit, *given(lane))
+            return *got.y, got.outcome, got.level, got.error
+
+        *columns, outcome, level, error = _in_chunks(begin, cost(), size, report(revolutions), workers())
+        y, limit = np.stack(columns, axis=-1).reshape(lanes, dim), jnp.asarray(ESCAPE)
+    follow = lambda lane: _observe_chunk(designs, method, lengths, room, *given(lane))
+    seen = Observation(*_in_chunks(follow, cost(), size, report(watched), workers()))
     return seen._replace(strobe=seen.strobe[room.keep - plan.keep :], growth=seen.growth[: plan.blocks])
