@@ -11,6 +11,7 @@ PROGRAMS = os.environ.setdefault(
 )
 
 import jax
+import on_call
 import pytest
 
 
@@ -23,9 +24,17 @@ if PROGRAMS != "off":
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 
+on_call.check_first_calls()
+
 MAPS = pathlib.Path("/proc/self/maps")
 MOST_MAPS = 30_000
 """Compiled programs hold memory maps, of which Linux gives a process 65 530."""
+
+
+@pytest.fixture(autouse=True)
+def check_types_again():
+    """Each test begins with the types of all calls checked."""
+    on_call.begin_test()
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -660,6 +660,25 @@ def test_results_do_not_depend_on_chunks_cores_or_lane_order(monkeypatch):
             np.testing.assert_array_equal(getattr(got, field), getattr(expected, field), err_msg=f"{chunk} {field}")
 
 
+@pytest.mark.parametrize("lanes, size, least", [(1, 16, 2), (7, 16, 2), (40, 16, 2), (300, 64, 2), (300, 512, 4)])
+def test_chunks_take_about_as_long(lanes: int, size: int, least: int):
+    """Every lane once, no chunk above its size; while there is room none is behind another by more than a block."""
+    cost = np.random.default_rng(lanes).choice([64.0, 128.0, 4096.0], lanes, p=[0.6, 0.38, 0.02])
+    parts = _engine._dealt(cost, size, least)
+    assert sorted(np.concatenate(parts)) == list(range(lanes)) and max(p.size for p in parts) <= size
+    if max(p.size for p in parts) < size:
+        blocks = lambda p: sum(c * -(-np.sum(cost[p] == c) // _engine.BLOCK) for c in np.unique(cost[p]))
+        load = [blocks(p) for p in parts]
+        assert max(load) - min(load) <= np.max(cost)
+
+
+def test_the_dearest_lanes_do_not_wait_for_each_other():
+    """Two levels of eight lanes each that cost most: one for each core."""
+    cost = np.array([4096.0] * 8 + [2048.0] * 8 + [64.0] * 100)
+    dear, other = _engine._dealt(cost, 128, 2)
+    assert set(range(8)) == set(dear[:8]) and set(range(8, 116)) == set(other)
+
+
 @pytest.mark.wide
 def test_several_designs_in_one_batch_give_what_each_gives_alone():
     models = [MODEL, jc.replace(MODEL, guidance_gap=0.5e-3), jc.case("2b", "preliminary")]

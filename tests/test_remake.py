@@ -131,6 +131,20 @@ def test_a_stale_block_says_so(checkout: pathlib.Path, capsys: pytest.CaptureFix
     assert "force = 1" in text and f"<sub>Not yet made again by `{FAKE}` since commit" in text
 
 
+def test_a_package_that_gives_the_same_leaves_blocks_fresh_but_for_times(
+    checkout: pathlib.Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    remake(checkout)
+    before = fingerprint(checkout)
+    (checkout / "jaxcage" / "law.py").write_text("force = 2 - 1\n")
+    monkeypatch.setattr(stamps, "SAME", {fingerprint(checkout): (before,)})
+    assert stamps.state(LAW, fingerprint(checkout), checkout) == "fresh"
+    remake(checkout, "--mark")
+    assert "<sub>Made at commit" in (checkout / "page.md").read_text()
+    monkeypatch.setattr(Shown, "timed", True)
+    assert stamps.state(LAW, fingerprint(checkout), checkout) == "stale"
+
+
 def test_a_failure_leaves_the_others(checkout: pathlib.Path, capsys: pytest.CaptureFixture[str]):
     page = "<!-- made: {0} -->\n{0}\n<!-- end -->\n"
     (checkout / "page.md").write_text(page.format("bad") + page.format("odd") + page.format("law"))

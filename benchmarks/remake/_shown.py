@@ -33,6 +33,11 @@ class Shown:
         return self.excerpt is None and not self.files
 
     @property
+    def timed(self) -> bool:
+        """Whether it says how long sweeps take."""
+        return self.commands[0] in (SPEED, STUDY)
+
+    @property
     def in_place(self) -> list[str]:
         """Files that its commands write in the checkout."""
         own = [self.page] if self.whole and not self.commands[0].startswith("jaxcage") else []
@@ -68,7 +73,7 @@ BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
 PAPER = "python -m benchmarks.bearing_paper"
 PAPER_PARTS = (("force", ""), ("support", " --revolutions 12 --discard 8"), ("cases", ""))
 SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxcage design 1b", "jaxcage reproduce"
-SPEED = "python -m benchmarks"
+SPEED, STUDY = "python -m benchmarks", "python -m benchmarks.study"
 PAPER_FIGURE = {"experiments/reproduce_7a.png": "out/fig7a.png"}
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 CRISES = "jaxcage gradient 1a --lasting --first 9000 --last 12900 --count 40 --designs 32"
@@ -93,7 +98,7 @@ SHOWN = (
     Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
     OPTIMISE,
     Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
-    Shown("studies-text", STUDIES, ["python -m benchmarks.study"]),
+    Shown("studies-text", STUDIES, [STUDY]),
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
     Shown("lasting-fit", REPRODUCTION, [CHECK, f"{CHECK} --ledger experiments/lasting_search.csv"], ex.lasting_fit),
