@@ -46,6 +46,8 @@ def begin_test() -> None:
 def _first_calls(f: Any = None, **options: Any) -> Any:
     if f is None:
         return functools.partial(_first_calls, **options)
+    if isinstance(f, type) and hasattr(f.__init__, "checks_types"):  # it is written out, and checked as a function
+        return f
     if not isinstance(f, types.FunctionType):
         return _every(f, **options)
     code = f.__code__
@@ -59,4 +61,5 @@ def _first_calls(f: Any = None, **options: Any) -> Any:
         _calls[code] += 1
         return made()(*args, **kwargs)
 
+    run.__dict__["checks_types"] = True
     return run

@@ -20,6 +20,7 @@ def test_load_must_be_positive_under_a_gradient():
         jax.grad(lambda load: jb.load_distribution(jb.nu2310(), load).shaft_shift)(-1.0)
 
 
+@pytest.mark.wide
 def test_traced_load_must_be_positive():
     solve = eqx.filter_jit(lambda load: jb.load_distribution(jb.nu2310(), load).shaft_shift)
     with pytest.raises(eqx.EquinoxRuntimeError, match="Argument `load` must be positive."):

@@ -16,6 +16,7 @@ def distribution(clearance=40e-6, load=4450.0, centrifugal=0.0, angle=-np.pi / 2
     return bearing, jb.load_distribution(bearing, load, centrifugal, angle)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("clearance", [0.0, 40e-6])
 @pytest.mark.parametrize("load, centrifugal", [(1.0, 0.0), (4450.0, 435.9), (18.6e3, 27.2), (50.0, 435.9)])
 @pytest.mark.parametrize("angle", [-np.pi / 2, -np.pi / 2 + np.pi / 13, 0.7])
@@ -158,6 +159,7 @@ def test_homogeneity_of_the_statics(index, unit):
     np.testing.assert_allclose(found, exponents(unit) * value, atol=1e-8 * value)
 
 
+@pytest.mark.wide
 def test_homogeneity_of_cage_mass_and_viscosity():
     mass = jb.cage_mass(jb.nu2310(), 0.45e-3, jb.CageGeometry())
     found = homogeneity(jb.cage_mass, [jb.nu2310(), (0.45e-3, "m"), jb.CageGeometry()])
@@ -168,6 +170,7 @@ def test_homogeneity_of_cage_mass_and_viscosity():
     np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
+@pytest.mark.wide
 def test_batch_over_clearances_equals_single_solves():
     clearances = jnp.array([0.0, 20e-6, 60e-6])
     batch = jax.vmap(lambda c: jb.load_distribution(replace(jb.nu2310(), radial_clearance=c)).shaft_shift)(clearances)

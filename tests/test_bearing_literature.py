@@ -47,6 +47,7 @@ def test_discrete_rollers(bearing, clearance, load):
     assert float(result.half_angle) == pytest.approx(half_angle, rel=1e-6)
 
 
+@pytest.mark.wide
 def test_load_factor_of_13_rollers_and_of_the_continuous_integral():
     continuous = 2 * np.pi / beta(0.5, (10 / 9 + 2) / 2)
     assert continuous == pytest.approx(4.0850, abs=5e-5)

@@ -104,6 +104,7 @@ def test_stability_changes_at_the_folds_and_nowhere_else(over_speed):
     assert np.array_equal(largest < 1, stable)
 
 
+@pytest.mark.wide
 def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     """Damping is all that shrinks areas; the strobe map does not know of the continuation."""
     np.testing.assert_allclose(over_speed.speed_rpm / 60 * 2 * np.pi, over_speed.speed, rtol=1e-14)
@@ -149,6 +150,7 @@ def test_parameter_as_a_function(over_speed):
     assert picked.parameter == "parameter" and np.ptp(named.value) > 0.2
 
 
+@pytest.mark.wide
 def test_period_doublings_over_the_force(over_force):
     points = [p for p in over_force.special if p.kind == "period-doubling"]
     first = min(points, key=lambda p: abs(p.value - DOUBLING))
@@ -217,6 +219,7 @@ class Parabola(eqx.Module):
         return (self.p - y[0] ** 2,)
 
 
+@pytest.mark.wide
 def test_system_of_one_state():
     """Orbits x = +-sqrt(p) with the multiplier exp(-2 x T), and a fold at p = 0: exact."""
     system = jc.ForcedSystem(Parabola(**numbers(p=0.25)), dimension=1)
@@ -240,6 +243,7 @@ class Bend(eqx.Module):
         return (self.p + self.a * x - x**3,)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("start", wide_but([-1.3, -1.2, -1.1, -1.0, -0.9], -1.3))
 def test_two_folds_within_a_step(start):
     """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
@@ -275,6 +279,7 @@ def mathieu_trace(a):
     return end[0] + end[3]
 
 
+@pytest.mark.wide
 def test_branch_point_and_period_doublings_of_the_rest_state():
     """x = exp(-z t) y turns it into the undamped equation at a - z^2, whose trace is then +-2 cosh(z pi) (SciPy)."""
     z = 0.1
@@ -428,6 +433,7 @@ def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     assert branch.special == ()
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("first", wide_but(["period-doubling", "branch-point"], "period-doubling"))
 def test_crossings_within_one_step_are_in_order(first):
     """One at p = 0.02 and one at 0.0201, with one orbit put between them: only the first is next to stable orbits."""

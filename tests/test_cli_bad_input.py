@@ -167,6 +167,7 @@ def test_interruption(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Mo
     assert capsys.readouterr().err.endswith(f".\n{WHOLE}")
 
 
+@pytest.mark.wide
 def test_interruption_of_a_sweep_does_not_wait_for_its_threads(tmp_path: Path):
     command = [sys.executable, "-m", "jaxcage", "sweep", "1a", "--out", str(tmp_path)]
     pipe = subprocess.PIPE

@@ -194,6 +194,7 @@ def test_a_configuration_file_in_place_of_a_case(capsys: pytest.CaptureFixture[s
     assert err == ""  # T = 0.3 mm > C_r = 0.28 mm: the design rule holds
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", PUBLISHED_CASES)
 def test_every_published_case_is_known(capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str):
     found = document(capsys, "statics", name, "--out", str(tmp_path))
@@ -252,6 +253,7 @@ def test_as_a_module_from_a_shell(tmp_path: Path):
     assert json.loads(done.stdout)["case"] == "1a"
 
 
+@pytest.mark.wide
 def test_status_of_a_mistake_in_a_shell():
     command = [sys.executable, "-m", "jaxcage", "statics", "4z"]
     wrong = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -183,6 +183,7 @@ def test_slope_of_smooth_plus_is_its_derivative():
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13)
 
 
+@pytest.mark.wide
 def test_power_is_exact_with_finite_derivatives_at_touch():
     p = np.geomspace(1e-12, 1.0, 25)
     np.testing.assert_allclose(jax.vmap(power_10_9)(jnp.asarray(p)), p ** (10 / 9), rtol=1e-14)
@@ -195,6 +196,7 @@ def test_power_is_exact_with_finite_derivatives_at_touch():
     assert float(curvature(0.3)) == pytest.approx(10 / 81 * 0.3 ** (-8 / 9), rel=1e-13)
 
 
+@pytest.mark.wide
 def test_regularised_contact_sets_in_with_three_continuous_derivatives():
     """p^(10/9) after `smooth_plus` is of order 40/9 in the distance from the joint."""
     chain = derivatives(lambda u: power_10_9(smooth_plus(u, 1.0)), 3)

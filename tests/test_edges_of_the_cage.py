@@ -66,6 +66,7 @@ def found():
 KINDS = wide_but(STATES, "period-doubling")
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", KINDS)
 def test_edges_are_found_again(kind, found):
     """From speed and state of six digits, on which the result does not depend."""
@@ -150,6 +151,7 @@ def test_derivatives_against_differences(name, found):
     np.testing.assert_allclose(found["period-doubling"].derivative[name], slope, rtol=2e-6)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("base, factor", [("mass", 7.0), ("length", 1000.0), ("time", 60.0)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_edges_in_other_units(kind, base, factor, found):

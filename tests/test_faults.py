@@ -150,6 +150,7 @@ def failed(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
     return line
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_on_a_full_disk_says_so(
     capsys: pytest.CaptureFixture[str], nothing_computed: None, tmp_path: Path, name: str
@@ -224,6 +225,7 @@ def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     assert Store(store, study).pending() == []
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("call", ["rename", "replace"])
 @pytest.mark.parametrize("when", [1, 2, 3])
 def test_an_interruption_while_things_change_places(
@@ -452,6 +454,7 @@ def _writes(node: ast.AST) -> bool:
     return _called(node) != "open" or any(mode in given for mode in ("'w'", "'wb'", "'x'", "'xb'", "'a'", "'ab'"))
 
 
+@pytest.mark.wide
 def test_every_file_is_put_in_place_whole():
     """Whatever writes stands under `with replacing(...)` or `job.written(...)`, which is made of it; the others do the
     same in their own way, and are tested."""
@@ -511,6 +514,7 @@ def written() -> Iterator[list[Path]]:
         _watching[0], sys.dont_write_bytecode = False, bytecode
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("case", ["1a", "...toml"])
 def test_writes_stay_in_the_output_folder(

@@ -140,6 +140,7 @@ def matrix(model, r, v, omega=1.0, smoothing=SMOOTHING):
     return np.array([[m.xx, m.xy], [m.xy, m.yy]], dtype=float)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("state", random_states())
 def test_velocity_coefficients_are_the_derivative_and_positive_definite(model, state):
@@ -249,6 +250,7 @@ def test_gradient_at_the_centre_is_the_mean_of_opposite_limits(model):
         assert jump > 0.5 if model == "fixed_half" else jump < 1e-4
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("model", ["positive_pressure", "full"])
 def test_second_derivative_at_the_centre_against_differences(model):
     slope = jax.jacfwd(force, argnums=1)
@@ -325,6 +327,7 @@ def with_film(name):
 EPS = np.linspace(0.0, 1.5, 1501)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("angle", [0.0, 2.2])
 def test_land_force_at_rest_is_finite_and_monotone_through_contact(model, angle):
@@ -350,6 +353,7 @@ def test_land_force_at_rest_is_finite_and_monotone_through_contact(model, angle)
     np.testing.assert_allclose(there[onset + 1e-3 < EPS], there[-1], rtol=1e-9)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("model", MODELS)
 def test_film_in_the_cage_is_the_short_film_and_its_damping_saturates(model):
     built = with_film(model)

@@ -117,6 +117,7 @@ def test_a_command_that_writes_elsewhere_or_loses_an_option_is_found(monkeypatch
 # NaN and infinity.
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("model", hostile.MODELS[-2:], ids=["elastic", "roller pass"])
 @pytest.mark.parametrize("wrong", ["nan", "inf", "-inf", '"nan mm"', '"1e999"'])
 def test_nan_and_infinity_are_refused_at_every_key(tmp_path: Path, model: jc.CageModel, wrong: str):
@@ -141,6 +142,7 @@ NUMBERS = [
 ]
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "command", wide_but(sorted({command for command, _ in NUMBERS}), "gradient", "statics", "sweep")
 )

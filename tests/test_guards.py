@@ -138,6 +138,7 @@ def _thrown() -> tuple[np.ndarray, Any]:
     return speed, tuple(jnp.asarray(row) for row in rows)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "solver, steps",
     [
@@ -215,6 +216,7 @@ def test_labels_that_rest_on_too_few_revolutions(label: str, exponent: float, er
     assert too_few_revolutions(*lane, 19)[0] == judged_by_exponent
 
 
+@pytest.mark.wide
 def test_a_short_sweep_says_so_and_a_long_one_does_not():
     """The chaotic oscillator of Ueda: 0.65 a revolution."""
 

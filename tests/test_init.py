@@ -71,6 +71,7 @@ def test_it_describes_case_1a_but_for_the_readings_of_the_paper():
     compare(found, expected)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("number", options(), ids=lambda i: OPTION.sub("", TEXT.splitlines()[i]).split(" =")[0])
 def test_every_option_is_accepted_and_shows_what_it_is_when_left_out(number: int):
     lines = TEXT.splitlines()

@@ -69,6 +69,7 @@ def one_revolution(system, speed, chosen, start):
     return eqx.filter_jit(lambda y: stacked(strobe_map(system, speed, chosen)(y).y))(start)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize(
     "kind, solver, order, steps",
     [
@@ -144,6 +145,7 @@ def test_newmark_does_not_damp():
     np.testing.assert_allclose(end, [np.cos(phase), -np.sin(phase)], atol=1e-8)
 
 
+@pytest.mark.wide
 def test_newmark_says_where_it_has_not_converged():
     """One Newton iteration is enough at rest and not in motion; the lane beside it is none the worse."""
     one = FixedSteps(NewmarkBeta(max_iterations=1), 16)
@@ -156,6 +158,7 @@ def test_newmark_says_where_it_has_not_converged():
     assert bool(jnp.all(many.result == RESULTS.successful))
 
 
+@pytest.mark.wide
 def test_derivative_of_a_revolution_by_newmark():
     strobe = strobe_map(SECOND_ORDER, 1.3, method("newmark", steps=32))
     start = stacked(SECOND_ORDER.starts(1.3)[0])
@@ -217,6 +220,7 @@ NAMED = {
 }
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", wide_but(NAMED, "newmark"))
 def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
     steps, tolerance = NAMED[name]

@@ -84,6 +84,7 @@ def forces(model, speed, tau, state):
     return dict(zip(FORCES, np.asarray(found), strict=True))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("film", wide_but(FILMS, "fixed_half"))
 @random(50)
 @given(designs, speeds, angles, states(0.0, 1.2), angles)
@@ -130,6 +131,7 @@ def test_mirrored_states_have_mirrored_forces(film, cross, design, speed, tau, s
         )
 
 
+@pytest.mark.wide
 @random(50)
 @given(designs, speeds, states(0.0, 1.2))
 def test_mirror_image_of_the_fixed_half_is_the_other_half(design, speed, state):
@@ -297,6 +299,7 @@ def test_mirrored_starts_have_mirrored_ends(film, design, speed, start):
     np.testing.assert_allclose(found, end * np.tile(FLIP, 2), rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("kind", wide_but(SYSTEMS, "fixed_half"))
 @random(20)
 @given(designs, speeds, states(0.01, 0.9), states(0.0, 0.05, 0.05), units)

@@ -34,6 +34,7 @@ def asked_of(version: str) -> tuple[list[str], str]:
     return done.stdout.splitlines(), done.stderr
 
 
+@pytest.mark.wide
 def test_single_precision_is_refused_and_left_alone():
     said, warned = asked_of(jax.__version__)
     assert "jaxcage.enable_x64()" in said[0] and said[1] == "False" and "wrong" not in warned

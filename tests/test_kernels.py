@@ -90,6 +90,7 @@ def test_a_march_is_its_steps_one_by_one_in_one_lane_and_in_many():
         np.testing.assert_allclose(got, expected, rtol=1e-12)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("order, tolerance", [wide(1, 1e-12), (2, 1e-10), wide(3, 1e-8)])
 def test_derivatives_of_a_march_of_any_order(order, tolerance):
     """Against the same steps without the primitive; lanes outside the derivative and inside."""
@@ -136,6 +137,7 @@ def test_lanes_with_counts_of_their_own_are_differentiated(largest, monkeypatch)
     np.testing.assert_allclose(got, np.stack(expected), rtol=0, atol=1e-12)
 
 
+@pytest.mark.wide
 def test_tangents_with_and_without_those_of_the_fixed_numbers():
     z, h = LANES[4], 2 * np.pi / 200
     tangents, drifts = [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)], [(None, None), (None, None), (None, 1.0)]
@@ -175,6 +177,7 @@ def test_a_caught_tracer_cannot_be_in_the_loop():
 # --- steps in several kernels, and in parts -------------------------------------------------------------------------
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("largest", [1, 2, 3, 5, 100])
 def test_a_step_is_what_its_pieces_are_one_after_the_other(largest, monkeypatch):
     """Numbers of every type go from one kernel to the next; a result may be an argument, or the same in every lane."""
@@ -441,6 +444,7 @@ def van_der_pol(tau, q, v, speed):
     return (0.8 * (1 - x * x) * u - x,)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("solver", ["rk4", slow("rodas4")])
 @pytest.mark.parametrize("kind", [wide("cage"), slow("elastic rib"), "self-excited"])
 def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):

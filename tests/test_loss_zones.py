@@ -268,6 +268,7 @@ def hardening():
     return jc.synchronous_orbits(system, LOWER, UPPER, count=GRID.size, discard=100, method=METHOD)
 
 
+@pytest.mark.wide
 def test_synchronous_orbits_of_the_hardening_duffing(hardening):
     """Two stable stretches that overlap between the folds, on one branch."""
     low, high = hardening.stretches
@@ -300,6 +301,7 @@ def test_orbits_are_found_from_simulations_that_have_not_settled(hardening):
     assert sum(s.met for s in early.stretches) < 0.5 * early.sweep.label.size and early.missed == 0
 
 
+@pytest.mark.wide
 def test_orbits_that_coexist(hardening):
     """Three between the folds, the middle one unstable; one outside. Responses on the upper branch are larger."""
     for speed, count in ((1.0, 1), (1.5, 3), (2.1, 1)):

@@ -129,6 +129,7 @@ def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
     assert sign == 0 or np.sign(m.film_power) == sign
 
 
+@pytest.mark.wide
 def test_forces_of_a_simulation_are_its_acceleration():
     """M r'' from the recorded velocities, by a spectral derivative of a synchronous orbit."""
     model, speed = case("1a", "preliminary"), 16000 * np.pi / 30

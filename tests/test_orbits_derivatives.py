@@ -76,6 +76,7 @@ def test_jacobian_of_state_and_multipliers(name):
     np.testing.assert_allclose(reverse, forward, rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("name", ORBITS)
 def test_scaling_identities_of_an_orbit(name):
     """x in other units, time in other units, and the whole equation multiplied by a number."""

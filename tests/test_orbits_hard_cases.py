@@ -279,6 +279,7 @@ def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
     np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("growth, s", [(1.0, 1.5), (1.6, 2.5)])
 def test_planted_multipliers_of_a_strongly_unstable_orbit(growth, s):
     orbit = orbit_of(planted(a=1 + growth, s=s), 1.1, (0.999, 0.001))

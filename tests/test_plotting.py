@@ -251,6 +251,7 @@ def test_axes_that_are_given_are_used():
     assert time_history(trajectory(), ax) is ax
 
 
+@pytest.mark.wide
 def test_plotting_needs_no_window_and_keeps_no_global_state():
     code = "import sys, jaxcage.plotting; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -87,6 +87,7 @@ def test_it_is_the_function():
     assert np.allclose(jax.vmap(lambda s: applied(Law(law.f, s), jnp.asarray(0.3))[1])(x), np.sin(0.6 * x))
 
 
+@pytest.mark.wide
 def test_old_programs_are_dropped_with_their_laws(few: _recent.Recent):
     def used(frequency: float) -> weakref.ref:
         law = sines(frequency)
@@ -130,6 +131,7 @@ def test_memory_stays_as_it_is_over_laws_of_ones_own(few: _recent.Recent):
     assert max(traced[5:]) <= max(traced[:5]), traced
 
 
+@pytest.mark.wide
 def test_runs_of_one_size_of_chunks_share_their_programs(monkeypatch: pytest.MonkeyPatch):
     """Some lanes again, in chunks with room for all of them: nothing is compiled anew, and they do the same."""
     monkeypatch.setattr("jaxcage.integrate._traced.programs", programs := Recent(16))

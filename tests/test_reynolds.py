@@ -25,6 +25,7 @@ from jaxcage.forces import (
 from jaxcage.io import load_model
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("stations, k", [(8, 1), (5, 1), (12, 3), (9, 2)])
 def test_ring_solver_against_a_dense_one(stations: int, k: int):
     rng = np.random.default_rng(stations)

@@ -36,6 +36,7 @@ def test_what_needs_no_computation_loads_no_jax(arguments: str, status: int):
         assert lines[0] == f"jaxcage {jaxcage.__version__}"
 
 
+@pytest.mark.wide
 def test_names_are_there_without_having_been_used():
     offered = {
         alias.asname
@@ -48,6 +49,7 @@ def test_names_are_there_without_having_been_used():
     assert set(names.split()) >= offered | {"orbits", "keep_compiled_programs"} and same == "True"
 
 
+@pytest.mark.wide
 def test_the_library_computes_without_loading_tables():
     """Whoever makes a data set, a store or a figure loads what that takes."""
     code = """

@@ -128,6 +128,7 @@ def test_shards_fill_one_store(whole: Path, tmp_path: Path):
     assert contents(store) == contents(whole)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("written", [0, 1, 3, 7])
 def test_a_chunk_half_written_is_written_again(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int

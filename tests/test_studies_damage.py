@@ -67,6 +67,7 @@ def test_random_faults(bench: faults.Bench):
     assert bench.wrong == [] and bench.count["damaged"] == bench.count["recomputed"] > 5
 
 
+@pytest.mark.wide
 def test_a_store_that_is_believed_is_found_out(bench: faults.Bench, monkeypatch: pytest.MonkeyPatch):
     """The checks can fail: with a manifest that nobody reads, false values are seen."""
     for module in (_zarr, _check, _store):

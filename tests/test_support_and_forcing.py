@@ -226,6 +226,7 @@ def test_impact_against_scipy(samples, tolerance):
     assert np.min(h.bar_force) < -0.01 * q.max()  # the bar swings back, as in fig. 5
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("samples, tolerance", [(512, 3e-5), pytest.param(4089, 1e-6, marks=pytest.mark.wide)])
 def test_impact_keeps_energy(samples, tolerance):
     h = history(samples=samples, substeps=4 if samples == 512 else 8)
@@ -259,6 +260,7 @@ RIGID = eqx.tree_at(
 )
 
 
+@pytest.mark.wide
 def test_rigid_bar_gives_the_hertz_impact_in_closed_form():
     """m v^2/2 = (9/19) K d^(19/9), and the time 2 (d/v) sqrt(pi) G(1 + 1/p)/G(1/2 + 1/p)."""
     v0, k = SPEED, 1e6

@@ -251,6 +251,7 @@ def test_the_peak_of_a_ramp_counts_its_start():
     assert jc.ramp(Decay(), 1.0, 1.2, revolutions=2, samples=4, method=FAST).peak == 0.8
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("discard", [0, 3])
 def test_the_peak_of_a_sweep_counts_the_state_it_is_observed_from(discard: int):
     found = raw_sweep(Decay(), np.array([1.0]), discard=discard, revolutions=2, exponents=0, blocks=1, method=FAST)

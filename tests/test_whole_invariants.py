@@ -29,6 +29,7 @@ def cross(a, b):
     return np.imag(np.conj(a) * b)
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("guidance", ["outer", pytest.param("inner", marks=pytest.mark.wide)])
 def test_forces_and_moments_inside_cancel(guidance):
     """Rates of momentum and angular momentum of everything are what acts from outside: weight, load, mounting, the
@@ -190,6 +191,7 @@ def test_derivatives_by_every_parameter():
         assert slope == pytest.approx(difference, rel=1e-4, abs=1e-7 / max(abs(size), 1e-9)), name
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("values", [(0.0, 0.05, 0.036, 1.0), (0.01, 0.10, 0.005, 0.5), (0.03, 0.04, 0.0, 2.0)])
 def test_traction_curve(values):
     """Two printed solutions; coefficients of the second implementation; the peak is where and what it should be."""

@@ -102,6 +102,7 @@ def test_energy_of_other_kinds(kind):
     assert abs(ran.total("input") - lost - gain) < 1e-8 * abs(lost)
 
 
+@pytest.mark.wide
 def test_angular_momentum_of_the_cage(run):
     """About the outer ring's centre: the integral of the moments of pockets, land and weight."""
     model, start, ran = run

@@ -45,6 +45,7 @@ def told_apart(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return lanes
 
 
+@pytest.mark.wide
 @pytest.mark.parametrize("order", [("speed", "load"), ("load", "speed")])
 def test_every_lane_is_in_its_place(told_apart: list[int], order: tuple[str, ...], tmp_path: pathlib.Path):
     """Speeds that do not ascend, on the slow axis or the fast one, in chunks that cut axes and starts."""
