@@ -433,7 +433,6 @@ def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     assert branch.special == ()
 
 
-@pytest.mark.wide
 @pytest.mark.parametrize("first", wide_but(["period-doubling", "branch-point"], "period-doubling"))
 def test_crossings_within_one_step_are_in_order(first):
     """One at p = 0.02 and one at 0.0201, with one orbit put between them: only the first is next to stable orbits."""

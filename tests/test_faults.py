@@ -195,6 +195,7 @@ def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
     return (-0.2 * u - x - x**3 + 0.3 * jnp.cos(tau),)
 
 
+@pytest.mark.wide
 def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     """Out of room at once, or after two of its chunks: called again, it ends with the files of an unbroken study."""
     plan = Plan({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
