@@ -214,9 +214,8 @@ def run_lanes(
 
     Lanes that go `onward`, from where another run left them, may be as far out as lanes come on their way.
 
-    Lanes run beside their neighbours, and after the discarded revolutions beside those that need as many steps. Runs
-    that name the same `size` of their chunks share their programs; what a chunk has room for beyond its lanes costs
-    next to nothing.
+    Lanes run beside their neighbours at first, and soon beside those that need as many steps. Runs that name the same
+    `size` of their chunks share their programs; what a chunk has room for beyond its lanes costs next to nothing.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
