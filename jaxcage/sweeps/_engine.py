@@ -138,7 +138,7 @@ def _dealt(cost: Float[np.ndarray, " lanes"], size: int, least: int) -> list[Int
             parts[i].append(taken)
             room[i] -= taken.size
             if room[i]:
-                heapq.heappush(load, (done + cost[block[0]], i))
+                heapq.heappush(load, (done + float(cost[block[0]]), i))
             block = rest
     return [np.concatenate(part) for part in parts]
 
