@@ -139,6 +139,28 @@ class VanDerPol(eqx.Module):
         return (u, self.mu * (1 - x * x) * u - x)
 
 
+class Bautin(eqx.Module):
+    """Cycles of radius r with r^4 - r^2 = mu, the faster the larger, in states of other units."""
+
+    mu: jax.Array
+
+    def __call__(self, tau, y, speed):
+        u, v = y[0] / 3.0, y[1] / 0.2
+        square = u * u + v * v
+        growth = self.mu + square - square * square
+        rate = 0.5 + square
+        return 3.0 * (growth * u - rate * v), 0.2 * (growth * v + rate * u)
+
+
+def test_fold_of_cycles_of_the_bautin_normal_form():
+    """At mu = -1/4 and r^2 = 1/2 (Kuznetsov, Elements of Applied Bifurcation Theory, 8.3), whatever the scale."""
+    system = jc.ForcedSystem(Bautin(jnp.asarray(0.0)), 2, scale=(3.0, 0.2))
+    near = (2.13, 0.0), -0.249
+    point = jc.bifurcation(system, "fold", near, "mu", speed=1.0, period="free", reach=0, method=METHOD)
+    assert point.status == "converged" and abs(point.value + 0.25) < 1e-9 and abs(point.speed - 1) < 1e-9
+    assert abs((point.state[0] / 3.0) ** 2 + (point.state[1] / 0.2) ** 2 - 0.5) < 1e-6
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize("mu", VAN_DER_POL)
 def test_limit_cycle_of_van_der_pol(mu):
