@@ -281,7 +281,6 @@ def test_rigid_bar_gives_the_hertz_impact_in_closed_form():
     assert float(h.roller_velocity[-1]) == pytest.approx(-v0, rel=1e-5)
 
 
-@pytest.mark.wide
 def test_peak_force_on_a_stiff_bar_grows_as_the_20_19_power_of_speed():
     speeds = 0.05, 0.1, 0.4
     peaks = [float(history(RIGID, v, samples=4097, substeps=1).contact_force.max()) for v in speeds]
