@@ -26,8 +26,7 @@ HERE = pathlib.Path(__file__).resolve()
 
 def sweeps() -> dict[str, Callable[[], list[Any]]]:
     """By name."""
-    case = lambda name: jc.case(name)
-    one = lambda name, speeds, **options: lambda: [jc.sweep(case(name), speeds, **options)]
+    one = lambda name, speeds, **options: lambda: [jc.sweep(jc.case(name), speeds, **options)]
     few: dict[str, Any] = {"discard": 100, "revolutions": 100, "horizon": 0}
     speeds = jc.rpm(500, 25000, 40)
     return {
@@ -38,7 +37,7 @@ def sweeps() -> dict[str, Callable[[], list[Any]]]:
         "by Rodas4": one("3b", speeds[::2], method=jc.method("rodas4", steps=64), **few),
         "short": one("1b", speeds, discard=5, revolutions=20, blocks=5, keep=8, confirm=False, horizon=0),
         "several designs": lambda: jc.sweeps.sweep_designs(
-            [case("1a"), case("1b"), case("2a")], speeds, starts=1, settled=200, confirm=False, horizon=0
+            list(map(jc.case, ("1a", "1b", "2a"))), speeds, starts=1, settled=200, confirm=False, horizon=0
         ),
     }
 

@@ -7,8 +7,8 @@ dask: the same study on a local cluster of two workers, one of them killed half 
 map: labels on a grid of 300 x 300, adaptively and in full: share of the label changes found, share of points computed;
 once with every chaos and once with chaos that outlasts 3000 revolutions.
 
-At full size and on two cores the first takes some 40 minutes, all of them hours; with `--size 0.05`, which is
-published, they take half an hour.
+At full size the first takes some 40 minutes on two cores (83 lanes a second were measured), all of them hours;
+`--size 0.05` is what is published.
 """
 
 import argparse

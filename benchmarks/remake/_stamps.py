@@ -22,7 +22,7 @@ CHANGES = {
     "7b86501": "sweeps confirm labels and follow chaos to a horizon",
 }
 """Commits since which numbers are other ones, and what they changed."""
-SAME: dict[str, tuple[str, ...]] = {"6b3e39437d8b": ("c30ebb27dcdf", "477a5cf07e2c", "a1a559caa996")}
+SAME: dict[str, tuple[str, ...]] = {"6b3e39437d8b": ("c30ebb27dcdf", "a1a559caa996")}
 """Fingerprints of packages with those of earlier ones that give the same to the last bit, if not in the same time:
 checked by `python -m benchmarks.same`."""
 KEY, CELL = "jaxcage", "stamp"
