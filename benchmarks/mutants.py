@@ -18,22 +18,25 @@ import tempfile
 import time
 from collections.abc import Iterator
 
+import pytest
+
 
 ROOT = pathlib.Path(__file__).parent.parent
 FORCES = "test_support_and_forcing test_contact_analytic test_film_analytic"
+SLOPES = "test_kernels::test_analytic_slopes_of_the_cage_against_autodiff"
 SEARCH = "test_loss_zones test_missed test_branches"
 NEWTON = "test_orbits_literature test_orbits_hard_cases"
 TESTS = {
     "analysis/_labels": "test_labels test_guards",
     "analysis/_zones": "test_labels test_loss_zones",
     "forces/_axial": "test_reynolds",
-    "forces/_contact": FORCES,
+    "forces/_contact": f"{FORCES} {SLOPES}",
     "forces/_film": "test_film_analytic test_equilibrium_literature",
     "forces/_finite_film": "test_reynolds",
     "forces/_gravity": "test_reference test_models",
     "forces/_impact_forcing": "test_support_and_forcing test_reference",
-    "forces/_land": "test_contact_analytic test_reference",
-    "forces/_land_film": "test_film_analytic test_reference",
+    "forces/_land": f"test_contact_analytic test_reference {SLOPES}",
+    "forces/_land_film": f"test_film_analytic test_reference {SLOPES}",
     "forces/_phase": "test_support_and_forcing",
     "forces/_pocket_impact": "test_support_and_forcing",
     "forces/_pulse": "test_support_and_forcing",
@@ -41,7 +44,7 @@ TESTS = {
     "forces/_rib": "test_support_and_forcing test_models",
     "forces/_ring": "test_reynolds",
     "forces/_smooth": "test_contact_analytic",
-    "forces/_support": "test_support_and_forcing",
+    "forces/_support": f"test_support_and_forcing {SLOPES}",
     "forces/_unbalance": "test_support_and_forcing",
     "orbits/_arclength": "test_branches",
     "orbits/_astray": "test_missed test_branches",
@@ -65,9 +68,9 @@ TESTS = {
     "orbits/_sensitivity": "test_edges_of_the_cage",
     "orbits/_singularity": "test_branches test_curves",
     "orbits/_steps": "test_orbits_steps",
-    "orbits/_walk": "test_branches",
+    "orbits/_walk": "test_orbits_hard_cases",
 }
-"""Module -> test files that are there for it."""
+"""Module -> test files, or tests, that are there for it."""
 FLIPS = {
     ast.Lt: ast.GtE,
     ast.LtE: ast.Gt,
@@ -88,6 +91,7 @@ FLIPS = {
     ast.And: ast.Or,
     ast.Or: ast.And,
 }
+NO_TESTS = int(pytest.ExitCode.NO_TESTS_COLLECTED)
 NOT_CODE = "annotation", "returns", "decorator_list", "type_params"
 
 
@@ -148,21 +152,26 @@ def mutant(source: str, index: int) -> tuple[int, str, str, str]:
 
 
 def survives(copied: pathlib.Path, files: str, seconds: float) -> bool:
-    """Whether the tests pass; one that takes too long counts as a failure."""
-    tests = [f"tests/{name}.py" for name in files.split()]
+    """Whether the tests pass, those of the default suite and then the wide ones; one that takes too long fails."""
+    tests = [f"tests/{file}.py{colons}{test}" for file, colons, test in (x.partition("::") for x in files.split())]
     command = [sys.executable, "-m", "pytest", "-n0", "-x", "-q", "-p", "no:cacheprovider", *tests]
     cache = {"JAXCAGE_CACHE": str(ROOT / ".pytest_cache" / "mutants"), "PYTHONPATH": str(copied)}
-    try:
-        done = subprocess.run(command, cwd=copied, env=os.environ | cache, capture_output=True, timeout=seconds)
-    except subprocess.TimeoutExpired:
-        return False
-    return done.returncode == 0
+    for marks in "not slow and not wide", "wide and not slow":
+        marked = [*command, "-m", marks]
+        try:
+            done = subprocess.run(marked, cwd=copied, env=os.environ | cache, capture_output=True, timeout=seconds)
+        except subprocess.TimeoutExpired:
+            return False
+        if done.returncode not in (0, NO_TESTS):
+            return False
+    return True
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--count", type=int, default=200, help="faults (%(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the draw (%(default)s)")
+    parser.add_argument("--skip", type=int, default=0, help="go on after this many faults of the draw (%(default)s)")
     parser.add_argument("--only", default="", help="modules whose name has this in it, e.g. forces/")
     parser.add_argument("--seconds", type=float, default=600.0, help="for the tests of one fault (%(default)s)")
     given = parser.parse_args()
@@ -174,7 +183,7 @@ def main() -> None:
         copied = pathlib.Path(folder) / "copy"
         hidden = shutil.ignore_patterns(".*", "__pycache__", "out", "*.zarr")
         shutil.copytree(ROOT, copied, ignore=hidden)
-        for k, (name, index) in enumerate(drawn, start=1):
+        for k, (name, index) in enumerate(drawn[given.skip :], start=given.skip + 1):
             line, old, new, text = mutant(sources[name], index)
             path, began = copied / "jaxcage" / f"{name}.py", time.perf_counter()
             path.write_text(text)
@@ -183,7 +192,8 @@ def main() -> None:
             survivors += alive
             said = f"{'SURVIVED' if alive else 'killed'} {name}.py:{line}: {old} -> {new}"
             print(f"{k}/{len(drawn)} {said} ({time.perf_counter() - began:.0f} s)", flush=True)
-    print(f"{len(drawn) - survivors} of {len(drawn)} killed, of {len(all_of_them)} places (seed {given.seed})")
+    count = len(drawn) - given.skip
+    print(f"{count - survivors} of {count} killed, of {len(all_of_them)} places (seed {given.seed})")
 
 
 if __name__ == "__main__":

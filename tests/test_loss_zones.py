@@ -1,5 +1,7 @@
 """Synchronous-loss zones between stable stretches, and chaotic edges matched with bifurcations."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -242,6 +244,27 @@ def test_the_nearest_of_several_bifurcations_is_taken():
     assert result.zones.zones[0].onset.mechanism == "fold" and result.zones.zones[0].exit is None
 
 
+@pytest.mark.parametrize("limit, taken", [(6320, True), (6199, False), (6401, False)])
+def test_an_exit_is_taken_from_the_limit_of_a_cascade_that_ends_within_its_uncertainty(monkeypatch, limit, taken):
+    """The doubling lies 400 rpm above the exit at 6300 +- 100 rpm; where its cascade ends is planted."""
+    asked = []
+
+    def planted(system, point, *, lower, upper, levels, method):
+        asked.append((point.speed_rpm, lower / PER_RPM, upper / PER_RPM))
+        return jc.orbits.Cascade((point,), limit * PER_RPM, 2.0 * PER_RPM)
+
+    monkeypatch.setattr("jaxcage.orbits._mechanism.cascade", planted)
+    above = stretch(6700, 9000, kinds=("period-doubling", "fold"))
+    result = explained(chaotic(None, 6300), above)
+    np.testing.assert_allclose(asked, [(6700, 5700, 7700)])
+    leaves = result.zones.zones[0].exit
+    if taken:
+        assert (leaves.mechanism, leaves.basis) == ("period-doubling", "cascade")
+        np.testing.assert_allclose([leaves.speed_rpm, leaves.uncertainty_rpm], [limit, 2.0])
+    else:
+        assert (leaves.mechanism, leaves.basis, leaves.speed_rpm) == ("unknown", "statistical", 6300)
+
+
 class Hardening(eqx.Module):
     """x'' + 0.1 x' + x + x^3 = f cos(w t)."""
 
@@ -317,6 +340,21 @@ def test_orbits_that_coexist(hardening):
     size = {stable: np.hypot(s[0], s[1] / 1.5) for _, stable, s, _ in hardening.coexisting(1.5)}
     assert max(size.values()) > 0.5
     assert hardening.coexisting(0.3) == []
+
+
+def test_between_two_points_of_a_branch_an_orbit_is_as_stable_as_at_the_nearer(hardening):
+    branch = next(b for b in hardening.branches if not np.all(b.stable == b.stable[0]))
+    alone = dataclasses.replace(hardening, branches=(branch,))
+    changes = np.flatnonzero(np.diff(branch.stable.astype(int)))
+    assert changes.size
+    for k in changes:
+        for share in (0.1, 0.9):
+            between = lambda x: x[k] + share * (x[k + 1] - x[k])
+            orbits = alone.coexisting(between(branch.value))
+            _, stable, _, multipliers = min(orbits, key=lambda o: np.abs(o[2] - between(branch.state)).max())
+            nearer = k + round(share)
+            assert stable == branch.stable[nearer]
+            np.testing.assert_array_equal(multipliers, branch.multipliers[nearer])
 
 
 def test_overlapping_stretches_of_one_branch_leave_no_zone(hardening):

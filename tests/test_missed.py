@@ -97,3 +97,16 @@ def test_two_doublings_within_a_long_last_step_are_suspected():
     doubling = np.array([[0.30397864, 0.09297943, 0.42741154, 0.69109067]])
     assert (0, 1) in dips(doubling, np.diff(rpm))
     assert not dips(doubling + 1.0, np.diff(rpm))
+
+
+def test_orbits_of_many_starts_are_told_apart():
+    """Three between the folds of the hardening Duffing oscillator, all of period 1: none that closes after two
+    revolutions only."""
+    swing = lambda tau, q, v, speed: (-0.1 * v[0] - q[0] - q[0] ** 3 + 0.3 * jnp.cos(tau),)
+    hardening = jc.ForcedOscillator(swing, coordinates=1, starts=((0.1, 0.2), (2.0, 1.0), (-1.5, 2.0)))
+    find = lambda *given, **more: jc.orbits.coexisting_orbits(*given, **more, method=jc.method("rk4", steps=128))
+    orbits = find(hardening, 1.5, count=24, revolutions=3)
+    assert [o.stable for o in orbits] == [True, True, False]
+    sizes = [np.hypot(o.state[0], o.state[1] / 1.5) for o in orbits]
+    assert sizes[0] != pytest.approx(sizes[1], rel=0.5) and min(sizes[:2]) < sizes[2] < max(sizes[:2])
+    assert find(hardening, 1.5, 2, count=24, revolutions=3) == []
