@@ -143,9 +143,9 @@ def _thrown() -> tuple[np.ndarray, Any]:
     "solver, steps",
     [
         ("rk4", 16),
-        pytest.param("rk4", 128, marks=pytest.mark.wide),
-        pytest.param("newmark", 64, marks=pytest.mark.wide),
-        pytest.param("rodas3", 32, marks=pytest.mark.wide),
+        ("rk4", 128),
+        ("newmark", 64),
+        ("rodas3", 32),
     ],
 )
 def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageModel, solver: str, steps: int):

@@ -85,7 +85,7 @@ def forces(model, speed, tau, state):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("film", wide_but(FILMS, "fixed_half"))
+@pytest.mark.parametrize("film", FILMS)
 @random(50)
 @given(designs, speeds, angles, states(0.0, 1.2), angles)
 def test_turned_states_have_turned_forces(film, design, speed, tau, state, angle):
@@ -300,7 +300,7 @@ def test_mirrored_starts_have_mirrored_ends(film, design, speed, start):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("kind", wide_but(SYSTEMS, "fixed_half"))
+@pytest.mark.parametrize("kind", SYSTEMS)
 @random(20)
 @given(designs, speeds, states(0.01, 0.9), states(0.0, 0.05, 0.05), units)
 def test_revolutions_in_other_units(kind, design, speed, cage, rib, scales):

@@ -31,7 +31,7 @@ def bowl(damping=0.4, cubic=1.5):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("optimiser", [None, *(pytest.param(o, marks=pytest.mark.wide) for o in OPTIMISERS)])
+@pytest.mark.parametrize("optimiser", [None, *OPTIMISERS])
 def test_any_optimiser_finds_a_known_optimum(optimiser):
     found = jc.optimise(double_well(), VARY, bowl(), starts=4, steps=150, optimiser=optimiser).best
     assert found.objective == pytest.approx(1.0, abs=2e-2)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
-from helpers import beyond_range, elastic, raw_sweep, roller_pass, wide_but
+from helpers import beyond_range, elastic, raw_sweep, roller_pass
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
@@ -74,8 +74,8 @@ def with_extra(*laws: AbstractForce) -> jc.CageModel:
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("solver", wide_but(["rk4", "rodas4"], "rk4"))
-@pytest.mark.parametrize("rib", wide_but(["rigid", "elastic"], "rigid"))
+@pytest.mark.parametrize("solver", ["rk4", "rodas4"])
+@pytest.mark.parametrize("rib", ["rigid", "elastic"])
 def test_a_drag_moves_the_cage_like_the_damping_of_its_support(solver: str, rib: str):
     """Rodas4 asks the law for its derivatives; an elastic rib feels the reaction."""
     models = [elastic(model) if rib == "elastic" else model for model in (OWN, CASE)]

@@ -117,7 +117,7 @@ EXTREMES = [
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("changed", wide_but(EXTREMES, BOUNCING, HEAVY, SLOW, FAST), ids=str)
+@pytest.mark.parametrize("changed", EXTREMES, ids=str)
 def test_spectrum_of_a_pulse_at_the_ends_of_the_ranges(changed):
     given = {"roller_mass": 0.0423, "pocket_clearance": 3e-4, "omega": 1000.0, **OSCILLATOR, **changed}
     oscillator, omega, clearance = {name: given[name] for name in OSCILLATOR}, given["omega"], given["pocket_clearance"]
