@@ -106,8 +106,8 @@ def global_sensitivity(
 def sobol_of(
     evaluate: Callable[[np.ndarray], np.ndarray], names: Sequence[str], *, samples: int, seed: int = 0
 ) -> SobolIndices:
-    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values; all of
-    them 0 if it does not vary.
+    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values; 0, and
+    their intervals too, of a parameter that changes nothing in any sample, and all of them if none does.
 
     **Raises:** `ValueError` for samples that are no power of 2.
     """
@@ -129,11 +129,13 @@ def sobol_of(
             none, nowhere = dict.fromkeys(names, 0.0), dict.fromkeys(names, (0.0, 0.0))
             return SobolIndices(none, none, nowhere, nowhere, number, samples)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DegenerateDataWarning)  # of what has no influence at all
+            warnings.simplefilter("ignore", DegenerateDataWarning)  # of what has hardly any influence
             drawn = lambda rows: np.stack(_shares(*(v[..., rows] for v in values)))[..., 0]
             spread = bootstrap([np.arange(samples)], drawn, vectorized=False, rng=seed).confidence_interval
+    idle = np.all(values[2] == values[0], axis=(1, 2))  # parameters that change nothing in any sample
     named = lambda row: dict(zip(names, np.ravel(row).tolist(), strict=True))
-    pairs = lambda k: dict(zip(names, zip(spread.low[k].tolist(), spread.high[k].tolist(), strict=True), strict=True))
+    ends = lambda k: (np.where(idle, 0.0, end[k]).tolist() for end in (spread.low, spread.high))
+    pairs = lambda k: dict(zip(names, zip(*ends(k), strict=True), strict=True))
     return SobolIndices(named(found.first_order), named(found.total_order), pairs(0), pairs(1), number, samples)
 
 
