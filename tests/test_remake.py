@@ -143,6 +143,8 @@ def test_a_package_that_gives_the_same_leaves_blocks_fresh_but_for_times(
     assert "<sub>Made at commit" in (checkout / "page.md").read_text()
     monkeypatch.setattr(Shown, "timed", True)
     assert stamps.state(LAW, fingerprint(checkout), checkout) == "stale"
+    monkeypatch.setattr(stamps, "AS_FAST", {fingerprint(checkout): (before,)})
+    assert stamps.state(LAW, fingerprint(checkout), checkout) == "fresh"
 
 
 def test_a_failure_leaves_the_others(checkout: pathlib.Path, capsys: pytest.CaptureFixture[str]):
