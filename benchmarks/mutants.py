@@ -24,6 +24,7 @@ import pytest
 ROOT = pathlib.Path(__file__).parent.parent
 FORCES = "test_support_and_forcing test_contact_analytic test_film_analytic"
 SLOPES = "test_kernels::test_analytic_slopes_of_the_cage_against_autodiff"
+MOMENTS = "test_own_force::test_forces_and_moments_of_a_run_name_it"
 SEARCH = "test_loss_zones test_missed test_branches"
 NEWTON = "test_orbits_literature test_orbits_hard_cases"
 TESTS = {
@@ -36,7 +37,7 @@ TESTS = {
     "forces/_gravity": "test_reference test_models",
     "forces/_impact_forcing": "test_support_and_forcing test_reference",
     "forces/_land": f"test_contact_analytic test_reference {SLOPES}",
-    "forces/_land_film": f"test_film_analytic test_reference {SLOPES}",
+    "forces/_land_film": f"test_film_analytic test_reference test_reynolds {SLOPES} {MOMENTS}",
     "forces/_phase": "test_support_and_forcing",
     "forces/_pocket_impact": "test_support_and_forcing",
     "forces/_pulse": "test_support_and_forcing",
@@ -54,14 +55,14 @@ TESTS = {
     "orbits/_curve": "test_curves",
     "orbits/_follower": "test_branches test_curves",
     "orbits/_illinois": "test_branches",
-    "orbits/_implicit": "test_orbits_derivatives",
+    "orbits/_implicit": "test_orbits_derivatives test_orbits_steps",
     "orbits/_located": SEARCH,
     "orbits/_loss": "test_loss_zones",
     "orbits/_mechanism": "test_loss_zones",
     "orbits/_multiplier": "test_objectives",
     "orbits/_newton": NEWTON,
     "orbits/_normal_form": "test_branches",
-    "orbits/_orbit": NEWTON,
+    "orbits/_orbit": f"{NEWTON} test_orbits_steps",
     "orbits/_bifurcation": NEWTON,
     "orbits/_problem": NEWTON,
     "orbits/_search": SEARCH,

@@ -91,6 +91,11 @@ def test_branch_passes_the_folds_of_the_hardening_duffing(over_speed):
     assert over_speed.value[0] <= 0.5 and over_speed.value[-1] >= 2.5
 
 
+def test_predictions_by_a_cubic_spare_orbits(over_speed):
+    """Without its cubic term, by a parabola through the last two points, twice as many orbits are needed."""
+    assert over_speed.value.size < 130
+
+
 def test_stability_changes_at_the_folds_and_nowhere_else(over_speed):
     first, second = (p.index for p in over_speed.special)
     stable = np.ones(over_speed.value.size, dtype=bool)
