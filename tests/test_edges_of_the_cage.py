@@ -181,7 +181,7 @@ def test_width_between_two_edges(found):
 
 
 def test_sensitivity_of_the_limit_of_a_cascade(monkeypatch):
-    """Doublings are planted at L - D/4.669^n, where L and D depend on the gap: the derivative of L is found from the last
+    """Doublings are planted at L - D/4.669^n, where L and D depend on the gap: the derivative of L comes from the last
     two of them."""
     per_rpm, ratio = 30 / np.pi, 4.669201609102990
     limit, distance = np.array([9000.0, 250.0]), np.array([800.0, 40.0])  # [rpm], and by the gap
