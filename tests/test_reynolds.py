@@ -237,6 +237,18 @@ def test_grid_of_the_force_law_is_fine_enough(slenderness: float, bound: float):
         assert np.linalg.norm(found - fine) < bound * np.linalg.norm(fine)
 
 
+@pytest.mark.wide
+def test_the_edge_of_the_film_is_found_for_lands_of_all_widths():
+    """Where it is not, the force is NaN: places, squeezes, and widths from a tenth of the diameter to all of it."""
+    rng = np.random.default_rng(4)
+    eps, angle, width = rng.uniform(0.05, 0.97, 48), rng.uniform(0, 2 * np.pi, 48), rng.uniform(0.1, 1.0, 48)
+    r, v = eps * np.array([np.cos(angle), np.sin(angle)]), 0.3 * rng.normal(size=(2, 48))
+    drive = lambda x, y, vx, vy: film_drive(x, y, vx, vy, 1.0)
+    one = lambda *state: finite_film_force(*state[:2], *drive(*state[:4]), 1.0, state[4])
+    found = jax.vmap(one)(*r, *v, width)
+    assert np.all(np.isfinite(found)) and np.all(np.hypot(*found) > 0)
+
+
 def test_mirror_and_turn_of_the_state_turn_the_force():
     r, v = jnp.asarray([0.5, -0.3]), jnp.asarray([0.2, 0.1])
     f = FORCE(r, v, 0.1, profiles=1, stations=64)
