@@ -5,6 +5,7 @@ damping there. A quadratic drag is compared with the equations of motion written
 SciPy.
 """
 
+import dataclasses
 from pathlib import Path
 
 import equinox as eqx
@@ -210,6 +211,12 @@ def test_forces_and_moments_of_a_run_name_it(tmp_path: Path):
     power = jc.analysis.film_drag_power(OWN, run.speed, eps)
     np.testing.assert_allclose(-moments["film"] * SPEED, power, rtol=1e-6)
     assert not np.any(moments["contact"])
+    # Pressed into the land the film is no thinner than at the onset of contact.
+    outside = np.full(eps.size, 1.02)
+    place = run.state[:, :2] * (outside / eps)[:, None]
+    pressed = dataclasses.replace(run, state=np.concatenate([place, run.state[:, 2:]], axis=1))
+    power = jc.analysis.film_drag_power(OWN, run.speed, outside)
+    np.testing.assert_allclose(-jc.analysis.cage_moments(OWN, pressed)["film"] * SPEED, power, rtol=1e-6)
 
 
 @pytest.mark.wide
