@@ -232,7 +232,7 @@ def test_grid_of_the_force_law_is_fine_enough(slenderness: float, bound: float):
         eps, phi, v = rng.uniform(0.05, 0.95), rng.uniform(-np.pi, np.pi), rng.normal(scale=0.2, size=2)
         x, y = eps * np.cos(phi), eps * np.sin(phi)
         drive = film_drive(x, y, *v, 1.0)
-        fine = np.array(law(x, y, *drive, 1.0, slenderness, stations=512, profiles=1))
+        fine = np.array(law(x, y, *drive, 1.0, slenderness, stations=512, profiles=3))
         found = np.array(law(x, y, *drive, 1.0, slenderness))
         assert np.linalg.norm(found - fine) < bound * np.linalg.norm(fine)
 
@@ -247,6 +247,14 @@ def test_the_edge_of_the_film_is_found_for_lands_of_all_widths():
     one = lambda *state: finite_film_force(*state[:2], *drive(*state[:4]), 1.0, state[4])
     found = jax.vmap(one)(*r, *v, width)
     assert np.all(np.isfinite(found)) and np.all(np.hypot(*found) > 0)
+
+
+@pytest.mark.wide
+def test_one_function_across_a_narrow_land_is_enough():
+    drive = film_drive(0.6, 0.0, 0.1, 0.05, 1.0)
+    law = jax.jit(finite_film_force, static_argnames=("stations", "profiles"))
+    one, two = (np.array(law(0.6, 0.0, *drive, 1.0, 0.03, stations=32, profiles=k)) for k in (1, 2))
+    np.testing.assert_allclose(one, two, rtol=1e-6)
 
 
 def test_mirror_and_turn_of_the_state_turn_the_force():
