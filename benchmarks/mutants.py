@@ -32,7 +32,7 @@ TESTS = {
     "analysis/_zones": "test_labels test_loss_zones",
     "forces/_axial": "test_reynolds",
     "forces/_contact": f"{FORCES} {SLOPES}",
-    "forces/_film": "test_film_analytic test_equilibrium_literature",
+    "forces/_film": f"test_film_analytic test_equilibrium_literature {SLOPES}",
     "forces/_finite_film": "test_reynolds",
     "forces/_gravity": "test_reference test_models",
     "forces/_impact_forcing": "test_support_and_forcing test_reference",
