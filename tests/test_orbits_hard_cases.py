@@ -101,6 +101,24 @@ def test_period_doubling_from_beyond_a_superstable_orbit():
         find(reach=-1.0)
 
 
+class MorePendulum(eqx.Module):
+    """The same with a force of 1.0805 and some more."""
+
+    more: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        return Pendulum(1.0805 + self.more)(tau, q, v, speed)
+
+
+@pytest.mark.wide
+def test_a_bifurcation_is_looked_for_around_a_parameter_of_zero():
+    """`reach` is a part of the parameter, which for zero is one of its unit."""
+    system = jc.ForcedOscillator(MorePendulum(jnp.asarray(0.0)), coordinates=1)
+    orbit = jc.periodic_orbit(system, 2 * np.pi, 4, guess=(-np.pi / 2, 0.0), revolutions=400)
+    point = jc.bifurcation(system, "period-doubling", orbit, "more", reach=0.01)
+    assert point.status == "converged" and abs(point.value - 0.00158437) < 1e-7
+
+
 @pytest.mark.slow
 def test_a_failing_lane_leaves_its_neighbours_alone():
     """Bit for bit, orbits and points."""

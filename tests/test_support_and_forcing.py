@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.special import gamma
 
+import jaxcage as jc
 from jaxcage.bearing import load_distribution
 from jaxcage.forces import (
     ElasticRib,
@@ -121,6 +122,16 @@ def test_dimensionless_cubic_reaches_the_cage():
     given = Support(stiffness_x=3e4, stiffness_y=5e4, damping=0.0, cubic_ratio=2.0, cubic="dimensionless")
     _, cage = cage_with(support=given)
     assert float(cage.law("support").cubic) == pytest.approx(2.0 * 4e4 / 0.45e-3**2, rel=1e-13)
+
+
+@pytest.mark.parametrize("reading, name", [("absolute", "cubic_stiffness"), ("dimensionless", "cubic_ratio")])
+def test_a_linear_support_is_a_cubic_term_of_zero(reading, name):
+    model = jc.replace(case("1a"), **{"support.cubic": reading, name: 0.0, "cross_stiffness": 0.0})
+    support, (x, y) = model.support, POINTS[0]
+    held = model.cage_at(900.0).forces(0.0, x, y, 0.0, 0.0)["support"][:2]
+    np.testing.assert_allclose(held, (-support.stiffness_x * x, -support.stiffness_y * y), rtol=1e-13)
+    with pytest.raises(ValueError, match=name):
+        jc.replace(model, **{name: -1.0})
 
 
 def test_elastic_rib_is_held_by_its_own_spring():
