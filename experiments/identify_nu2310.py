@@ -35,7 +35,7 @@ UNKNOWNS = (
     jc.design.Unknown("cage_mass", 0.20, 0.36),  # [kg] from the cage's shape
     jc.design.Unknown("stiffness_x", 5e3, 4e5),  # [N/m] of the support
     jc.design.Unknown("stiffness_y", 5e3, 4e5),
-    jc.design.Unknown("cubic_stiffness", 1e10, 1e15),  # [N/m^3]
+    jc.design.Unknown("cubic_stiffness", 1e10, 1e15),  # [N/m^3]; see RELATIVE
     jc.design.Unknown("damping", 0.3, 60.0),  # [N s/m]
     jc.design.Unknown("cross_stiffness", -1e4, 1e4, "linear"),  # [N/m]
     jc.design.Unknown("land_width", 0.5e-3, 6.5e-3),  # [m]
@@ -44,7 +44,8 @@ UNKNOWNS = (
     jc.design.Unknown("contact_stiffness", 1e7, 1e11, sets=("stiffness",)),  # [N/m^(10/9)]
     jc.design.Unknown("restitution", 0.3, 1.0, "linear"),
 )
-
+RELATIVE = jc.design.Unknown("cubic_ratio", 1e-2, 1e3)
+"""alpha in K_3 = alpha K_s / c^2, in place of the cubic stiffness, by the reading support.cubic=dimensionless."""
 
 POPULATION = 4 + int(3 * np.log(len(UNKNOWNS)))
 """Designs of a generation of the evolution strategy."""
@@ -69,7 +70,7 @@ class Stage:
 STAGES = (
     Stage("seen", 0, 32, 1, 64, 40, 0.15),
     Stage("lasts 600", 600, 32, 1, 2, 30, 0.04),
-    Stage("lasts 3000", 3000, 56, 1, 2, 8, 0.02),
+    Stage("lasts 3000", 3000, 56, 1, 2, 40, 0.03),
 )
 QUICK = tuple(dataclasses.replace(s, speeds=8, designs=2, generations=1, horizon=min(s.horizon, 100)) for s in STAGES)
 
@@ -77,10 +78,9 @@ QUICK = tuple(dataclasses.replace(s, speeds=8, designs=2, generations=1, horizon
 class Ledger:
     """The designs tried, in a file."""
 
-    HEAD = ("stage", "score", *PUBLISHED_CASES, *(u.name for u in UNKNOWNS))
-
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, unknowns: tuple[jc.design.Unknown, ...]):
+        self.path, self.unknowns = path, unknowns
+        self.head = ("stage", "score", *PUBLISHED_CASES, *(u.name for u in unknowns))
         self.rows: list[dict[str, str]] = []
         if path.exists():
             with path.open() as file:
@@ -89,11 +89,11 @@ class Ledger:
     def add(self, stage: str, candidate: jc.design.Candidate) -> None:
         """One more design."""
         cases = [f"{candidate.by_case[c]:.4f}" if c in candidate.by_case else "" for c in PUBLISHED_CASES]
-        row = [stage, f"{candidate.score:.4f}", *cases, *(f"{candidate.values[u.name]:.6g}" for u in UNKNOWNS)]
-        self.rows.append(dict(zip(self.HEAD, row, strict=True)))
+        row = [stage, f"{candidate.score:.4f}", *cases, *(f"{candidate.values[u.name]:.6g}" for u in self.unknowns)]
+        self.rows.append(dict(zip(self.head, row, strict=True)))
         new = not self.path.exists()
         with self.path.open("a") as file:
-            csv.writer(file, lineterminator="\n").writerows([self.HEAD, row] if new else [row])
+            csv.writer(file, lineterminator="\n").writerows([self.head, row] if new else [row])
 
     def of(self, stage: str) -> list[dict[str, str]]:
         """The designs of a stage, best first."""
@@ -103,9 +103,10 @@ class Ledger:
         """Values of the best design of the last stage that was reached, else of the package's set."""
         for stage in reversed(STAGES):
             if rows := self.of(stage.name):
-                return {u.name: float(rows[0][u.name]) for u in UNKNOWNS}
-        model = jc.case("1a", "identified")
-        return {u.name: float(jc.parameters(model)[u.targets[0]]) for u in UNKNOWNS}
+                return {u.name: float(rows[0][u.name]) for u in self.unknowns}
+        known = jc.parameters(jc.case("1a", "identified"))
+        known["cubic_ratio"] = known["cubic_stiffness"] * known["guidance_gap"] ** 2 / known["stiffness_x"]
+        return {u.name: float(known[u.targets[0]]) for u in self.unknowns}
 
 
 def edges(cases: list[str]) -> list[jc.design.MeasuredEdge]:
@@ -119,9 +120,9 @@ def edges(cases: list[str]) -> list[jc.design.MeasuredEdge]:
     return made
 
 
-def check(models: dict[str, jc.CageModel], values: dict[str, float], steps: int, horizon: int) -> None:
+def check(models: dict[str, jc.CageModel], ledger: Ledger, values: dict[str, float], steps: int, horizon: int) -> None:
     """Edges of lasting chaos and its wide zones with these values, at 100 rpm, from three starts."""
-    chosen = {target: values[u.name] for u in UNKNOWNS for target in u.targets}
+    chosen = {target: values[u.name] for u in ledger.unknowns for target in u.targets}
     made = [jc.replace(model, **chosen) for model in models.values()]
     method = finer(controlled(), steps.bit_length() - 1) if steps > 1 else None
     errors = []
@@ -137,7 +138,7 @@ def check(models: dict[str, jc.CageModel], values: dict[str, float], steps: int,
 def trade_off(ledger: Ledger) -> None:
     """How far off the ledger's designs are in each case and in all choices of cases: means of the score's parts."""
     reached = [rows for stage in STAGES if (rows := ledger.of(stage.name))]
-    cases = list(PUBLISHED_CASES)
+    cases = [c for c in PUBLISHED_CASES if reached[-1][0][c]]
     off = np.array([[float(row[c]) for c in cases] for row in reached[-1]])
     mean = lambda some: off[:, list(some)].mean(axis=1)
     print(f"{len(off)} designs of the stage '{reached[-1][0]['stage']}'\n")
@@ -176,7 +177,7 @@ def search(
     options: dict[str, Any] = dict(designs=stage.designs, generations=stage.generations, spread=stage.spread)
     options |= dict(discard=100, revolutions=100, horizon=stage.horizon, seed=seed, starts=starts, report=tried)
     try:
-        jc.design.screen(models, UNKNOWNS, edges(list(models)), grid, begin=begin, **options)
+        jc.design.screen(models, ledger.unknowns, edges(list(models)), grid, begin=begin, **options)
     except OutOfTime:
         return False
     return True
@@ -203,12 +204,14 @@ def main() -> None:
     jc.keep_compiled_programs()
     read = dict(each.split("=", 1) for each in given.read)
     models = {name: jc.replace(jc.case(name, "identified"), **read) for name in given.cases}
-    ledger = Ledger(given.ledger)
+    relative = read.get("support.cubic") == "dimensionless"
+    unknowns = tuple(RELATIVE if relative and u.name == "cubic_stiffness" else u for u in UNKNOWNS)
+    ledger = Ledger(given.ledger, unknowns)
     if given.trade_off:
         return trade_off(ledger)
     begin = json.loads(given.begin.read_text()) if given.begin else None
     if given.check:
-        return check(models, begin or ledger.best(), given.steps, given.horizon)
+        return check(models, ledger, begin or ledger.best(), given.steps, given.horizon)
     until = time.perf_counter() + 60 * given.minutes
     for stage in (QUICK if given.quick else STAGES)[given.first :]:
         if len(ledger.of(stage.name)) > stage.designs + stage.generations * POPULATION:
