@@ -231,7 +231,7 @@ def _report(tracked: TrackedEdges, measured: Sequence[MeasuredEdge], place: np.n
         chi_square=float(np.sum(off**2)),
         solves=tracked.solves,
         status="an edge is lost" if lost else "converged" if converged else "not converged",
-        models=with_values(tracked.systems, unknowns, place),
+        models={case: with_values(system, unknowns, place) for case, system in tracked.systems.items()},
     )
 
 

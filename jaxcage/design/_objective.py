@@ -55,7 +55,7 @@ class DesignSpace(Generic[Design]):
 
     def model(self, place: Float[np.ndarray, " n"]) -> Design:
         """The design at a place."""
-        return with_values({"": self.system}, self.unknowns, place)[""]
+        return with_values(self.system, self.unknowns, place)
 
     def slope_of(self, derivative: Mapping[str, float], place: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """d / d place of what has these derivatives with respect to parameters [SI]."""

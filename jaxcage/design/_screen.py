@@ -14,6 +14,7 @@ from jaxtyping import Float
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
+from .._sobol import sobol
 from ..analysis import CHAOS_THRESHOLD, Sweep, Zone, zones
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -150,7 +151,7 @@ def screen(
     def scores(places: Float[np.ndarray, "designs unknowns"]) -> np.ndarray:
         new: list[Candidate] = []
         for part in np.array_split(places, -(-len(places) // TOGETHER)):
-            models = [m for place in part for m in with_values(systems, unknowns, place).values()]
+            models = [with_values(system, unknowns, place) for place in part for system in systems.values()]
             swept = sweep_designs(
                 models,
                 speeds,
@@ -174,9 +175,7 @@ def screen(
                     report(len(tried), new[-1])
         return np.array([c.score for c in new])
 
-    from scipy.stats import qmc  # takes half a second to load
-
-    sample = qmc.Sobol(len(unknowns), rng=seed).random_base2(max(1, int(np.ceil(np.log2(designs)))))
+    sample = sobol(len(unknowns), 2 ** max(1, int(np.ceil(np.log2(designs)))), seed)
     if begin is not None:
         sample = np.vstack([np.clip([u.place(begin[u.name]) for u in unknowns], 0.0, 1.0), sample])
     first = scores(sample)

@@ -126,12 +126,10 @@ class SurrogateSearch:
     def _candidates(self, lengths: Float[np.ndarray, " n"], rng: np.random.Generator) -> Places:
         """Places in the region, wide in parameters that do little; half of their parameters are as in the best design,
         which is in its middle."""
-        from scipy.stats import qmc  # takes half a second to load
-
         middle = self.places[int(np.argmin(_known(self.values)))]
         half = 0.5 * self.region * np.clip(lengths / np.exp(np.mean(np.log(lengths))), 0.3, 3.0)
         low, high = np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)
-        places = low + qmc.Sobol(middle.size, rng=rng).random(CANDIDATES) * (high - low)
+        places = low + sobol(middle.size, CANDIDATES, rng) * (high - low)
         moved = rng.random(places.shape) < 0.5
         moved[np.arange(CANDIDATES), rng.integers(0, middle.size, CANDIDATES)] = True
         return np.where(moved, places, middle)

@@ -101,7 +101,7 @@ class TrackedEdges:
         """One edge at `place`, from where it was `last` found, with the unknowns at `start` and with that slope."""
         self._solved.append(case)
         guess = dataclasses.replace(last, speed=last.speed + float(slope @ (place - start)) * np.pi / 30)
-        model = with_values({case: self.systems[case]}, self.unknowns, place)[case]
+        model = with_values(self.systems[case], self.unknowns, place)
         found = sensitivity(model, guess, method=self.method)
         if np.isfinite(found.value_rpm) or halvings == 0:
             return found

@@ -87,13 +87,10 @@ def values_at(unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]) -> di
     return {u.name: u.value(p) for u, p in zip(unknowns, place, strict=True)}
 
 
-def with_values(
-    systems: Mapping[str, Design], unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]
-) -> dict[str, Design]:
-    """The cases with the unknowns at `place`."""
+def with_values(system: Design, unknowns: Sequence[Unknown], place: Float[np.ndarray, " n"]) -> Design:
+    """A design with the unknowns at `place`."""
     values = values_at(unknowns, place)
-    chosen = {target: values[u.name] for u in unknowns for target in u.targets}
-    return {case: replace(system, **chosen) for case, system in systems.items()}
+    return replace(system, **{target: values[u.name] for u in unknowns for target in u.targets})
 
 
 def slope_in_place(
