@@ -272,15 +272,14 @@ def chaotic_shares(
 
 def _bands(found: Sequence[Sweep]) -> list[Band]:
     """Where the ends of the first two zones of each draw are."""
-    places: dict[str, list[float]] = {}
+    places: dict[str, list[float]] = {f"zone {i} {end}": [] for i in (1, 2) for end in ("onset", "exit")}
     for swept in found:
         for i, zone in enumerate(zones(swept).zones[:2], start=1):
-            for name, edge in ((f"zone {i} onset", zone.onset), (f"zone {i} exit", zone.exit)):
+            for end, edge in (("onset", zone.onset), ("exit", zone.exit)):
                 if edge is not None:
-                    places.setdefault(name, []).append(edge.speed_rpm)
-    order = ("zone 1 onset", "zone 1 exit", "zone 2 onset", "zone 2 exit")
+                    places[f"zone {i} {end}"].append(edge.speed_rpm)
     return [
-        Band(name, len(places[name]) / len(found), tuple(map(float, np.quantile(places[name], (0.05, 0.5, 0.95)))))  # pyright: ignore[reportArgumentType]
-        for name in order
-        if name in places
+        Band(name, len(rpm) / len(found), tuple(map(float, np.quantile(rpm, (0.05, 0.5, 0.95)))))  # pyright: ignore[reportArgumentType]
+        for name, rpm in places.items()
+        if rpm
     ]

@@ -92,16 +92,13 @@ class BearingStudy(AbstractStudy):
         values, start = self.plan.at(self.plan.lanes_of(number))
         shape = [part.stop - part.start for part in self.plan.region(number)]
         speed_axis = list(self.plan.axes).index(SPEED)
-        last = [*(i for i in range(len(shape)) if i not in (speed_axis, len(shape) - 1)), speed_axis, len(shape) - 1]
-        laid_out = {name: x.reshape(shape).transpose(last) for name, x in {**values, "": start}.items()}
-        speeds, starts = laid_out.pop(SPEED)[..., 0], laid_out.pop("")
-        designs = np.ndindex(speeds.shape[:-1])
+        speeds_inside = lambda x: np.moveaxis(x.reshape(shape), speed_axis, -2)  # next to the starts, which are last
+        laid_out = {name: speeds_inside(x) for name, x in values.items()}
+        speeds, starts = laid_out.pop(SPEED), speeds_inside(start)
+        designs = list(np.ndindex(starts.shape[:-2]))
         models = [replace(self.system, **{name: float(x[*i, 0, 0]) for name, x in laid_out.items()}) for i in designs]
-        row = speeds.reshape(-1, shape[speed_axis])[0]
-        places = [CAGE_STARTS[i] for i in starts.reshape(-1, shape[-1])[0]]
-        found = self._swept(models, row, places)
-        back, new = np.argsort(last), [shape[i] for i in last]
-        return {name: x.reshape(new).transpose(back) for name, x in found.items()}
+        found = self._swept(models, speeds[*designs[0], :, 0], [CAGE_STARTS[i] for i in starts[*designs[0], 0]])
+        return {name: np.moveaxis(x.reshape(starts.shape), -2, speed_axis) for name, x in found.items()}
 
     def _swept(self, models: list[BearingModel], speeds: Float[np.ndarray, " speeds"], places: Any) -> Results:
         """Designs, speeds, starts."""
