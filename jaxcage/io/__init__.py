@@ -13,13 +13,11 @@
 | `_tables`       | tables as CSV or Excel                                                    |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
-| `_dataset`      | `Sweep` to labelled data set, zarr and back                               |
-| `_bearing_dataset` | `BearingSweep` to labelled data set and zarr                           |
+| `_dataset`      | `Sweep` and `BearingSweep` to labelled data set and zarr, a `Sweep` back  |
 | `_csv`          | time histories, strobe points and branches as CSV                         |
 | `_files`        | whole files or none; is a folder writable                                 |
 """
 
-from ._bearing_dataset import bearing_dataset as bearing_dataset, save_bearing_sweep as save_bearing_sweep
 from ._config import (
     BearingFile as BearingFile,
     Unknown as Unknown,
@@ -40,9 +38,11 @@ from ._csv import (
     write_columns as write_columns,
 )
 from ._dataset import (
+    bearing_dataset as bearing_dataset,
     from_dataset as from_dataset,
     load_sweep as load_sweep,
     open_sweep as open_sweep,
+    save_bearing_sweep as save_bearing_sweep,
     save_sweep as save_sweep,
     stored_configuration as stored_configuration,
     to_dataset as to_dataset,

@@ -1,5 +1,7 @@
-"""`Sweep` <-> labelled data set <-> zarr, with the configuration and versions that made it."""
+"""`Sweep` or `BearingSweep` -> labelled data set -> zarr, with the configuration and versions that made it; a `Sweep`
+back from it."""
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._glossary import component_names, quantity
-from ..analysis import Confirmation, Sweep
+from ..analysis import BearingSweep, Confirmation, Sweep
 from ..integrate import OUTCOMES
-from ..models import CageModel
+from ..models import BearingModel, CageModel
 from ._files import replacing
 from ._write_config import configuration
 
@@ -35,6 +37,12 @@ _DERIVED: dict[str, tuple[str, ...]] = {
     "standard_error": ("speed", "start", "exponent"),
     "chaotic_share": ("speed",),
 }
+_LANES = ("speed", "start")
+_LAST: dict[str, tuple[str, ...]] = {
+    "last_rollers": (*_LANES, "of_roller", "roller"),
+    "last_bodies": (*_LANES, "of_bodies"),
+}
+"""Labelled dimensions of what a sweep of the whole bearing has beside numbers of its lanes."""
 
 
 def to_dataset(sweep: Sweep, model: CageModel | None = None) -> "xr.Dataset":
@@ -52,10 +60,9 @@ def to_dataset(sweep: Sweep, model: CageModel | None = None) -> "xr.Dataset":
     if sweep.escape is not None:
         stored["escape"] = ("speed", "start"), sweep.escape
     derived = {name: (dims, getattr(sweep, name)) for name, dims in _DERIVED.items()}
-    labels, codes = np.unique(sweep.label, return_inverse=True)
-    codes = codes.reshape(sweep.label.shape).astype(np.int32)
+    codes, flags = _coded(sweep.label)
     dataset = xr.Dataset(
-        {**stored, **derived, "label": (("speed", "start"), codes)},
+        {**stored, **derived, "label": (_LANES, codes)},
         coords=_coordinates(sweep, cage=model is not None),
         attrs=_attributes(sweep, model),
     )
@@ -63,7 +70,7 @@ def to_dataset(sweep: Sweep, model: CageModel | None = None) -> "xr.Dataset":
         known = quantity("exponent" if name == "exponents" else str(name))
         dataset[name].attrs |= {"long_name": known.text, "units": known.unit}
     dataset["outcome"].attrs |= _flags(OUTCOMES)
-    dataset["label"].attrs |= _flags(labels.tolist())
+    dataset["label"].attrs |= flags
     return dataset
 
 
@@ -80,7 +87,6 @@ def _coordinates(sweep: Sweep, cage: bool) -> dict[str, Any]:
 
 
 def _attributes(sweep: Sweep, model: CageModel | None) -> dict[str, Any]:
-    configured = {} if model is None else {"configuration": json.dumps(configuration(model))}
     return {
         "title": "jaxcage sweep over speed",
         "discard": sweep.discard,
@@ -89,8 +95,60 @@ def _attributes(sweep: Sweep, model: CageModel | None) -> dict[str, Any]:
         "confirmed": json.dumps(sweep.confirmed),
         "resolution_rpm": sweep.resolution_rpm if np.isfinite(sweep.resolution_rpm) else "none",
         "settings": json.dumps(sweep.settings),
-        **configured,
+        **_configured(model),
     }
+
+
+def bearing_dataset(sweep: BearingSweep, model: BearingModel | None = None) -> "xr.Dataset":
+    """A sweep of the whole bearing as a labelled data set.
+
+    **Arguments:** the sweep; the model it was made with, whose every parameter then goes along.
+
+    **Returns:** variables over `speed` and `start`, block means as `NAME_blocks` over `block` too, parts of the power
+    over `part`; states and outcomes as codes with their names; units and words from the sweep.
+    """
+    import xarray as xr
+
+    variables: dict[str, Any] = {}
+    for field in dataclasses.fields(sweep):
+        value, known = getattr(sweep, field.name), dict(field.metadata)
+        about = {"units": known.get("unit", ""), "long_name": known.get("text", "")}
+        if field.name in ("state", "outcome"):
+            codes, flags = _coded(np.asarray(value, dtype=str))
+            variables[field.name] = (_LANES, codes, about | flags)
+        elif field.name == "power_parts_W":
+            parts = np.stack([np.broadcast_to(x, sweep.cage_slip.shape) for x in value.values()], axis=-1)
+            variables[field.name] = ((*_LANES, "part"), parts, about)
+        elif field.name == "block_means":
+            of = lambda name: "exponent_block" if name == "exponent" else "block"
+            variables |= {f"{name}_blocks": ((*_LANES, of(name)), x, about) for name, x in value.items()}
+        elif isinstance(value, np.ndarray) and field.name != "speed":
+            variables[field.name] = (_LAST.get(field.name, _LANES), value, about)
+    return xr.Dataset(
+        variables,
+        coords={
+            "speed": ("speed", sweep.speed, {"units": "rad/s", "long_name": "shaft speed"}),
+            "speed_rpm": ("speed", sweep.rpm, {"units": "rpm", "long_name": "shaft speed"}),
+            "part": np.array(list(sweep.power_parts_W), dtype=object),
+        },
+        attrs={
+            "title": "jaxcage sweep of a whole bearing over shaft speed",
+            "discard": sweep.discard,
+            "revolutions": sweep.revolutions,
+            "settings": json.dumps(sweep.settings),
+            **_configured(model),
+        },
+    )
+
+
+def _configured(model: CageModel | BearingModel | None) -> dict[str, str]:
+    return {} if model is None else {"configuration": json.dumps(configuration(model))}
+
+
+def _coded(names: np.ndarray) -> tuple[np.ndarray, dict[str, Any]]:
+    """Names as integer codes, and what these mean."""
+    known, codes = np.unique(names, return_inverse=True)
+    return codes.reshape(names.shape).astype(np.int32), _flags(known.tolist())
 
 
 def _flags(names: list[str] | tuple[str, ...]) -> dict[str, Any]:
@@ -125,7 +183,15 @@ def save_sweep(path: str | Path, sweep: Sweep, model: CageModel | None = None) -
     """Write a sweep to the zarr folder `path`, whole or not at all; an earlier result stays until
     then.
     """
-    dataset = to_dataset(sweep, model)
+    return _write(path, to_dataset(sweep, model))
+
+
+def save_bearing_sweep(path: str | Path, sweep: BearingSweep, model: BearingModel | None = None) -> Path:
+    """Write a sweep to the zarr folder `path`, whole or not at all; `jaxcage.io.open_sweep` reads it."""
+    return _write(path, bearing_dataset(sweep, model))
+
+
+def _write(path: str | Path, dataset: "xr.Dataset") -> Path:
     with replacing(path) as temporary:
         dataset.to_zarr(temporary, mode="w", consolidated=False)
     return Path(path)
