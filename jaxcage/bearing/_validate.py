@@ -22,22 +22,20 @@ def _known(array: Array) -> Any:
     return np.asarray(array) if is_concrete(array) else array
 
 
-def _require(array: Array, holds: Any, message: str) -> Array:
+def _require(name: str, array: Array, holds: Any, said: str) -> Array:
+    """`array`, if what is `said` of it `holds`."""
     if isinstance(holds, Tracer):
-        return eqx.error_if(array, ~holds, f"{message}.")
+        return eqx.error_if(array, ~holds, f"Argument `{name}` {said}.")
     if not np.all(np.asarray(holds)):
         # Under `grad` without `jit` the comparison is concrete while the value is still traced.
         given = "" if isinstance(array, Tracer) else f", but {float(array):g} was given"
-        raise ValueError(f"{message}{given}.")
+        raise ArgumentError(name, said=f"{said}{given}.")
     return array
 
 
 def require_at_most(name: str, array: Array, largest: float, unit: str) -> Array:
-    """`array`, checked not to be beyond all sense. **Raises:** as `require_positive`, an `ArgumentError` if known."""
-    holds = _known(array) <= largest
-    if not isinstance(holds, Tracer) and not isinstance(array, Tracer) and not np.all(holds):
-        raise ArgumentError(name, said=f"must be at most {largest:g} {unit}, but {np.max(array):g} was given.")
-    return _require(array, holds, f"Argument `{name}` must be at most {largest:g} {unit}")
+    """`array`, checked not to be beyond all sense. **Raises:** as `require_positive`."""
+    return _require(name, array, _known(array) <= largest, f"must be at most {largest:g} {unit}")
 
 
 def require_positive(name: str, value: Scalar) -> Array:
@@ -46,10 +44,10 @@ def require_positive(name: str, value: Scalar) -> Array:
     **Raises:** `ValueError` that names the argument; when traced, an error as the computation runs.
     """
     array = jnp.asarray(value, dtype=float)
-    return _require(array, _known(array) > 0, f"Argument `{name}` must be positive")
+    return _require(name, array, _known(array) > 0, "must be positive")
 
 
 def require_not_negative(name: str, value: Scalar) -> Array:
     """`value` as an array, checked to be zero or above (NaN is not). **Raises:** as above."""
     array = jnp.asarray(value, dtype=float)
-    return _require(array, _known(array) >= 0, f"Argument `{name}` must not be negative")
+    return _require(name, array, _known(array) >= 0, "must not be negative")
