@@ -229,16 +229,15 @@ def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: An
 
 def shown(value: Any) -> str:
     """A value as a message shows it."""
-    if isinstance(value, bool | int | float | complex | str | np.generic):
+    plain = bool | int | float | complex | str
+    row = isinstance(value, tuple | list) and all(isinstance(x, plain) for x in value)
+    if row or isinstance(value, plain | np.generic):
         try:
-            text = repr(value) if isinstance(value, str | complex) else str(value)
+            text = repr(value) if row or isinstance(value, str | complex) else str(value)
         except ValueError:  # of thousands of digits
             return f"a very large {type(value).__name__}"
         return text if len(text) < 100 else f"{text[:100]}..."
     if isinstance(value, _ARRAYS):
         kind = "a masked array" if isinstance(value, np.ma.MaskedArray) else "an array"
         return f"{kind} of shape {np.shape(value)} and kind {value.dtype}"
-    if isinstance(value, tuple | list) and all(isinstance(x, bool | int | float | complex | str) for x in value):
-        text = repr(value)
-        return text if len(text) < 100 else f"{text[:100]}..."
     return f"something of kind {type(value).__name__}"

@@ -108,6 +108,7 @@ SPEEDS = np.array([1.0, 1.1])
         (lambda: jc.sweep(DUFFING, np.ma.array(SPEEDS, mask=[0, 1])), "without a mask, but a masked array of shape"),
         (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
         (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
+        (lambda: jc.sweep(DUFFING, ["a", 10**5000]), "`speeds` must be .*, but a very large list was given"),
         (lambda: jc.sweep("1a", SPEEDS), "`system` must be of kind AbstractForcedSystem, but '1a' was given"),
         (lambda: jc.sweep_designs(DUFFING, SPEEDS), "`systems` must be a row of things, but something of kind Forced"),
         (

@@ -222,6 +222,11 @@ def test_every_draw_starts_on_its_own_rib(monkeypatch: pytest.MonkeyPatch, what:
     assert len(models) >= 8 and rest == pytest.approx([float(m.contact.onset) for m in models], rel=1e-6)
 
 
+def test_an_ensemble_of_no_draws_is_refused():
+    with pytest.raises(ValueError, match="`draws` must be at least 1, but 0 was given"):
+        ensemble(jc.case("1a"), [STIFF], jc.rpm(6000, 7000, 2), draws=0)
+
+
 @pytest.mark.wide
 def test_draws_that_run():
     """A support that is as stiff as may be, and no impact: calm in every draw, as alone."""

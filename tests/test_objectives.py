@@ -342,6 +342,8 @@ def test_designs_that_no_other_beats_are_found_among_all():
 def test_a_trade_off_of_nothing_is_refused():
     with pytest.raises(ValueError, match="`objectives` must hold at least one"):
         trade_off(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, {})
+    with pytest.raises(ValueError, match="`designs` must be at least 1, but 0 was given"):
+        trade_off(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, {"cost": jc.design.cost()}, designs=0)
 
 
 def test_loads_that_two_terms_ask_for_are_read_once(monkeypatch: pytest.MonkeyPatch):

@@ -99,6 +99,8 @@ def test_a_surrogate_search_goes_on_where_it_stopped(tmp_path):
     assert asked == [16] * 2
     with pytest.raises(ValueError, match="but is of another one"):
         search(keep=tmp_path / "search", seed=1)
+    with pytest.raises(ValueError, match="but is of another one"):
+        jc.design.surrogate_search(double_well(), VARY, bowl(), starts=2, batches=5, batch=8, keep=tmp_path / "search")
     with pytest.raises(ValueError, match="`batch` and `batches` must be at least 2 and 1, but 1 and 10"):
         jc.design.surrogate_search(double_well(), VARY, bowl(), batch=1)
 
@@ -216,6 +218,9 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(tmp_path):
     assert [o.history for o in again.optima] == [o.history for o in unbroken.optima]
     with pytest.raises(ValueError, match="file of this search"):
         jc.optimise(double_well(), VARY, bowl(), starts=3, steps=30, keep=path)
+    for other in (bowl(damping=0.5), 2.0 * bowl(), bowl() + jc.design.Smooth(jnp.sum)):
+        with pytest.raises(ValueError, match="but is of another one"):
+            jc.optimise(double_well(), VARY, other, starts=2, steps=30, keep=path)
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(ValueError, match="is none"):
         jc.optimise(double_well(), VARY, bowl(), starts=2, steps=30, keep=path)
@@ -272,6 +277,7 @@ def test_tolerance_budget_is_the_root_of_squares():
     assert "80 % of the variance" in str(got)
     with pytest.raises(ValueError, match="must be of one of"):
         jc.design.tolerance_budget(edge, {"heat": 0.1})
+    assert "0 % of the variance" in str(jc.design.tolerance_budget(edge, {"gap": 0.0}))
 
 
 @pytest.mark.wide
@@ -285,6 +291,15 @@ def test_pareto_front_of_two_parabolas():
     for p in front:
         assert np.sqrt(p.first.value) + np.sqrt(p.second.value) == pytest.approx(0.5, abs=0.01)
         assert p.values["damping"] == pytest.approx((0.3 + 0.8 * p.weight) / (1 + p.weight), abs=0.02)
+
+
+def test_a_front_has_nothing_that_another_design_beats():
+    """With a first objective that is the same everywhere, the last and best of the second alone; none of NaN."""
+    same, g = jc.design.Smooth(lambda s: 0.0 * jc.parameters(s)["damping"]), bowl()
+    front = jc.design.pareto_front(double_well(), VARY, same, g, [1.0, 2.0, 3.0], steps=3)
+    assert [p.weight for p in front] == [3.0]
+    unknown = jc.design.Smooth(lambda s: jnp.nan * jc.parameters(s)["damping"])
+    assert jc.design.pareto_front(double_well(), VARY, unknown, g, [1.0], steps=1) == ()
 
 
 @pytest.mark.parametrize(

@@ -1,27 +1,53 @@
 """The state of a search in a file, so that it goes on where it stopped: numbers only, put in place whole."""
 
+import dataclasses
 import json
 import os
+import types
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from .._errors import InputError
 from .._parameters import parameters
-from ._objective import DesignSpace
+from ._objective import AbstractObjective, DesignSpace
+
+
+def made_of(x: Any) -> Any:
+    """What tells an objective from another, as JSON has it: the kinds of its parts and their numbers, to six digits
+    since some come from simulations; of a function its name and the values that it was made with."""
+    if x is None or isinstance(x, str | int):
+        return x
+    if isinstance(x, Mapping):
+        return {str(key): made_of(value) for key, value in x.items()}
+    if isinstance(x, list | tuple):
+        return [made_of(value) for value in x]
+    if isinstance(x, float | np.ndarray | jax.Array):
+        return [f"{value:.6g}" for value in np.ravel(x).tolist()]
+    if dataclasses.is_dataclass(x) and not isinstance(x, type):
+        values = {f.name: made_of(getattr(x, f.name)) for f in dataclasses.fields(x) if f.init}
+        return {type(x).__qualname__: values}
+    if isinstance(x, types.FunctionType):
+        cells = [cell.cell_contents for cell in x.__closure__ or () if cell.cell_contents is not x]
+        return {x.__qualname__: made_of([*(x.__defaults__ or ()), *cells])}
+    return type(x).__qualname__
 
 
 class KeptSearch:
     """A file of one search; that of another is refused."""
 
-    def __init__(self, path: str | Path, space: DesignSpace, **search: Any):
-        """**Arguments:** where; the space that is searched; what else makes this search another one, as JSON has it."""
+    def __init__(self, path: str | Path, space: DesignSpace, objective: AbstractObjective, **search: Any):
+        """**Arguments:** where; the space that is searched, and for what; what else makes this search another one, as
+        JSON has it."""
         design = {name: np.asarray(value).tolist() for name, value in parameters(space.system).items()}
         bounds = {u.name: [u.lower, u.upper] for u in space.unknowns}
         self.path = Path(path)
-        self.what = json.dumps({"design": design, "bounds": bounds, **search}, sort_keys=True)
+        what = {"design": design, "bounds": bounds, "objective": made_of(objective), **search}
+        self.what = json.dumps(what, sort_keys=True)
 
     def save(self, **arrays: Any) -> None:
         """Put these in the file, in place of what was there."""

@@ -154,7 +154,8 @@ def optimise(
     - `scouts`: number of quasi-random points evaluated beforehand, without slopes; searches start from the best.
     - `steps`: at most so many; `tolerance`: a slope below this fraction of the first value of the objective is small.
     - `seed`: of the quasi-random points.
-    - `keep`: file in which the state is saved after each step; if it exists, the search continues from it.
+    - `keep`: file in which the state is saved after each step; if it exists, the search continues from it, with the
+        same optimiser.
     - `report`: called with the step and what was measured in each search.
 
     **Returns:** `Optimised`.
@@ -170,7 +171,8 @@ def optimise(
     with jax.numpy_dtype_promotion("standard"):  # optax mixes steps and numbers
         state = jax.vmap(chosen.init)(jnp.asarray(z))
     history: list[list[Step]] = [[] for _ in first]
-    kept = None if keep is None else KeptSearch(keep, space, steps=steps, first=first.tolist())
+    about = {"steps": steps, "tolerance": tolerance, "first": first.tolist()}
+    kept = None if keep is None else KeptSearch(keep, space, objective, **about)
     if kept is not None:
         z, state, history = _loaded(kept, z, state, history)
     before = z.copy()

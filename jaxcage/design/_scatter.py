@@ -14,6 +14,7 @@ from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
 from ._objective import AbstractObjective, DesignSpace, Measured
 from ._optimise import Optimised, optimise
+from ._trade_off import unbeaten
 
 
 NARROW = 0.3
@@ -163,7 +164,8 @@ class ToleranceBudget:
 
     def __str__(self) -> str:
         order = sorted(self.deviation_rpm.items(), key=lambda item: -item[1])
-        rows = [f"  {n:<24} +-{d:.3g} rpm, {100 * (d / self.total_rpm) ** 2:.0f} % of the variance" for n, d in order]
+        total = self.total_rpm or 1.0  # without any scatter, nothing is a part of it
+        rows = [f"  {n:<24} +-{d:.3g} rpm, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
         half = ndtri(0.975) * self.total_rpm
         return "\n".join([f"{self.edge} at {self.speed_rpm:.1f} rpm: +-{half:.3g} rpm (95 %)", *rows])
 
@@ -187,7 +189,7 @@ def tolerance_budget(edge: Sensitivity, deviation: Mapping[str, float]) -> Toler
 
 @dataclasses.dataclass(frozen=True)
 class ParetoPoint:
-    """A design than which none that was found is better in one respect and no worse in the other."""
+    """A design that no other beats: none that was found is as good in both respects and better in one."""
 
     weight: float
     values: dict[str, float]
@@ -205,9 +207,11 @@ def pareto_front(
     report: Callable[[int, Optimised], None] | None = None,
     **options: Any,
 ) -> tuple[ParetoPoint, ...]:
-    """Trade-off of two objectives: optima of first + weight * second without those that are dominated.
+    """Trade-off of two objectives: optima of first + weight * second without those that another beats.
 
     **Arguments:** as for `optimise`; weights of the second objective, one search from each optimum to the next.
+
+    **Returns:** points by the second objective; none where either could not be had.
     """
     points = []
     for i, weight in enumerate(weights):
@@ -218,5 +222,5 @@ def pareto_front(
         points.append(ParetoPoint(weight, best.values, first.measure(space, place)[0], second.measure(space, place)[0]))
         if report is not None:
             report(i, found)
-    beats = lambda a, b: a.first.value < b.first.value and a.second.value <= b.second.value
-    return tuple(sorted((p for p in points if not any(beats(q, p) for q in points)), key=lambda p: p.second.value))
+    kept = unbeaten(np.array([(p.first.value, p.second.value) for p in points]).reshape(-1, 2))
+    return tuple(sorted((p for p, good in zip(points, kept, strict=True) if good), key=lambda p: p.second.value))

@@ -77,7 +77,7 @@ def surrogate_search(
     first = first_places(space, objective, starts, scouts, seed)
     searches = [SurrogateSearch(place, batch, (seed, i)) for i, place in enumerate(first)]
     about = {"batches": batches, "batch": batch, "seed": seed, "first": first.tolist()}
-    kept = None if keep is None else KeptSearch(keep, space, **about)
+    kept = None if keep is None else KeptSearch(keep, space, objective, **about)
     known = None if kept is None else kept.load()
     told = [] if known is None else list(zip(known["places"], known["values"], strict=True))
     for number in range(batches):

@@ -26,11 +26,7 @@ class TradeOff:
     @property
     def efficient(self) -> Bool[np.ndarray, " designs"]:
         """Designs that no other beats: none is as good in every objective and better in one. One with a NaN is not."""
-        known = np.all(np.isfinite(self.values), axis=1)
-        kept = np.where(known[:, None], self.values, np.inf)
-        no_worse = np.all(kept[:, None] <= kept[None], axis=2)
-        better = np.any(kept[:, None] < kept[None], axis=2)
-        return known & ~np.any(no_worse & better, axis=0)
+        return unbeaten(self.values)
 
     def parameters(self, i: int) -> dict[str, float]:
         """Of the i-th design [SI]."""
@@ -42,6 +38,15 @@ class TradeOff:
         head = "  ".join([*self.space.names, *self.names])
         rows = ["  ".join(f"{x:.4g}" for x in cells(i)) for i in chosen[np.argsort(self.values[chosen, 0])].tolist()]
         return "\n".join([f"{chosen.size} of {len(self.places)} designs that no other beats", head, *rows])
+
+
+def unbeaten(values: Float[np.ndarray, "designs objectives"]) -> Bool[np.ndarray, " designs"]:
+    """Rows that no other beats, being as good in every column and better in one. One with a NaN is not."""
+    known = np.all(np.isfinite(values), axis=1)
+    kept = np.where(known[:, None], values, np.inf)
+    no_worse = np.all(kept[:, None] <= kept[None], axis=2)
+    better = np.any(kept[:, None] < kept[None], axis=2)
+    return known & ~np.any(no_worse & better, axis=0)
 
 
 def trade_off(
@@ -58,10 +63,12 @@ def trade_off(
     **Arguments:** the system; bounds [SI] by parameter; objectives by name, each to be small; number of designs
     (scrambled Sobol points) and their seed; places of more designs, such as an optimum.
 
-    **Raises:** `ValueError` for bounds that are none, and without objectives.
+    **Raises:** `ValueError` for bounds that are none, and without objectives or designs.
     """
     if not objectives:
         raise ArgumentError("objectives", said="must hold at least one, but it is empty.")
+    if designs < 1:
+        raise ArgumentError("designs", said=f"must be at least 1, but {designs} was given.")
     space = DesignSpace.of(system, vary)
     points = sobol(len(space.names), designs, seed)
     places = points if beside is None else np.vstack([points, beside])

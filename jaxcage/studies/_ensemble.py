@@ -205,10 +205,12 @@ def ensemble(
 
     **Returns:** `Ensemble`.
 
-    **Raises:** `ValueError` if nothing is unknown, or values from the ranges do not go together.
+    **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges do not go together.
     """
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
+    if draws < 1:
+        raise ArgumentError("draws", said=f"must be at least 1, but {draws} was given.")
     place = sobol(len(unknowns), draws, seed)
     found = run_draws(draw(model, unknowns, place), speeds, method, progress, discard, revolutions, blocks)
     info = parameter_info(model)
