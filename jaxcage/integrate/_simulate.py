@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -98,12 +99,6 @@ def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> S
     return tuple(jnp.asarray(c, dtype=float) for c in y0)
 
 
-def _check(speed: float, revolutions: int, samples: int, discard: int) -> None:
-    if not (np.isfinite(speed) and speed > 0):
-        raise ArgumentError("speed", said=f"must be positive and finite, but {speed} rad/s was given.")
-    require_counts(revolutions, samples, discard)
-
-
 def require_counts(revolutions: int, samples: int, discard: int) -> None:
     """**Raises:** `ValueError` for what no history can have."""
     if revolutions < 1 or samples < 1 or discard < 0:
@@ -157,13 +152,8 @@ def simulate(
     """
     require_x64()
     require_known("simulate", INSTEAD, system, speed, start)
-    value = float(speed)
-    _check(value, revolutions, samples, discard)
-    require_speeds(system, value)
-    chosen = _method(method, samples)
-    speeds = np.full(discard + revolutions, value)
-    ran = _run(system, chosen, jnp.asarray(speeds), jnp.zeros(speeds.size), _start(system, value, start), samples)
-    return _trajectory(ran, speeds, 0.0, samples, discard)
+    options: dict[str, Any] = dict(revolutions=revolutions, samples=samples, discard=discard)
+    return ramp(system, speed, speed, **options, start=start, method=method)  # one that does not rise
 
 
 def ramp(
@@ -190,7 +180,10 @@ def ramp(
     require_x64()
     require_known("ramp", INSTEAD, system, first, last, start)
     low, high = float(first), float(last)
-    _check(min(low, high), revolutions, samples, discard)
+    lowest = min(low, high)
+    if not (np.isfinite(lowest) and lowest > 0):
+        raise ArgumentError("speed", said=f"must be positive and finite, but {lowest} rad/s was given.")
+    require_counts(revolutions, samples, discard)
     require_speeds(system, max(low, high))
     chosen = _method(method, samples)
     rise = (high - low) / revolutions
