@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
 from ..analysis import BearingSweep
+from ..analysis._zones import runs
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS
 from ._bearing import sweep_bearing
@@ -63,9 +64,7 @@ class BearingUpDown:
     @property
     def stretches(self) -> list[tuple[float, float]]:
         """Speeds between which both ways differ, first and last step of each [rpm of the shaft]."""
-        marked = np.flatnonzero(self.apart)
-        groups = np.split(marked, np.flatnonzero(np.diff(marked) > 1) + 1) if marked.size else []
-        return [(float(self.rpm[g[0]]), float(self.rpm[g[-1]])) for g in groups]
+        return [(float(self.rpm[first]), float(self.rpm[last])) for first, last in runs(self.apart)]
 
 
 def bearing_up_down(

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError, NoResult
 from ..analysis import relative_state
+from ..analysis._zones import runs
 from ..integrate import AbstractMethod, Trajectory, ramp
 from ..models import CageModel
 
@@ -66,10 +67,7 @@ class RampUpDown:
     @property
     def stretches(self) -> list[tuple[float, float]]:
         """First and last speed [rpm] of each run of windows that differ."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.apart.astype(int), [0]])))
-        return [
-            (float(self.up.rpm[i]), float(self.up.rpm[j - 1])) for i, j in zip(edges[::2], edges[1::2], strict=True)
-        ]
+        return [(float(self.up.rpm[first]), float(self.up.rpm[last])) for first, last in runs(self.apart)]
 
 
 def _around(x: np.ndarray) -> np.ndarray:
