@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
-from ._labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period
+from ._labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period, scatter
 
 
 CONFIRM = 8
@@ -46,7 +46,7 @@ def calm_at_the_end(
     """
     end = growth[:, -confirm:]
     exponent = np.mean(end, axis=1)
-    error = np.std(end, axis=1, ddof=1) / np.sqrt(end.shape[1]) if end.shape[1] > 1 else np.zeros(exponent.shape)
+    error = scatter(end, axis=1) if end.shape[1] > 1 else np.zeros(exponent.shape)
     unknown = max(TORUS_THRESHOLD, 1 / (block * end.shape[1]))
     return (closing_period(strobe, scale) > 0) | (exponent <= np.maximum(2 * error, unknown))  # false for NaN
 
