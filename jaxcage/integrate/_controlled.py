@@ -22,6 +22,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
+from ._kernel import Pieces
 from ._method import AbstractMethod, AdaptiveSteps, FixedSteps, Moved, Stretch, make_fixed, moved_by, run_steps
 from ._results import INACCURATE, result_of
 
@@ -51,8 +52,6 @@ IMPLICIT = 3.0
 """An implicit step takes about as long as so many explicit ones."""
 
 Levels = FixedSteps | AdaptiveSteps
-Pieces = tuple[AbstractField, AbstractForcedSystem, State]
-"""What is integrated: field, system and its scale."""
 Attempt = Callable[[Levels, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
 """The revolution of those lanes that are marked by the i-th level of a solver."""
 
@@ -144,7 +143,7 @@ def run_level(
     if not (isinstance(parts, int) and parts == 1):
         unit = jnp.asarray(method.ladder[0].steps)[0] if isinstance(method.ladder[0], FixedSteps) else 1
         steps, multiple = -(-(-(-unit // parts) * steps) // unit) * parts, 1
-    return lambda y: run_steps(levels.solver, steps, *pieces, y, phase, parts, multiple=multiple)
+    return lambda y: run_steps(levels.solver, steps, pieces, y, phase, parts, multiple)
 
 
 def nowhere(y: Any, tangents: Any) -> Moved:

@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import diffrax as dfx
 import equinox as eqx
@@ -26,9 +26,11 @@ from ._rosenbrock import AbstractRosenbrock, computed_once, rosenbrock_step
 
 REVOLUTION = 2 * math.pi
 KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
+Pieces = tuple[AbstractField, AbstractForcedSystem, State]
+"""What is integrated: field, system and its scale."""
 
 
-def can_be_kernel(solver: Any) -> bool:
+def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
     """Whether a step of `solver` is a plain formula: ours, and explicit methods with the first stage last."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
@@ -155,7 +157,7 @@ class KernelStage:
 
     def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
         phase, h, until, *numbers = fixed
-        pieces: tuple[AbstractField, AbstractForcedSystem, State] = self.structure.filled(numbers)
+        pieces: Pieces = self.structure.filled(numbers)
         field, system, scale = pieces
         method, n = self.stages, len(scale)
         step = jnp.floor(i / self.count)
@@ -198,9 +200,7 @@ def kernel_step(
 def steps_through(
     solver: KernelSolver,
     steps: Any,
-    field: AbstractField,
-    system: AbstractForcedSystem,
-    scale: State,
+    pieces: Pieces,
     y: State,
     tangents: Sequence[State] = (),
     drifts: Sequence[Sequence[Any] | None] = (),
@@ -210,14 +210,14 @@ def steps_through(
 ) -> tuple[State, Scalar, dfx.RESULTS, tuple[State, ...]]:
     """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
 
-    **Arguments:** solver; steps of a revolution; field, system and its scale; state; tangent vectors, and for each of
+    **Arguments:** solver; steps of a revolution; what is integrated; state; tangent vectors, and for each of
     them the tangents of the field's numbers, None where there are none; phase and part; a number that the steps of a
     part are known to be a multiple of.
 
     **Returns:** the state after it, the largest excursion on the way, whether the steps' own iteration converged, the
     tangent vectors.
     """
-    step, numbers = kernel_step(solver, field, system, scale)
+    step, numbers = kernel_step(solver, *pieces)
     count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
     end = phase + REVOLUTION / jnp.asarray(parts, dtype=float)
     fixed = (jnp.asarray(phase, dtype=float), h, end, *numbers)

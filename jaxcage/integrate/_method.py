@@ -16,7 +16,7 @@ from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
 from ._explicit import ClassicalRK4
-from ._kernel import REVOLUTION, can_be_kernel, steps_through
+from ._kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
 from ._march import with_tangents
 from ._newmark import NewmarkBeta
 from ._results import RESULTS, outcome_code
@@ -116,13 +116,11 @@ def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULT
 def run_steps(
     solver: dfx.AbstractSolver,
     steps: Int[Array, ""] | int,
-    field: AbstractField,
-    system: AbstractForcedSystem,
-    scale: State,
+    pieces: Pieces,
     y: State,
-    phase: Scalar = 0.0,
-    parts: Int[Array, ""] | int = 1,
-    multiple: int | None = None,
+    phase: Scalar,
+    parts: Int[Array, ""] | int,
+    multiple: int = 1,
 ) -> Stretch:
     """One `parts`-th of a revolution of so many equal steps, in a single lane.
 
@@ -132,32 +130,15 @@ def run_steps(
         if steps % parts:
             raise ArgumentError("parts", said=f"must divide the {steps} steps per revolution, but it is {parts}.")
         multiple = math.gcd(steps // parts, 4)
-    pieces = (field, system, scale)
     if can_be_kernel(solver):
-        y, peak, result, _ = steps_through(
-            solver,  # pyright: ignore[reportArgumentType]
-            steps,
-            *pieces,
-            y,
-            phase=phase,
-            parts=parts,
-            multiple=multiple or 1,
-        )
+        y, peak, result, _ = steps_through(solver, steps, pieces, y, phase=phase, parts=parts, multiple=multiple)
         return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
-    return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), *pieces, y, phase)
+    return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), pieces, y, phase)
 
 
-def _by_solver(
-    solver: Any,
-    count: Any,
-    h: Scalar,
-    field: AbstractField,
-    system: AbstractForcedSystem,
-    scale: State,
-    y: State,
-    phase: Scalar,
-) -> Stretch:
+def _by_solver(solver: Any, count: Any, h: Scalar, pieces: Pieces, y: State, phase: Scalar) -> Stretch:
     """The same with a diffrax solver's own step."""
+    field, system, scale = pieces
     term = _term(solver)
     if isinstance(solver, dfx.AbstractImplicitSolver):  # its Newton tolerance is one number for all components
         field, y = ScaledField(field, scale), divide(y, scale)
@@ -201,7 +182,7 @@ class FixedSteps(AbstractMethod):
         phase: Scalar,
         parts: Int[Array, ""] | int,
     ) -> Stretch:
-        return run_steps(self.solver, self.steps, field, system, scale, y, phase, parts)
+        return run_steps(self.solver, self.steps, (field, system, scale), y, phase, parts)
 
 
 class AdaptiveSteps(AbstractMethod):

@@ -5,7 +5,7 @@ together, so that the work is that of the lanes which ask for it, whatever their
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -17,7 +17,7 @@ from .._recent import split
 from .._types import Scalar, State
 from ..models import ESCAPE
 from ._controlled import ControlledSteps, Levels, climb, nowhere, run_level
-from ._kernel import KernelSolver, can_be_kernel, steps_through
+from ._kernel import can_be_kernel, steps_through
 from ._method import FixedSteps, Moved, Stretch, Tangents, moved_by, result_at
 from ._results import outcome_code
 from ._strobe import StrobeMap
@@ -53,9 +53,8 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
     method = strobe.method
     if not (isinstance(method, FixedSteps) and can_be_kernel(method.solver)):
         return _pushed_from_outside(strobe, y, tangents, drifts)
-    solver = cast(KernelSolver, method.solver)
     pieces = (strobe.field, strobe.system, strobe.scale)
-    y, peak, result, after = steps_through(solver, method.steps, *pieces, y, tangents, drifts)
+    y, peak, result, after = steps_through(method.solver, method.steps, pieces, y, tangents, drifts)
     code = outcome_code(result_at(result, y, peak, ESCAPE))
     return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), jnp.asarray(jnp.nan), ())
 
