@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from .._parameters import parameter_info, parameters
 from ..models import BearingModel
-from ._figures import Picture, picture_of
+from ._figures import picture_of
 from ._page import rendered
 from ._sources import shown
 from ._table import Table
@@ -36,9 +36,7 @@ def bearing_page(title: str, subtitle: str, sections: Sequence[Section], version
 
     **Arguments:** title; what stands beneath it; parts; version of the package; the command line that asked for it.
     """
-    drawn: dict[str, Picture] = {
-        key: picture_of(key, figure, words, words) for s in sections for key, (figure, words) in s.figures.items()
-    }
+    drawn = {key: picture_of(figure, words, words) for s in sections for key, (figure, words) in s.figures.items()}
     return rendered(
         "bearing_page.html.j2",
         title=title,

@@ -2,7 +2,6 @@
 
 import base64
 import dataclasses
-import functools
 import io
 from collections.abc import Callable, Iterator, Sequence
 
@@ -45,7 +44,6 @@ RASTER_DPI = 150
 class Picture:
     """A figure of the page."""
 
-    key: str
     alt: str
     """What it shows, for those who do not see it."""
     caption: str
@@ -61,28 +59,17 @@ def pictures(
     findings: Findings, operating: list[Operating], chances: Ensemble | None, units: ShownUnits
 ) -> dict[str, Picture]:
     """All figures that the findings allow, by name."""
-    picture = functools.partial(_picture, float(findings.model.bearing.cage_speed_ratio), units)
-    drawn = {each.key: each for each in _draw(findings, operating, picture)}
-    return drawn if chances is None else drawn | {"chance": _chance(findings, operating, chances, picture)}
+    ratio = float(findings.model.bearing.cage_speed_ratio)
+    return {
+        key: picture_of(in_units(add_shaft_axes(figure, ratio), units), alt, caption)
+        for key, figure, alt, caption in _draw(findings, operating, chances)
+    }
 
 
-Painter = Callable[..., Picture]
-
-
-def _chance(findings: Findings, operating: list[Operating], found: Ensemble, picture: Painter) -> Picture:
-    bands = [(b.name, b.rpm) for b in found.bands]
-    figure = _alone(9.5, 4.6, lambda ax: chance_of_chaos(found.rpm, found.chance, found.interval, bands, ax))
-    mark_operating(figure.axes[0], [(at.low_rpm, at.high_rpm) for at in operating])
-    return picture(
-        "chance",
-        figure,
-        f"Chance of chaos of {findings.name} over cage speed with 95 % bars, and bands of the edges beneath.",
-        f"Share of {found.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars; beneath, where "
-        "the edges lie in 90 % of the draws that have them.",
-    )
-
-
-def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> Iterator[Picture]:
+def _draw(
+    findings: Findings, operating: list[Operating], chances: Ensemble | None
+) -> Iterator[tuple[str, Figure, str, str]]:
+    """Name, figure, what it shows and caption, one after the other."""
     swept, found, name = findings.sweep, findings.found, findings.name
     spans = [(at.low_rpm, at.high_rpm) for at in operating]
     limits = float(swept.rpm[0]), float(swept.rpm[-1])
@@ -91,7 +78,7 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
         1.9 if spans else 1.5,
         lambda ax: zone_strip(findings.loss.zones, findings.zones.zones, limits, spans, findings.published, ax),
     )
-    yield picture(
+    yield (
         "strip",
         strip,
         f"Bars over the cage speed: zones of {name} without a stable synchronous orbit, chaotic zones"
@@ -101,7 +88,7 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
     diagram = sweep_figure(swept, findings.zones, findings.published)
     for ax in diagram.axes:
         mark_operating(ax, spans)
-    yield picture(
+    yield (
         "orbits",
         diagram,
         f"Orbit diagram of {name}: strobe points of the vertical displacement over cage speed, with the largest "
@@ -110,7 +97,7 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
         "Chaotic zones are shaded.",
     )
     if found.branches:
-        yield picture(
+        yield (
             "branches",
             _alone(9.5, 5.4, lambda ax: orbit_diagram_with_branches(swept, found.branches, 1, ax)),
             f"Synchronous orbits of {name} over speed, stable parts thick, unstable ones thin, bifurcations marked.",
@@ -118,7 +105,7 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
         )
         principal = findings.loss.principal
         branch = found.branches[0 if principal is None else principal.branch]
-        yield picture(
+        yield (
             "multipliers",
             _alone(7.0, 5.8, lambda ax: multiplier_circle(branch, ax)),
             "Floquet multipliers of the synchronous orbit in the complex plane with the unit circle.",
@@ -127,7 +114,7 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
         )
     if findings.map is not None:
         curves = " The lines are its edges, solved for." if findings.map.curves else ""
-        yield picture(
+        yield (
             "map",
             _map(findings.model, findings.map, spans),
             f"Stability map of {name}: largest exponent over cage speed and guidance gap.",
@@ -136,7 +123,7 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
     edges = [s for n, s in findings.slopes.items() if s.trusted and n in findings.loss.edges]
     trusted = [with_full_names(findings, s) for s in to_be_turned(findings.model, edges)]
     if trusted:
-        yield picture(
+        yield (
             "elasticities",
             _alone(9.5, 2.2 + 0.95 * len(trusted), lambda ax: _bars(trusted, ax)),
             "Bars: elasticities of the synchronous-loss edges with respect to the parameters that move them most.",
@@ -145,11 +132,22 @@ def _draw(findings: Findings, operating: list[Operating], picture: Painter) -> I
         )
     if findings.statics is not None:
         shared = findings.statics
-        yield picture(
+        yield (
             "statics",
             _alone(7.0, 3.2, lambda ax: load_bars(shared, ax)),
             "Load of every roller over its angle from the load.",
             f"Load of every roller at rest under {float(findings.model.load):g} N.",
+        )
+    if chances is not None:
+        bands = [(b.name, b.rpm) for b in chances.bands]
+        chance = _alone(9.5, 4.6, lambda ax: chance_of_chaos(chances.rpm, chances.chance, chances.interval, bands, ax))
+        mark_operating(chance.axes[0], spans)
+        yield (
+            "chance",
+            chance,
+            f"Chance of chaos of {name} over cage speed with 95 % bars, and bands of the edges beneath.",
+            f"Share of {chances.place.shape[0]} draws from the ranges that are chaotic, with 95 % bars; beneath, where "
+            "the edges lie in 90 % of the draws that have them.",
         )
 
 
@@ -193,18 +191,13 @@ def _map(model: CageModel, chart: Map, spans: list[tuple[float, float]]) -> Figu
     return figure
 
 
-def _picture(cage_speed_ratio: float, units: ShownUnits, key: str, figure: Figure, alt: str, caption: str) -> Picture:
-    in_units(add_shaft_axes(figure, cage_speed_ratio), units)
-    return picture_of(key, figure, alt, caption)
-
-
-def picture_of(key: str, figure: Figure, alt: str, caption: str) -> Picture:
+def picture_of(figure: Figure, alt: str, caption: str) -> Picture:
     """A figure as the page holds it."""
     for cloud in figure.findobj(Collection):
         cloud.set_rasterized(True)
     width, height = (96 * float(x) for x in figure.get_size_inches())
     light, dark = (_address(restyle(figure, style)) for style in ("light", "dark"))
-    return Picture(key, alt, caption, light, dark, round(width), round(height))
+    return Picture(alt, caption, light, dark, round(width), round(height))
 
 
 def _address(figure: Figure) -> str:
