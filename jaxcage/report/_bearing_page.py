@@ -41,6 +41,7 @@ def bearing_page(title: str, subtitle: str, sections: Sequence[Section], version
         "bearing_page.html.j2",
         title=title,
         subtitle=subtitle,
+        links=[(s.key, s.title) for s in sections],
         sections=sections,
         pictures=drawn,
         version=version,

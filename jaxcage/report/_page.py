@@ -138,7 +138,7 @@ def _context(
     }
     there = {"operating": bool(assessed), "map": "map" in drawn, "gradients": bool(slopes)}
     there |= {"statics": statics is not None, "known": chances is not None}
-    return context | {"sections": [(k, text) for k, text in _SECTIONS.items() if there.get(k, True)]}
+    return context | {"links": [(k, text) for k, text in _SECTIONS.items() if there.get(k, True)]}
 
 
 _SECTIONS = {
