@@ -11,7 +11,7 @@ from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
 from ._table import Table, chosen, number
-from ._zone_tables import SPEEDS, partner_of, published_cell, published_document, published_zones, zone_document
+from ._zone_tables import published_document, zone_document, zones_beside_published
 
 
 AT_LIMIT_RPM = 1e-6
@@ -111,18 +111,10 @@ def stretch_table(name: str, found: SynchronousOrbits) -> Table:
 
 def loss_table(name: str, found: SynchronousOrbits, loss: LossZones, published: PublishedCase | None) -> Table:
     """Synchronous-loss zones, each published (chaotic) zone beside the one it shares most speeds with [rpm]."""
-    spans = published_zones(published)
-    partner = [partner_of(span, loss.zones) for span in spans]
-    rows = []
-    for i, zone in enumerate(loss.zones):
-        beside = [span for span, k in zip(spans, partner, strict=True) if k == i]
-        rows.append((str(i + 1), *_zone_cells(zone), published_cell(beside)))
-    for span in (span for span, k in zip(spans, partner, strict=True) if k is None):
-        met = span[0] <= found.upper_rpm and (span[1] is None or span[1] >= found.lower_rpm)
-        rows.append(("-", "not found" if met else "not searched", *4 * ("-",), published_cell([span])))
     title = f"Synchronous-loss zones of {name} [rpm], closed below {number(loss.close_below_rpm)} rpm"
     columns = ("zone", "onset", "by", "exit", "by", "width", "published chaos")
-    return Table(title, columns, rows or [("none", *6 * ("-",))], SPEEDS)
+    cells, searched = [_zone_cells(zone) for zone in loss.zones], (found.lower_rpm, found.upper_rpm)
+    return zones_beside_published(title, columns, cells, loss.zones, published, searched, "not searched")
 
 
 def _zone_cells(zone: Zone) -> list[str]:

@@ -10,8 +10,6 @@ from ._table import Table, number
 
 
 LIFE = "mean life [revolutions]"
-SPEEDS = ("onset", "exit", "width")
-"""Columns that hold speeds."""
 Span = tuple[float, float | None]
 
 
@@ -71,22 +69,36 @@ def zones_table(name: str, zones: Zones, published: PublishedCase | None, swept:
     """Zones found, each published zone beside the one it shares most speeds with, or in a row of
     its own that says whether its speeds were swept at all [rpm].
     """
-    spans = published_zones(published)
-    partner = [partner_of(span, zones.zones) for span in spans]
-    rows, followed = [], int(zones.horizon > 0)
-    for i, zone in enumerate(zones.zones):
-        beside = [span for span, found in zip(spans, partner, strict=True) if found == i]
-        rows.append((str(i + 1), *_zone_cells(zone), *[_life_cell(zone)][:followed], published_cell(beside)))
-    for span in (span for span, found in zip(spans, partner, strict=True) if found is None):
-        missed = span[0] <= swept[1] and (span[1] is None or span[1] >= swept[0])
-        why = "not found" if missed else "not swept"
-        rows.append(("-", why, *(4 + followed) * ("-",), published_cell([span])))
-    if not rows:
-        rows = [("none", *(6 + followed) * ("-",))]
     lasting = f", chaos that lasts beyond {zones.horizon} revolutions" if zones.horizon else ""
     title = f"Chaotic zones of {name} [rpm], resolution {number(zones.resolution_rpm)} rpm{lasting}"
-    columns = ("zone", "onset", "exit", "width", "mechanism", "share")
-    return Table(title, (*columns, *[LIFE][:followed], "published"), rows, SPEEDS)
+    life = [LIFE] if zones.horizon > 0 else []
+    columns = ("zone", "onset", "exit", "width", "mechanism", "share", *life, "published")
+    cells = [[*_zone_cells(zone), *(_life_cell(zone) for _ in life)] for zone in zones.zones]
+    return zones_beside_published(title, columns, cells, zones.zones, published, swept, "not swept")
+
+
+def zones_beside_published(
+    title: str,
+    columns: Sequence[str],
+    cells: Sequence[Sequence[str]],
+    zones: Sequence[Zone],
+    published: PublishedCase | None,
+    range_rpm: tuple[float, float],
+    outside: str,
+) -> Table:
+    """A row for each zone: its number, its cells, and the published zones that share most speeds with it. Published
+    zones that share none are in rows of their own, which say whether they are `outside` the range.
+    """
+    beside: dict[int | None, list[Span]] = {}
+    for span in published_zones(published):
+        beside.setdefault(_partner(span, zones), []).append(span)
+    rows = [(str(i + 1), *found, _published_cell(beside.get(i, []))) for i, found in enumerate(cells)]
+    for onset, exit_ in beside.get(None, []):
+        met = onset <= range_rpm[1] and (exit_ is None or exit_ >= range_rpm[0])
+        dashes = (len(columns) - 3) * ("-",)
+        rows.append(("-", "not found" if met else outside, *dashes, _published_cell([(onset, exit_)])))
+    nothing = ("none", *(len(columns) - 1) * ("-",))
+    return Table(title, columns, rows or [nothing], ("onset", "exit", "width"))
 
 
 def transient_tables(name: str, zones: Zones) -> list[Table]:
@@ -127,7 +139,7 @@ def _edge_cell(edge: Edge | None) -> str:
     )
 
 
-def published_cell(spans: list[Span]) -> str:
+def _published_cell(spans: list[Span]) -> str:
     """Onset and exit of the published zones; the paper gives the second no exit."""
     texts = (number(a) + (" and up" if b is None else f" to {b:.0f}") for a, b in spans)
     return ", ".join(texts) or "-"
@@ -141,7 +153,7 @@ def zone_span(zone: Zone, lowest: float = -math.inf, highest: float = math.inf) 
     )
 
 
-def partner_of(span: Span, zones: Sequence[Zone]) -> int | None:
+def _partner(span: Span, zones: Sequence[Zone]) -> int | None:
     """The zone that shares most speeds with a published one; None if none does."""
     top = math.inf if span[1] is None else span[1]
     shared = [min(high, top) - max(low, span[0]) for low, high in map(zone_span, zones)]
