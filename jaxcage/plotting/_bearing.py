@@ -16,6 +16,7 @@ from ..analysis import Around, BearingHistory, BearingSweep, BearingZone, OrderS
 from ..integrate import BearingRun
 from ..models import BearingModel
 from ..sweeps import BearingUpDown
+from ._history import path_in_circle
 from ._style import (
     BLACK,
     BLUE,
@@ -172,11 +173,8 @@ def _around_axis(ax: Axes, ylabel: str) -> None:
 def cage_orbit(history: BearingHistory, ax: Axes | None = None) -> Axes:
     """Path of the cage's centre in the clearance circle, a dot at each revolution."""
     ax = axes_or_new(ax, 5.0, 5.0)
-    ax.add_patch(Circle((0, 0), 1.0, fill=False, color=GREY, linewidth=1.0, linestyle="--"))
     x, y = history.place.T
-    ax.plot(x, y, color=BLUE, linewidth=0.7, alpha=0.8)
-    ax.plot(x[:: history.samples], y[:: history.samples], ".", color=BLACK, markersize=4)
-    ax.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal")
+    path_in_circle(ax, x, y, 1.0, history.samples, 1.1)
     ax.set(xlabel="Cage centre, horizontal / clearance", ylabel="Cage centre, vertical / clearance")
     return ax
 

@@ -57,19 +57,19 @@ def orbit(trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: 
     x, y = trajectory.state[:, 0], trajectory.state[:, 1]
     if trajectory.state.shape[1] == 8:
         x, y = x - trajectory.state[:, 2], y - trajectory.state[:, 3]
-    x, y, radius = shown("x_C", x), shown("y_C", y), float(clearance) * quantity("x_C").factor
+    radius = float(clearance) * quantity("x_C").factor
+    path_in_circle(ax, shown("x_C", x), shown("y_C", y), radius, trajectory.samples, 1.08)
+    ax.set(xlabel=quantity("x_C").label, ylabel=quantity("y_C").label)
+    return ax
+
+
+def path_in_circle(ax: Axes, x: np.ndarray, y: np.ndarray, radius: float, samples: int, reach: float) -> None:
+    """A path in the clearance circle, a dot at each revolution; the axes end at `reach` times the radius."""
     ax.add_patch(Circle((0, 0), radius, fill=False, color=GREY, linewidth=1.0, linestyle="--"))
     ax.plot(x, y, color=BLUE, linewidth=0.7, alpha=0.8)
-    ax.plot(x[:: trajectory.samples], y[:: trajectory.samples], ".", color=BLACK, markersize=4)
-    limits = (-1.08 * radius, 1.08 * radius)
-    ax.set(
-        xlim=limits,
-        ylim=limits,
-        aspect="equal",
-        xlabel=quantity("x_C").label,
-        ylabel=quantity("y_C").label,
-    )
-    return ax
+    ax.plot(x[::samples], y[::samples], ".", color=BLACK, markersize=4)
+    limits = (-reach * radius, reach * radius)
+    ax.set(xlim=limits, ylim=limits, aspect="equal")
 
 
 def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
