@@ -244,6 +244,12 @@ def test_quick_page_leaves_out_gradients_and_says_so(without_figures: None):
     assert "not tried" in words
 
 
+def test_page_of_edges_without_a_gradient(without_figures: None, example: Findings):
+    lost = {n: dataclasses.replace(s, status="not converged") for n, s in example.slopes.items()}
+    words = plain(page(dataclasses.replace(example, slopes=lost)))
+    assert "largest relative residual none is to be trusted" in words and "(not converged)" in words
+
+
 def test_words_of_a_file_cannot_break_the_page(without_figures: None, example: Findings):
     nasty = dataclasses.replace(example, name="<script>alert(1)</script>", published=None)
     text = page(nasty, command="jaxcage report '<i>.toml'")

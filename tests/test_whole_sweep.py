@@ -23,7 +23,13 @@ from jaxcage.integrate import (
     slowness,
 )
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
-from jaxcage.plotting import bearing_figure, bearing_map_figure, bearing_sweep_figure, bearings_beside
+from jaxcage.plotting import (
+    bearing_figure,
+    bearing_map_figure,
+    bearing_sweep_figure,
+    bearings_beside,
+    over_shaft_speed,
+)
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
@@ -264,6 +270,9 @@ def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
     first, second = beside.axes[0].lines
     for line in (first, second):
         assert np.asarray(line.get_ydata())[0] == pytest.approx(100 * both.cage_slip[0, 0])
+    assert len(bearings_beside([*"abcdefg"], [both] * 7).axes[0].lines) == 7  # more than there are colours
+    many = over_shaft_speed(both, np.tile(both.cage_slip, 4), "Cage slip")
+    assert len(many.lines) == 8
     over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
     cells = np.ravel(np.asarray(over.axes[0].collections[0].get_array(), float))
     np.testing.assert_allclose(cells, 100 * np.tile(both.cage_slip[:, 0], 2))

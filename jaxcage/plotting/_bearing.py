@@ -1,6 +1,7 @@
 """The whole bearing: drawn to scale with pocket forces, slips around it, whirl of the cage, spectra, an animation."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -184,7 +185,7 @@ def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel
     ax = axes_or_new(ax, 7.0, 3.0)
     keep = (spectrum.order > 0) & (spectrum.order <= 1.15 * max(orders.values()))
     ax.semilogy(spectrum.order[keep], np.maximum(spectrum.amplitude[keep], 1e-12), color=BLACK, linewidth=0.8)
-    for colour, (name, order) in zip(MARK_COLOURS, orders.items(), strict=False):
+    for colour, (name, order) in zip(cycle(MARK_COLOURS), orders.items(), strict=False):
         ax.axvline(order, color=colour, linewidth=1.1, linestyle="--", label=f"{name} {order:.3g}")
     shown = spectrum.amplitude[keep]
     ax.set(
@@ -362,7 +363,7 @@ def bearings_beside(names: Sequence[str], found: Sequence[BearingSweep]) -> Figu
         "exponent": ("Largest exponent per revolution", 1.0),
     }
     for ax, (measure, (label, factor)) in zip(axes.ravel(), panels.items(), strict=True):
-        for name, each, colour in zip(names, found, MARK_COLOURS[::4] + MARK_COLOURS[1:4], strict=False):
+        for name, each, colour in zip(names, found, cycle(MARK_COLOURS[::4] + MARK_COLOURS[1:4]), strict=False):
             blocks = each.block_means[measure].reshape(each.speed.size, -1)
             freedom = np.maximum(np.isfinite(blocks).sum(axis=1) - 1, 1)
             mean, bars = np.nanmean(blocks, axis=1), np.nan_to_num(np.nanstd(blocks, axis=1) / np.sqrt(freedom))
@@ -384,7 +385,7 @@ def over_shaft_speed(
 ) -> Axes:
     """A quantity of a sweep over the shaft's speed, a line for each start, with bars of one standard error."""
     ax = axes_or_new(ax, 6.0, 3.2)
-    for i, colour in zip(range(values.shape[1]), MARK_COLOURS, strict=False):
+    for i, colour in zip(range(values.shape[1]), cycle(MARK_COLOURS), strict=False):
         bars = None if errors is None else np.where(np.isfinite(errors[:, i]), errors[:, i], 0.0)
         style: Any = dict(color=colour, linewidth=0.9, marker=".", markersize=5, elinewidth=0.7, label=f"start {i + 1}")
         ax.errorbar(found.rpm, values[:, i], bars, **style)

@@ -1,6 +1,7 @@
 """How edges, and statistics of the whole bearing, answer to the design: elasticities as bars."""
 
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -107,7 +108,7 @@ def statistic_bars(found: BearingGradient, title: str = "") -> Figure:
     figure = new_figure(11.0 * columns / ROW, 1.0 + rows * (0.8 + 0.28 * len(names)))
     axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
     place = np.arange(len(names))
-    for ax, each, colour in zip(axes.ravel(), shown, EDGE_COLOURS * 2, strict=False):
+    for ax, each, colour in zip(axes.ravel(), shown, cycle(EDGE_COLOURS), strict=False):
         dress(ax)
         ax.barh(place, each.elasticity, height=0.7, color=colour, alpha=0.75, linewidth=0)
         ax.errorbar(each.elasticity, place, xerr=2 * each.elasticity_error, fmt="none", ecolor=BLACK, elinewidth=1.1)

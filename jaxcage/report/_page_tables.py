@@ -89,9 +89,10 @@ def checks_table(findings: Findings) -> Table:
         ("chaotic edges that coincide with something solved for", exact),
     ]
     if findings.slopes:
-        worst = max(abs(r) for s in findings.slopes.values() if s.trusted for r in s.homogeneity.values())
+        residuals = [abs(r) for s in findings.slopes.values() if s.trusted for r in s.homogeneity.values()]
         lost = [f"{n} ({s.status})" for n, s in findings.slopes.items() if not s.trusted]
-        rows.append(("gradients against the scaling of units, largest relative residual", f"{worst:.0e}"))
+        worst = f"{max(residuals):.0e}" if residuals else "none is to be trusted"
+        rows.append(("gradients against the scaling of units, largest relative residual", worst))
         rows.append(("edges whose gradient is not to be trusted", ", ".join(lost) or "none"))
     return Table("Checks of this report", ("check", "result"), rows)
 
