@@ -21,7 +21,8 @@
 | `_study`, `_page`, `_reproduce`, `_validate` | `study`, `report`, `reproduce`, `validate` |
 
 A command is its options, a function that computes with a `Job` and returns a `Report`, and a line in
-`_options.COMMANDS`. Its tables and documents are made in `jaxcage.report`, for scripts as well.
+`_options.COMMANDS`. One that takes a whole bearing too has a function for that, and a line in `WHOLE_COMMANDS`. Tables
+and documents are made in `jaxcage.report`, for scripts as well.
 """
 
 from ._main import main as main

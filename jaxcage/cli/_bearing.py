@@ -10,8 +10,8 @@ from ..io import write_template
 from ..plotting import impact_forces, load_bars
 from ..report import Table, chosen, displacements, impact_document, impact_table, statics_table
 from ..sweeps import rpm
-from ._job import WHOLE_COMMANDS, Job
-from ._options import ImpactOptions, InitOptions, StaticsOptions
+from ._job import Job
+from ._options import WHOLE_COMMANDS, ImpactOptions, InitOptions, StaticsOptions
 from ._show import Report
 
 

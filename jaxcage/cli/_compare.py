@@ -13,7 +13,6 @@ from ..sweeps import motions, rpm, sweep
 from ._job import Job, Subject, blocks_of, read_subject
 from ._options import CompareOptions
 from ._show import Report
-from ._whole_compare import bearings_compared
 
 
 CHOSEN = 5
@@ -21,9 +20,7 @@ CHOSEN = 5
 
 
 def compare(job: Job[CompareOptions]) -> Report:
-    """Carry out `jaxcage compare`."""
-    if job.whole is not None:
-        return bearings_compared(job, job.whole)
+    """Carry out `jaxcage compare` of cages."""
     options, first = job.options, Subject(job.name, job.model, job.published, job.file)
     second = read_subject(options.other)
     if second.name == first.name:  # two files in two folders may have one

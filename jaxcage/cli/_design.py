@@ -45,8 +45,6 @@ from ._options import DesignOptions, SensitivityOptions, VaryOptions
 from ._search import kept_search, no_worse_balance
 from ._show import Report
 from ._vary import read_bounds, read_scatter
-from ._whole_design import design_bearing
-from ._whole_sensitivity import bearing_shares
 
 
 Found = TypeVar("Found")
@@ -76,10 +74,7 @@ def _loss_zones(model: CageModel, options: VaryOptions, say: Say) -> LossZones:
 
 
 def design(job: Job[DesignOptions]) -> Report:
-    """`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs; of a whole bearing less wear,
-    force, friction and slip."""
-    if job.whole is not None:
-        return design_bearing(job, job.whole)
+    """`jaxcage design`: fewer chaotic speeds by changing the design, and what that costs."""
     options = job.options
     vary = read_bounds(options.vary or _usual(job.model), job.model)
     balance = None if options.worse_balance else no_worse_balance(job.model, vary)
@@ -268,10 +263,7 @@ def _notes(document: Mapping[str, Any], found: Optimised) -> list[str]:
 
 
 def sensitivity(job: Job[SensitivityOptions]) -> Report:
-    """`jaxcage sensitivity`: shares of the chaotic width's variance, and tolerance budgets of the edges; of a measure
-    of a whole bearing both."""
-    if job.whole is not None:
-        return bearing_shares(job, job.whole)
+    """`jaxcage sensitivity`: shares of the chaotic width's variance, and tolerance budgets of the edges."""
     options = job.options
     vary = read_bounds(options.vary or _usual(job.model), job.model)
     width = chaotic_width(options.first, options.last, options.speeds)

@@ -36,24 +36,10 @@ from ..plotting import Style, add_shaft_axes, in_units, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
 from ._limits import Demand, check_demand, demand_of, options_of_size
-from ._options import AnyOptions, CommonOptions, IntegrationOptions, Options
+from ._options import WHOLE_COMMANDS, AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
 
-WHOLE_COMMANDS = (
-    "simulate",
-    "sweep",
-    "zones",
-    "map",
-    "runup",
-    "gradient",
-    "compare",
-    "report",
-    "design",
-    "study",
-    "sensitivity",
-)
-"""What takes a whole bearing."""
 Given = TypeVar("Given", bound=AnyOptions, covariant=True)
 
 

@@ -9,7 +9,7 @@ import itertools
 import logging
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
@@ -26,7 +26,7 @@ from ._console import (
     tell_of_kept_programs,
     visible,
 )
-from ._options import COMMANDS, AnyOptions, Command, CommonOptions
+from ._options import COMMANDS, WHOLE_COMMANDS, AnyOptions, Command, CommonOptions
 from ._readers import flag
 
 
@@ -84,18 +84,26 @@ def _carry_out(options: AnyOptions) -> None:
         tell_of_kept_programs()
         keep_compiled_programs()
     command, place = next((name, place) for name, (kind, place) in COMMANDS.items() if kind is type(options))
-    module, function = place.split(".")
-    run = getattr(importlib.import_module(f".{module}", __package__), function)
     from ._job import Job
 
     try:
         job = Job(command, options)
-        report = _complete(job, run(job))
+        if job.whole is None:
+            report = _function(place)(job)
+        else:
+            report = _function(WHOLE_COMMANDS[command])(job, job.whole)
+        report = _complete(job, report)
     except ArgumentError as error:
         raise _of_options(error, options) from error
     _print(report, options.json)
     if report.failure:
         raise NoResult(report.failure)
+
+
+def _function(place: str) -> Callable[..., "Report"]:
+    """The function of this package that is at `place`, as `_options` has it."""
+    module, name = place.split(".")
+    return getattr(importlib.import_module(f".{module}", __package__), name)
 
 
 def _of_options(error: ArgumentError, options: AnyOptions) -> Exception:

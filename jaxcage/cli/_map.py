@@ -17,13 +17,11 @@ from ._label_map import label_map_of
 from ._options import MapOptions
 from ._orbits import require_edges, searched
 from ._show import Report
-from ._whole_map import bearing_map, given_ends
+from ._whole_map import given_ends
 
 
 def map_of(job: Job[MapOptions]) -> Report:
-    """Carry out `jaxcage map`."""
-    if job.whole is not None:
-        return bearing_map(job, job.whole)
+    """Carry out `jaxcage map` of a cage."""
     options, (x, y) = job.options, _axes(job)
     own = len(job.model.starts(1.0))
     if options.starts > own:

@@ -16,13 +16,10 @@ from ..sweeps import rpm, sweep
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import PoincareOptions, SimulateOptions
 from ._show import Report
-from ._whole import bearing_at
 
 
 def simulate_at(job: Job[SimulateOptions]) -> Report:
     """`jaxcage simulate`: time history, orbit and each force at one speed."""
-    if job.whole is not None:
-        return bearing_at(job, job.whole)
     options, model = job.options, job.model
     for name, given in (("--load", options.load is not None), ("--animate", options.animate)):
         if given:

@@ -718,5 +718,19 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "validate": (ValidateOptions, "_validate.validate"),
     "report": (ReportOptions, "_page.report_on"),
 }
-"""Command -> its options, and the function of this package that carries it out."""
+"""Command -> its options, and the function of this package that carries it out for a cage."""
+WHOLE_COMMANDS: Mapping[str, str] = {
+    "simulate": "_whole.bearing_at",
+    "sweep": "_whole_sweep.bearing_over_speed",
+    "zones": "_whole_sweep.bearing_over_speed",
+    "map": "_whole_map.bearing_map",
+    "runup": "_whole_runup.bearing_runup",
+    "gradient": "_whole_gradient.bearing_gradients",
+    "compare": "_whole_compare.bearings_compared",
+    "report": "_whole_page.bearing_report",
+    "design": "_whole_design.design_bearing",
+    "study": "_study.study",
+    "sensitivity": "_whole_sensitivity.bearing_shares",
+}
+"""Command that takes a whole bearing -> the function that carries it out for one."""
 Command: Any = Union[tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, (kind, _) in COMMANDS.items())]  # noqa: UP007

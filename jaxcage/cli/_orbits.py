@@ -10,7 +10,6 @@ from ._job import Job
 from ._lasting import lasting_gradient
 from ._options import GradientOptions, SearchOptions
 from ._show import Report
-from ._whole_gradient import bearing_gradients
 
 
 def searched(job: Job[SearchOptions]) -> tuple[SynchronousOrbits, LossZones]:
@@ -72,8 +71,6 @@ def _figures(job: Job[SearchOptions], found: SynchronousOrbits, loss: LossZones)
 
 def gradient(job: Job[GradientOptions]) -> Report:
     """`jaxcage gradient`: how the synchronous-loss edges, and the width of zone 1, answer to every parameter."""
-    if job.whole is not None:
-        return bearing_gradients(job, job.whole)
     if job.options.lasting:
         return lasting_gradient(job)
     found, loss = searched(job)

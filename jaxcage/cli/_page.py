@@ -9,7 +9,7 @@ from ._chances import drawn_chances
 from ._job import Job, blocks_of
 from ._options import ReportOptions
 from ._show import Report
-from ._whole_page import bearing_report, command_line
+from ._whole_page import command_line
 
 
 SPEEDS, QUICK_SPEEDS = 251, 126
@@ -17,9 +17,7 @@ SPEEDS, QUICK_SPEEDS = 251, 126
 
 
 def report_on(job: Job[ReportOptions]) -> Report:
-    """Carry out `jaxcage report`."""
-    if job.whole is not None:
-        return bearing_report(job, job.whole)
+    """Carry out `jaxcage report` about a cage."""
     options = job.options
     operating = report.read_operating(options.operating, job.ratio, job.speeds)
     if options.operating and not operating:

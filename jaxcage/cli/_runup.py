@@ -10,7 +10,6 @@ from ._job import Job
 from ._limits import ALONE, NUMBER, Demand
 from ._options import RunUpOptions
 from ._show import Report
-from ._whole_runup import bearing_runup
 
 
 ROWS = 20
@@ -18,9 +17,7 @@ ROWS = 20
 
 
 def runup(job: Job[RunUpOptions]) -> Report:
-    """Carry out `jaxcage runup`."""
-    if job.whole is not None:
-        return bearing_runup(job, job.whole)
+    """Carry out `jaxcage runup` of a cage."""
     options, settle = job.options, job.options.discard or 0
     rate = rpm(options.rate * (job.ratio if job.speeds == "shaft" else 1.0))
     first, last = rpm(options.first), rpm(options.last)

@@ -46,15 +46,15 @@ MEASURES = ("cage_slip", "pocket_force_max_N", "land_force_max_N", "friction_pow
 ADVICE = "what is stored stays, and the same command goes on from there"
 
 
-def study(job: Job[StudyOptions]) -> Report:
-    """Carry out `jaxcage study`."""
+def study(job: Job[StudyOptions], whole: BearingModel | None = None) -> Report:
+    """Carry out `jaxcage study`, of a cage or of a whole bearing."""
     options = job.options
     if options.verify:
         return _verify(job)
     length: dict[str, Any] = job.given("discard revolutions exponents") | {"blocks": blocks_of(options.revolutions)}
-    if job.whole is not None:
+    if whole is not None:
         given = WHOLE_TOLERANCE if options.tolerance is None else options.tolerance
-        work = BearingStudy(job.whole, _plan(job, job.whole, len(CAGE_STARTS)), **length, tolerance=given)
+        work = BearingStudy(whole, _plan(job, whole, len(CAGE_STARTS)), **length, tolerance=given)
         job.require(_demand(work))
     else:
         plan = _plan(job, job.model, len(job.model.starts(1.0)))

@@ -19,7 +19,6 @@ from ._console import say, warn_of_short
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import SweepOptions, ZonesOptions
 from ._show import Report
-from ._whole_sweep import bearing_over_speed
 
 
 ENDS = ("onset", "exit")
@@ -45,8 +44,6 @@ def _swept(job: Job[SweepOptions]) -> Sweep:
 
 def sweep_over_speed(job: Job[SweepOptions]) -> Report:
     """`jaxcage sweep`: orbit diagram, exponents and zones of a case over speed."""
-    if job.whole is not None:
-        return bearing_over_speed(job, job.whole)
     if job.unknowns and not job.options.nominal:
         return chances(job)
     found = _swept(job)
@@ -128,8 +125,6 @@ def _waterfall(job: Job[SweepOptions], found: Sweep) -> None:
 
 def zones_over_speed(job: Job[ZonesOptions]) -> Report:
     """`jaxcage zones`: where the synchronous orbit is lost, with exact edges and gradients, beside where chaos is."""
-    if job.whole is not None:
-        return bearing_over_speed(job, job.whole)
     if job.unknowns and not job.options.nominal:
         return chances(job)
     swept = _swept(job)
