@@ -225,7 +225,7 @@ def _filled(options: Any, whole: bool) -> Any:
 
     **Raises:** `InputError` for one that says nothing of such a case.
     """
-    for name in options.of_cage if whole else options.of_whole:
+    for name in (options.of_cage if whole else options.of_whole).split():
         field = type(options).__dataclass_fields__[name]
         if getattr(options, name) != field.default:
             about = "does not go with a whole bearing" if whole else "goes with a whole bearing, such as nu2310"

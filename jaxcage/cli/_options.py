@@ -44,10 +44,10 @@ class AnyOptions:
 
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {}
     """Option that may be left out -> what it then is for a cage, and for a whole bearing."""
-    of_cage: ClassVar[tuple[str, ...]] = ()
-    """Options that say nothing of a whole bearing."""
-    of_whole: ClassVar[tuple[str, ...]] = ()
-    """Options that say nothing of a cage."""
+    of_cage: ClassVar[str] = ""
+    """Names of options that say nothing of a whole bearing."""
+    of_whole: ClassVar[str] = ""
+    """Names of options that say nothing of a cage."""
 
     json: bool = False
     """Print one JSON document on standard output instead of tables."""
@@ -131,7 +131,8 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
     bearing, whose speeds are the shaft's."""
 
-    of_whole: ClassVar[tuple[str, ...]] = ("load",)
+    of_cage: ClassVar[str] = "solver steps waterfall horizon confirm draws seed nominal"
+    of_whole: ClassVar[str] = "load"
 
     count: Annotated[int | None, whole(1)] = None
     """Number of speeds; if left out 251, of a whole bearing 13, and 40 where ranges are drawn from. With one, only the
@@ -163,7 +164,7 @@ class ZonesOptions(SweepOptions):
     """Zones without a stable synchronous orbit, with exact edges, and chaotic zones, beside the published ones; of a
     whole bearing, stretches of speed in which its cage does the same, by the sweep."""
 
-    of_cage: ClassVar[tuple[str, ...]] = ("quick",)
+    of_cage: ClassVar[str] = f"quick {SweepOptions.of_cage}"
 
     quick: bool = False
     """Leave out the gradients of the edges, which take about a minute to compile."""
@@ -193,8 +194,8 @@ class GradientOptions(SearchOptions):
         "spread": (None, 0.05),
         "starts": (None, 2),
     }
-    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "first", "last", "count", "lasting", "zone")
-    of_whole: ClassVar[tuple[str, ...]] = ("speed", "load", "revolutions", "spread", "starts", "chaos")
+    of_cage: ClassVar[str] = "solver steps first last count lasting zone"
+    of_whole: ClassVar[str] = "speed load revolutions spread starts chaos"
     called: ClassVar[Mapping[str, str]] = {"directions": "by"}
 
     lasting: bool = False
@@ -245,19 +246,7 @@ class MapOptions(SearchOptions):
         "columns": (50, 13),
         "revolutions": (100, 20),
     }
-    of_cage: ClassVar[tuple[str, ...]] = (
-        "solver",
-        "steps",
-        "count",
-        "x",
-        "persist",
-        "points",
-        "adaptive",
-        "refine",
-        "most",
-        "speed",
-        "no_curves",
-    )
+    of_cage: ClassVar[str] = "solver steps count x persist points adaptive refine most speed no_curves"
 
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
@@ -325,7 +314,7 @@ class StudyOptions(_Length, IntegrationOptions):
 
     called: ClassVar[Mapping[str, str]] = {"lanes": "chunk", "samples": "sample"}
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"chunk": (2048, 48)}
-    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "strobe")
+    of_cage: ClassVar[str] = "solver steps strobe"
 
     vary: Annotated[Texts, tyro.conf.arg(metavar="NAME=VALUES")] = ()
     """What to vary, once for each parameter, `speed` among them, of a whole bearing the shaft's. A grid:
@@ -399,27 +388,8 @@ class DesignOptions(VaryOptions):
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[tuple[str, ...]] = (
-        "first",
-        "last",
-        "speeds",
-        "quick",
-        "cost",
-        "front",
-        "scatter",
-        "worst",
-        "search",
-    )
-    of_whole: ClassVar[tuple[str, ...]] = (
-        "speed",
-        "load",
-        "impulse",
-        "slip",
-        "balance",
-        "ensemble",
-        "discard",
-        "revolutions",
-    )
+    of_cage: ClassVar[str] = "first last speeds quick cost front scatter worst search"
+    of_whole: ClassVar[str] = "speed load impulse slip balance ensemble discard revolutions"
     called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
 
     speed: OptionalSpeed = None
@@ -494,8 +464,8 @@ class SensitivityOptions(VaryOptions):
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[tuple[str, ...]] = ("first", "last", "speeds")
-    of_whole: ClassVar[tuple[str, ...]] = ("speed", "load", "of", "ensemble", "discard", "revolutions")
+    of_cage: ClassVar[str] = "first last speeds"
+    of_whole: ClassVar[str] = "speed load of ensemble discard revolutions"
 
     speed: OptionalSpeed = None
     """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
@@ -596,7 +566,7 @@ class ReportOptions(_Length, _Range, IntegrationOptions):
     """One HTML page about a design: zones, operating speeds, orbits, map, what moves the edges, how sure it is; of a
     whole bearing its drawing, slips, forces, wear, spectra, sweep and gradients."""
 
-    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "draws", "seed")
+    of_cage: ClassVar[str] = "solver steps draws seed"
 
     operating: str = ""
     """Cage speeds and ranges to assess, e.g. "8500, 12000-15000" [rpm], "900 rad/s" or "20000-24000 rpm shaft"."""
@@ -634,7 +604,7 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
 
     called: ClassVar[Mapping[str, str]] = {"operating": "at"}
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"count": (126, 13)}
-    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps", "confirm", "horizon", "at")
+    of_cage: ClassVar[str] = "solver steps confirm horizon at"
 
     other: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="OTHER")]
     """The design to compare it with, a case or a TOML file. Both run at the same speeds of the shaft."""
@@ -655,8 +625,8 @@ class RunUpOptions(_Range, IntegrationOptions):
 
     called: ClassVar[Mapping[str, str]] = {"settle": "discard", "steps": "windows"}
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {"discard": (100, 10), "windows": (100, 24)}
-    of_cage: ClassVar[tuple[str, ...]] = ("solver", "steps")
-    of_whole: ClassVar[tuple[str, ...]] = ("load",)
+    of_cage: ClassVar[str] = "solver steps"
+    of_whole: ClassVar[str] = "load"
 
     rate: Annotated[float, number("be a rate above 0 rpm/s", lambda x: x > 0)] = 5000.0
     """Speed gained per second [rpm/s], in the mean over the ramp; the cage's, or the shaft's if the file says so."""

@@ -17,14 +17,11 @@ from ..sweeps import sweep_bearing
 from ._job import Job, blocks_of
 from ._limits import Demand
 from ._options import SweepOptions
-from ._readers import flag
 from ._show import Report
 from ._whole import SWEEPING, loaded, shaft_speeds
 
 
 SPEEDS, STARTS = 13, 3
-NOT_YET = "solver steps waterfall horizon confirm draws seed nominal"
-"""Options of sweeps of a cage that say nothing here."""
 COLUMNS = (
     "cage_slip roller_slip_max pocket_force_mean_sum_N pocket_force_max_N pocket_impulse_N_s land_force_max_N "
     "land_impulse_N_s pocket_wear_mm3_per_h land_wear_mm3_per_h friction_power_W input_power_W eccentricity_mean "
@@ -36,7 +33,9 @@ COLUMNS = (
 def bearing_over_speed(job: Job[SweepOptions], model: BearingModel) -> Report:
     """`jaxcage sweep` of a whole bearing, and `jaxcage zones`."""
     options, model = job.options, loaded(model, job.options.load)
-    speeds = _speeds(job, model)
+    if options.exponents > 1:
+        raise InputError(f"Option --exponents must be 1 for a whole bearing, but {options.exponents} was given.")
+    speeds = shaft_speeds(job, model, options.count or SPEEDS)
     found = swept(job, model, speeds)
     title = f"{job.name}, {float(model.load):g} N, {options.discard} + {options.revolutions} revolutions of the cage"
     found_zones = bearing_zones(found)
@@ -80,20 +79,6 @@ def swept(job: Job[Any], model: BearingModel, speeds: np.ndarray) -> BearingSwee
     if found.failed.all():
         raise NoResult(f"All lanes failed ({', '.join(np.unique(found.outcome))}).")
     return found
-
-
-def _speeds(job: Job[SweepOptions], model: BearingModel) -> np.ndarray:
-    """Shaft speeds [rad/s].
-
-    **Raises:** `InputError` for options that a whole bearing does not take, and speeds that it cannot have.
-    """
-    options = job.options
-    for name in NOT_YET.split():
-        if getattr(options, name) != getattr(SweepOptions, name):
-            raise InputError(f"Option {flag(name)} does not go with a whole bearing.")
-    if options.exponents > 1:
-        raise InputError(f"Option --exponents must be 1 for a whole bearing, but {options.exponents} was given.")
-    return shaft_speeds(job, model, options.count or SPEEDS)
 
 
 def zones_table(name: str, found: tuple[BearingZone, ...]) -> Table:
