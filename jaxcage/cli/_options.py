@@ -368,6 +368,10 @@ class VaryOptions(_Range):
     """Seed of all that is drawn."""
     quick: bool = False
     """Leave out the exact edges, of a design before and after or with their tolerance budget."""
+    speed: OptionalSpeed = None
+    """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
+    load: Load = None
+    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -392,10 +396,6 @@ class DesignOptions(VaryOptions):
     of_whole: ClassVar[str] = "speed load impulse slip balance ensemble discard revolutions"
     called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
 
-    speed: OptionalSpeed = None
-    """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
-    load: Load = None
-    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
     cost: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What one unit of manufacturing cost is worth, in rpm of chaotic speeds; the paper's case 1a costs 2 units."""
     wear: Price = None
@@ -467,10 +467,6 @@ class SensitivityOptions(VaryOptions):
     of_cage: ClassVar[str] = "first last speeds"
     of_whole: ClassVar[str] = "speed load of ensemble discard revolutions"
 
-    speed: OptionalSpeed = None
-    """Of a whole bearing: the shaft's speed [rpm], or with a unit."""
-    load: Load = None
-    """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
     of: OptionalText = None
     """Of a whole bearing: what is looked at: wear, power, slip, or a statistic such as pocket_force_peak_N; wear if
     left out."""
