@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._errors import InputError, NoResult
-from ..analysis import OrbitMeasures, Sweep, cage_forces, orbit_measures
+from ..analysis import BearingMeasures, OrbitMeasures, Sweep, cage_forces, orbit_measures
 from ..integrate import OUTCOMES, simulate
 from ..io import strobe_columns, trajectory_columns
 from ..plotting import simulation_figure, strobe_section
@@ -42,17 +42,22 @@ def simulate_at(job: Job[SimulateOptions]) -> Report:
         "measures": dataclasses.asdict(measures),
     }
     error = f"Error of a revolution: at most {trajectory.error:.0e} of the clearance"
-    return Report(document, [Table(title, ("measure", "value", "unit"), _rows(measures))], [error])
+    return Report(document, [measures_table(title, measures)], [error])
 
 
-def _rows(measures: OrbitMeasures) -> list[tuple[str, str, str]]:
-    """Measures with their own words; lengths in millimetres."""
+def measures_table(title: str, measures: OrbitMeasures | BearingMeasures) -> Table:
+    """Measures with their own words; lengths in millimetres, parts one by one."""
     shown = {"1": ("", 1.0), "m": ("mm", 1e3)}
     rows = []
     for field in dataclasses.fields(measures):
+        value = getattr(measures, field.name)
         unit, factor = shown.get(field.metadata["unit"], (field.metadata["unit"], 1.0))
-        rows.append((field.metadata["text"], f"{factor * getattr(measures, field.name):.4g}", unit))
-    return rows
+        if isinstance(value, dict):
+            rows += [(f"of it {name.replace('_', ' ')}", f"{factor * part:.4g}", unit) for name, part in value.items()]
+        else:
+            text = value if isinstance(value, str) else f"{factor * value:.4g}"
+            rows.append((field.metadata["text"], text, unit))
+    return Table(title, ("measure", "value", "unit"), rows)
 
 
 def poincare_at(job: Job[PoincareOptions]) -> Report:

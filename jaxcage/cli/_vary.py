@@ -9,7 +9,7 @@ import numpy as np
 
 from .._errors import ArgumentError, InputError
 from .._parameters import parameter_info, replace
-from ..design import Scatter, rayleigh, uniform
+from ..design import CAGE_PARAMETERS, Scatter, rayleigh, uniform, usual_bounds
 from ..io import Whose, cage_rpm, configuration, model_from, to_si, whole_bearing_from
 from ..models import BearingModel, CageModel
 from ..studies import OIL, SPEED, Between, Spread, Tolerance, with_values
@@ -53,6 +53,17 @@ def read_bounds(given: Sequence[str], model: CageModel | BearingModel) -> dict[s
     found = _each("--vary", given, "a parameter's NAME=LOWER:UPPER", read)
     _check_corners(found, model)
     return {name: between.bounds for name, between in found.items()}
+
+
+def read_cage_bounds(given: Sequence[str], model: BearingModel) -> dict[str, tuple[float, float]]:
+    """The same of a whole bearing, whose cage alone is to be chosen; the usual bounds if nothing is given.
+
+    **Raises:** `InputError`.
+    """
+    vary = read_bounds(given, model) if given else usual_bounds(model)
+    if wrong := [name for name in vary if name not in CAGE_PARAMETERS]:
+        raise InputError(f"Option --vary must name one of {', '.join(CAGE_PARAMETERS)}, but names '{wrong[0]}'.")
+    return vary
 
 
 def read_scatter(given: Sequence[str], names: Sequence[str]) -> dict[str, Scatter]:

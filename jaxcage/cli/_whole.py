@@ -30,6 +30,7 @@ from ..report import Table, chosen, number
 from ..sweeps import rpm
 from ._job import Job
 from ._limits import Demand
+from ._one_speed import measures_table
 from ._options import DesignOptions, GradientOptions, SensitivityOptions, SimulateOptions
 from ._readers import flag
 from ._show import Report
@@ -129,7 +130,7 @@ class Examined:
         """Measures, rollers around the bearing, lines of the spectra."""
         title = f"{self.title}, {self.revolutions} revolutions of the cage"
         return [
-            Table(title, ("measure", "value", "unit"), _rows(self.measures)),
+            measures_table(title, self.measures),
             _circumference_table(self.circumference),
             *_line_tables(self.spectra, self.orders),
         ]
@@ -264,16 +265,3 @@ def _circumference_table(found: Around) -> Table:
     ]
     heads = ("position, load at 270°", "slip [%]", "inner load [N]", "driving [N]", "braking [N]", "largest [N]")
     return Table("Rollers around the bearing: slip, load, pocket force", heads, rows)
-
-
-def _rows(measures: BearingMeasures) -> list[tuple[str, str, str]]:
-    """Measures with their own words; parts one by one."""
-    rows = []
-    for field in dataclasses.fields(measures):
-        value, unit = getattr(measures, field.name), field.metadata["unit"]
-        if isinstance(value, dict):
-            rows += [(f"of it {name.replace('_', ' ')}", f"{part:.4g}", unit) for name, part in value.items()]
-        else:
-            shown = value if isinstance(value, str) else f"{value:.4g}"
-            rows.append((field.metadata["text"], shown, "" if unit == "1" else unit))
-    return rows

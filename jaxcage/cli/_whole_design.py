@@ -8,13 +8,11 @@ from .. import report
 from .._errors import InputError
 from ..bearing import design_rule_violations
 from ..design import (
-    CAGE_PARAMETERS,
     TERMS,
     BearingRuns,
     bearing_objective,
     before_and_after,
     optimise,
-    usual_bounds,
     walk,
 )
 from ..models import BearingModel
@@ -24,7 +22,7 @@ from ._limits import Demand
 from ._options import DesignOptions
 from ._search import kept_search, no_worse_balance
 from ._show import Report
-from ._vary import read_bounds
+from ._vary import read_cage_bounds
 from ._whole import SWEEPING, at_shaft_speed
 
 
@@ -37,9 +35,7 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
     options = job.options
     at = at_shaft_speed(job, whole)
     model = at.model
-    vary = read_bounds(options.vary, model) if options.vary else usual_bounds(model)
-    if wrong := [name for name in vary if name not in CAGE_PARAMETERS]:
-        raise InputError(f"Option --vary must name one of {', '.join(CAGE_PARAMETERS)}, but names '{wrong[0]}'.")
+    vary = read_cage_bounds(options.vary, model)
     balance = None if options.worse_balance else no_worse_balance(model, vary)
     prices = job.given(" ".join(TERMS))
     if not sum(prices.values()):

@@ -10,7 +10,6 @@ from .._errors import InputError
 from .._parameters import parameters
 from ..design import (
     BEARING_MEASURES,
-    CAGE_PARAMETERS,
     DIRECTIONS,
     BearingGradient,
     BearingRuns,
@@ -18,7 +17,6 @@ from ..design import (
     bearing_gradient,
     bearing_measure,
     bearing_sensitivity,
-    usual_bounds,
 )
 from ..models import BearingModel
 from ..plotting import statistic_bars
@@ -26,7 +24,7 @@ from ._job import Job
 from ._limits import Demand
 from ._options import SensitivityOptions
 from ._show import Report
-from ._vary import read_bounds
+from ._vary import read_cage_bounds
 from ._whole import SWEEPING, at_shaft_speed
 
 
@@ -43,9 +41,7 @@ def bearing_shares(job: Job[SensitivityOptions], whole: BearingModel) -> Report:
     model, of = at.model, filled["of"]
     if of not in BEARING_MEASURES:
         raise InputError(f"Option --of must be one of {', '.join(BEARING_MEASURES)}, but '{of}' was given.")
-    vary = read_bounds(options.vary, model) if options.vary else usual_bounds(model)
-    if wrong := [name for name in vary if name not in CAGE_PARAMETERS]:
-        raise InputError(f"Option --vary must name one of {', '.join(CAGE_PARAMETERS)}, but names '{wrong[0]}'.")
+    vary = read_cage_bounds(options.vary, model)
     length, relative = filled["discard"] + filled["revolutions"], options.tolerance / 100
     lanes = filled["samples"] * (len(vary) + 2) * filled["ensemble"]
     more = 0 if options.quick else AROUND * STARTS
