@@ -29,7 +29,7 @@ def design_history(found: Optimised, ax: Axes | None = None) -> Axes:
         else:
             ax.plot(value, color=GREY, linewidth=0.9)
     ax.set(xlabel="Step", ylabel="Objective [rpm]")
-    ax.legend(loc="upper right", frameon=False)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0, frameon=False)
     return ax
 
 
