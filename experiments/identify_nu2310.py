@@ -7,7 +7,7 @@ with a price for every band too many. The first begins with quasi-random designs
 
 Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
 others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the
-paper. `--check` shows what the ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts;
+paper, with `cubic_ratio` in place of the cubic stiffness for `support.cubic=dimensionless`. `--check` shows what the ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts;
 with four times the steps by `--steps 4`, to another horizon by `--horizon 6000`. `--trade-off` runs nothing and shows
 how well the cases go together: what the ledger's designs reach in some of them, and in those left out.
 """
@@ -142,7 +142,7 @@ def trade_off(ledger: Ledger) -> None:
     off = np.array([[float(row[c]) for c in cases] for row in reached[-1]])
     mean = lambda some: off[:, list(some)].mean(axis=1)
     print(f"{len(off)} designs of the stage '{reached[-1][0]['stage']}'\n")
-    print("case  the best for it alone  the best for the other five: in these  in it")
+    print("case  the best for it alone  the best for all the others: in these  in it")
     for i, case in enumerate(cases):
         others = mean(set(range(len(cases))) - {i})
         best = np.argmin(others)

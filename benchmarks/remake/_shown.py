@@ -102,6 +102,7 @@ SHOWN = (
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
     Shown("lasting-fit", REPRODUCTION, [CHECK, f"{CHECK} --ledger experiments/lasting_search.csv"], ex.lasting_fit),
+    Shown("without-1b", REPRODUCTION, [f"{CHECK} --ledger experiments/lasting_search_without_1b.csv"], ex.printed),
     Shown("trade-off", REPRODUCTION, [f"{TRADE}.csv"], ex.printed),
     Shown("trade-off-physical", REPRODUCTION, [f"{TRADE}_physical.csv"], ex.printed),
     Shown("reproduction-figure", REPRODUCTION, [REPRODUCE], files=PAPER_FIGURE),
