@@ -218,7 +218,8 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(tmp_path):
     assert [o.history for o in again.optima] == [o.history for o in unbroken.optima]
     with pytest.raises(ValueError, match="file of this search"):
         jc.optimise(double_well(), VARY, bowl(), starts=3, steps=30, keep=path)
-    for other in (bowl(damping=0.5), 2.0 * bowl(), bowl() + jc.design.Smooth(jnp.sum)):
+    compiled = jc.design.Smooth(jax.jit(bowl(cubic=1.0).function))
+    for other in (bowl(damping=0.5), 2.0 * bowl(), bowl() + jc.design.Smooth(jnp.sum), compiled):
         with pytest.raises(ValueError, match="but is of another one"):
             jc.optimise(double_well(), VARY, other, starts=2, steps=30, keep=path)
     path.write_bytes(path.read_bytes()[:100])

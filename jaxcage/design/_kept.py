@@ -1,6 +1,7 @@
 """The state of a search in a file, so that it goes on where it stopped: numbers only, put in place whole."""
 
 import dataclasses
+import inspect
 import json
 import os
 import types
@@ -22,15 +23,19 @@ def made_of(x: Any) -> Any:
     since some come from simulations; of a function its name and the values that it was made with."""
     if x is None or isinstance(x, str | int):
         return x
+    if isinstance(x, float):
+        return f"{x:.6g}"
+    if isinstance(x, np.ndarray | np.generic | jax.Array):
+        return made_of(np.asarray(x).tolist())
     if isinstance(x, Mapping):
         return {str(key): made_of(value) for key, value in x.items()}
     if isinstance(x, list | tuple):
         return [made_of(value) for value in x]
-    if isinstance(x, float | np.ndarray | jax.Array):
-        return [f"{value:.6g}" for value in np.ravel(x).tolist()]
     if dataclasses.is_dataclass(x) and not isinstance(x, type):
         values = {f.name: made_of(getattr(x, f.name)) for f in dataclasses.fields(x) if f.init}
         return {type(x).__qualname__: values}
+    if callable(x):
+        x = inspect.unwrap(x)  # a compiled one is what it was made of
     if isinstance(x, types.FunctionType):
         cells = [cell.cell_contents for cell in x.__closure__ or () if cell.cell_contents is not x]
         return {x.__qualname__: made_of([*(x.__defaults__ or ()), *cells])}
