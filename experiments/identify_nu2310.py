@@ -7,8 +7,9 @@ with a price for every band too many. The first begins with quasi-random designs
 
 Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
 others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the
-paper, with `cubic_ratio` in place of the cubic stiffness for `support.cubic=dimensionless`. `--check` shows what the ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts;
-with four times the steps by `--steps 4`, to another horizon by `--horizon 6000`. `--trade-off` runs nothing and shows
+paper, with `cubic_ratio` in place of the cubic stiffness for `support.cubic=dimensionless`. `--check` shows what the
+ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts; with four times the steps by
+`--steps 4`, to another horizon by `--horizon 6000`. `--trade-off` runs nothing and shows
 how well the cases go together: what the ledger's designs reach in some of them, and in those left out.
 """
 
