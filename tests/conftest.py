@@ -31,6 +31,11 @@ MOST_MAPS = 30_000
 """Compiled programs hold memory maps, of which Linux gives a process 65 530."""
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whole bearings first: their files take longest, and at the end one process would wait for the other."""
+    items.sort(key=lambda item: not item.path.name.startswith("test_whole"))
+
+
 @pytest.fixture(autouse=True)
 def check_types_again():
     """Each test begins with the types of all calls checked."""
