@@ -51,7 +51,8 @@ class Zone:
     onset: Edge | None
     exit: Edge | None
     share: float
-    """Mean share of the starts, over the zone's speeds, that do what the zone is named for."""
+    """Mean over the zone's speeds of the share of starts that are chaotic while observed; where the synchronous orbit
+    was met, that settled on it; where it was lost, that did not."""
     life: tuple[float, float] | None = None
     """Shortest and longest mean life of chaos at the zone's speeds [revolutions], each from the starts there and next
     to it; a lower bound where none of them left chaos. None where lanes were not followed."""
