@@ -63,7 +63,7 @@ _QUANTITIES = (
     Quantity("period", "", "1", "revolutions after which the orbit closes, 0 if it does not"),
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
     Quantity("label", "", "1", "what each lane does"),
-    Quantity("chaotic_share", "", "1", "share of the finished starts that are chaotic"),
+    Quantity("chaotic_share", "", "1", "share of the finished starts that are chaotic while observed"),
     Quantity("order", r"$f/f_c$", "1", "frequency over cage rotation"),
     Quantity("amplitude", r"$|Y_C|$", "m", "amplitude", "µm", 1e6),
     Quantity("force", r"$F$", "N", "force"),

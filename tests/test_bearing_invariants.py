@@ -67,8 +67,15 @@ def test_zero_clearance_half_angle_is_90_degrees_with_exact_slope():
     assert float(slope) == pytest.approx(-1 / (2 * float(shift)), rel=1e-12)
 
 
-def test_loaded_rollers_lie_within_the_half_angle():
-    _, result = distribution()
+@pytest.mark.parametrize("shaft_rpm", [0.0, 30000.0, 60000.0])
+def test_loaded_rollers_lie_within_the_half_angle(shaft_rpm: float):
+    bearing, _ = distribution()
+    centrifugal = bearing.roller_centrifugal_force(shaft_rpm * np.pi / 30)
+    result = jb.load_distribution(bearing, 4450.0, centrifugal)
+    # At its ends the inner raceway just touches a roller that its own centrifugal force has pressed outwards.
+    seat = float(jb.line_contact_approach(bearing.raceway_stiffness, centrifugal))
+    ends = np.arccos((float(bearing.radial_clearance) / 2 + seat) / float(result.shaft_shift))
+    assert float(result.half_angle) == pytest.approx(ends, rel=1e-9)
     off_load = np.abs(np.angle(np.exp(1j * (np.asarray(result.roller_angles) + np.pi / 2))))
     assert np.array_equal(off_load < result.half_angle, np.asarray(result.inner_loads) > 0)
 

@@ -181,6 +181,7 @@ def test_impact(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert columns["bar_force [N]"].min() == pytest.approx(found["lowest_bar_force"])
     # The roller leaves faster than it came by nothing: it cannot give more than twice its momentum.
     assert 0 < found["impulse"] < 2 * 0.0424 * found["approach_speed"]
+    assert found["bar"]["bar_mass"] == float(jc.forces.PocketImpact().bar_mass)
     assert is_png(found["figure"])
 
 

@@ -52,6 +52,8 @@ def test_only_what_differs_is_listed_in_the_units_people_read(pair: list[Compare
     assert set(found) == {"guidance_gap", "eccentricity"}
     assert found["guidance_gap"][1:] == ("0.45", "0.3", "mm", "-33.3 %")
     assert found["eccentricity"][1:] == ("23", "46", "µm", "+100 %")
+    warm = differences([pair[0].model, jc.replace(pair[0].model, temperature=323.15)])
+    assert warm["lubricant.temperature"][3:] == ("°C", "+10 K")
     same = differences_table(("a", "b"), [pair[0].model] * 2)
     assert [row[0] for row in same.rows] == ["nothing"]
 
@@ -106,6 +108,12 @@ def test_speeds_outside_and_unknown_cases_are_refused(capsys: pytest.CaptureFixt
     assert "Option --at must lie between --first and --last" in capsys.readouterr().err
     assert main(["compare", "1a", "9z", "--out", str(tmp_path)]) == 2
     assert "Case '9z' is unknown" in capsys.readouterr().err
+    (large := tmp_path / "large.toml").write_text(
+        'base = "1a"\n[bearing]\nbore = 0.2\ninner_raceway_diameter = 0.26\nroller_diameter = 0.052\n'
+        "rib_diameter = 0.35\noutside_diameter = 0.42\nwidth = 0.08\nroller_length = 0.052\n"
+    )
+    assert main(["compare", "1a", str(large), "--out", str(tmp_path)]) == 2
+    assert "at which the other's land runs at 300 m/s" in capsys.readouterr().err
 
 
 @pytest.mark.wide

@@ -160,6 +160,11 @@ def test_oscillator_of_the_impact():
         ({"lubricant": {"grade": "68"}}, "`lubricant.grade` must be a number from 2"),
         ({"bearing": {"designation": "6310"}}, "`bearing.designation` must be NU2310"),
         ({"bearing": {"n_rollers": 40}}, "40 rollers overlap on the pitch circle"),
+        ({"bearing": {"rib_diameter": "98 mm"}}, "between the pitch circle and the outer raceway, 81 and 97 mm"),
+        ({"bearing": {"rib_diameter": "80 mm"}}, "between the pitch circle and the outer raceway, 81 and 97 mm"),
+        ({"bearing": {"outside_diameter": "96 mm"}}, "`bearing.outside_diameter` must be above the outer raceway"),
+        ({"bearing": {"roller_length": "41 mm"}}, "`bearing.roller_length` must fit into the rings, 40 mm"),
+        ({"bearing": {"pocket_clearance": "4 mm"}}, "must leave a bar between pockets, which are 19.57 mm apart"),
         (
             {"contact": {"smoothing": 1e-5}, "guidance_gap": 5e-5},
             "a tenth of the clearance, 0.05",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.analysis import closing_period, label_lanes
+from jaxcage.analysis import closing_period, closing_width, label_lanes
 
 
 def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
@@ -80,14 +80,20 @@ def test_failure_comes_first_and_closing_before_chaos():
     assert list(label) == ["failed", "periodic-2"]
 
 
+def test_windows_of_slow_bearings_are_closed_below_a_part_of_their_speed():
+    """Two zones at 125 to 374 rpm stay two: what is closed is narrower than 5 % of the highest speed, here 18.7 rpm."""
+    assert closing_width(np.array([125.0, 374.0])) == pytest.approx(18.7)
+    assert closing_width(np.array([4000.0, 27500.0])) == 500
+
+
 def test_narrow_windows_are_closed_and_wide_ones_are_not():
-    found = jc.zones(made("11###111##11"))  # chaotic at 5200-5400 and 5800-5900: a window of 400 rpm
+    found = jc.zones(made("11###111##11"), 500.0)  # chaotic at 5200-5400 and 5800-5900: a window of 400 rpm
     (zone,) = found.zones
     assert zone.onset is not None and zone.exit is not None
     assert (zone.onset.speed_rpm, zone.exit.speed_rpm) == pytest.approx((5150, 5950))
     assert zone.width_rpm == pytest.approx(800)
     assert zone.onset.uncertainty_rpm == pytest.approx(100) and zone.onset.kind == "chaotic"
-    assert len(jc.zones(made("11###1111##11")).zones) == 2
+    assert len(jc.zones(made("11###1111##11"), 500.0).zones) == 2
 
 
 def test_zones_that_run_past_the_range_are_open():

@@ -269,6 +269,12 @@ def test_sobol_indices_of_a_parameter_without_influence_are_known_to_be_zero():
     np.testing.assert_allclose([found.total["a"], found.total["b"]], shares, atol=0.02)
 
 
+def test_sobol_indices_of_a_single_parameter_are_all():
+    found = jc.design.sobol_of(lambda x: (x[0] ** 2)[None], ("a",), samples=256)
+    assert found.first["a"] == pytest.approx(1, abs=0.02) and found.total["a"] == pytest.approx(1, abs=0.02)
+    assert found.evaluations == 3 * 256 and found.first_interval["a"][0] <= 1 <= found.first_interval["a"][1]
+
+
 def test_tolerance_budget_is_the_root_of_squares():
     elasticity = {"gap": 0.5, "mass": -2.0}
     edge = jc.orbits.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")

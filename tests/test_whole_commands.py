@@ -13,6 +13,7 @@ import jaxcage as jc
 from jaxcage.analysis import bearing_zones
 from jaxcage.cli import _whole, _whole_page, main
 from jaxcage.plotting import bearing_ramp_figure
+from jaxcage.report import read_operating
 from jaxcage.sweeps import BearingRamp, BearingUpDown, bearing_up_down
 
 
@@ -141,11 +142,25 @@ def test_commands(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
         (["report", "nu2310", "--draws", "3"], "Option --draws does not go with a whole bearing."),
         (["runup", "nu2310", "--solver", "rk4"], "Option --solver does not go with a whole bearing."),
         (["runup", "nu2310", "--last", "200000"], "must leave the cage at most 300 m/s"),
+        (["compare", "nu2310", "nu2310", "--last", "200000"], "must leave the cage at most 300 m/s"),
     ],
 )
 def test_refusals(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
     assert said in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+def test_speeds_of_the_cage_with_a_turning_outer_ring(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    """The outer ring turns the cage by itself; what it does is neither forgotten nor asked back of the shaft."""
+    (path := tmp_path / "planet.toml").write_text('base = "nu2310"\nouter_speed = "1500 rpm"')
+    assert main(["sweep", str(path), "--first", "500 rpm cage", "--out", str(tmp_path / "out")]) == 2
+    assert "--first must be above 898.075 rpm of the cage, which the outer ring makes" in capsys.readouterr().err
+    planet = jc.replace(jc.whole_bearing("nu2310"), outer_speed=float(jc.rpm(1500)))
+    ratio = float(planet.rolling_cage_speed(1.0) - planet.rolling_cage_speed(0.0))
+    at_rest = float(planet.rolling_cage_speed(0.0)) * 30 / np.pi
+    for text in ("1200 rpm cage", f"{(1200 - at_rest) / ratio:.6f} rpm shaft"):
+        (at,) = read_operating(text, ratio, "cage", at_rest)
+        assert at.low_rpm == pytest.approx(1200, abs=1e-3)
 
 
 @pytest.mark.wide

@@ -157,7 +157,7 @@ def test_the_command_finds_a_known_optimum(
     after = found["before_and_after"]["friction_power_W"]
     gap = found["optimum"]["guidance_gap"] / 0.45e-3
     assert after["change"] / after["before"] == pytest.approx(1 / gap - 1, abs=0.01) and after["known"]
-    assert found["check"]["starts"] == 8 and found["check"]["tolerance"] == pytest.approx(1e-5)
+    assert found["better"] and found["check"]["starts"] == 8 and found["check"]["tolerance"] == pytest.approx(1e-5)
     assert pathlib.Path(found["figure"]).stat().st_size > 20_000 and not any(tmp_path.glob(".design*"))
 
 

@@ -116,6 +116,10 @@ def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):
         ('base = "nu2310"\n[traction]\npeak = 0.01', "`peak` must be above `rest` and `limit`, but is 0.01"),
         ('base = "nu2310"\nguidance = "roller"', "`guidance` must be one of outer, inner, but is 'roller'"),
         ('base = "nu2310"\nguidance = "inner"\ninner_land_diameter = 0.092', "must leave room for the cage within"),
+        ('base = "nu2310"\nguidance = "inner"\ninner_land_diameter = "45 mm"', "above the bore, 50 mm, but is 45 mm"),
+        ('model = "bearing"\nguidance = "inner"', '`inner_land_diameter` must be given with guidance = "inner"'),
+        ('base = "nu2310"\ncage_mass = "90 kg"', "`cage_mass` must be at most"),
+        ('base = "nu2310"\ncage_inertia = "9e-2 kg m^2"', "`cage_inertia` must be that of a ring"),
         ('base = "nu2310"\neccentricity = "0.5 mm"', "but is 0.5 mm in a gap of 0.45 mm"),
         ('base = "nu2310"\n[film]\nland_width = "7 mm"', "must fit beside the rollers, in 6.5 mm, but is 7 mm"),
         ('model = "bearing"', 'must be given, unless `base = "nu2310"` or the like gives the rest'),
@@ -142,7 +146,8 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """`init` says what goes on, and a command for cages says which take a whole bearing."""
     path = tmp_path / "mine.toml"
     assert main(["init", str(path), "--model", "bearing"]) == 0
-    assert f'jaxcage simulate {path} --speed "10000 rpm shaft"' in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert f'jaxcage simulate {path} --speed "10000 rpm shaft"' in told and f"jaxcage compare {path} nu2310" in told
     assert subject_of(path) == "bearing"
     for command in ("bifurcations", "statics"):
         assert main([command, str(path)]) == 2

@@ -321,6 +321,9 @@ def test_a_cage_at_rest_is_not_followed_over_its_angle():
         jc.simulate_bearing(model, 0.0, revolutions=1)
     with pytest.raises(ValueError, match="revolutions"):
         jc.simulate_bearing(model, SPEED, revolutions=0)
+    against = jc.replace(model, outer_speed=-0.67 * SPEED)  # the cage hardly turns
+    with pytest.raises(ValueError, match="must make the cage turn at 0.01 of the faster ring's speed"):
+        jc.simulate_bearing(against, SPEED, revolutions=1)
 
 
 @pytest.mark.wide

@@ -127,6 +127,7 @@ from ._zones import (
     Zone as Zone,
     Zones as Zones,
     close_windows as close_windows,
+    closing_width as closing_width,
     zones as zones,
 )
 

@@ -33,10 +33,10 @@ class BearingMeasures:
     land_force_max_N: float = measure("N", "largest force of the land on the cage")
     land_impulse_N_s: float = measure("N s", "integral of the land's force on the cage over a revolution")
     friction_power_W: float = measure("W", "mean power lost")
-    friction_torque_N_m: float = measure("N m", "power lost over shaft speed")
+    friction_torque_N_m: float = measure("N m", "power lost over the shaft's speed relative to the outer ring")
     friction_torque_parts_N_m: dict[str, float] = measure("N m", "parts of that torque, by kind of loss")
     power_parts_W: dict[str, float] = measure("W", "mean power lost by kind")
-    input_power_W: float = measure("W", "mean power of the shaft")
+    input_power_W: float = measure("W", "mean power of shaft and outer ring")
     eccentricity_mean: float = measure("1", "mean eccentricity ratio")
     eccentricity_std: float = measure("1", "standard deviation of the eccentricity ratio, at the samples")
     eccentricity_max: float = measure("1", "largest eccentricity ratio")
@@ -59,7 +59,7 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
     rolling = float(model.rolling_cage_speed(speed))
     mean = lambda name: float(run.total(name) / spent)
     parts = {name: mean(name) for name in LEDGER[1:]}
-    lost = sum(parts.values())
+    lost, relative = sum(parts.values()), abs(speed - float(model.outer_speed))
     middle = len(run.time) // 2
     slip = lambda part: 1 - np.diff(run.angle[part][[0, -1]])[0] / np.diff(run.time[part][[0, -1]])[0] / rolling
     eps = np.hypot(*from_land(model, run).T) / float(model.clearance)
@@ -77,8 +77,8 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
         land_force_max_N=run.largest("land_force"),
         land_impulse_N_s=run.total("land_force") / revolutions,
         friction_power_W=lost,
-        friction_torque_N_m=lost / abs(speed),
-        friction_torque_parts_N_m={name: part / abs(speed) for name, part in parts.items()},
+        friction_torque_N_m=lost / relative,
+        friction_torque_parts_N_m={name: part / relative for name, part in parts.items()},
         power_parts_W=parts,
         input_power_W=mean("input"),
         eccentricity_mean=mean("eccentricity"),

@@ -52,7 +52,7 @@ class BearingSweep:
     land_wear_mm3_per_h: OfLanes = measure("mm^3/h", "Archard wear of the cage's guiding land")
     friction_power_W: OfLanes = measure("W", "mean power lost")
     power_parts_W: dict[str, OfLanes] = measure("W", "mean power lost by kind")
-    input_power_W: OfLanes = measure("W", "mean power of the shaft")
+    input_power_W: OfLanes = measure("W", "mean power of shaft and outer ring")
     eccentricity_mean: OfLanes = measure("1", "mean eccentricity ratio")
     eccentricity_std: OfLanes = measure("1", "standard deviation of the eccentricity ratio over time")
     eccentricity_max: OfLanes = measure("1", "largest eccentricity ratio")

@@ -18,7 +18,14 @@ from .._notebook import notebook_html
 from ._sweep import Sweep
 
 
-CLOSE_BELOW_RPM = 500.0
+CLOSE_BELOW_RPM, CLOSE_BELOW = 500.0, 0.05
+"""Windows within a zone are closed below so many rpm, and below this part of the highest speed: large bearings turn
+slowly."""
+
+
+def closing_width(rpm: np.ndarray) -> float:
+    """Width below which windows are closed [rpm], of speeds that are looked at."""
+    return min(CLOSE_BELOW_RPM, CLOSE_BELOW * float(np.max(rpm)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +58,8 @@ class Zone:
     onset: Edge | None
     exit: Edge | None
     share: float
-    """Mean share of the starts, over the zone's speeds, that do what the zone is named for."""
+    """Mean over the zone's speeds of the share of starts that are chaotic while observed; where the synchronous orbit
+    was met, that settled on it; where it was lost, that did not."""
     life: tuple[float, float] | None = None
     """Shortest and longest mean life of chaos at the zone's speeds [revolutions], each from the starts there and next
     to it; a lower bound where none of them left chaos. None where lanes were not followed."""
@@ -168,19 +176,21 @@ def _life(sweep: Sweep, restless: np.ndarray, first: int, last: int) -> tuple[fl
     return min(lives), max(lives)
 
 
-def zones(sweep: Sweep, close_below_rpm: float = CLOSE_BELOW_RPM) -> Zones:
+def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:
     """Chaotic zones of a sweep, and the stretches in which the synchronous orbit was met.
 
     A speed counts as chaotic if any start is and, where lanes were followed to a horizon, if the mean life of its chaos
     is beyond that; else as transient. Where no start is chaotic but some failed or were inaccurate, nothing is known:
     such speeds are neither in a zone nor outside, and an edge next to them is as uncertain as their gap is wide.
 
-    **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm].
+    **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm], by default 500 rpm
+    and at most 5 % of the highest speed.
 
     **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty, or the
     distance to the first speed on either side at which the interval of the mean life (95 %) leaves the horizon out.
     """
     label = sweep.label
+    close_below_rpm = closing_width(sweep.rpm) if close_below_rpm is None else close_below_rpm
     lasting = sweep.lasting
     restless = sweep.restless
     sound = np.all(~sweep.failed, axis=1)

@@ -42,7 +42,7 @@ class LoadDistribution(eqx.Module):
     With that roller at the bottom it is delta_s - G_r/2. It holds the centrifugal part, (10).
     """
     half_angle: Float[Array, ""]
-    """Half angle of the loaded zone, (2) [rad]."""
+    """Half angle of the loaded zone, (2), at whose ends a roller just touches the inner raceway [rad]."""
 
 
 def roller_angles(n_rollers: int, first_angle: Scalar = -jnp.pi / 2) -> Float[Array, " rollers"]:
@@ -54,10 +54,10 @@ def loaded_half_angle(radial_clearance: Scalar, shaft_shift: Scalar) -> Array:
     """Half angle of the loaded zone, acos(G_r/(2 delta_s)) [rad]: the clean form of (2).
 
     The paper prints this as the whole angle and with delta_r, the elastic approach, in place of the
-    shift of the shaft delta_s = delta_r + G_r/2; the geometry asks for both corrections. It is the
-    zone without centrifugal load, which shrinks it.
+    shift of the shaft delta_s = delta_r + G_r/2; the geometry asks for both corrections.
 
-    **Arguments:** radial clearance G_r [m], shift of the shaft [m].
+    **Arguments:** radial clearance G_r [m], to which twice the approach of the rollers to the outer raceway is added
+    that their centrifugal force makes, as it shrinks the zone; shift of the shaft [m].
     """
     return jnp.arccos(radial_clearance / (2 * shaft_shift))
 
@@ -157,7 +157,7 @@ def _distribution(bearing: Bearing, load: Array, centrifugal: Array, roller_angl
         max_load=jnp.max(inner),
         shaft_shift=shift,
         elastic_approach=case.seat + excess,
-        half_angle=loaded_half_angle(bearing.radial_clearance, shift),
+        half_angle=loaded_half_angle(bearing.radial_clearance + 2 * case.seat, shift),
     )
 
 

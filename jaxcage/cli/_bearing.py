@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._errors import InputError
+from .._parameters import parameters
 from ..bearing import load_distribution, raceway_surface_speed
 from ..forces import PocketImpact, RollerPassImpact, approach_speed, impact_history
 from ..io import write_template
@@ -15,13 +16,20 @@ from ._options import WHOLE_COMMANDS, ImpactOptions, InitOptions, StaticsOptions
 from ._show import Report
 
 
+AT_SPEED = ' --speed "10000 rpm shaft"'
+NEEDED = dict.fromkeys(("simulate", "gradient", "design", "sensitivity"), AT_SPEED) | {
+    "compare": " nu2310",
+    "study": " --vary guidance_gap=0.3mm:0.6mm:3",
+}
+"""What commands about a whole bearing ask for beside it, as an example."""
+
+
 def init(job: Job[InitOptions]) -> Report:
     """`jaxcage init`: a commented description of a bearing to fill in."""
     subject = job.options.model
     path = write_template(job.options.path, subject)
     commands = ("statics", "sweep", "zones", "report") if subject == "cage" else WHOLE_COMMANDS
-    speed = {"simulate": ' --speed "10000 rpm shaft"'} if subject == "bearing" else {}
-    goes_on = [f"  jaxcage {command} {path}{speed.get(command, '')}" for command in commands]
+    goes_on = [f"  jaxcage {command} {path}{NEEDED.get(command, '')}" for command in commands]
     described = "the NU2310 of case 1a" if subject == "cage" else "the NU2310 with its rollers"
     told = f"It describes {described}: change the values and go on with"
     return Report({"file": str(path)}, notes=[f"Written: {path}", told, *goes_on])
@@ -82,4 +90,8 @@ def impact(job: Job[ImpactOptions]) -> Report:
     job.columns({f"{n} [{unit}]": np.asarray(getattr(history, n)) for n, unit in units.items()}, detail=at)
     values = {"approach_speed": float(v0)} | impact_document(history)
     table = impact_table(f"Impact in {job.name} at {job.at_speed}", values)
-    return Report({"speed_rpm": options.speed, "shaft_speed_rpm": options.speed / job.ratio, **values}, [table])
+    assumed = {name: float(getattr(law, name)) for name in parameters(law)}
+    whose = "of the file" if isinstance(model.impact, RollerPassImpact) else "assumed, as a synchronous impact has none"
+    said = f"Bar and contact, {whose}: " + ", ".join(f"{name} {value:g}" for name, value in assumed.items()) + " (SI)"
+    speeds = {"speed_rpm": options.speed, "shaft_speed_rpm": options.speed / job.ratio}
+    return Report({**speeds, **values, "bar": assumed}, [table], [said])

@@ -8,6 +8,7 @@ from .. import report
 from .._errors import InputError
 from ..analysis import zones
 from ..design import land_loads
+from ..models import FASTEST, fastest_speed
 from ..plotting import over_speed, sweeps_beside
 from ..sweeps import motions, rpm, sweep
 from ._job import Job, Subject, blocks_of, read_subject
@@ -28,6 +29,12 @@ def compare(job: Job[CompareOptions]) -> Report:
     pair = [first, second]
     first_ratio, ratio = (float(s.model.bearing.cage_speed_ratio) for s in pair)
     wanted = [at.low_rpm for at in report.read_operating(options.at, first_ratio, job.speeds)]
+    fastest = fastest_speed(second.model) * 30 / np.pi * first_ratio / ratio
+    if options.last > fastest:
+        raise InputError(
+            f"Option --last must be at most {fastest:.0f} rpm of the first cage, at which the other's land runs at "
+            f"{FASTEST:g} m/s, but {options.last:g} rpm was given."
+        )
     speeds, at = _speeds(rpm(options.first, options.last, options.count or 2) * 30 / np.pi, wanted)
     with job.computing() as say:
         found = [

@@ -83,7 +83,8 @@ class CommonOptions(AnyOptions):
 @dataclasses.dataclass(frozen=True)
 class _Case:
     case: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="CASE")]
-    """A published case (1a, 1b, 2a, 2b, 3a, 3b), a whole bearing (nu2310), or the path of a TOML file."""
+    """A published case (1a, 1b, 2a, 2b, 3a, 3b), the path of a TOML file, or for commands that take one a whole bearing
+    (nu2310)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,7 +145,8 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     nominal: bool = False
     """Take the best guesses of what is known within ranges only, as if they were known."""
     confirm: bool = True
-    """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
+    """Confirm labels: what is not periodic, its neighbours and a tenth of the rest are run again with steps half as
+    long. --no-confirm turns this off."""
     horizon: FromZero = 3000
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
     exponents: FromOne = 1
@@ -204,7 +206,7 @@ class GradientOptions(SearchOptions):
     """With --lasting: number of the zone, as `jaxcage sweep` counts them; 0 takes all."""
     by: tuple[str, ...] = ()
     """With --lasting, or of a whole bearing: parameters, of which several joined by + change together; if left out
-    guidance_gap and eccentricity, and what a designer turns of a whole bearing."""
+    guidance_gap and eccentricity, and the usual design parameters of a whole bearing."""
     designs: FromTwo = 64
     """With --lasting: designs around this one in each of four rounds, from which an edge is estimated. Of a whole
     bearing: designs around it, in pairs."""
@@ -344,7 +346,8 @@ class StudyOptions(_Length, IntegrationOptions):
     """Processes of the cluster on this machine; one a core if left out."""
 
     verify: Annotated[bool, tyro.conf.arg(name="check")] = False
-    """Compute nothing: compare every byte of the store with what was written. Needs only the case, and --store."""
+    """Compute nothing: compare every byte of the store with what was written. Needs only the case, and --store if it
+    was given."""
 
     def check(self) -> None:
         if self.executor == "local" and (self.scheduler is not None or self.workers is not None):
@@ -356,8 +359,10 @@ class VaryOptions(_Range):
     """What may be changed in a design."""
 
     vary: Annotated[Texts, tyro.conf.arg(metavar="NAME=LOWER:UPPER")] = ()
-    """What may be changed and between which values, once for each parameter, e.g. guidance_gap=0.3mm:0.6mm; the
-    guidance gap from 0.7 to 1.4 of what it is and the eccentricity from 0.2 to 2.5 if left out."""
+    """What may be changed and between which values, once for each parameter, e.g. guidance_gap=0.3mm:0.6mm. If
+    left out, the guidance gap from 0.7 to 1.4 of what it is and the eccentricity from 0.2 to 2.5, but in `design` to 1
+    without --worse-balance; of a whole bearing pocket clearance and land width too, as the gap, and the eccentricity
+    to 1."""
     first: Speed = 4000.0
     """First cage speed that matters [rpm], or with a unit or of the shaft."""
     last: Speed = 27500.0
@@ -414,7 +419,7 @@ class DesignOptions(VaryOptions):
     balance: Price = None
     """Of a whole bearing: what the balance grade G of its cage counts; 1 if left out."""
     front: FromZero = 0
-    """Designs all over the bounds, of which those are listed that no other beats in chaotic speeds, wear load, peak
+    """Designs spread over the bounds, of which those are listed that no other beats in chaotic speeds, wear load, peak
     force and cost at once; 0 lists none."""
     worse_balance: bool = False
     """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
@@ -429,7 +434,7 @@ class DesignOptions(VaryOptions):
     starts: FromOne = 1
     """Searches: one from the design itself, others from the best of the scouts."""
     scouts: FromZero = 0
-    """Designs all over the bounds that are looked at beforehand; without any, further searches start anywhere."""
+    """Designs spread over the bounds that are looked at beforehand; without any, further searches start anywhere."""
     steps: Annotated[int | None, whole(1)] = None
     """Steps of each search at most; 10 if left out, 12 of a whole bearing."""
     cloud: Annotated[int | None, whole(4)] = None
@@ -479,7 +484,7 @@ class SensitivityOptions(VaryOptions):
     revolutions: Annotated[int | None, whole(2, of=2)] = None
     """Of a whole bearing: revolutions of the cage observed, an even number; 20 if left out."""
     tolerance: Annotated[float, number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0
-    """Tolerance of every parameter, +- so many percent, evenly used."""
+    """Tolerance of every parameter, ± so many percent, uniformly distributed."""
 
     def check(self) -> None:
         super().check()
@@ -609,7 +614,8 @@ class CompareOptions(_Length, _Range, IntegrationOptions):
     at: str = ""
     """Speeds to be shown in a table, e.g. "8500, 12000" [rpm] or "20000 rpm shaft"; five of the range if left out."""
     confirm: bool = True
-    """Run what is not periodic, its neighbours and a tenth of the rest again with steps half as long."""
+    """Confirm labels: what is not periodic, its neighbours and a tenth of the rest are run again with steps half as
+    long. --no-confirm turns this off."""
     horizon: FromZero = 3000
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
 

@@ -194,13 +194,23 @@ def shaft_rpm_of(model: BearingModel, given: float, unsaid: Whose, option: str =
     at_rest = float(model.rolling_cage_speed(0.0)) * 30 / np.pi  # where the outer ring turns
     ratio = float(model.rolling_cage_speed(1.0) - model.rolling_cage_speed(0.0))
     shaft = float(given) if whose == "shaft" else (float(given) - at_rest) / ratio
-    land = abs(float(model.rolling_cage_speed(rpm(shaft)) * model.land_radius))
+    if shaft <= 0:
+        raise InputError(
+            f"Option {option} must be above {at_rest:g} rpm of the cage, which the outer ring makes by itself, but "
+            f"{float(given):g} rpm was given."
+        )
+    require_land_speed(model, shaft, option)
+    return shaft
+
+
+def require_land_speed(model: BearingModel, shaft_rpm: float, option: str) -> None:
+    """**Raises:** `InputError` for a shaft speed at which the cage's land is faster than any cage runs."""
+    land = abs(float(model.rolling_cage_speed(rpm(shaft_rpm)) * model.land_radius))
     if land > FASTEST:
         raise InputError(
-            f"Option {option} must leave the cage at most {FASTEST:g} m/s at its land, but {shaft:g} rpm of the shaft "
-            f"make {land:.0f} m/s."
+            f"Option {option} must leave the cage at most {FASTEST:g} m/s at its land, but {shaft_rpm:g} rpm of the "
+            f"shaft make {land:.0f} m/s."
         )
-    return shaft
 
 
 def shaft_speeds(job: Job[Any], model: BearingModel, count: int) -> np.ndarray:

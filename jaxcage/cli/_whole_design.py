@@ -28,6 +28,8 @@ from ._whole import SWEEPING, at_shaft_speed
 
 CHECKED, LONGER = 8, 2
 """Starts of the check, and how many times as many revolutions it leaves out."""
+SURE = 2.0
+"""Standard errors by which the objective of a better design is below 1, that of the given one."""
 
 
 def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
@@ -87,8 +89,15 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
         report.changed_parameters_table(title, model, found, vary),
         report.before_and_after_table(rows, fresh.revolutions // 2),
     ]
+    better = found.best.objective + SURE * found.best.error < 1
+    document["better"] = better
     broken = design_rule_violations(best.bearing, best.guidance_gap)
     notes = [
+        *(
+            []
+            if better
+            else ["No design was found that is better by more than twice the error: keep the one you have."]
+        ),
         f"Search: {found.best.status}, {len(found.best.history)} steps, objective {found.best.objective:.3f} ± "
         f"{found.best.error:.3f} of what it was, {document['designs_run']} designs in {searched:.0f} s",
         f"At a bound: {', '.join(found.best.at_bound)}." if found.best.at_bound else "No parameter ended at a bound.",

@@ -12,6 +12,7 @@ from .._errors import InputError
 from ..analysis import BearingSweep, BearingZone, bearing_zones
 from ..bearing import design_rule_violations
 from ..design import BearingGradient, bearing_gradient
+from ..io import SpeedOf
 from ..models import BearingModel
 from ..plotting import bearing_sweep_figure, statistic_bars
 from ..sweeps import rpm
@@ -19,7 +20,7 @@ from ._console import visible
 from ._job import Job
 from ._options import ReportOptions
 from ._show import Report
-from ._whole import AtShaftSpeed, Examined, examined, shaft_speeds
+from ._whole import AtShaftSpeed, Examined, examined, shaft_rpm_of, shaft_speeds
 from ._whole_sweep import sweep_table, swept, zones_table
 
 
@@ -77,10 +78,12 @@ def _operating(job: Job[ReportOptions], model: BearingModel) -> list[float]:
     **Raises:** `InputError` for a text without a speed.
     """
     options, ratio = job.options, float(model.rolling_cage_speed(1.0) - model.rolling_cage_speed(0.0))
-    read = report.read_operating(options.operating, ratio, job.speeds)
+    at_rest = float(model.rolling_cage_speed(0.0)) * 30 / np.pi  # where the outer ring turns
+    read = report.read_operating(options.operating, ratio, job.speeds, at_rest)
     if options.operating and not read:
         raise InputError(f"Option --operating must hold a speed, but '{options.operating}' was given.")
-    return [(one.low_rpm + one.high_rpm) / 2 / ratio for one in read]
+    middle = [SpeedOf((one.low_rpm + one.high_rpm) / 2, "cage") for one in read]
+    return [shaft_rpm_of(model, one, job.speeds, "--operating") for one in middle]
 
 
 def _sections(

@@ -120,7 +120,9 @@ def sobol_of(
 
     def indices(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         values[:] = f_A, f_B, f_AB
-        return _shares(f_A, f_B, f_AB)
+        found = _shares(f_A, f_B, f_AB)
+        # Of one parameter SciPy would squeeze them to plain numbers, which it cannot go on with.
+        return found if len(names) > 1 else (np.repeat(found[0], 2, axis=0), np.repeat(found[1], 2, axis=0))
 
     number = samples * (len(names) + 2)
     how: Any = dict(n=samples, dists=[uniform()] * len(names), method=indices, rng=seed)
@@ -134,7 +136,7 @@ def sobol_of(
             drawn = lambda rows: np.stack(_shares(*(v[..., rows] for v in values)))[..., 0]
             spread = bootstrap([np.arange(samples)], drawn, vectorized=False, rng=seed).confidence_interval
     idle = np.all(values[2] == values[0], axis=(1, 2))  # parameters that change nothing in any sample
-    named = lambda row: dict(zip(names, np.ravel(row).tolist(), strict=True))
+    named = lambda row: dict(zip(names, np.ravel(row)[: len(names)].tolist(), strict=True))
     ends = lambda k: (np.where(idle, 0.0, end[k]).tolist() for end in (spread.low, spread.high))
     pairs = lambda k: dict(zip(names, zip(*ends(k), strict=True), strict=True))
     return SobolIndices(named(found.first_order), named(found.total_order), pairs(0), pairs(1), number, samples)

@@ -20,6 +20,9 @@ from ._results import INACCURATE, OUTCOMES
 from ._simulate import require_counts
 
 
+SLOWEST = 0.01
+"""Least speed of the cage in pure rolling over that of the faster ring: of rings that turn against each other it may
+hardly turn, and a revolution of it takes for ever."""
 IMBALANCE = 1e-6
 """Of the load, by which a quasi-static ring may be out of balance."""
 SHORT = 2
@@ -155,13 +158,22 @@ def simulate_bearing(
     between samples, two periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land,
     is `outside`: follow it over time, with `bearing_over_time`.
 
-    **Raises:** `ValueError` for a speed that is zero or not a number, or impossible counts.
+    **Raises:** `ValueError` for a speed that is zero or not a number, or at which rings that turn against each other
+    leave the cage next to rest, and for impossible counts.
     """
     require_x64()
     value = float(speed)
     if not np.isfinite(value) or value == 0:
         raise ArgumentError("speed", said=f"must be a speed other than 0, but {value:g} rad/s was given.")
     require_counts(revolutions, samples, discard)
+    rolling, fastest = float(model.rolling_cage_speed(value)), max(abs(value), abs(float(model.outer_speed)))
+    if abs(rolling) < SLOWEST * fastest:
+        raise ArgumentError(
+            "speed",
+            said=f"must make the cage turn at {SLOWEST:g} of the faster ring's speed at least, {SLOWEST * fastest:.3g} "
+            f"rad/s, but with the outer ring at {float(model.outer_speed):.6g} rad/s {value:.6g} rad/s of the shaft "
+            f"make it {rolling:.3g} rad/s: `bearing_over_time` follows it over time.",
+        )
     state = rolling_start(model, value) if start is None else start
     parts = _parts(model, value, samples)
     places = samples * parts

@@ -27,7 +27,7 @@ import equinox as eqx
 
 from .._checks import require_x64
 from .._parameters import must_be_given, parameter_paths
-from ..bearing import BEARINGS, PUBLISHED_CASES, vg
+from ..bearing import BEARINGS, PUBLISHED_CASES, Bearing, vg
 from ..forces import PocketImpact
 from ..models import BearingModel, CageModel, case, whole_bearing
 from ..models.whole import WHOLE_BEARINGS
@@ -193,6 +193,8 @@ def _made(
         if not isinstance(name, str) or name not in bases:
             raise ConfigError(f"`base` must be one of {', '.join(bases)}, but is {shown(name)}.")
         start = base(name)
+    if start is None and rest.get("guidance") == "inner" and "inner_land_diameter" not in rest:
+        raise ConfigError('`inner_land_diameter` must be given with guidance = "inner".')
     ranges: Ranges = {}
     model = _build(kind, rest, start, (), ranges)
     assert isinstance(model, kind)
@@ -359,10 +361,33 @@ HEAVIEST = 8900.0
 """Density of bronze [kg/m^3]."""
 
 
-def _volume(model: CageModel) -> float:
+def _volume(model: CageModel | BearingModel) -> float:
     """Of the space between shaft and housing [m^3]."""
     b = model.bearing
     return math.pi / 4 * float((b.outside_diameter**2 - b.bore**2) * b.width)
+
+
+def _check_rings(bearing: Bearing) -> None:
+    """**Raises:** `ConfigError` for ribs or rollers that no bearing has."""
+    mm = lambda value: 1e3 * float(value)
+    pitch, raceway = mm(bearing.pitch_diameter), mm(bearing.outer_raceway_diameter)
+    if not pitch < (rib := mm(bearing.rib_diameter)) < raceway:
+        raise ConfigError(
+            f"`bearing.rib_diameter` must lie between the pitch circle and the outer raceway, {pitch:g} and "
+            f"{raceway:g} mm, but is {rib:g} mm."
+        )
+    if raceway >= (outside := mm(bearing.outside_diameter)):
+        raise ConfigError(
+            f"`bearing.outside_diameter` must be above the outer raceway, {raceway:g} mm, but is {outside:g} mm."
+        )
+    if (length := mm(bearing.roller_length)) >= (width := mm(bearing.width)):
+        raise ConfigError(f"`bearing.roller_length` must fit into the rings, {width:g} mm, but is {length:g} mm.")
+    pocket, room = mm(bearing.roller_diameter + bearing.pocket_clearance), math.pi * pitch / bearing.n_rollers
+    if pocket >= room:
+        raise ConfigError(
+            f"`bearing.pocket_clearance` must leave a bar between pockets, which are {room:.4g} mm apart, but makes "
+            f"them {pocket:g} mm wide."
+        )
 
 
 def check_together(model: CageModel | BearingModel) -> None:
@@ -375,22 +400,31 @@ def check_together(model: CageModel | BearingModel) -> None:
         raise ConfigError(
             f"`eccentricity` must be smaller than `guidance_gap`, but is {eccentricity:g} mm in a gap of {gap:g} mm."
         )
+    _check_rings(model.bearing)
     rib = 1e3 * float(model.bearing.rib_diameter)
     if gap >= rib:
         raise ConfigError(f"`guidance_gap` must leave room for the cage, but is {gap:g} mm in a rib of {rib:g} mm.")
     if isinstance(model, BearingModel) and model.guidance == "inner":
         land = 1e3 * float(model.inner_land_diameter)
+        if land <= (bore := 1e3 * float(model.bearing.bore)):
+            raise ConfigError(f"`inner_land_diameter` must be above the bore, {bore:g} mm, but is {land:g} mm.")
         if land + gap >= rib:
             raise ConfigError(
                 f"`inner_land_diameter` and `guidance_gap` must leave room for the cage within the outer ring's ribs, "
                 f"{rib:g} mm, but are {land:g} and {gap:g} mm."
             )
-    if isinstance(model, CageModel):
-        mass, most = float(model.cage_mass), HEAVIEST * _volume(model)
-        if mass > most:
+    mass, most = float(model.cage_mass), HEAVIEST * _volume(model)
+    if mass > most:
+        raise ConfigError(
+            f"`cage_mass` must be at most {most:.3g} kg, as of a bearing of this size full of bronze, but is "
+            f'{mass:g} kg; grams are written "60 g".'
+        )
+    if isinstance(model, BearingModel):
+        inertia, ring = float(model.cage_inertia), mass * float(model.bearing.pitch_diameter) ** 2 / 4
+        if not 0.1 * ring <= inertia <= 10 * ring:
             raise ConfigError(
-                f"`cage_mass` must be at most {most:.3g} kg, as of a bearing of this size full of bronze, but is "
-                f'{mass:g} kg; grams are written "60 g".'
+                f"`cage_inertia` must be that of a ring, between a tenth and ten times {ring:.2g} kg m^2 for a cage of "
+                f"{1e3 * mass:g} g, but is {inertia:g} kg m^2."
             )
     if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
         raise ConfigError(

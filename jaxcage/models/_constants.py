@@ -1,9 +1,10 @@
 """Constants that the paper does not print, in sets: one set for all its cases.
 
 `preliminary`: a blind search of an independent code, whose film was some twenty times too weak, on the sign of the
-largest exponent in the published zones. `identified`: found with this package, see `experiments/identify_nu2310.py`.
-Both read the clearance as printed (c = C_r), the speed axis as cage speed relative to the rib, eccentricities in
-micrometres; with the fixed half film, the synchronous impact, a rigid rib and circulatory cross-coupling.
+largest exponent in the published zones. `identified`: found with this package, by chaos seen after 300 revolutions
+(an earlier version of `experiments/identify_nu2310.py`). Both read the clearance as printed (c = C_r), the speed axis
+as cage speed relative to the rib, eccentricities in micrometres; with the fixed half film, the synchronous impact, a
+rigid rib and circulatory cross-coupling.
 """
 
 import dataclasses

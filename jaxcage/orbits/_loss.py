@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._notebook import notebook_html
-from ..analysis import CLOSE_BELOW_RPM, Edge, Zone
+from ..analysis import Edge, Zone, closing_width
 from ._point import Point
 from ._search import Stretch, SynchronousOrbits
 
@@ -83,13 +83,15 @@ def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
         groups = [g for g in groups if g is not a and g is not b] + [_Group((*a.stretches, *b.stretches))]
 
 
-def loss_zones(found: SynchronousOrbits, close_below_rpm: float = CLOSE_BELOW_RPM) -> LossZones:
+def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -> LossZones:
     """Zones in which the synchronous orbit is lost, from the stable stretches that were found.
 
-    **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm].
+    **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
+    500 rpm and at most 5 % of the highest speed.
 
     **Returns:** `LossZones`. Without any stretch there is no zone: nothing is known of the orbit.
     """
+    close_below_rpm = closing_width(found.sweep.rpm) if close_below_rpm is None else close_below_rpm
     if not found.stretches:
         return LossZones((), {}, {}, None, close_below_rpm)
     principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from ..analysis import Zone, Zones
@@ -75,7 +76,7 @@ def mark_published(ax: Axes, published: PublishedCase, text: bool = True) -> Axe
 def mark_operating(ax: Axes, spans: Sequence[tuple[float, float]]) -> Axes:
     """Mark operating speeds [rpm]: a line for a speed, a light band for a range, both with a bar at the foot."""
     low, high = ax.get_xlim()
-    for i, (first, last) in enumerate(spans):
+    for i, (first, last) in enumerate(span for span in spans if span[1] >= low and span[0] <= high):
         label = "operating speed" if i == 0 else "_operating speed"
         for edge in {first, last}:
             ax.axvline(edge, color=PURPLE, linewidth=1.1, linestyle=(0, (6, 2)), zorder=2, label=label)
@@ -84,6 +85,7 @@ def mark_operating(ax: Axes, spans: Sequence[tuple[float, float]]) -> Axes:
             ax.axvspan(first, last, color=PURPLE, alpha=0.12, linewidth=0, zorder=0.5)
         middle, half = (first + last) / 2, max(last - first, 0.004 * (high - low)) / 2
         foot = ax.get_xaxis_transform()
-        ax.plot([middle - half, middle + half], [0, 0], color=PURPLE, linewidth=5, transform=foot, clip_on=False)
+        ends = np.clip([middle - half, middle + half], low, high)
+        ax.plot(ends, [0, 0], color=PURPLE, linewidth=5, transform=foot, clip_on=False)
     ax.set_xlim(low, high)
     return ax

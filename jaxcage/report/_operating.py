@@ -57,20 +57,22 @@ class Verdict:
         return f"{self.where}; nearest edge: {self.edge}, {self.distance_rpm:.0f} rpm ({self.percent:.1f} %) away"
 
 
-def read_operating(text: str, cage_speed_ratio: float = 1.0, unsaid: Whose = "cage") -> list[Operating]:
+def read_operating(
+    text: str, cage_speed_ratio: float = 1.0, unsaid: Whose = "cage", cage_rpm_at_rest: float = 0.0
+) -> list[Operating]:
     """Speeds and ranges such as `8500, 12000-15000`, `900 rad/s, 1200 to 1500 rad/s` or `20000-24000 rpm shaft`.
 
     **Arguments:** the text, in rpm if nothing else is said; cage speed over shaft speed; whose speeds they are where
-    the text does not say it.
+    the text does not say it; speed of the cage while the shaft rests [rpm], where the outer ring turns.
 
     **Returns:** speeds of the cage.
 
     **Raises:** `ValueError`, one sentence.
     """
-    return [_read_one(part, cage_speed_ratio, unsaid) for part in text.split(",") if part.strip()]
+    return [_read_one(part, cage_speed_ratio, unsaid, cage_rpm_at_rest) for part in text.split(",") if part.strip()]
 
 
-def _read_one(given: str, ratio: float, unsaid: Whose) -> Operating:
+def _read_one(given: str, ratio: float, unsaid: Whose, at_rest: float) -> Operating:
     try:
         part, whose = split_owner(given)
     except ValueError as error:
@@ -94,8 +96,9 @@ def _read_one(given: str, ratio: float, unsaid: Whose) -> Operating:
         raise ArgumentError(
             "operating", said=f'must be speeds above 0 and ranges that grow, but "{part.strip()}" was given.'
         )
-    factor = ratio if (whose or unsaid) == "shaft" else 1.0
-    return Operating(factor * first, factor * last)
+    if (whose or unsaid) == "cage":
+        return Operating(first, last)
+    return Operating(at_rest + ratio * first, at_rest + ratio * last)
 
 
 def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:
