@@ -3,7 +3,8 @@
     python -m benchmarks.solvers [--cases 1a,1b] [--only edge,width] [--quick]
 
 Every solver that is one compiled loop is used with two step sizes; with diffrax's implicit ones, Kvaerno3, Kvaerno5 and
-KenCarp4, a sweep takes hours, and the tests compare them on revolutions. Tables are printed and written to `benchmarks/solvers.md`, each for itself:
+KenCarp4, a sweep takes hours, and the tests compare them on revolutions. Tables are printed and written to
+`benchmarks/solvers.md`, each for itself:
 
 1. Speeds of the exact edges of the synchronous orbit, and how far each solver's are from the finest one's [ppm].
 2. Largest exponents of a calm and a chaotic speed of each case, with standard errors over the starts.
