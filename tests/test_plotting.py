@@ -9,6 +9,7 @@ import matplotlib.colors as colours
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from test_io_dataset import sweep_of
 
@@ -20,6 +21,7 @@ from jaxcage.plotting import (
     force_history,
     impact_forces,
     load_bars,
+    mark_operating,
     mark_published,
     new_figure,
     orbit,
@@ -68,6 +70,15 @@ def test_orbit_diagram_shows_every_strobe_point_of_every_start():
     assert ax.get_xlabel() == "Cage speed $n$ [rpm]"
     assert ax.get_ylabel() == "Vertical displacement $Y_C$ [mm]"
     assert ax.get_xlim() == pytest.approx((8000, 8400))
+
+
+def test_operating_speeds_outside_the_axis_are_not_drawn():
+    """Beyond its ends a bar at the foot would leave no room for the axes."""
+    ax = Figure().subplots()
+    ax.set_xlim(3000, 9000)
+    mark_operating(ax, [(5000.0, 5000.0), (8000.0, 9500.0), (20000.0, 24000.0)])
+    drawn = np.concatenate([np.asarray(line.get_xdata()) for line in ax.get_lines() if not line.get_clip_on()])
+    assert drawn.min() > 3000 and drawn.max() == 9000 and ax.get_xlim() == (3000, 9000)
 
 
 def test_zoomed_diagram_fits_its_limits_to_the_points_in_it():
