@@ -23,14 +23,14 @@ from ._show import Report
 
 
 QUICK: dict[str, Any] = {
-    "speeds": 126,
+    "speeds": 101,
     "discard": 150,
     "revolutions": 100,
     "section_revolutions": 504,
     "orbits": False,
     "observers": OBSERVERS[:1],
 }
-QUICK_READINGS: dict[str, Any] = {"speeds": 48, "discard": 150, "revolutions": 100}
+QUICK_READINGS: dict[str, Any] = {"speeds": 24, "discard": 150, "revolutions": 100}
 
 
 def reproduce(job: Job[ReproduceOptions]) -> Report:
