@@ -119,7 +119,7 @@ def test_speeds_outside_and_unknown_cases_are_refused(capsys: pytest.CaptureFixt
 @pytest.mark.wide
 def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     other = tmp_path / "narrow.toml"
-    other.write_text('base = "1a"\nguidance_gap = "0.3 mm"\n[bearing]\nroller_diameter = "13 mm"\n')
+    other.write_text('base = "1a"\nguidance_gap = "0.3 mm"\n[bearing]\nroller_diameter = "15 mm"\n')
     asked = ["compare", "1a", str(other), *TINY, "--at", "12321", "--out", str(tmp_path), "--json"]
     assert main(asked) == 0
     found = json.loads(capsys.readouterr().out)

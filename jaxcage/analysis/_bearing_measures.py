@@ -1,6 +1,7 @@
 """What a run of the whole bearing says: slips, forces, losses, whirl, and a name for the cage's motion."""
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -59,7 +60,7 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
     rolling = float(model.rolling_cage_speed(speed))
     mean = lambda name: float(run.total(name) / spent)
     parts = {name: mean(name) for name in LEDGER[1:]}
-    lost, relative = sum(parts.values()), abs(speed - float(model.outer_speed))
+    lost, relative = sum(parts.values()), abs(speed - float(model.outer_speed)) or math.nan
     middle = len(run.time) // 2
     slip = lambda part: 1 - np.diff(run.angle[part][[0, -1]])[0] / np.diff(run.time[part][[0, -1]])[0] / rolling
     eps = np.hypot(*from_land(model, run).T) / float(model.clearance)

@@ -80,18 +80,15 @@ def differences(models: Sequence[CageModel | BearingModel]) -> dict[str, tuple[s
             cells = [f"{r.value} {r.unit}" for r in rows if r is not None]
         unit = units.pop() if len(units) == 1 else ""
         text = path if row is None or not row.text else row.text
-        found[path] = (text, *cells, unit, _change(*values) if unit != "°C" else _warmer(*values))
+        found[path] = (text, *cells, unit, _change(*values, unit))
     return found
 
 
-def _change(before: Any, after: Any) -> str:
+def _change(before: Any, after: Any, unit: str) -> str:
     numbers = all(isinstance(v, float | int) and math.isfinite(v) for v in (before, after))
+    if numbers and unit == "°C":  # temperatures have no per cent
+        return f"{after - before:+.3g} K"
     return f"{100 * (after / before - 1):+.3g} %" if numbers and before else "-"
-
-
-def _warmer(before: Any, after: Any) -> str:
-    """Temperatures have no per cent."""
-    return f"{after - before:+.3g} K"
 
 
 def _flat(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> dict[str, Any]:
