@@ -69,12 +69,12 @@ def differences(models: Sequence[CageModel | BearingModel]) -> dict[str, tuple[s
     exact = [_flat(configuration(model)) for model in models]
     found = {}
     for path in dict.fromkeys([*exact[0], *exact[1]]):
-        before, after = (each.get(path) for each in exact)
+        before, after = values = [each.get(path) for each in exact]
         if before == after:
             continue
         rows = [each.get(path) for each in shown]
         row = next((r for r in rows if r is not None), None)
-        cells = [str(v if v is not None else "") if r is None else r.value for r, v in zip(rows, (before, after), strict=True)]
+        cells = [str(v if v is not None else "") if r is None else r.value for r, v in zip(rows, values, strict=True)]
         units = {r.unit for r in rows if r is not None}
         if len(units) > 1:  # one in mm, the other in um
             cells = [f"{r.value} {r.unit}" for r in rows if r is not None]
