@@ -56,9 +56,10 @@ def follow(
             break
         stage = slice(first, min(first + STAGE, blocks))
         new = run(Plan(0, LIFE_BLOCK, stage.stop - first, plan.keep, 1), active, np.asarray(seen.last).T[active])
-        _put(seen, active, new, label[active] == "undecided")
+        ran = np.asarray(new.strobe)[-min(plan.keep, LIFE_BLOCK * (stage.stop - first)) :]  # a stage may be shorter
+        _put(seen, active, new, ran, label[active] == "undecided")
         late[stage, active] = new.growth[:, 0]
-        strobe = np.moveaxis(np.asarray(new.strobe), -1, 0)
+        strobe = np.moveaxis(ran, -1, 0)
         end = late[: stage.stop, active].T
         calm[active] = calm_at_the_end(strobe, scale[active], end, LIFE_BLOCK)
         closed = closing_period(strobe, scale[active]) > 0
@@ -71,13 +72,18 @@ def follow(
 
 
 def _put(
-    seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
+    seen: Observation,
+    lanes: Int[np.ndarray, " some"],
+    new: Observation,
+    strobe: Float[np.ndarray, "ran dim some"],
+    open_: Bool[np.ndarray, " some"],
 ) -> None:
-    """Where lanes are later, NaN where one fails; the strobe states of those that were `open_`, which may close."""
+    """Where lanes are later, NaN where one fails; the last strobe states of those that are `open_`, which may close."""
     seen.last[:, lanes] = new.last
     seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
     seen.outcome[lanes] = new.outcome
-    seen.strobe[..., lanes[open_]] = new.strobe[..., open_]
+    every = np.concatenate([seen.strobe[..., lanes[open_]], strobe[..., open_]])
+    seen.strobe[..., lanes[open_]] = every[len(strobe) :]
     lost = lanes[np.asarray(new.outcome) != 0]
     seen.strobe[..., lost] = seen.growth[..., lost] = np.nan
 
