@@ -213,8 +213,11 @@ PAIR = (("LSODA", 1e-11), ("DOP853", 1e-11), ("Radau", 1e-10))
 """Integrators and their tolerances, the last one for what is stiff."""
 
 
-def confirmed(field: Field, state: Sequence[float] | np.ndarray, count: int = 1, budget: float = 2e5) -> Confirmed:
-    """Integrate `count` revolutions twice, by the first two of `PAIR` that need at most `budget` evaluations each.
+def confirmed(
+    field: Field, state: Sequence[float] | np.ndarray, count: int = 1, budget: float = 2e5, sharper: float = 1.0
+) -> Confirmed:
+    """Integrate `count` revolutions twice, by the first two of `PAIR` that need at most `budget` evaluations each, with
+    tolerances that are `sharper` times smaller.
 
     **Raises:** `Outside` where two of them say that the cage leaves; `TooLong` where no two of them finish.
     """
@@ -222,7 +225,7 @@ def confirmed(field: Field, state: Sequence[float] | np.ndarray, count: int = 1,
     left = 0
     for method, tolerance in PAIR:
         try:
-            found.append(revolutions(field, state, count, method=method, tolerance=tolerance, budget=budget))
+            found.append(revolutions(field, state, count, method=method, tolerance=tolerance / sharper, budget=budget))
         except Outside:
             left += 1
         except (TooLong, ValueError, ArithmeticError):
