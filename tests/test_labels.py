@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -54,6 +55,36 @@ def test_closing_is_measured_in_the_scale():
     assert closing_period(strobe, np.array([0.5])) == 2
 
 
+def spiral(turn: float, size: float, shrinks: float = 0.985, orbit: tuple[float, ...] = (0.0,)) -> np.ndarray:
+    """Strobe states on the way to an orbit, which they go round by `turn` in a revolution."""
+    n = np.arange(64)
+    z = size * shrinks**n * np.exp(2j * np.pi * turn * n)
+    return np.stack([np.resize(orbit, 64) + z.real, 0.7 * z.imag], axis=1)
+
+
+@pytest.mark.parametrize("turn", [0.5, 0.497, 1 / 3, 0.2, 0.401, 2 / 7, 1 / 8, 0.1251])
+@pytest.mark.parametrize("orbit", [(0.0,), (0.0, 0.5), (0.0, 0.2, 0.3)], ids=["1", "2", "3"])
+def test_a_spiral_has_the_period_of_the_orbit_that_it_leads_to(turn: float, orbit: tuple[float, ...]):
+    """Sizes at which the states return after more revolutions than the orbit has, and smaller ones."""
+    found = {int(closing_period(spiral(turn, size, orbit=orbit), np.ones(2))) for size in (2e-3, 5e-4, 1e-4, 1e-5, 0.0)}
+    assert found - {0} == {len(orbit)}
+
+
+@pytest.mark.parametrize("size", [4e-4, 2e-4, 1e-5, 0.0])
+def test_a_small_orbit_keeps_its_period_while_what_is_left_dies_out(size: float):
+    """Of period 2 and three tolerances wide, as next to a doubling: what is left may be as large as the orbit."""
+    assert closing_period(spiral(0.5, size, 0.95, (0.0, 3e-4)), np.ones(2)) == 2
+    assert closing_period(spiral(0.0, size / 10, 0.99, (0.0, 3e-4)), np.ones(2)) == 2
+
+
+def test_a_linear_oscillator_has_no_subharmonics():
+    """Lightly damped, still on its way: seen to return after 2, 3 or 5 revolutions, it was called by these."""
+    linear = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.0054 * v[0] - q[0] + jnp.cos(tau),), coordinates=1)
+    speeds = np.array([1.5, 2.0, 2.5, 4.5])
+    label = jc.sweep(linear, speeds, horizon=0, confirm=False, method=jc.method("rk4", steps=64)).label
+    assert set(label.ravel()) <= {"periodic-1", "quasi-periodic", "undecided"} and "periodic-1" in label
+
+
 def test_period_nine_and_nan_do_not_close():
     assert closing_period(np.tile(np.arange(9.0), 8)[:, None], np.ones(1)) == 0
     assert closing_period(np.full((64, 1), np.nan), np.ones(1)) == 0
@@ -75,9 +106,12 @@ def test_labels_by_exponent_and_error(exponent: float, error: float, expected: s
     assert got[0] == expected
 
 
-def test_failure_comes_first_and_closing_before_chaos():
-    label = label_lanes(np.array([1, 0]), np.array([1, 2]), np.array([0.5, 0.5]), np.zeros(2))
-    assert list(label) == ["failed", "periodic-2"]
+def test_failure_comes_first_and_closing_before_the_exponent():
+    """But what closes while its neighbours part is too small to be told from an orbit, or rests on an unstable one."""
+    label = label_lanes(
+        np.array([1, 0, 0, 0]), np.array([1, 2, 2, 2]), np.array([0.5, 0.5, 0.03, -1]), np.full(4, 0.01)
+    )
+    assert list(label) == ["failed", "undecided", "periodic-2", "periodic-2"]
 
 
 def test_windows_of_slow_bearings_are_closed_below_a_part_of_their_speed():
