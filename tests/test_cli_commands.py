@@ -45,6 +45,8 @@ ZONE_KEYS = {
     "onset_uncertainty_rpm",
     "exit_uncertainty_rpm",
     "mean_life_revolutions",
+    "mean_life_seconds",
+    "mean_life_is_lower_bound",
     "mechanism",
     "onset_mechanism",
     "exit_mechanism",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.analysis import closing_period, closing_width, label_lanes
+from jaxcage.analysis import closing_period, closing_width, label_lanes, lives_in_words
 
 
 def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
@@ -181,11 +181,30 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     (lasting,), (dying,) = found.zones, found.transient
     assert lasting.onset.speed_rpm == pytest.approx((followed.rpm[1] + followed.rpm[2]) / 2)
     assert dying.exit.speed_rpm == pytest.approx((followed.rpm[9] + followed.rpm[10]) / 2)
-    assert lasting.life == pytest.approx((2 * 3000 / 3, 3 * 3000 / 3))  # bounds: two lanes at the rim, three within
+    assert lasting.life is not None and dying.life is not None
+    shortest, longest = lasting.life  # bounds: two lanes at the rim, three within
+    assert shortest == (pytest.approx(2 * 3000 / 3), pytest.approx(followed.rpm[2]), True)
+    assert longest == (pytest.approx(3 * 3000 / 3), pytest.approx(followed.rpm[3]), True)
     n, survived, block = 3, 3 * 270, 30  # three escapes in the block that ends 300 revolutions after the first begins
-    assert dying.life is not None and dying.life[1] == pytest.approx(block / np.log1p(n * block / survived))
+    assert dying.life[1].revolutions == pytest.approx(block / np.log1p(n * block / survived))
+    assert dying.life[1].seconds == pytest.approx(dying.life[1].revolutions * 60 / dying.life[1].speed_rpm)
     assert "beyond 3020 revolutions" in str(found) and "Transient chaos" in str(found)
+    assert "mean life > 2000 revolutions" in str(found)
     assert jc.zones(sweep, close_below_rpm=0.0).transient == ()
+
+
+def test_a_bound_is_not_the_shortest_of_mean_lives_of_which_some_are_known():
+    """One lane of three leaves chaos, in the middle of a zone: at its ends it is only known to last longer."""
+    sweep = made("11#####11")
+    escape = np.full(sweep.outcome.shape, 20.0)
+    escape[2:7], escape[4] = np.inf, 2720.0
+    (zone,) = jc.zones(dataclasses.replace(sweep, escape=escape, horizon=3020), close_below_rpm=0.0).zones
+    assert zone.life is not None
+    shortest, longest = zone.life
+    assert not shortest.bound and shortest.speed_rpm == pytest.approx(sweep.rpm[3])
+    assert longest.bound and longest.revolutions == max(shortest.revolutions, 3000)
+    words = lives_in_words(zone.life, lambda life: f"{life.revolutions:.0f}")
+    assert words == f"{shortest.revolutions:.0f} to > {longest.revolutions:.0f}"
 
 
 def test_an_edge_is_no_more_certain_than_the_mean_lives_next_to_it():

@@ -8,7 +8,7 @@ where the stable period-1 orbit appears or disappears; a sweep only brackets it 
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +50,26 @@ class Edge:
     _repr_html_ = notebook_html
 
 
+class MeanLife(NamedTuple):
+    """Mean life of chaos at a speed."""
+
+    revolutions: float
+    speed_rpm: float
+    bound: bool
+    """Whether no start left chaos there: the life is longer, and how much is not known."""
+
+    @property
+    def seconds(self) -> float:
+        """At its speed."""
+        return 60 * self.revolutions / self.speed_rpm
+
+
+def lives_in_words(lives: Sequence[MeanLife], value: Callable[[MeanLife], str]) -> str:
+    """The shortest and longest of them as `value` writes one, a lower bound with a sign."""
+    signed = [("> " if life.bound else "") + value(life) for life in lives]
+    return signed[0] if all(life.bound for life in lives) else " to ".join(dict.fromkeys(signed))
+
+
 @dataclasses.dataclass(frozen=True)
 class Zone:
     """A range of speed; an edge is None where the zone runs past the swept range."""
@@ -60,9 +80,10 @@ class Zone:
     share: float
     """Mean over the zone's speeds of the share of starts that are chaotic while observed; where the synchronous orbit
     was met, that settled on it; where it was lost, that did not."""
-    life: tuple[float, float] | None = None
-    """Shortest and longest mean life of chaos at the zone's speeds [revolutions], each from the starts there and next
-    to it; a lower bound where none of them left chaos. None where lanes were not followed."""
+    life: tuple[MeanLife, MeanLife] | None = None
+    """Shortest and longest mean life of chaos at the zone's speeds, each from the starts there and next to it. Where
+    none of them left chaos only a lower bound is known, which may be the longest, but the shortest only if nothing
+    else is known. None where lanes were not followed."""
 
     @property
     def width_rpm(self) -> float | None:
@@ -99,8 +120,8 @@ class Zones:
 def _row(zone: Zone) -> str:
     width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.0f} rpm wide"
     ends = f"{zone.onset or 'below the range'} to {zone.exit or 'above the range'}"
-    life = "" if zone.life is None else ", mean life {:.0f} to {:.0f} revolutions".format(*zone.life)
-    return f"{ends}, {width}, {zone.share:.0%} of starts chaotic{life}"
+    life = "" if zone.life is None else lives_in_words(zone.life, lambda life: f"{life.revolutions:.0f}")
+    return f"{ends}, {width}, {zone.share:.0%} of starts chaotic{life and f', mean life {life} revolutions'}"
 
 
 def runs(mask: Bool[np.ndarray, " speeds"]) -> list[tuple[int, int]]:
@@ -169,11 +190,13 @@ def _zones(sweep: Sweep, at: _Speeds, spans: Sequence[tuple[int, int]], kind: st
     )
 
 
-def _life(sweep: Sweep, restless: np.ndarray, first: int, last: int) -> tuple[float, float]:
+def _life(sweep: Sweep, restless: np.ndarray, first: int, last: int) -> tuple[MeanLife, MeanLife]:
     """Shortest and longest mean life at the speeds of a zone at which there is chaos."""
-    seen = [sweep.survival(i) for i in range(first, last + 1) if restless[i]]
-    lives = [s.mean_life if s.escapes else s.lower_bound for s in seen]
-    return min(lives), max(lives)
+    at = {float(sweep.rpm[i]): sweep.survival(i) for i in range(first, last + 1) if restless[i]}
+    lives = [MeanLife(s.mean_life if s.escapes else s.lower_bound, rpm, not s.escapes) for rpm, s in at.items()]
+    shortest = min(lives, key=lambda life: (life.bound, life.revolutions))
+    longest = max(lives, key=lambda life: life.revolutions)
+    return shortest, longest._replace(bound=any(life.bound for life in lives))
 
 
 def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:

@@ -109,7 +109,7 @@ def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:
     found = _verdict(at, zones.zones)
     dying = [z for z in zones.transient if _meets(at, z)]
     if dying and found.state != "inside":
-        lives = [life * 60 / at.low_rpm for z in dying for life in z.life or ()]
+        lives = [life.seconds for z in dying for life in z.life or ()]
         often = f", mean life up to {max(lives):.2g} s after each disturbance" if lives else ""
         return dataclasses.replace(found, state="inside", where=f"in transient chaos{often}")
     beside = (rpm >= at.low_rpm - zones.resolution_rpm) & (rpm <= at.high_rpm + zones.resolution_rpm)

@@ -125,8 +125,10 @@ def _zone_cells(zone: Zone) -> list[str]:
 
 
 def edge_cell(edge: Edge) -> str:
-    """A located edge with its error."""
-    return f"{number(edge.speed_rpm, 2)} ± {error_cell(edge.uncertainty_rpm)}"
+    """A located edge with its error, and as many digits as that has: the shaft's speed is made of them."""
+    error = float(edge.uncertainty_rpm)
+    digits = min(max(2, -math.floor(math.log10(error))), 6) if 0 < error < math.inf else 2
+    return f"{number(edge.speed_rpm, digits)} ± {error_cell(error)}"
 
 
 def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:

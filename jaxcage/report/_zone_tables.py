@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ..analysis import Edge, Zone, Zones
+from ..analysis import Edge, Zone, Zones, lives_in_words
 from ..bearing import PublishedCase
 from ._table import Table, number
 
@@ -47,7 +47,9 @@ def zone_document(zone: Zone) -> dict[str, Any]:
         "width_kind": zone.kind,
         "width_rpm": zone.width_rpm,
         "share": zone.share,
-        "mean_life_revolutions": zone.life,
+        "mean_life_revolutions": zone.life and [life.revolutions for life in zone.life],
+        "mean_life_seconds": zone.life and [life.seconds for life in zone.life],
+        "mean_life_is_lower_bound": zone.life and [life.bound for life in zone.life],
     }
 
 
@@ -118,15 +120,11 @@ def _zone_cells(zone: Zone) -> tuple[str, ...]:
 
 
 def _life_cell(zone: Zone) -> str:
-    """Mean lives in revolutions and, at the zone's middle speed, in seconds."""
+    """Mean lives in revolutions and, each at its own speed, in seconds."""
     if zone.life is None:
         return "-"
-    ends = [edge.speed_rpm for edge in (zone.onset, zone.exit) if edge is not None]
-    revolutions = " to ".join(dict.fromkeys(f"{x:.0f}" for x in zone.life))
-    if not ends:
-        return revolutions
-    seconds = " to ".join(dict.fromkeys(number(x * 60 * len(ends) / sum(ends), 1) for x in zone.life))
-    return f"{revolutions} ({seconds} s)"
+    revolutions = lives_in_words(zone.life, lambda life: f"{life.revolutions:.0f}")
+    return f"{revolutions} ({lives_in_words(zone.life, lambda life: number(life.seconds, 1))} s)"
 
 
 def _edge_cell(edge: Edge | None) -> str:
