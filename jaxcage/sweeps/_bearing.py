@@ -33,7 +33,8 @@ from ..integrate import (
 )
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
-from ._engine import Progress, alike, cores, workers
+from ._cores import cores, workers
+from ._engine import Progress, alike
 from ._speed import checked_speeds, require_lengths, versions
 
 
