@@ -533,7 +533,8 @@ class StaticsOptions(Options):
     load: Annotated[float | None, number("be above 0 N", lambda x: x > 0, "N", "own")] = None
     """Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out."""
     shaft_speed: Annotated[float, number("be at least 0 rpm", lambda x: x >= 0, "rpm")] = 0.0
-    """Shaft speed [rpm], for the centrifugal load of the rollers and for the kinematics."""
+    """Shaft speed [rpm], or with a unit or of the cage, e.g. "10000 rpm cage", for the centrifugal load of the rollers
+    and for the kinematics."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
