@@ -484,7 +484,7 @@ class SensitivityOptions(VaryOptions):
     revolutions: Annotated[int | None, whole(2, of=2)] = None
     """Of a whole bearing: revolutions of the cage observed, an even number; 20 if left out."""
     tolerance: Annotated[float, number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0
-    """Tolerance of every parameter, ± so many percent, uniformly distributed."""
+    """Tolerance of every parameter but constants, ± so many percent, uniformly distributed."""
 
     def check(self) -> None:
         super().check()

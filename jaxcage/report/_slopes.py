@@ -43,6 +43,12 @@ def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensit
     ]
 
 
+def not_fixed(model: CageModel, names: Iterable[str]) -> list[str]:
+    """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
+    info = parameter_info(model)
+    return [n for n in names if info[n].kind != "fixed" or n.startswith(EXTRA)]
+
+
 ONSET, EXIT = "zone 1 onset", "zone 1 exit"
 EXPECTED = (ONSET, EXIT, "zone 2 onset")
 
