@@ -329,6 +329,16 @@ def allowed(info: ParameterInfo) -> str:
     return f"must be a number from {info.lower:g} to {info.upper:g}{unit}"
 
 
+ROUNDING = 1e-12
+"""Relative difference of numbers that are the same but for a conversion of units."""
+
+
+def within(numbers: Any, lower: float, upper: float) -> np.ndarray:
+    """Whether numbers are from `lower` to `upper`; 10 um, converted, is a little less than 1e-5 m."""
+    given = np.asarray(numbers, dtype=float)
+    return np.asarray((given >= lower - ROUNDING * abs(lower)) & (given <= upper + ROUNDING * abs(upper)))
+
+
 def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
     """**Raises:** `ValueError` in the words of a configuration; what is still traced passes."""
     if isinstance(value, _NO_NUMBERS):
@@ -336,7 +346,7 @@ def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
     if isinstance(value, Tracer) or not isinstance(value, int | float | np.ndarray | np.generic | jax.Array):
         return
     numbers = np.asarray(value, dtype=float)
-    wrong = numbers[~((numbers >= info.lower) & (numbers <= info.upper))]
+    wrong = numbers[~within(numbers, info.lower, info.upper)]
     if wrong.size:
         unit = "" if info.unit in ("1", UNKNOWN) else f" {info.unit}"
         raise ArgumentError(name, said=f"{allowed(info)}, but is {wrong.flat[0]:g}{unit}.")

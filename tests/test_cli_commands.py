@@ -285,7 +285,7 @@ def test_sweep_draws_a_waterfall_when_asked(capsys: pytest.CaptureFixture[str], 
         capsys, "sweep", "1a", *tiny, "--solver", "rk4", "--steps", "256", "--waterfall", "3", "--out", str(tmp_path)
     )
     assert is_png(found["waterfall"]) and is_png(found["figure"])
-    assert all(z["kind"] == "synchronous-loss" for z in found["synchronous"])
+    assert all(z["kind"] == "synchronous" for z in found["synchronous"])  # where the orbit is, not where it is lost
     closed = [z for z in found["zones"] if z["width_rpm"]]
     assert ("zoom" in found) == bool(closed)
 

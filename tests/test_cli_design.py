@@ -10,6 +10,7 @@ import report_example
 
 import jaxcage as jc
 from jaxcage.cli import _design, main
+from jaxcage.orbits import Sensitivity
 
 
 RANGE = ["--first", "8000rpm", "--last", "14000rpm", "--speeds", "6", "--quick"]
@@ -170,6 +171,28 @@ def test_sensitivity_of_a_known_objective(
     assert sum(own.first.values()) == pytest.approx(1.0, abs=0.2)  # nothing is in both
     assert said["sobol"]["doubtful"] == list(own.doubtful) and said["sobol"]["samples_wanted"] == own.samples_wanted
     assert said["edges"] == [] and said["figure"] is None
+
+
+def test_no_tolerance_is_budgeted_for_what_nobody_makes(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    loss, own, bowled = report_example.findings().loss, jc.design.global_sensitivity, jc.design.Smooth(bowl)
+    moved = dict.fromkeys(jc.parameters(jc.case("1a")), 0.5)
+    edge = Sensitivity("zone 1 exit", "fold", 12000.0, moved, moved, {}, 1e-3, "converged")
+    monkeypatch.setattr(
+        _design, "global_sensitivity", lambda model, vary, width, **given: own(model, vary, bowled, **given)
+    )
+    monkeypatch.setattr(_design, "synchronous_orbits", lambda *_, **__: None)
+    monkeypatch.setattr(_design, "loss_zones", lambda _: loss)
+    monkeypatch.setattr(_design, "sensitivities", lambda *_: {edge.name: edge})
+    arguments = [x for x in SENSITIVITY if x != "--quick"]
+    said = document(capsys, *arguments, "--tolerance", "1", "--out", str(tmp_path))
+    (budget,) = said["edges"]
+    assert set(budget["elasticity"]) - set(budget["by_parameter_rpm"]) == {
+        *("gravity", "printed_unit", "reference_speed", "reference_viscosity", "approach_speed", "palmgren_constant"),
+        *(n for n in moved if "smoothing" in n),
+    }
+    assert budget["deviation_rpm"] == pytest.approx(60 / 3**0.5 * len(budget["by_parameter_rpm"]) ** 0.5)
 
 
 @pytest.mark.parametrize(

@@ -229,7 +229,8 @@ def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_mo
     assert table.rows[0] == ("guidance_gap", "0.00045", "m", "+1.55556e+06", "+0.100000")
     assert table.rows[1][3:] == ("+0", "0")
     assert table.title.startswith("Zone 1 onset of 1a: 7000.000 ± 0.002 rpm (shaft 17446 rpm), fold; ")
-    assert f"; {len(jc.parameters(model)) - 4} other parameters do not move it" in table.title
+    assert f"; {len(jc.parameters(model)) - 4} other parameters do not move the cage's speed" in table.title
+    assert table.columns[3] == "rpm of the cage per unit"  # the shaft's moves with the ratio of both too
 
 
 def test_gradient_document_has_the_width_and_the_worst_residuals():

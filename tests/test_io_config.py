@@ -13,6 +13,7 @@ from jaxcage.io import (
     configuration,
     load_model,
     model_from,
+    read_bearing,
     save_model,
     to_si,
     toml_text,
@@ -43,6 +44,28 @@ from jaxcage.io import (
 )
 def test_units(text: str, unit: str, value: float):
     assert to_si(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize("gap", ["10 um", "0.01 mm", 1e-5, "10 um .. 1 mm", "0.1 (0.01 .. 1) mm"])
+def test_a_bound_may_be_given_in_any_unit(gap: str | float, tmp_path: Path):
+    mine = tmp_path / "mine.toml"
+    given = configuration(jc.case("1a")) | {"guidance_gap": gap, "eccentricity": "1 um"}
+    mine.write_text(toml_text(given))
+    read_bearing(mine)
+    mine.write_text(toml_text(given | {"guidance_gap": "9.99999 um"}))
+    with pytest.raises(ConfigError, match="`guidance_gap` must be a number from 1e-05 to"):
+        read_bearing(mine)
+    jc.replace(jc.case("1a"), eccentricity=1e-6, guidance_gap=to_si("10 um", "m"))
+
+
+def test_rounding_of_units_is_no_reason_to_refuse_an_oil():
+    point = dict(density=870.0, temperature_1=to_si("40 degC", "K"), temperature_2=to_si("100 degC", "K"))
+    thin, same = to_si("1 mm^2/s", "m^2/s"), to_si("1 cSt", "m^2/s")
+    oil = jc.bearing.Lubricant(viscosity_1=thin, viscosity_2=same, **point)
+    assert float(oil.kinematic_viscosity) == pytest.approx(1e-6, rel=1e-9)
+    point["temperature_2"] = to_si("104 degF", "K")  # 40 degC
+    with pytest.raises(ValueError, match="must differ from `temperature_1`"):
+        jc.bearing.Lubricant(viscosity_1=2e-6, viscosity_2=thin, **point)
 
 
 @pytest.mark.parametrize(

@@ -150,6 +150,7 @@ def test_failed_speeds_are_neither_chaotic_nor_calm():
 def test_synchronous_stretches_end_where_period_one_is_lost():
     stretch = jc.zones(made("11122##q11")).synchronous
     assert [z.exit and z.exit.speed_rpm for z in stretch] == [pytest.approx(5250), None]
+    assert all(z.kind == "synchronous" for z in stretch)
     assert all(e.kind == "synchronous-loss" for z in stretch for e in (z.onset, z.exit) if e)
 
 

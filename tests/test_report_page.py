@@ -98,11 +98,11 @@ ZONES = (
         (8000.0, 8000.0, "clear", 1000.0, 12.5),
         (8800.0, 8800.0, "close", 200.0, 200 / 88),
         (8000.0, 8800.0, "close", 200.0, 200 / 88),
-        (8000.0, 9500.0, "inside", 0.0, 0.0),
+        (8000.0, 9500.0, "partly inside", 0.0, 0.0),
         (12500.0, 15000.0, "close", 500.0, 4.0),
         (13000.0, 15000.0, "clear", 1000.0, 1000 / 130),
         (25000.0, 25000.0, "inside", 5000.0, 20.0),
-        (8000.0, 22000.0, "inside", 0.0, 0.0),
+        (8000.0, 22000.0, "partly inside", 0.0, 0.0),
     ],
 )
 def test_verdicts(low: float, high: float, state: str, away: float, percent: float):
@@ -133,7 +133,7 @@ def test_nothing_is_said_of_speeds_that_were_not_swept_or_failed():
     assert chaotic_verdict(Operating(15000.0, 15000.0), zones, broken).state == "unknown"
     assert chaotic_verdict(Operating(14000.0, 16000.0), zones, broken).state == "unknown"
     assert chaotic_verdict(Operating(14000.0, 14000.0), zones, broken).state == "clear"
-    assert chaotic_verdict(Operating(10000.0, 16000.0), zones, broken).state == "inside"
+    assert chaotic_verdict(Operating(10000.0, 16000.0), zones, broken).state == "partly inside"
 
 
 def test_calmest_range_is_outside_both_kinds(example: Findings):
@@ -235,6 +235,21 @@ def test_page_says_what_was_found(text: str):
     assert "Against the published edges" in words and "−0.5 %" in words  # 9050 beside 9100
     assert "jaxcage report 1a" in words
     assert "What moves the edges" in words and "bearing outside diameter" in words
+
+
+def test_what_is_partly_inside_or_in_transient_chaos_is_said_to_be(without_figures: None, example: Findings):
+    dying = Zone("transient", Edge(6000.0, 100.0, "transient"), Edge(7000.0, 100.0, "transient"), 1.0, (200.0, 900.0))
+    zones = dataclasses.replace(example.zones, transient=(dying,))
+    with_it = dataclasses.replace(example, explained=dataclasses.replace(example.explained, zones=zones))
+    operating = read_operating("6500, 6500-7500, 9000-9500, 10000")
+    verdicts = [one.verdicts["chaotic"] for one in assess(with_it, operating)]
+    states = ["in transient chaos", "partly in transient chaos", "partly inside", "inside"]
+    assert [v.state for v in verdicts] == states
+    assert verdicts[0].where.startswith("in transient chaos, mean life up to 8.3 s")
+    words = plain(page(with_it, operating))
+    kinds = ["in transient chaos", "partly in transient chaos", "partly inside chaotic zones", "inside chaotic zones"]
+    for one, said in zip(operating, kinds, strict=True):
+        assert re.search(rf"{one} \(shaft [^)]*\): [a-z ]+ synchronous-loss zones, {said}\.", words)
 
 
 def test_quick_page_leaves_out_gradients_and_says_so(without_figures: None):

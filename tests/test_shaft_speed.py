@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import pytest
@@ -101,6 +102,18 @@ def test_a_figure_over_speed_has_the_shaft_on_a_second_axis():
     figure.draw_without_rendering()
     (axis,) = [a for a in figure.findobj(matplotlib.axes._secondary_axes.SecondaryAxis)]  # pyright: ignore
     assert axis.get_xlim() == pytest.approx((10000, 20000)) and axis.get_xlabel() == "Shaft speed [rpm]"
+
+
+def test_statics_takes_a_cage_speed_as_the_cages(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    def found(speed: str) -> dict[str, Any]:
+        assert main(["statics", "1a", "--shaft-speed", speed, "--out", str(tmp_path), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    cage, shaft = found("10000 rpm cage"), found(f"{10000 / RATIO!r} rpm shaft")
+    assert cage["shaft_speed_rpm"] == pytest.approx(24923, abs=0.5)
+    assert cage["rollers"] == shaft["rollers"] and cage["kinematics"] == shaft["kinematics"]
+    assert cage["kinematics"]["cage_speed"] == pytest.approx(10000 * math.pi / 30)
+    assert found("10000")["shaft_speed_rpm"] == found("10000 rpm shaft")["shaft_speed_rpm"] == 10000
 
 
 def test_one_speed_is_named_for_both(capsys: pytest.CaptureFixture[str], tmp_path: Path):

@@ -61,7 +61,9 @@ def test_tables_by_the_head_the_column_unit_or_the_cell():
     assert shown.rows == [("0.02", "10 ± 2", "0.001", "inch", "+3 %"), ("-", "0", "12.0", "", "1 in 20")]
     assert table_in_units(table, ShownUnits()) is table
     slopes = Table(
-        "", ("parameter", "value", "unit", "rpm per unit", "elasticity"), [("gap", "0.000254", "m", "-508", "-0.5")]
+        "",
+        ("parameter", "value", "unit", "rpm of the cage per unit", "elasticity"),
+        [("gap", "0.000254", "m", "-508", "-0.5")],
     )
     assert table_in_units(slopes, INCHES).rows == [("gap", "0.01", "inch", "-12.9", "-0.5")]
 

@@ -35,7 +35,7 @@ class Edge:
     speed_rpm: float
     uncertainty_rpm: float
     kind: str
-    """`chaotic` or `synchronous-loss`."""
+    """`chaotic`, `transient` or `synchronous-loss`."""
     mechanism: str = "unknown"
     """`period-doubling`, `Neimark-Sacker`, `fold`, `crisis` or `unknown`."""
     basis: str = "statistical"
@@ -75,6 +75,8 @@ class Zone:
     """A range of speed; an edge is None where the zone runs past the swept range."""
 
     kind: str
+    """`chaotic`, `transient`, `synchronous-loss`, or `synchronous` for a stretch in which the stable period-1 orbit was
+    met."""
     onset: Edge | None
     exit: Edge | None
     share: float
@@ -176,13 +178,14 @@ def _first(mask: Bool[np.ndarray, " speeds"], index: int, step: int) -> int:
 
 
 def _zones(sweep: Sweep, at: _Speeds, spans: Sequence[tuple[int, int]], kind: str) -> tuple[Zone, ...]:
-    followed = kind != "synchronous-loss" and sweep.escape is not None
+    followed = kind != "synchronous" and sweep.escape is not None
+    edges = kind if kind != "synchronous" else "synchronous-loss"
     restless = sweep.restless
     return tuple(
         Zone(
             kind,
-            _edge(sweep.rpm, at, a, -1, kind),
-            _edge(sweep.rpm, at, b, 1, kind),
+            _edge(sweep.rpm, at, a, -1, edges),
+            _edge(sweep.rpm, at, b, 1, edges),
             float(np.nanmean(at.share[a : b + 1])),
             _life(sweep, restless, a, b) if followed else None,
         )
@@ -223,9 +226,7 @@ def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:
     between = lambda chaotic: close_windows(sweep.rpm, chaotic, close_below_rpm)
     return Zones(
         _zones(sweep, chaos, between(lasting), "chaotic"),
-        _zones(
-            sweep, _Speeds(synchronous | sound, np.zeros_like(sound), share_1), runs(synchronous), "synchronous-loss"
-        ),
+        _zones(sweep, _Speeds(synchronous | sound, np.zeros_like(sound), share_1), runs(synchronous), "synchronous"),
         sweep.resolution_rpm,
         close_below_rpm,
         _zones(sweep, chaos, runs(restless & ~lasting), "transient"),

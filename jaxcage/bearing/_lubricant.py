@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array
 
 from .._errors import ArgumentError
-from .._parameters import parameter
+from .._parameters import ROUNDING, parameter
 from .._types import Scalar
 from ._validate import is_concrete, require_positive
 
@@ -65,7 +65,7 @@ class Lubricant(eqx.Module):
 
     def __check_init__(self) -> None:
         first, second = self.temperature_1, self.temperature_2
-        if is_concrete(first, second) and np.asarray(first) == np.asarray(second):
+        if is_concrete(first, second) and np.isclose(first, second, ROUNDING, 0.0):
             raise ArgumentError(
                 "temperature_2", said=f"must differ from `temperature_1`, but both are {float(first):g} K."
             )
@@ -74,7 +74,7 @@ class Lubricant(eqx.Module):
         if is_concrete(first, second, *points):
             hotter = np.asarray(second) > np.asarray(first)
             thicker = np.asarray(points[1]) > np.asarray(points[0])
-            if np.any((hotter == thicker) & (np.asarray(points[1]) != np.asarray(points[0]))):
+            if np.any((hotter == thicker) & ~np.isclose(*points, ROUNDING, 0.0)):
                 row = zip(points, (first, second), strict=True)
                 given = " and ".join(f"{np.ravel(x)[0]:g} m^2/s at {np.ravel(t)[0]:g} K" for x, t in row)
                 raise ArgumentError(

@@ -7,7 +7,7 @@ from .._errors import InputError
 from .._parameters import parameters
 from ..bearing import load_distribution, raceway_surface_speed
 from ..forces import PocketImpact, RollerPassImpact, approach_speed, impact_history
-from ..io import write_template
+from ..io import shaft_rpm, write_template
 from ..plotting import impact_forces, load_bars
 from ..report import Table, chosen, displacements, impact_document, impact_table, statics_table
 from ..sweeps import rpm
@@ -41,7 +41,8 @@ def statics(job: Job[StaticsOptions]) -> Report:
     load = float(model.load) if options.load is None else options.load
     if load <= 0:
         raise InputError(f"The shaft load of {job.name} must be above 0 N, but it is {load:g}: give one with --load.")
-    shaft = rpm(options.shaft_speed)
+    at = shaft_rpm(options.shaft_speed, "shaft", job.ratio)
+    shaft = rpm(at)
     with job.computing():
         shared = load_distribution(bearing, load, bearing.roller_centrifugal_force(shaft))
     loads = {
@@ -53,7 +54,7 @@ def statics(job: Job[StaticsOptions]) -> Report:
     job.columns(loads)
     document = {
         "load": load,
-        "shaft_speed_rpm": options.shaft_speed,
+        "shaft_speed_rpm": at,
         "rollers": [dict(zip(("angle", "inner_load", "outer_load"), row, strict=True)) for row in zip(*loads.values())],
         **chosen(shared, "max_load shaft_shift elastic_approach half_angle"),
         "cage_displacement": displacements(model, shared),
@@ -66,7 +67,7 @@ def statics(job: Job[StaticsOptions]) -> Report:
     }
     degrees = np.degrees(loads["angle [rad]"])
     rollers = [tuple(f"{x:.1f}" for x in row) for row in zip(degrees, shared.inner_loads, shared.outer_loads)]
-    title = f"Statics of {job.name} at {load:g} N, shaft at {options.shaft_speed:g} rpm"
+    title = f"Statics of {job.name} at {load:g} N, shaft at {at:g} rpm"
     tables = [
         Table("Rollers", ("angle [°]", "inner load [N]", "outer load [N]"), rollers),
         statics_table(title, model, shared, shaft),

@@ -276,7 +276,8 @@ def sensitivity(job: Job[SensitivityOptions]) -> Report:
             say("gradients", 0, 1)
             edges = {n: s for n, s in sensitivities(job.model, loss.edges).items() if s.trusted}
             relative = options.tolerance / 100 / math.sqrt(3)
-            budgets = [tolerance_budget(s, dict.fromkeys(s.elasticity, relative)) for s in edges.values()]
+            scatter = lambda s: dict.fromkeys(report.not_fixed(job.model, s.elasticity), relative)
+            budgets = [tolerance_budget(s, scatter(s)) for s in edges.values()]
     job.files["figure"] = None
     if edges:
         title, size = f"{job.name}: elasticities of the synchronous-loss edges", (9.0, 2.2 + 1.2 * len(edges))

@@ -484,7 +484,7 @@ class SensitivityOptions(VaryOptions):
     revolutions: Annotated[int | None, whole(2, of=2)] = None
     """Of a whole bearing: revolutions of the cage observed, an even number; 20 if left out."""
     tolerance: Annotated[float, number("lie between 0 and 100 percent", lambda x: 0 < x < 100)] = 5.0
-    """Tolerance of every parameter, ± so many percent, uniformly distributed."""
+    """Tolerance of every parameter but constants, ± so many percent, uniformly distributed."""
 
     def check(self) -> None:
         super().check()
@@ -533,7 +533,8 @@ class StaticsOptions(Options):
     load: Annotated[float | None, number("be above 0 N", lambda x: x > 0, "N", "own")] = None
     """Shaft load [N], or with a unit, e.g. "4.45 kN"; the case's own if left out."""
     shaft_speed: Annotated[float, number("be at least 0 rpm", lambda x: x >= 0, "rpm")] = 0.0
-    """Shaft speed [rpm], for the centrifugal load of the rollers and for the kinematics."""
+    """Shaft speed [rpm], or with a unit or of the cage, e.g. "10000 rpm cage", for the centrifugal load of the rollers
+    and for the kinematics."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

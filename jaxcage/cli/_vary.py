@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._errors import ArgumentError, InputError
-from .._parameters import parameter_info, replace
+from .._parameters import parameter_info, replace, within
 from ..design import CAGE_PARAMETERS, Scatter, rayleigh, uniform, usual_bounds
 from ..io import Whose, cage_rpm, configuration, model_from, to_si, whole_bearing_from
 from ..models import BearingModel, CageModel
@@ -156,7 +156,7 @@ def _check_range(name: str, values: Sequence[float] | np.ndarray, model: CageMod
     unit = "rad/s" if name == SPEED else "" if info is None or info.unit == "1" else info.unit
     allowed = "above 0" if name == SPEED else f"from {low:g} to {high:g}"
     for value in values:
-        if not (low <= value <= high and math.isfinite(value) and (name != SPEED or value > 0)):
+        if not (within(value, low, high) and math.isfinite(value) and (name != SPEED or value > 0)):
             raise ValueError(f"must stay {allowed} {unit}".rstrip() + f", but holds {value:g}.")
 
 

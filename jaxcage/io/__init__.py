@@ -59,7 +59,13 @@ from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
 from ._shown_units import UNIT as UNIT, ShownUnits as ShownUnits
-from ._speeds import SpeedOf as SpeedOf, Whose as Whose, cage_rpm as cage_rpm, split_owner as split_owner
+from ._speeds import (
+    SpeedOf as SpeedOf,
+    Whose as Whose,
+    cage_rpm as cage_rpm,
+    shaft_rpm as shaft_rpm,
+    split_owner as split_owner,
+)
 from ._tables import write_tables as write_tables
 from ._template import Subject as Subject, template as template, write_template as write_template
 from ._units import to_si as to_si

@@ -12,7 +12,7 @@ import equinox as eqx
 
 from .._arguments import options
 from .._errors import InputError
-from .._parameters import ParameterInfo, allowed as must_be
+from .._parameters import ParameterInfo, allowed as must_be, within
 from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
 from ._ranges import Range, is_range, read_range
 from ._units import printable, shown, to_si
@@ -98,7 +98,7 @@ def _read_number(name: str, value: Any, info: ParameterInfo) -> float:
     except OverflowError as error:  # of a whole number
         raise ConfigError(f"{allowed}, but is {shown(value)}.") from error
     for each in (number.range.lower, number.range.upper) if isinstance(number, Known) else (number,):
-        if not math.isfinite(each) or not info.lower <= each <= info.upper:
+        if not math.isfinite(each) or not within(each, info.lower, info.upper):
             given = f' (given as "{printable(value)}")' if isinstance(value, str) else ""
             raise ConfigError(f"{allowed}, but is {each:g}{unit}{given}.")
     return number

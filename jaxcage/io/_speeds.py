@@ -35,5 +35,13 @@ class SpeedOf(float):
 
 def cage_rpm(value: float, unsaid: Whose, cage_speed_ratio: float) -> float:
     """The cage's speed [rpm] that `value` means: the shaft's if it says so, or if `unsaid` does for it."""
-    whose = value.whose if isinstance(value, SpeedOf) else unsaid
-    return float(value) * (cage_speed_ratio if whose == "shaft" else 1.0)
+    return float(value) * (cage_speed_ratio if _whose(value, unsaid) == "shaft" else 1.0)
+
+
+def shaft_rpm(value: float, unsaid: Whose, cage_speed_ratio: float) -> float:
+    """The shaft's speed [rpm] that `value` means: the cage's if it says so, or if `unsaid` does for it."""
+    return float(value) / (cage_speed_ratio if _whose(value, unsaid) == "cage" else 1.0)
+
+
+def _whose(value: float, unsaid: Whose) -> Whose:
+    return value.whose if isinstance(value, SpeedOf) else unsaid

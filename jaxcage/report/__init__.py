@@ -127,6 +127,7 @@ from ._slopes import (
     gradient_table as gradient_table,
     homogeneity_notes as homogeneity_notes,
     missing_notes as missing_notes,
+    not_fixed as not_fixed,
     slopes_document as slopes_document,
     source_document as source_document,
     source_notes as source_notes,

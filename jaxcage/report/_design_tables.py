@@ -144,7 +144,7 @@ def bearing_budget_table(budget: BearingBudget, tolerance: float) -> Table:
     }
     title = (
         f"{budget.measure.replace('_', ' ').capitalize()} of {budget.value:.4g}{unit} under +-{tolerance:g} % of "
-        f"everything: standard deviation {budget.total:.3g}{unit}"
+        f"each of these: standard deviation {budget.total:.3g}{unit}"
     )
     return Table.of(title, columns, sorted(budget.deviation, key=lambda n: -budget.deviation[n]))
 
@@ -155,7 +155,7 @@ def budget_table(budget: ToleranceBudget, tolerance: float) -> Table:
     share = lambda item: f"{100 * (item[1] / budget.total_rpm) ** 2:.0f} %"
     columns = {"parameter": "{[0]}", "rpm": "{[1]:.3g}", "share of variance": share}
     title = (
-        f"{budget.edge.capitalize()} at {budget.speed_rpm:.1f} rpm under +-{tolerance:g} % of everything: "
+        f"{budget.edge.capitalize()} at {budget.speed_rpm:.1f} rpm under +-{tolerance:g} % of all but constants: "
         f"standard deviation {budget.total_rpm:.3g} rpm"
     )
     return Table.of(title, columns, order[:MOST])

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from .._errors import ArgumentError
-from .._parameters import parameter_info, parameters, replace
+from .._parameters import parameter_info, parameters, replace, within
 from ..integrate import AbstractMethod
 from ..models import BearingModel, CageModel
 from ..orbits import Curve, Point, bifurcation, curve
@@ -80,7 +80,7 @@ def parameter_axis(
     )
     unit = "" if info.unit == "1" else f" {info.unit}"
     for argument, given in (("lower", low), ("upper", high)):
-        if not info.lower <= given <= info.upper:
+        if not within(given, info.lower, info.upper):
             allowed = f"a value of {name} from {info.lower:g} to {info.upper:g}{unit}"
             raise ArgumentError(argument, said=f"must be {allowed}, but {given:g}{unit} was given.")
     if not low < value < high:

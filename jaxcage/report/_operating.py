@@ -15,6 +15,8 @@ from ._zone_tables import zone_span
 
 CLOSE = 0.05
 """An edge nearer than this share of the speed is called close."""
+INSIDE = ("inside", "partly inside")
+"""States of what is, at some speed at least, in a zone."""
 _RANGE = re.compile(r"\s*([\d.]+(?:e\d+)?)\s*([a-z/]*)\s*(?:(?:-|–|to)\s*([\d.]+(?:e\d+)?)\s*(.*?))?\s*", re.IGNORECASE)
 
 
@@ -40,7 +42,7 @@ class Verdict:
     """What the zones of one kind say of an operating speed."""
 
     state: str
-    """`inside`, `close`, `clear` or `unknown`."""
+    """`inside`, `partly inside`, `in transient chaos`, `partly in transient chaos`, `close`, `clear` or `unknown`."""
     where: str
     """In which zone, or why nothing is known."""
     edge: str = ""
@@ -107,14 +109,21 @@ def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:
     if at.low_rpm < rpm[0] - 1e-6 or at.high_rpm > rpm[-1] + 1e-6:
         return Verdict("unknown", f"not swept: the sweep goes from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm")
     found = _verdict(at, zones.zones)
+    inside = found.state in INSIDE
     dying = [z for z in zones.transient if _meets(at, z)]
+<<<<<<< HEAD
     if dying and found.state != "inside":
         lives = [life.seconds for z in dying for life in z.life or ()]
+=======
+    if dying and not inside:
+        lives = [life * 60 / at.low_rpm for z in dying for life in z.life or ()]
+>>>>>>> hy
         often = f", mean life up to {max(lives):.2g} s after each disturbance" if lives else ""
-        return dataclasses.replace(found, state="inside", where=f"in transient chaos{often}")
+        state = f"{'' if _held(at, dying) else 'partly '}in transient chaos"
+        return dataclasses.replace(found, state=state, where=f"{state}{often}")
     beside = (rpm >= at.low_rpm - zones.resolution_rpm) & (rpm <= at.high_rpm + zones.resolution_rpm)
     lost = int(np.sum(sweep.failed[beside]))
-    if lost and found.state != "inside":
+    if lost and not inside:
         return Verdict("unknown", f"{lost} simulations beside it failed: nothing is known")
     return found
 
@@ -131,7 +140,8 @@ def loss_verdict(at: Operating, zones: Sequence[Zone], lower_rpm: float, upper_r
 def _verdict(at: Operating, zones: Sequence[Zone]) -> Verdict:
     inside = [str(i) for i, z in enumerate(zones, start=1) if _meets(at, z)]
     numbers = f"zone{'s' if len(inside) > 1 else ''} {' and '.join(inside)}"
-    where = f"in {numbers}" if inside else "outside all zones"
+    partly = "" if _held(at, zones) else "partly "
+    where = f"{partly}in {numbers}" if inside else "outside all zones"
     edges = [
         (f"zone {i} {end}", edge)
         for i, zone in enumerate(zones, start=1)
@@ -139,20 +149,23 @@ def _verdict(at: Operating, zones: Sequence[Zone]) -> Verdict:
         if edge is not None
     ]
     if not edges:
-        return Verdict("inside" if inside else "clear", where)
+        return Verdict(f"{partly}inside" if inside else "clear", where)
     name, edge = min(edges, key=lambda e: _distance(at, e[1]))
     away = _distance(at, edge)
     percent = 100 * away / (at.high_rpm if edge.speed_rpm > at.high_rpm else at.low_rpm)
     near = away <= edge.uncertainty_rpm or percent < 100 * CLOSE
-    if inside and not any(low <= at.low_rpm and at.high_rpm <= high for low, high in map(zone_span, zones)):
-        where = f"partly {where}"
-    state = "inside" if inside else "close" if near else "clear"
+    state = f"{partly}inside" if inside else "close" if near else "clear"
     return Verdict(state, where, f"{name}, {edge}".replace("+-", "±"), edge.speed_rpm, away, percent)
 
 
 def _meets(at: Operating, zone: Zone) -> bool:
     low, high = zone_span(zone)
     return low <= at.high_rpm and at.low_rpm <= high
+
+
+def _held(at: Operating, zones: Sequence[Zone]) -> bool:
+    """Whether all of it is in one of the zones."""
+    return any(low <= at.low_rpm and at.high_rpm <= high for low, high in map(zone_span, zones))
 
 
 def _distance(at: Operating, edge: Edge) -> float:

@@ -156,7 +156,8 @@ _SECTIONS = {
 }
 
 
-_STATES = {"inside": "inside", "close": "close to", "clear": "clear of", "unknown": "not known for"}
+_STATES = {"close": "close to", "clear": "clear of", "unknown": "not known for"}
+"""States as they are said before a kind of zone; others are said as they are."""
 
 
 def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
@@ -172,12 +173,16 @@ def _summary(findings: Findings, assessed: list[Assessed]) -> list[str]:
     if calm is not None:
         said.append(f"The widest range outside all zones goes from {calm[0]:.0f} to {calm[1]:.0f} rpm.")
     for j in assessed:
-        states = [f"{_STATES[v.state]} {kind} zones" for kind, v in j.verdicts.items()]
+        states = [_state_words(kind, v.state) for kind, v in j.verdicts.items()]
         said.append(f"{_with_shaft(findings, j.at)}: {', '.join(states)}.")
     said.append(f"All of this rests on two readings: {readings_words(findings.model)}.")
     if np.any(swept.failed):
         said.append(f"{int(np.sum(swept.failed))} of {swept.failed.size} simulations failed: nothing is known of them.")
     return said
+
+
+def _state_words(kind: str, state: str) -> str:
+    return state if state.endswith("chaos") else f"{_STATES.get(state, state)} {kind} zones"
 
 
 def _of_the_unknown(chances: Ensemble | None, left: Sequence[str]) -> list[str]:

@@ -43,6 +43,12 @@ def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensit
     ]
 
 
+def not_fixed(model: CageModel, names: Iterable[str]) -> list[str]:
+    """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
+    info = parameter_info(model)
+    return [n for n in names if info[n].kind != "fixed" or n.startswith(EXTRA)]
+
+
 ONSET, EXIT = "zone 1 onset", "zone 1 exit"
 EXPECTED = (ONSET, EXIT, "zone 2 onset")
 
@@ -99,7 +105,10 @@ def gradient_document(edges: Mapping[str, Sensitivity], wide: Sensitivity | None
 
 
 def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Table:
-    """One edge or width: guidance gap and eccentricity on top, then by elasticity; what does not move it is counted."""
+    """One edge or width: guidance gap and eccentricity on top, then by elasticity; what does not move it is counted.
+
+    All of this is about the cage's speed: the shaft's also moves with all that enters their ratio, such as diameters.
+    """
     slope, change = sensitivity.derivative, sensitivity.elasticity
     moving = [n for n in slope if slope[n] != 0.0 or n in FIRST]
     order = sorted(moving, key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])))
@@ -112,8 +121,8 @@ def gradient_table(name: str, model: CageModel, sensitivity: Sensitivity) -> Tab
     if set(FIRST) <= set(change):
         rows.insert(len(FIRST), (FIXED_RHO, "", "", "", _elasticity_cell(at_fixed_rho(change))))
     still = len(slope) - len(moving)
-    columns = ("parameter", "value", "unit", "rpm per unit", "elasticity")
-    return Table(title + (f"; {still} other parameters do not move it" if still else ""), columns, rows)
+    columns = ("parameter", "value", "unit", "rpm of the cage per unit", "elasticity")
+    return Table(title + (f"; {still} other parameters do not move the cage's speed" if still else ""), columns, rows)
 
 
 def _elasticity_cell(value: float) -> str:
