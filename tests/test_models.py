@@ -240,6 +240,52 @@ def test_default_starts_are_of_the_order_of_the_scale():
     np.testing.assert_allclose(np.array(small.starts(1.0)) / (1e-6, 1e-2), plain.starts(1.0), rtol=1e-15)
 
 
+class Driven(eqx.Module):
+    """A pendulum that is driven at a multiple of the revolution."""
+
+    multiple: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        return (-0.1 * v[0] - 1e6 * jnp.sin(q[0]) + 0.3 * jnp.cos(self.multiple * tau),)
+
+
+@pytest.mark.parametrize("multiple", [1.5, 0.5, 1.01, jnp.sqrt(2.0), 1 / 3])
+def test_a_law_that_does_not_repeat_is_refused(multiple):
+    """The phase begins anew every revolution: its motion would be another one, and nothing said so."""
+    with pytest.raises(
+        ValueError, match=r"The law `acceleration.* must repeat after one revolution \(tau -> tau \+ 2 pi"
+    ):
+        jc.ForcedOscillator(Driven(jnp.asarray(multiple)), coordinates=1)
+    with pytest.raises(ValueError, match="The law `rates.* take the slowest forcing as the revolution"):
+        jc.ForcedSystem(lambda tau, y, speed: (-y[0] + jnp.cos(multiple * tau),), 1)
+    with pytest.raises(ValueError, match="must repeat after one revolution"):  # in time
+        jc.ForcedSystem(lambda tau, y, speed: (-y[0] + jnp.cos(3 * tau / speed),), 1)
+
+
+def test_laws_that_repeat_are_taken():
+    """Also those of which single precision, or rounding where forces cancel, leaves little."""
+    pulse = lambda tau, q, v, speed: (-q[0] + jnp.exp(-(((jnp.mod(tau, 2 * jnp.pi) - 3) / 0.01) ** 2)),)
+    cancels = lambda tau, q, v, speed: (jnp.cos(tau) ** 2 + jnp.sin(tau) ** 2 - 1 - q[0],)
+    undefined = lambda tau, q, v, speed: (jnp.cos(tau) / q[0] + jnp.log(q[0]),)
+    for law in (Driven(jnp.asarray(1.0)), Driven(jnp.asarray(97.0)), pulse, cancels, undefined, SPRING):
+        assert jc.ForcedOscillator(law, coordinates=1, harmonics=97).dimension == 2
+
+
+def test_systems_are_made_under_transformations():
+    def force(multiple):
+        system = jc.ForcedOscillator(Driven(multiple), coordinates=1)
+        return system.at_speed(1.0)(0.3, (0.1, 0.2))[1]
+
+    def beside(x):
+        return x * jc.ForcedOscillator(SPRING, coordinates=1).at_speed(1.0)(0.3, (0.1, 0.2))[1]
+
+    for f in (force, beside):
+        value = f(2.0)
+        np.testing.assert_allclose(jax.jit(f)(2.0), value)
+        np.testing.assert_allclose(jax.vmap(f)(jnp.array([2.0, 2.0])), [value, value])
+        assert np.isfinite(jax.grad(f)(2.0))
+
+
 SMOOTH = jc.case("1a")
 
 

@@ -18,7 +18,7 @@ from .._arguments import checked, shown
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ._field import AbstractField, FirstOrderField, SecondOrderField
-from ._user_law import components
+from ._user_law import components, require_repeats
 
 
 ESCAPE = 2.0
@@ -117,6 +117,10 @@ def _kept_harmonics(harmonics: int) -> int:
     return int(harmonics)
 
 
+_RATES = "The law `rates(tau, y, speed)`"
+_ACCELERATION = "The law `acceleration(tau, q, v, speed)`"
+
+
 class _UsersSystem(AbstractForcedSystem):
     """What a user's function does not say: it is the same for first and second order."""
 
@@ -138,6 +142,11 @@ class _UsersSystem(AbstractForcedSystem):
     def starts(self, speed: Scalar) -> tuple[State, ...]:
         given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
         return given or tuple(tuple(map(jnp.asarray, s)) for s in _default_starts(self._magnitudes))
+
+    def _probes(self) -> list[State]:
+        """States in which the law is looked at: at rest only the forcing is seen."""
+        rows = [(0.0,) * self.dimension, *(self._starts or _default_starts(self._magnitudes))[:2]]
+        return [tuple(map(np.float64, row)) for row in rows]
 
     def excursion(self, y: State) -> Scalar:
         return 0.0
@@ -162,19 +171,22 @@ class ForcedSystem(_UsersSystem):
         harmonics: int = 1,
     ):
         """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
-        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps;
-        highest harmonic of the revolution in the law.
+        parameters), the same at tau and tau + 2 pi; number of state components; characteristic magnitude of the
+        components; initial states for sweeps; highest harmonic of the revolution in the law.
+
+        **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
         self.rates, self._dimension = rates, dimension
         self._scale, self._starts = _kept_scale(scale, dimension), _kept_starts(starts, dimension)
         self._harmonics = _kept_harmonics(harmonics)
+        require_repeats(_RATES, rates, [(y,) for y in self._probes()], dimension, harmonics)
 
     @property
     def dimension(self) -> int:
         return self._dimension
 
     def at_speed(self, speed: Scalar) -> AbstractField:
-        return FirstOrderField(_Bound(self.rates, speed, "The law `rates(tau, y, speed)`"), speed)
+        return FirstOrderField(_Bound(self.rates, speed, _RATES), speed)
 
 
 class ForcedOscillator(_UsersSystem):
@@ -204,19 +216,24 @@ class ForcedOscillator(_UsersSystem):
         harmonics: int = 1,
     ):
         """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
-        parameters), with velocities v = dq/dt; number of coordinates; characteristic magnitude of the state components
-        (coordinates first); initial states (q, v) for sweeps; highest harmonic of the revolution in the law.
+        parameters), the same at tau and tau + 2 pi, with velocities v = dq/dt; number of coordinates; characteristic
+        magnitude of the state components (coordinates first); initial states (q, v) for sweeps; highest harmonic of
+        the revolution in the law.
+
+        **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
         self.acceleration, self.coordinates = acceleration, coordinates
         self._scale, self._starts = _kept_scale(scale, 2 * coordinates), _kept_starts(starts, 2 * coordinates)
         self._harmonics = _kept_harmonics(harmonics)
+        states = [(y[:coordinates], y[coordinates:]) for y in self._probes()]
+        require_repeats(_ACCELERATION, acceleration, states, coordinates, harmonics)
 
     @property
     def dimension(self) -> int:
         return 2 * self.coordinates
 
     def at_speed(self, speed: Scalar) -> AbstractField:
-        return SecondOrderField(_Bound(self.acceleration, speed, "The law `acceleration(tau, q, v, speed)`"), speed)
+        return SecondOrderField(_Bound(self.acceleration, speed, _ACCELERATION), speed)
 
 
 class _Bound(eqx.Module):
