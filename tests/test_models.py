@@ -267,7 +267,8 @@ def test_laws_that_repeat_are_taken():
     pulse = lambda tau, q, v, speed: (-q[0] + jnp.exp(-(((jnp.mod(tau, 2 * jnp.pi) - 3) / 0.01) ** 2)),)
     cancels = lambda tau, q, v, speed: (jnp.cos(tau) ** 2 + jnp.sin(tau) ** 2 - 1 - q[0],)
     undefined = lambda tau, q, v, speed: (jnp.cos(tau) / q[0] + jnp.log(q[0]),)
-    for law in (Driven(jnp.asarray(1.0)), Driven(jnp.asarray(97.0)), pulse, cancels, undefined, SPRING):
+    random = lambda tau, q, v, speed: (-q[0] + np.random.default_rng().normal(),)  # said by who keeps its results
+    for law in (Driven(jnp.asarray(1.0)), Driven(jnp.asarray(97.0)), pulse, cancels, undefined, random, SPRING):
         assert jc.ForcedOscillator(law, coordinates=1, harmonics=97).dimension == 2
 
 
