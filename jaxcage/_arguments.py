@@ -24,7 +24,7 @@ MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
 LEAST: dict[str, int] = {
     **dict.fromkeys(["blocks", "keep", "count", "steps", "lanes", "period", "rows", "columns", "starts", "workers"], 1),
-    **dict.fromkeys(["coordinates", "dimension", "n_rollers", "profiles", "stations", "substeps"], 1),
+    **dict.fromkeys(["coordinates", "dimension", "n_rollers", "periods", "profiles", "stations", "substeps"], 1),
     **dict.fromkeys(["discard", "horizon", "exponents", "strobe", "samples", "seed", "persist"], 0),
 }
 """Of counts by their names; others have a least value of their own, which their function knows."""

@@ -599,12 +599,32 @@ def test_criticality_on_a_self_excited_orbit(name):
     [
         (dict(lower=2.0, upper=1.0), "`upper` must be above `lower`, but they are 1 and 2"),
         (dict(lower=1.0, upper=1.0), "`upper` must be above `lower`, but they are 1 and 1"),
+        (dict(lower=0.0, upper=1.0), "`lower` must be positive where the speed is followed, but 0 was given"),
+        (dict(lower=0.5, upper=np.inf), "`lower` and `upper` must be finite, but are 0.5 and inf"),
+        (dict(parameter="g", lower=-np.inf, upper=1.0), "`lower` and `upper` must be finite, but are -inf and 1"),
+        (dict(lower=1.0, upper=2.0), "`orbit` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"),
         (dict(parameter="m", lower=0.0, upper=1.0), "`parameter` must be one of speed, d, k, g, but 'm' was given"),
     ],
 )
 def test_bad_arguments(settings, sentence):
     with pytest.raises(ValueError, match=sentence):
         jc.branch(hardening(), ((0.5, 0.0), 0.8), method=METHOD, speed=0.8, **settings)
+
+
+def test_an_orbit_at_the_end_of_the_range_is_followed():
+    """Also where rounding puts it just beyond."""
+    beyond = np.nextafter(0.8, 0.0)
+    steps = jc.orbits.Steps(most=2)
+    branch = jc.branch(hardening(), ((0.5, 0.0), beyond), lower=0.8, upper=1.5, steps=steps, method=METHOD)
+    assert branch.value.max() > 0.8 and branch.ended == ("range", "steps")
+
+
+def test_many_branches_and_cascades_ask_for_a_range_too():
+    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
+    with pytest.raises(ValueError, match="`orbits` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"):
+        jc.orbits.branches([hardening()], [orbit], lower=1.0, upper=2.0, method=METHOD)
+    with pytest.raises(ValueError, match="`lower` must be positive"):
+        jc.orbits.branches([hardening()], [orbit], lower=-1.0, upper=2.0, method=METHOD)
 
 
 def test_parameter_without_a_speed():

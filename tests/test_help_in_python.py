@@ -105,6 +105,7 @@ def test_what_steers_by_its_findings_says_what_to_call_instead(run):
         (lambda tau, q, v, speed: (-q[0] if q[0] > 0 else q[0],), r"`jnp.where\(x > 0, a, b\)`"),
         (lambda tau, q, v, speed: -q[0], r"must return a tuple of 1 scalar, .*: a single one is written `\(a,\)`"),
         (lambda tau, q, v, speed: (-q[0], -v[0]), "must return a tuple of 1 scalar, .* but returned 2"),
+        (lambda tau, q, v, speed: (jax.lax.complex(jnp.cos(tau), q[0]),), "one of them is complex: take `jnp.real`"),
         (lambda tau, q, v, speed: (-jnp.stack(q),), r"but one of them has shape \(1,\)"),
         (lambda tau, q, v, speed: None, r"but returned nothing \(is there a `return`\?\)"),
     ],
@@ -113,3 +114,10 @@ def test_a_law_of_ones_own_that_is_wrong_is_explained(law, said: str):
     system = jc.ForcedOscillator(law, coordinates=1)
     with pytest.raises(ValueError, match="The law `acceleration.*" + said):
         jc.simulate(system, 1.0, revolutions=1, method=jc.method("rk4", steps=64))
+
+
+def test_whole_numbers_of_a_law_are_numbers():
+    """They had no derivative, which JAX said about `float0`."""
+    system = jc.ForcedSystem(lambda tau, y, speed: (1, y[0] > 2), dimension=2, scale=10.0)
+    after = jc.strobe_map(system, 1.0, jc.method("rodas4", steps=64))((0.0, 0.0))
+    np.testing.assert_allclose(after.y[0], 2 * np.pi)

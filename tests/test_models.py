@@ -192,6 +192,101 @@ def test_harmonics_of_a_system_of_ones_own():
     assert jc.ForcedSystem(rates, 1, harmonics=3).harmonics == 3
 
 
+SPRING = lambda tau, q, v, speed: (-q[0] - 0.1 * v[0] + jnp.cos(tau),)
+
+
+@pytest.mark.parametrize(
+    "settings, said",
+    [
+        (dict(scale=0.0), "`scale` must be a positive finite number or 2 of them.*, but 0.0 was given"),
+        (dict(scale=-1), "`scale` must be .*, but -1 was given"),
+        (dict(scale=np.inf), "`scale` must be .*, but inf was given"),
+        (dict(scale=(1.0,)), r"`scale` must be .* 2 of them, .*, but \(1.0,\) was given"),
+        (dict(scale=()), r"`scale` must be .*, but \(\) was given"),
+        (dict(scale=[1.0, -2.0]), r"`scale` must be .*, but \[1.0, -2.0\] was given"),
+        (dict(scale=np.ones((2, 2))), r"`scale` must be .*, but an array of shape \(2, 2\)"),
+        (
+            dict(starts=((0.1, 0.2, 0.3),)),
+            r"`starts` must be states of 2 finite numbers each, but \(0.1, 0.2, 0.3\) is",
+        ),
+        (dict(starts=((0.1, 0.2), (0.1, np.nan))), r"`starts` must be .*, but \(0.1, nan\) is among them"),
+        (dict(starts=(0.1, 0.2)), "`starts` must be "),
+        (dict(starts=3.0), "`starts` must be "),
+        (dict(harmonics=0), "`harmonics` must be a whole number from 1 to 4096, but 0 was given"),
+        (dict(harmonics=5000), "`harmonics` must be .*, but 5000 was given"),
+        (dict(harmonics=2.5), "`harmonics` must be a whole number, but 2.5"),
+    ],
+)
+def test_settings_of_a_system_of_ones_own_are_compared(settings, said):
+    rates = lambda tau, y, speed: (y[1], -y[0] - 0.1 * y[1] + jnp.cos(tau))
+    with pytest.raises(ValueError, match=said):
+        jc.ForcedOscillator(SPRING, 1, **settings)
+    with pytest.raises(ValueError, match=said):
+        jc.ForcedSystem(rates, 2, **settings)
+
+
+def test_rows_of_numbers_may_be_of_any_kind():
+    for scale in ((2, 3), [2.0, 3.0], np.array([2.0, 3.0]), jnp.array([2, 3])):
+        for starts in ([[0, 1], [1, 0]], np.array([[0.0, 1.0], [1.0, 0.0]]), (jnp.array([0.0, 1.0]), (1.0, 0.0))):
+            system = jc.ForcedOscillator(SPRING, 1, scale=scale, starts=starts, harmonics=2)
+            assert list(map(float, system.scale(1.0))) == [2.0, 3.0]
+            np.testing.assert_array_equal(system.starts(1.0), [[0.0, 1.0], [1.0, 0.0]])
+    assert hash(jax.tree.structure(system))  # none of them is left an array
+
+
+def test_default_starts_are_of_the_order_of_the_scale():
+    plain, small = jc.ForcedOscillator(SPRING, 1), jc.ForcedOscillator(SPRING, 1, scale=(1e-6, 1e-2))
+    np.testing.assert_array_equal(plain.starts(1.0), [[0.1, 0.2], [0.9, -0.4], [-0.6, 0.8]])
+    np.testing.assert_allclose(np.array(small.starts(1.0)) / (1e-6, 1e-2), plain.starts(1.0), rtol=1e-15)
+
+
+class Driven(eqx.Module):
+    """A pendulum that is driven at a multiple of the revolution."""
+
+    multiple: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        return (-0.1 * v[0] - 1e6 * jnp.sin(q[0]) + 0.3 * jnp.cos(self.multiple * tau),)
+
+
+@pytest.mark.parametrize("multiple", [1.5, 0.5, 1.01, jnp.sqrt(2.0), 1 / 3])
+def test_a_law_that_does_not_repeat_is_refused(multiple):
+    """The phase begins anew every revolution: its motion would be another one, and nothing said so."""
+    with pytest.raises(
+        ValueError, match=r"The law `acceleration.* must repeat after one revolution \(tau -> tau \+ 2 pi"
+    ):
+        jc.ForcedOscillator(Driven(jnp.asarray(multiple)), coordinates=1)
+    with pytest.raises(ValueError, match="The law `rates.* take the slowest forcing as the revolution"):
+        jc.ForcedSystem(lambda tau, y, speed: (-y[0] + jnp.cos(multiple * tau),), 1)
+    with pytest.raises(ValueError, match="must repeat after one revolution"):  # in time
+        jc.ForcedSystem(lambda tau, y, speed: (-y[0] + jnp.cos(3 * tau / speed),), 1)
+
+
+def test_laws_that_repeat_are_taken():
+    """Also those of which single precision, or rounding where forces cancel, leaves little."""
+    pulse = lambda tau, q, v, speed: (-q[0] + jnp.exp(-(((jnp.mod(tau, 2 * jnp.pi) - 3) / 0.01) ** 2)),)
+    cancels = lambda tau, q, v, speed: (jnp.cos(tau) ** 2 + jnp.sin(tau) ** 2 - 1 - q[0],)
+    undefined = lambda tau, q, v, speed: (jnp.cos(tau) / q[0] + jnp.log(q[0]),)
+    random = lambda tau, q, v, speed: (-q[0] + np.random.default_rng().normal(),)  # said by who keeps its results
+    for law in (Driven(jnp.asarray(1.0)), Driven(jnp.asarray(97.0)), pulse, cancels, undefined, random, SPRING):
+        assert jc.ForcedOscillator(law, coordinates=1, harmonics=97).dimension == 2
+
+
+def test_systems_are_made_under_transformations():
+    def force(multiple):
+        system = jc.ForcedOscillator(Driven(multiple), coordinates=1)
+        return system.at_speed(1.0)(0.3, (0.1, 0.2))[1]
+
+    def beside(x):
+        return x * jc.ForcedOscillator(SPRING, coordinates=1).at_speed(1.0)(0.3, (0.1, 0.2))[1]
+
+    for f in (force, beside):
+        value = f(2.0)
+        np.testing.assert_allclose(jax.jit(f)(2.0), value)
+        np.testing.assert_allclose(jax.vmap(f)(jnp.array([2.0, 2.0])), [value, value])
+        assert np.isfinite(jax.grad(f)(2.0))
+
+
 SMOOTH = jc.case("1a")
 
 

@@ -382,3 +382,27 @@ def strobe(model, speed, z, method):
     strobe = jc.strobe_map(model, speed, method)
     stretch = strobe(tuple(z[i] * strobe.scale[i] for i in range(4)))
     return jnp.stack([c / s for c, s in zip(stretch.y, strobe.scale, strict=True)]), stretch.peak
+
+
+def van_der_pol(tau, y, speed):
+    x, u = y
+    return u, 0.5 * (1 - x * x) * u - x
+
+
+def test_an_equilibrium_is_no_self_excited_orbit():
+    """It closes after any period, and Newton's method finds it from nearby."""
+    system = jc.ForcedSystem(van_der_pol, dimension=2)
+    still = jc.periodic_orbit(system, 1.0, guess=(0.05, 0.0), period="free")
+    assert still.status == "equilibrium" and not still.converged and not still.stable
+    assert np.all(np.isnan(still.state)) and "led to an equilibrium, which has no period" in str(still)
+    orbit = jc.periodic_orbit(system, 1.0, guess=(1.9, 0.3), period="free")
+    assert orbit.status == "converged" and not orbit.equilibrium and abs(orbit.state[0]) > 1
+    small = jc.ForcedSystem(lambda tau, y, speed: tuple(1e-4 * c for c in van_der_pol(tau, _times(y), speed)), 2)
+    orbit = jc.periodic_orbit(small, 1.0, guess=(1.9e-4, 0.3e-4), period="free")
+    assert orbit.status == "converged" and abs(orbit.state[0]) > 1e-4  # a ten-thousandth of the scale is no rest
+    driven = jc.ForcedSystem(lambda tau, y, speed: (-y[0],), 1)
+    assert jc.periodic_orbit(driven, 1.0, guess=(0.1,)).status == "converged"
+
+
+def _times(y):
+    return tuple(1e4 * c for c in y)

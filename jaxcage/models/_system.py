@@ -5,20 +5,27 @@ Everything above this layer (integration, analysis, design) works on `AbstractFo
 """
 
 import abc
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
 
-from .._arguments import checked
+from .._arguments import checked, shown
+from .._errors import ArgumentError
 from .._types import Scalar, State
 from ._field import AbstractField, FirstOrderField, SecondOrderField
-from ._user_law import components
+from ._user_law import components, require_repeats
 
 
 ESCAPE = 2.0
 """Excursion beyond which a lane has left the model for good."""
+MOST_HARMONICS = 4096
+"""Of a law: a sweep takes a few steps in the period of the highest."""
+Numbers = Sequence[Scalar] | np.ndarray | Array
 
 
 class AbstractForcedSystem(eqx.Module):
@@ -67,10 +74,51 @@ class AbstractForcedSystem(eqx.Module):
         """
 
 
-def _default_starts(dimension: int) -> tuple[State, ...]:
-    """Three distinct states of order one: no symmetry of the system should map one to another."""
+def _default_starts(scale: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+    """Three distinct states of the order of the scale: no symmetry of the system should map one to another."""
     patterns = ((0.1, 0.2, -0.1, 0.15), (0.9, -0.4, 0.3, 0.7), (-0.6, 0.8, -0.5, -0.2))
-    return tuple(tuple(jnp.asarray(p[i % 4] * (1 + i // 4)) for i in range(dimension)) for p in patterns)
+    return tuple(tuple(p[i % 4] * (1 + i // 4) * s for i, s in enumerate(scale)) for p in patterns)
+
+
+def _finite(values: Any) -> tuple[float, ...] | None:
+    """A row of finite numbers as floats, None if it is anything else."""
+    try:
+        row = tuple(map(float, values))
+    except (TypeError, ValueError, OverflowError):  # of another kind, ragged, or traced
+        return None
+    return row if all(map(math.isfinite, row)) else None
+
+
+def _kept_scale(scale: Any, dimension: int) -> float | tuple[float, ...]:
+    """The scale as it is kept."""
+    single = isinstance(scale, int | float) or np.shape(scale) == ()
+    row = _finite((scale,) if single else scale)
+    if row is None or min(row, default=0.0) <= 0 or (not single and len(row) != dimension):
+        said = f"must be a positive finite number or {dimension} of them, one for each component of the state"
+        raise ArgumentError("scale", said=f"{said}, but {shown(scale)} was given.")
+    return row[0] if single else row
+
+
+def _kept_starts(starts: Any, dimension: int) -> tuple[tuple[float, ...], ...]:
+    """The starts as they are kept."""
+    rows = tuple(map(_finite, starts))
+    for given, row in zip(starts, rows, strict=True):
+        if row is None or len(row) != dimension:
+            said = f"must be states of {dimension} finite number{'s' if dimension > 1 else ''} each"
+            raise ArgumentError("starts", said=f"{said}, but {shown(given)} is among them.")
+    return tuple(row for row in rows if row is not None)
+
+
+def _kept_harmonics(harmonics: int) -> int:
+    """The highest harmonic as it is kept."""
+    if not 1 <= harmonics <= MOST_HARMONICS:
+        said = f"must be a whole number from 1 to {MOST_HARMONICS}, but {shown(harmonics)} was given."
+        raise ArgumentError("harmonics", said=said)
+    return int(harmonics)
+
+
+_RATES = "The law `rates(tau, y, speed)`"
+_ACCELERATION = "The law `acceleration(tau, q, v, speed)`"
 
 
 class _UsersSystem(AbstractForcedSystem):
@@ -85,12 +133,20 @@ class _UsersSystem(AbstractForcedSystem):
         return self._harmonics
 
     def scale(self, speed: Scalar) -> State:
-        values = self._scale if isinstance(self._scale, tuple) else (self._scale,) * self.dimension
-        return tuple(jnp.asarray(s, dtype=float) for s in values)
+        return tuple(jnp.asarray(s, dtype=float) for s in self._magnitudes)
+
+    @property
+    def _magnitudes(self) -> tuple[float, ...]:
+        return self._scale if isinstance(self._scale, tuple) else (self._scale,) * self.dimension
 
     def starts(self, speed: Scalar) -> tuple[State, ...]:
         given = tuple(tuple(jnp.asarray(c, dtype=float) for c in s) for s in self._starts)
-        return given or _default_starts(self.dimension)
+        return given or tuple(tuple(map(jnp.asarray, s)) for s in _default_starts(self._magnitudes))
+
+    def _probes(self) -> list[State]:
+        """States in which the law is looked at: at rest only the forcing is seen."""
+        rows = [(0.0,) * self.dimension, *(self._starts or _default_starts(self._magnitudes))[:2]]
+        return [tuple(map(np.float64, row)) for row in rows]
 
     def excursion(self, y: State) -> Scalar:
         return 0.0
@@ -110,23 +166,27 @@ class ForcedSystem(_UsersSystem):
         self,
         rates: Callable[[Scalar, State, Scalar], State],
         dimension: int,
-        scale: float | tuple[float, ...] = 1.0,
-        starts: tuple[tuple[float, ...], ...] = (),
+        scale: Scalar | Numbers = 1.0,
+        starts: Sequence[Numbers] | np.ndarray | Array = (),
         harmonics: int = 1,
     ):
         """**Arguments:** `rates(tau, y, speed)`, a function or a module (whose arrays are then differentiable
-        parameters); number of state components; characteristic magnitude of the components; initial states for sweeps;
-        highest harmonic of the revolution in the law.
+        parameters), the same at tau and tau + 2 pi; number of state components; characteristic magnitude of the
+        components; initial states for sweeps; highest harmonic of the revolution in the law.
+
+        **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
-        self.rates, self._dimension, self._scale, self._starts = rates, dimension, scale, starts
-        self._harmonics = harmonics
+        self.rates, self._dimension = rates, dimension
+        self._scale, self._starts = _kept_scale(scale, dimension), _kept_starts(starts, dimension)
+        self._harmonics = _kept_harmonics(harmonics)
+        require_repeats(_RATES, rates, [(y,) for y in self._probes()], dimension, harmonics)
 
     @property
     def dimension(self) -> int:
         return self._dimension
 
     def at_speed(self, speed: Scalar) -> AbstractField:
-        return FirstOrderField(_Bound(self.rates, speed, "The law `rates(tau, y, speed)`"), speed)
+        return FirstOrderField(_Bound(self.rates, speed, _RATES), speed)
 
 
 class ForcedOscillator(_UsersSystem):
@@ -151,23 +211,29 @@ class ForcedOscillator(_UsersSystem):
         self,
         acceleration: Callable[[Scalar, State, State, Scalar], State],
         coordinates: int,
-        scale: float | tuple[float, ...] = 1.0,
-        starts: tuple[tuple[float, ...], ...] = (),
+        scale: Scalar | Numbers = 1.0,
+        starts: Sequence[Numbers] | np.ndarray | Array = (),
         harmonics: int = 1,
     ):
         """**Arguments:** `acceleration(tau, q, v, speed)`, a function or a module (whose arrays are then differentiable
-        parameters), with velocities v = dq/dt; number of coordinates; characteristic magnitude of the state components
-        (coordinates first); initial states (q, v) for sweeps; highest harmonic of the revolution in the law.
+        parameters), the same at tau and tau + 2 pi, with velocities v = dq/dt; number of coordinates; characteristic
+        magnitude of the state components (coordinates first); initial states (q, v) for sweeps; highest harmonic of
+        the revolution in the law.
+
+        **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
-        self.acceleration, self.coordinates, self._scale, self._starts = acceleration, coordinates, scale, starts
-        self._harmonics = harmonics
+        self.acceleration, self.coordinates = acceleration, coordinates
+        self._scale, self._starts = _kept_scale(scale, 2 * coordinates), _kept_starts(starts, 2 * coordinates)
+        self._harmonics = _kept_harmonics(harmonics)
+        states = [(y[:coordinates], y[coordinates:]) for y in self._probes()]
+        require_repeats(_ACCELERATION, acceleration, states, coordinates, harmonics)
 
     @property
     def dimension(self) -> int:
         return 2 * self.coordinates
 
     def at_speed(self, speed: Scalar) -> AbstractField:
-        return SecondOrderField(_Bound(self.acceleration, speed, "The law `acceleration(tau, q, v, speed)`"), speed)
+        return SecondOrderField(_Bound(self.acceleration, speed, _ACCELERATION), speed)
 
 
 class _Bound(eqx.Module):

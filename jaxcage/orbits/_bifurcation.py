@@ -130,8 +130,8 @@ def bifurcation(
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
     require_x64()
-    if not reach >= 0:
-        raise ArgumentError("reach", said=f"must be at least 0, but {reach:g} was given.")
+    if not 0 <= reach < float("inf"):
+        raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
     if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     free = is_free(period)

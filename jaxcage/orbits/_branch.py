@@ -23,6 +23,8 @@ from ._follower import (
     by_rodas4,
     in_a_row,
     make_follower,
+    require_range,
+    require_within,
     seeds,
     stable_steps,
     turned,
@@ -97,17 +99,16 @@ def branch(
 
     - `orbit`: an `Orbit`, or a pair (state, value of the parameter) near one.
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
-    - `lower`, `upper`: range of the parameter [SI].
+    - `lower`, `upper`: range of the parameter [SI], in which `orbit` lies.
     - `speed`: speed [rad/s] where it is not the parameter and `orbit` does not have it.
     - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
 
     **Returns:** `Branch`.
 
-    **Raises:** `ValueError` if there is no orbit to start from.
+    **Raises:** `ValueError` if there is no orbit to start from, or none in a finite range.
     """
     require_x64()
-    if not lower < upper:
-        raise ArgumentError("upper", said=f"must be above `lower`, but they are {upper:g} and {lower:g}.")
+    require_range(parameter, lower, upper)
     if isinstance(orbit, Orbit | Point):
         speed, periods = orbit.speed, int(orbit.periods)
         state, at = orbit.state, value_at(orbit, system, speed, parameter)
@@ -116,6 +117,7 @@ def branch(
     known_speed = at if parameter == SPEED else speed
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
+    require_within("orbit", float(at), lower, upper)
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
         follower = by_rodas4(follower)
@@ -145,6 +147,7 @@ def branches(
     **Returns:** a `Branch` per system; None where Newton's method finds no orbit to start from.
     """
     require_x64()
+    require_range(parameter, lower, upper)
     if not systems or len(systems) != len(orbits):
         raise ArgumentError(
             "systems", "orbits", said=f"must be as many, above 0, but are {len(systems)} and {len(orbits)}."
@@ -152,7 +155,9 @@ def branches(
     starts = []
     for system, orbit in zip(systems, orbits, strict=True):
         at = orbit.speed if speed is None else speed
-        starts.append((np.asarray(orbit.state), float(value_at(orbit, system, at, parameter))))
+        value = float(value_at(orbit, system, at, parameter))
+        require_within("orbits", value, lower, upper)
+        starts.append((np.asarray(orbit.state), value))
     known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)

@@ -14,7 +14,7 @@ from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
-from ._follower import Follower, make_follower
+from ._follower import Follower, make_follower, require_range
 from ._point import Point
 from ._singularity import test_functions
 
@@ -90,6 +90,7 @@ def doubled_branch(
     **Raises:** `ValueError` if the branch is not found.
     """
     require_x64()
+    require_range(parameter, lower, upper)
     if point.kind != "period-doubling":
         raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
     at, periods = float(point.value), int(point.periods)
@@ -138,6 +139,7 @@ def cascade(
     **Returns:** `Cascade`.
     """
     require_x64()
+    require_range(parameter, lower, upper)
     fixed = None if parameter == SPEED else (point.speed if speed is None else speed)
     points = [point]
     amplitude = 0.02

@@ -1,5 +1,6 @@
 """What the lanes of one continuation of orbits over a parameter share, its first points, and multipliers along it."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,12 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from . import _arclength
 from ._arclength import Corrected, Curves, settle_on, stack, take
-from ._by_name import Parameter, with_value
+from ._by_name import SPEED, Parameter, with_value
 from ._orbit import OrbitEquations, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._steps import Counts, counted, stiff
@@ -75,6 +77,29 @@ class Follower(eqx.Module):
         if self.problem.free_speed:
             np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
         return np.sum(~(size < circle), axis=-1)
+
+
+AT_THE_END = 1e-9
+"""How far beyond its range a parameter may be, of the larger end: rounding of speeds in rpm is less."""
+
+
+def require_range(parameter: Parameter, lower: float, upper: float) -> None:
+    """**Raises:** `ArgumentError` for a range in which a parameter cannot be followed."""
+    if not lower < upper:
+        raise ArgumentError("upper", said=f"must be above `lower`, but they are {upper:g} and {lower:g}.")
+    if not -math.inf < lower < upper < math.inf:
+        raise ArgumentError("lower", "upper", said=f"must be finite, but are {lower:g} and {upper:g}.")
+    if parameter == SPEED and lower <= 0:
+        raise ArgumentError("lower", said=f"must be positive where the speed is followed, but {lower:g} was given.")
+
+
+def require_within(name: str, at: float, lower: float, upper: float) -> None:
+    """**Raises:** `ArgumentError` for an orbit outside the range in which it is to be followed."""
+    slack = AT_THE_END * max(abs(lower), abs(upper))
+    if at < lower - slack or at > upper + slack:
+        raise ArgumentError(
+            name, said=f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
+        )
 
 
 def make_follower(

@@ -15,6 +15,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
+from ..bearing import is_concrete
 from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractMapEquations, as_root, settled
@@ -29,6 +30,8 @@ Period = Literal["driven", "free"]
 ROUNDING = 1e-13
 AT_REST = 1e-3
 """A simulation has led to an orbit where it moves by less, in units of the system's scale."""
+STILL = 1e-6
+"""Where a period's way at the speed of the flow is less, in the same units, a self-excited system is in equilibrium."""
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
@@ -98,6 +101,8 @@ class Orbit(eqx.Module):
     self_excited: bool = eqx.field(static=True)
     solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
     """What takes these steps, or the whole method where it chooses them itself."""
+    equilibrium: Bool[Array, ""] | bool = False
+    """Whether Newton's method led to an equilibrium of a self-excited system, which has no period: not `converged`."""
 
     @property
     def method(self) -> AbstractMethod:
@@ -119,12 +124,16 @@ class Orbit(eqx.Module):
 
     @property
     def status(self) -> str:
-        """`converged`, `no orbit` or `multipliers not trusted` (Liouville's identity is violated)."""
+        """`converged`, `no orbit`, `equilibrium` or `multipliers not trusted` (Liouville's identity is violated)."""
         if not bool(self.converged):
-            return "no orbit"
+            return "equilibrium" if bool(self.equilibrium) else "no orbit"
         return "converged" if abs(float(self.liouville)) <= LIOUVILLE_TOLERANCE else "multipliers not trusted"
 
     def __str__(self) -> str:
+        if bool(self.equilibrium):
+            return (
+                "No orbit found: Newton's method led to an equilibrium, which has no period; guess a state farther out"
+            )
         if not bool(self.converged):
             return f"No orbit found (residual {float(self.residual):.1e})"
         what = "stable" if bool(self.stable) else "unstable"
@@ -241,6 +250,8 @@ def _find(
     equations = OrbitEquations(problem, frame)
     u, found = settled(equations, given, u0, counts, at_root=True)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
+    equilibrium = converged & _is_still(problem, u, given, frame)
+    converged &= ~equilibrium
     u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
     monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
@@ -261,8 +272,19 @@ def _find(
         periods=frame.periods,
         self_excited=problem.free_speed,
         solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
+        equilibrium=equilibrium,
     )
     return orbit, equations, u
+
+
+def _is_still(problem: OrbitProblem, u: Array, given: Given, frame: Frame) -> Bool[Array, ""]:
+    """Whether a self-excited system does not move at the unknowns u: any period closes there."""
+    if not problem.free_speed:
+        return jnp.array(False)
+    state = problem.state(u, frame)
+    flow = problem.prepare(u, given, frame).field(jnp.zeros(()), tuple(state[i] for i in range(state.size)))
+    rate = jnp.stack([jnp.asarray(c) for c in flow]) / frame.scale
+    return jnp.max(jnp.abs(rate)) * REVOLUTION * frame.periods.astype(float) < STILL
 
 
 @compiled
@@ -303,6 +325,8 @@ def periodic_orbit(
     require_x64()
     require_speeds(system, speed)
     free = is_free(period)
+    if revolutions is not None and is_concrete(revolutions) and revolutions < 0:
+        raise ArgumentError("revolutions", said=f"must be at least 0, but {int(revolutions)} was given.")
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)
     once = revolutions is not None  # and no more than asked for
@@ -324,7 +348,7 @@ def periodic_orbit(
         state, speed, multipliers = _place(equations, u, monodromy, given)
         return dataclasses.replace(found, state=state, speed=speed, multipliers=multipliers, monodromy=monodromy)
 
-    return that_serves(find, method, serves=lambda found: found.converged)
+    return that_serves(find, method, serves=lambda found: found.converged | found.equilibrium)
 
 
 def is_free(period: str) -> bool:

@@ -119,7 +119,8 @@ def sweep(
         chaos lasts (`Sweep.survival`); 0 turns this off.
     - `exponents`: number of Lyapunov exponents, 0 to the dimension of the state.
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
-    - `keep`: number of strobe states kept, the last ones.
+    - `keep`: number of strobe states kept, the last ones; a period k is only seen with at least 2 k of them, all up to
+        8 with 16.
     - `method`: integration method, by default `jaxcage.controlled()`.
     - `progress`: called with lanes done and lanes in all.
 
