@@ -111,13 +111,8 @@ def chaotic_verdict(at: Operating, zones: Zones, sweep: Sweep) -> Verdict:
     found = _verdict(at, zones.zones)
     inside = found.state in INSIDE
     dying = [z for z in zones.transient if _meets(at, z)]
-<<<<<<< HEAD
-    if dying and found.state != "inside":
-        lives = [life.seconds for z in dying for life in z.life or ()]
-=======
     if dying and not inside:
-        lives = [life * 60 / at.low_rpm for z in dying for life in z.life or ()]
->>>>>>> hy
+        lives = [life.seconds for z in dying for life in z.life or ()]
         often = f", mean life up to {max(lives):.2g} s after each disturbance" if lives else ""
         state = f"{'' if _held(at, dying) else 'partly '}in transient chaos"
         return dataclasses.replace(found, state=state, where=f"{state}{often}")
