@@ -162,9 +162,9 @@ def test_tables_of_a_search(found: SynchronousOrbits):
     zones = loss_table("1a", found, loss, PUBLISHED_CASES["1a"])
     assert zones.rows[0] == (
         "1",
-        "7000.00 ± 0.0001",
+        "7000.0000 ± 0.0001",
         "fold",
-        "12000.00 ± 0.0001",
+        "12000.0000 ± 0.0001",
         "period-doubling",
         "5000.00",
         "9100 to 12000",

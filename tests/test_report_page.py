@@ -13,7 +13,7 @@ from hostile import declared
 from report_example import findings, orbits, swept
 
 import jaxcage as jc
-from jaxcage.analysis import Edge, Zone, Zones
+from jaxcage.analysis import Edge, MeanLife, Zone, Zones
 from jaxcage.cli import _page as _command, main
 from jaxcage.report import (
     AllFailed,
@@ -238,7 +238,8 @@ def test_page_says_what_was_found(text: str):
 
 
 def test_what_is_partly_inside_or_in_transient_chaos_is_said_to_be(without_figures: None, example: Findings):
-    dying = Zone("transient", Edge(6000.0, 100.0, "transient"), Edge(7000.0, 100.0, "transient"), 1.0, (200.0, 900.0))
+    lives = MeanLife(200.0, 6400.0, False), MeanLife(900.0, 6500.0, False)
+    dying = Zone("transient", Edge(6000.0, 100.0, "transient"), Edge(7000.0, 100.0, "transient"), 1.0, lives)
     zones = dataclasses.replace(example.zones, transient=(dying,))
     with_it = dataclasses.replace(example, explained=dataclasses.replace(example.explained, zones=zones))
     operating = read_operating("6500, 6500-7500, 9000-9500, 10000")
