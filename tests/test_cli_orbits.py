@@ -169,7 +169,7 @@ def test_tables_of_a_search(found: SynchronousOrbits):
         "5000.00",
         "9100 to 12000",
     )
-    assert zones.rows[1] == ("2", "20000.00 ± 0.0001", "Neimark-Sacker", "past range", "-", "open", "25500 and up")
+    assert zones.rows[1] == ("2", "20000.0000 ± 0.0001", "Neimark-Sacker", "past range", "-", "open", "25500 and up")
     edges = edge_table("1a", found, loss)
     assert edges.rows[0] == ("7000.000", "0.0001", "fold", "1.0000", "0.00", "0", "zone 1 onset")
     assert edges.rows[2] == (
