@@ -3,15 +3,7 @@
 from .. import report
 from .._errors import NoResult
 from ..io import branch_columns
-from ..orbits import (
-    LossZones,
-    SynchronousOrbits,
-    compile_sensitivity,
-    loss_zones,
-    sensitivities,
-    synchronous_orbits,
-    width,
-)
+from ..orbits import LossZones, SynchronousOrbits, loss_zones, sensitivities, synchronous_orbits, width
 from ..plotting import elasticity_bars, multiplier_circle, orbit_diagram_with_branches
 from ..sweeps import rpm
 from ._job import Job
@@ -81,7 +73,6 @@ def gradient(job: Job[GradientOptions]) -> Report:
     """`jaxcage gradient`: how the synchronous-loss edges, and the width of zone 1, answer to every parameter."""
     if job.options.lasting:
         return lasting_gradient(job)
-    compile_sensitivity(job.model, rpm(job.options.last), job.asked)
     found, loss = searched(job)
     require_edges(found, loss, "differentiate")
     with job.computing("gradients"):

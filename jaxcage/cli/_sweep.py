@@ -11,7 +11,7 @@ from .. import report
 from ..analysis import Sweep, Zones, waterfall, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
-from ..orbits import compile_sensitivity, explain, loss_zones, synchronous_orbits
+from ..orbits import explain, loss_zones, synchronous_orbits
 from ..plotting import sweep_figure, waterfall_map, zoomed_diagram
 from ..sweeps import rpm, sweep
 from ._chances import chances
@@ -127,8 +127,6 @@ def zones_over_speed(job: Job[ZonesOptions]) -> Report:
     """`jaxcage zones`: where the synchronous orbit is lost, with exact edges and gradients, beside where chaos is."""
     if job.unknowns and not job.options.nominal:
         return chances(job)
-    if not job.options.quick:
-        compile_sensitivity(job.model, rpm(job.options.last), job.asked)
     swept = _swept(job)
     first, last = float(swept.speed[0]), float(swept.speed[-1])
     with job.computing("synchronous orbits") as say:

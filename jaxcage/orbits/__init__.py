@@ -61,7 +61,6 @@ from ._search import (
 )
 from ._sensitivity import (
     Sensitivity as Sensitivity,
-    compile_sensitivity as compile_sensitivity,
     edge_speed as edge_speed,
     limit_sensitivity as limit_sensitivity,
     sensitivities as sensitivities,

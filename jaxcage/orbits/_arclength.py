@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from ..integrate import compiled
-from ..sweeps import compile_beside, cores
+from ..sweeps import cores
 from ._astray import ASIDE, CROSSED, classified
 from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, solve
 from ._steps import GIVEN_UP, Counts, by_steps
@@ -196,15 +196,6 @@ def correct(
     lost = ~(half.converged & points.converged)
     error, over, far = (np.where(lost, np.inf, x) for x in apart)
     return points._replace(error=error, over=over, moved=far)
-
-
-def compile_early(curves: Curves, at: np.ndarray, normal: np.ndarray) -> None:
-    """Have the programs of all sizes compiled beside what runs, on the first of the lanes and by few steps."""
-    run = _correct_own if curves.own_given else _correct_shared
-    for size in LANES:
-        lanes = np.zeros(size, int)
-        some, same = curves.take(lanes), np.full(size, TOLERANCE)
-        compile_beside(run, some.equations, some.given, at[lanes], normal[lanes], same, np.asarray(2), np.asarray(True))
 
 
 def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any) -> Corrected:

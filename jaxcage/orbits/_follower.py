@@ -14,7 +14,6 @@ from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from . import _arclength
 from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._by_name import SPEED, Parameter, with_value
 from ._orbit import OrbitEquations, is_free
@@ -119,22 +118,11 @@ def make_follower(
 
 def seeds(follower: Follower, frame: Frame, starts: Sequence[Start], steps: int = 0) -> Corrected:
     """Orbits near (state, value of the parameter), the parameter kept, by at least so many steps, the lanes first."""
-    return settle_on(follower.curves(frame, range(len(starts))), *_planes(follower, frame, starts), steps)
-
-
-def compile_early(follower: Follower, start: Start, periods: int) -> None:
-    """Have compiled, beside what runs, what following such orbits takes."""
-    frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
-    _arclength.compile_early(follower.curves(frame, range(1)), *_planes(follower, frame, [start]))
-
-
-def _planes(follower: Follower, frame: Frame, starts: Sequence[Start]) -> tuple[np.ndarray, np.ndarray]:
-    """States and values of the parameter as unknowns, and the normals of planes in which the parameter is kept."""
     free = follower.problem.free_speed
     u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return u, normal
+    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps)
 
 
 def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:

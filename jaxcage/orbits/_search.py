@@ -21,7 +21,7 @@ from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
 from ._by_name import SPEED
-from ._follower import Follower, Start, compile_early, make_follower, seeds, stable_steps
+from ._follower import Follower, Start, make_follower, seeds, stable_steps
 from ._point import Point
 
 
@@ -242,10 +242,9 @@ def synchronous_orbits(
             progress=lambda done, of: say("simulations", done, of),
         )
 
-    follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
-    compile_early(follower, (initial_states(system, np.array([upper]), None)[0, 0], upper), 1)
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
+    follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
     met = _met(settled)
     if met:
         middle = met[len(met) // 2]

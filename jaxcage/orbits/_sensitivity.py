@@ -23,7 +23,7 @@ from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
-from ..sweeps import compile_beside, cores
+from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._by_name import SPEED
 from ._cascade import FEIGENBAUM, Cascade
@@ -32,7 +32,7 @@ from ._orbit import OrbitEquations
 from ._point import Point
 from ._problem import Frame, Given, OrbitProblem, make_frame
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
-from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, counted, from_steps, that_serves
+from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
 
 
 PER_RPM = np.pi / 30
@@ -184,14 +184,10 @@ def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod,
         before, steps = edge, min(2 * steps, int(last))
 
 
-def _unfolded(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, u: Array) -> _Unfolding:
-    return _unfold(kind, u[:-1], _expand(problem, given, frame, u))
-
-
 def _polished(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, first: Array) -> _Edge:
     """The edge near the unknowns `first`, by the steps of the problem."""
     u = first
-    unfold = lambda u: _unfolded(problem, given, frame, kind, u)
+    unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, frame, u))
     here = unfold(u)
     for _ in range(POLISHING):
         step = jnp.linalg.solve(here.of_unknowns, here.residual)
@@ -202,19 +198,6 @@ def _polished(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, firs
         here = unfold(u)
     size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
     return _Edge(problem, given, frame, u, here, bool(size < SETTLED_TO))
-
-
-def compile_sensitivity(system: AbstractForcedSystem, speed: float, method: AbstractMethod | None = None) -> None:
-    """Have what a `sensitivity` takes compiled beside what runs: where edges are still to be found, it is ready then.
-
-    **Arguments:** the system; any speed [rad/s]; the method that will be used.
-    """
-    chosen, counts = counted(method)
-    problem, at = OrbitProblem(chosen, system.dimension, False, (SPEED,)), jnp.asarray(speed, dtype=float)
-    given, state = Given(system, at), jnp.asarray([float(c) for c in system.starts(at)[0]])
-    frame = make_frame(problem, given, state, at, 0.1 * at[None], 1)
-    problem = by_steps(problem, int(from_steps(counts, None)[0]))
-    compile_beside(_unfolded, problem, given, frame, "period-doubling", jnp.append(state / frame.scale, 10.0))
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:

@@ -19,7 +19,6 @@ from ..orbits import (
     LossZones,
     Sensitivity,
     SynchronousOrbits,
-    compile_sensitivity,
     explain,
     loss_zones,
     synchronous_orbits,
@@ -119,8 +118,6 @@ def examine(
         yield
         seconds[stage] = time.perf_counter() - began
 
-    if not quick:
-        compile_sensitivity(model, float(speeds[-1]), orbit_method)
     with timed("sweep"):
         swept = sweep(
             model,

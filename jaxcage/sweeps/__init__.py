@@ -2,7 +2,6 @@
 
 | module     | responsibility                                     |
 |------------|----------------------------------------------------|
-| `_cores`   | how many cores, and compiling beside what runs     |
 | `_engine`  | lanes in chunks, on all cores                      |
 | `_speed`   | sweeps over speed from several starts              |
 | `_bearing` | sweeps of the whole bearing over shaft speed         |
@@ -27,8 +26,7 @@ from ._bearing_ramp import (
     bearing_up_down as bearing_up_down,
 )
 from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs
-from ._cores import compile_beside as compile_beside, cores as cores
-from ._engine import Designs as Designs, Progress as Progress, run_lanes as run_lanes
+from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
 from ._motion import Motion as Motion, motions as motions
 from ._ramps import (

@@ -33,8 +33,7 @@ from ..integrate import (
 )
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
-from ._cores import cores, workers
-from ._engine import Progress, alike
+from ._engine import Progress, alike, cores, workers
 from ._speed import checked_speeds, require_lengths, versions
 
 

@@ -7,6 +7,7 @@ full size, so that the arithmetic of a lane does not depend on how many neighbou
 
 import concurrent.futures
 import heapq
+import os
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -21,7 +22,6 @@ from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
 from ..integrate import BLOCK, AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
-from ._cores import compile_beside, cores, workers
 
 
 CHUNKS = (16, 32, 64, 128, 256, 384, 512)
@@ -102,6 +102,16 @@ def alike(designs: Sequence[Any], name: str, kind: str) -> list[Any]:
     if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
         raise ArgumentError(name, said=f"must hold {kind} that differ in their numbers only.")
     return found
+
+
+def cores() -> int:
+    """Processor cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+def workers() -> int:
+    """Chunks that run at a time."""
+    return cores() if jax.default_backend() == "cpu" else 1
 
 
 def _padded(lanes: np.ndarray, size: int) -> np.ndarray:
@@ -242,8 +252,6 @@ def run_lanes(
     def cost() -> np.ndarray:
         return np.where(outcome == 0, work[level], 1.0)
 
-    nobody, nowhere = np.full(size, -1), Lengths(*map(jnp.asarray, (0, 0, 0)))
-    compile_beside(_observe_chunk, designs, method, nowhere, room, *given(nobody))
     for revolutions in stages:
 
         def begin(lane: np.ndarray, count: int = revolutions, limit: Array = limit) -> tuple[Any, ...]:
