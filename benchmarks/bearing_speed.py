@@ -24,6 +24,7 @@ from scipy.sparse import csr_matrix
 
 import jaxcage as jc
 from benchmarks.bearing_trends import table
+from benchmarks.rivals_c import FAST_MATH
 from jaxcage.models.whole import state_scale
 from tests.reference import WholeBearing
 
@@ -68,19 +69,8 @@ def compiled() -> Any:
     source = pathlib.Path(__file__).with_name("bearing_law.c")
     with tempfile.TemporaryDirectory() as folder:
         target = pathlib.Path(folder, "law.so")
-        command = [
-            "cc",
-            "-O3",
-            "-march=native",
-            "-ffast-math",
-            "-shared",
-            "-fPIC",
-            str(source),
-            "-lm",
-            "-o",
-            str(target),
-        ]
-        subprocess.run(command, check=True)
+        flags = ("-O3", "-march=native", *FAST_MATH, "-shared", "-fPIC")
+        subprocess.run(["cc", *flags, str(source), "-lm", "-o", str(target)], check=True)
         turned = ctypes.CDLL(str(target)).turned
     rows = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
     turned.argtypes = [ctypes.c_long, rows, rows, rows, ctypes.c_double, ctypes.c_long]

@@ -97,7 +97,7 @@ def test_period_doubling_from_beyond_a_superstable_orbit():
     lost = find(reach=0.001)
     assert lost.status == "no such point" and np.isnan(lost.value)
     assert "looked along the branch of its orbit, g from 1.07" in str(lost)
-    with pytest.raises(ValueError, match="`reach` must be at least 0, but -1 was given"):
+    with pytest.raises(ValueError, match="`reach` must be at least 0 and finite, but -1 was given"):
         find(reach=-1.0)
 
 
