@@ -10,8 +10,9 @@ second derivatives are derivatives of it.
 """
 
 import abc
+import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import equinox as eqx
 import jax
@@ -52,6 +53,14 @@ class AbstractMapEquations(AbstractEquations):
     ) -> tuple[Float[Array, " n"], Any]:
         """The equations, with the image of the state and its derivatives (see `returned`), and what else is
         wanted at the root."""
+
+    def across(self, u: Float[Array, " n"], given: Any, kept: Bool[Array, ""]) -> Self:
+        """The same on the plane through u (see `OrbitProblem.across`), if the one at hand is not to be kept."""
+        if not self.problem.free_speed:
+            return self
+        new = self.problem.across(u, given, self.frame)
+        frame = jax.tree.map(lambda own, through: jnp.where(kept, own, through), self.frame, new)
+        return dataclasses.replace(self, frame=frame)
 
     @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
