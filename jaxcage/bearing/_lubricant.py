@@ -106,8 +106,8 @@ class Lubricant(eqx.Module):
         if viscosity >= THINNEST * (1 - ROUNDING):
             return []
         return [
-            f"The oil has {1e6 * viscosity:.3g} mm²/s at {float(self.temperature) - 273.15:.4g} °C, but its law, ASTM D341, "
-            f"holds above {1e6 * THINNEST:g} mm²/s: the films are uncertain."
+            f"The oil has {1e6 * viscosity:.3g} mm²/s at {float(self.temperature) - 273.15:.4g} °C, but its law, ASTM "
+            f"D341, holds above {1e6 * THINNEST:g} mm²/s: the films are uncertain."
         ]
 
 

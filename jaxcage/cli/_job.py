@@ -263,7 +263,7 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     if not _is_file(given):
         return given.lower(), whole_bearing(given), None
     file = read_whole_bearing(given)
-    _say_broken_rule(file.model)
+    _say_doubts(file.model)
     return _shown_name(given), file.model, file
 
 

@@ -21,7 +21,7 @@ from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
 from ._astray import ASIDE, CROSSED, classified, to_crossing
-from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, solve
+from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, across, solve
 from ._steps import GIVEN_UP, Counts, by_steps
 
 
@@ -93,7 +93,7 @@ def _correct(
     kept: Array,
 ) -> Corrected:
     """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
-    curve = curve.across(at, given, kept)
+    curve = across(curve, at, given, kept)
 
     def turn(plane: tuple[Array, Array], half: Array) -> tuple[tuple[Array, Array], Corrected]:
         at, normal = plane

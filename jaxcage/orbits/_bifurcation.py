@@ -145,8 +145,8 @@ def bifurcation(
         raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
     if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
-    free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
+    free = is_free(period, system, first)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)

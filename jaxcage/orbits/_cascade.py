@@ -15,7 +15,6 @@ from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
 from ._follower import Follower, make_follower, require_range
-from ._orbit import is_free
 from ._point import Point
 from ._problem import Frame
 from ._singularity import test_functions
@@ -159,7 +158,7 @@ def cascade(
     """
     require_x64()
     require_range(parameter, lower, upper)
-    own = parameter == SPEED or is_free(period)  # each orbit has a speed of its own
+    own = parameter == SPEED or period == "free"  # each orbit has a speed of its own
     fixed = None if own else (point.speed if speed is None else speed)
     points = [point]
     amplitude, ended = 0.02, ""

@@ -116,7 +116,7 @@ def curve(
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
     units = (high - low) / 20
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), (x, y))
+    problem = OrbitProblem(chosen, system.dimension, is_free(period, system, point.speed), (x, y))
     given = Given(system, jnp.asarray(point.speed, dtype=float))
     frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), point.periods)
     tracer = _Tracer(problem, counts, given, frame, point.kind, units)
@@ -145,7 +145,7 @@ def curve(
         y_value=points.u[:, -1] * units[1],
         state=points.u[:, : system.dimension] * np.asarray(frame.scale),
         multipliers=multipliers,
-        genuine=np.array([point.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) <= 1 for mu in tracer.multipliers(points)]),
+        genuine=tracer.genuine(points),
         special=tuple(special),
         steps=points.steps,
         error=points.error * units[0],
@@ -190,8 +190,7 @@ class _Tracer(NamedTuple):
 
     def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
         """Coefficients of the normal form and their errors."""
-        known = [self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) < 1 for mu in self.multipliers(points)]
-        kinds = [self.kind if k else "" for k in known]
+        kinds = [self.kind if known else "" for known in self.genuine(points)]
         n, free = self.problem.dimension, self.problem.free_speed
         return coefficients(self.curves(_borders(points)), points, kinds, n, FEW, free=free)
 
@@ -225,6 +224,10 @@ class _Tracer(NamedTuple):
         cusps = [p for p in found if p.kind == "cusp"]
         near = lambda p, q: abs(p.x_value - q.x_value) < 1e-4 * self.units[0]
         return [p for p in found if p.kind != "extreme" or not any(near(p, q) for q in cusps)]
+
+    def genuine(self, points: Corrected) -> Bool[np.ndarray, " points"]:
+        """Whether points of a curve of Neimark-Sacker bifurcations are no neutral saddles."""
+        return np.array([self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) <= 1 for mu in self.multipliers(points)])
 
     def multipliers(self, points: Corrected) -> np.ndarray:
         """Those of each orbit, without the one at 1 of a self-excited orbit."""

@@ -126,7 +126,7 @@ def make_follower(
     method: AbstractMethod | None = None,
 ) -> Follower:
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
+    problem = OrbitProblem(chosen, system.dimension, is_free(period, system, speed), (parameter,))
     given = Given(system, jnp.asarray(speed, dtype=float))
     return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
 

@@ -12,7 +12,7 @@ second derivatives are derivatives of it.
 import abc
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -54,14 +54,6 @@ class AbstractMapEquations(AbstractEquations):
         """The equations, with the image of the state and its derivatives (see `returned`), and what else is
         wanted at the root."""
 
-    def across(self, u: Float[Array, " n"], given: Any, kept: Bool[Array, ""]) -> Self:
-        """The same on the plane through u (see `OrbitProblem.across`), if the one at hand is not to be kept."""
-        if not self.problem.free_speed:
-            return self
-        new = self.problem.across(u, given, self.frame)
-        frame = jax.tree.map(lambda own, through: jnp.where(kept, own, through), self.frame, new)
-        return dataclasses.replace(self, frame=frame)
-
     @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
@@ -69,6 +61,18 @@ class AbstractMapEquations(AbstractEquations):
         **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
         or of NumPy.
         """
+
+
+M = TypeVar("M", bound=AbstractMapEquations)
+
+
+def across(equations: M, u: Float[Array, " n"], given: Any, kept: Bool[Array, ""]) -> M:
+    """The equations on the plane through u (see `OrbitProblem.across`), if the one at hand is not to be kept."""
+    if not equations.problem.free_speed:
+        return equations
+    new = equations.problem.across(u, given, equations.frame)
+    frame = jax.tree.map(lambda own, through: jnp.where(kept, own, through), equations.frame, new)
+    return dataclasses.replace(equations, frame=frame)
 
 
 def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
