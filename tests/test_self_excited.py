@@ -1,5 +1,5 @@
-"""Self-excited orbits, which have no phase of their own: branches, curves and cascades see the orbit and not the plane on
-which it is met."""
+"""Self-excited orbits, which have no phase of their own: branches, curves and cascades see the orbit and not the plane
+on which it is met."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -129,7 +129,7 @@ class _Planes(NamedTuple):
 
     def of_lanes(self, lanes: np.ndarray) -> "_Planes":
         """Some of them."""
-        return _Planes(*(None if x is None else x[lanes] for x in self))
+        return _Planes(self.basis[lanes], None if self.across is None else self.across[lanes])
 
     def derivative(self, points: Corrected) -> Float[np.ndarray, "points k k"]:
         """Of the return maps, NaN where a point is none: what ends beside the plane is led to it along the flow."""
