@@ -264,7 +264,6 @@ def planted() -> list[Planted]:
             0.7,
             0.49,
             Point("branch-point", 0.0),
-            Point("fold", 0.0),
         ),
         *(imperfect(gap, side) for gap in (1e-3, 1e-4) for side in (1, -1)),
         crossing(0.0, 1),

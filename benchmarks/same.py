@@ -1,8 +1,10 @@
 """Whether the package of another checkout gives the same to the last bit: `python -m benchmarks.same PATH`.
 
-For a change of when lanes are run, or beside which others: what the package before it printed need not be made again
-(`SAME` in `benchmarks/remake/_stamps.py`). Sweeps of all cases, by several methods, with and without exponents, short
-and long, confirmed and followed; prints which fields differ, with status 1. It takes some six minutes.
+For a change of when lanes are run, or beside which others, or of another part of the package: what the package before
+it printed need not be made again (`SAME` in `benchmarks/remake/_stamps.py`). `cage`: sweeps of all cases, by several
+methods, with and without exponents, short and long, confirmed and followed; some four minutes. `bearing`: sweeps of the
+whole bearing, its histories by explicit and implicit steps, ramps and gradients; two minutes. Prints which fields
+differ, with status 1.
 """
 
 import argparse
@@ -13,9 +15,10 @@ import os
 import pathlib
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import jax
 import numpy as np
 
 import jaxcage as jc
@@ -24,8 +27,11 @@ import jaxcage as jc
 HERE = pathlib.Path(__file__).resolve()
 
 
-def sweeps() -> dict[str, Callable[[], list[Any]]]:
-    """By name."""
+Runs = dict[str, Callable[[], Any]]
+
+
+def sweeps() -> Runs:
+    """Of cages, by name."""
     one = lambda name, speeds, **options: lambda: [jc.sweep(jc.case(name), speeds, **options)]
     few: dict[str, Any] = {"discard": 100, "revolutions": 100, "horizon": 0}
     speeds = jc.rpm(500, 25000, 40)
@@ -42,24 +48,53 @@ def sweeps() -> dict[str, Callable[[], list[Any]]]:
     }
 
 
-def digests() -> dict[str, str]:
-    """Of every field of all sweeps but for how they were made."""
+def bearings() -> Runs:
+    """Of whole bearings, by name."""
+    model = jc.whole_bearing("nu2310")
+    light, cold = jc.replace(model, load=200.0), jc.replace(model, temperature=273.15)
+    short: dict[str, Any] = {"discard": 2, "revolutions": 6}
+    history = lambda model, rpm, **options: lambda: jc.simulate_bearing(model, jc.rpm(rpm), revolutions=2, **options)
+    return {
+        "bearings": lambda: jc.sweep_bearings([model, light], jc.rpm(3000, 15000, 3), starts=2, blocks=3, **short),
+        "history": history(light, 10000),
+        "history by implicit steps": history(cold, 1000, implicit=True),
+        "up and down": lambda: jc.sweeps.bearing_up_down(
+            light, jc.rpm(4000), jc.rpm(4400), jc.rpm(4000), steps=3, starts=1, settle=2
+        ),
+        "gradient": lambda: jc.design.bearing_gradient(model, jc.rpm(10000), designs=32, starts=1, **short),
+    }
+
+
+PARTS: dict[str, Callable[[], Runs]] = {"cage": sweeps, "bearing": bearings}
+
+
+def digests(part: str) -> dict[str, str]:
+    """Of every field of all results but for how they were made."""
     jc.enable_x64()
-    found = {}
-    for name, run in sweeps().items():
-        for i, sweep in enumerate(run()):
-            for field in dataclasses.fields(sweep):
-                value = getattr(sweep, field.name)
-                if field.name != "settings":
-                    data = value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode()
-                    found[f"{name}, {i}: {field.name}"] = hashlib.sha256(data).hexdigest()
-    return found
+    return {
+        name: hashlib.sha256(data).hexdigest() for key, run in PARTS[part]().items() for name, data in _of(key, run())
+    }
 
 
-def digests_at(checkout: pathlib.Path) -> dict[str, str]:
+def _of(name: str, value: Any) -> Iterator[tuple[str, bytes]]:
+    """Names and bytes of all that is in `value`."""
+    if isinstance(value, np.ndarray | jax.Array):
+        yield name, np.asarray(value).tobytes()
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            if field.name != "settings":
+                yield from _of(f"{name}, {field.name}", getattr(value, field.name))
+    elif isinstance(value, dict | list | tuple):
+        for key, x in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _of(f"{name}, {key}", x)
+    else:
+        yield name, repr(value).encode()
+
+
+def digests_at(checkout: pathlib.Path, part: str) -> dict[str, str]:
     """The same with the package of a checkout."""
     environment = {**os.environ, "PYTHONPATH": str(checkout), "JAXCAGE_CACHE": "off"}
-    command = [sys.executable, "-P", str(HERE), "--digests"]
+    command = [sys.executable, "-P", str(HERE), "--digests", "--part", part]
     done = subprocess.run(command, env=environment, cwd=checkout, capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"The sweeps did not end with the package at {checkout}:\n{done.stderr}")
@@ -70,14 +105,15 @@ def main() -> None:
     """Compare, or print the digests."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
     parser.add_argument("checkout", nargs="?", type=pathlib.Path, help="where the other package lies")
+    parser.add_argument("--part", choices=[*PARTS], default="cage", help="what is compared")
     parser.add_argument("--digests", action="store_true", help="print those of the package that is imported")
     given = parser.parse_args()
     if given.digests:
-        print(json.dumps(digests()))
+        print(json.dumps(digests(given.part)))
         return
     if given.checkout is None or not (given.checkout / "jaxcage").is_dir():
         parser.error(f"a checkout with a folder jaxcage is needed, but {given.checkout} was given.")
-    here, there = digests_at(HERE.parent.parent), digests_at(given.checkout.resolve())
+    here, there = (digests_at(path, given.part) for path in (HERE.parent.parent, given.checkout.resolve()))
     different = [name for name in sorted({*here, *there}) if here.get(name) != there.get(name)]
     print("\n".join(different) or f"All {len(here)} fields are the same to the last bit.")
     sys.exit(bool(different))

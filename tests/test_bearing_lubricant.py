@@ -85,3 +85,13 @@ def test_viscosity_falls_with_temperature_as_differences_say():
     difference = (viscosity(350.01) - viscosity(349.99)) / 0.02
     assert float(slope) < 0
     assert float(slope) == pytest.approx(float(difference), rel=1e-6)
+
+
+def test_an_oil_thinner_than_its_law_holds_for_is_doubted():
+    assert jb.vg(32, celsius(100)).doubts() == []
+    (said,) = jb.vg(32, celsius(200)).doubts()
+    assert "at 200 °C" in said and "above 2 mm²/s" in said
+
+
+def test_an_oil_at_the_end_of_its_law_is_not():
+    assert jb.Lubricant(870.0, 2e-6, 313.15, 1e-6, 373.15).doubts() == []

@@ -1,5 +1,7 @@
 """Nothing is missed: planted points are found, and a branch stays on its own side of one that runs close by."""
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,8 +10,15 @@ from helpers import wide_but
 import jaxcage as jc
 from benchmarks.missed import followed, judged
 from benchmarks.missed_models import comb, crossing, imperfect, planted
-from jaxcage.orbits._astray import astray, orientation
+from jaxcage.orbits._astray import astray, orientation, to_crossing
 from jaxcage.orbits._located import dips
+
+
+class Points(NamedTuple):
+    """Of curves: derivatives of their equations, and tangents."""
+
+    jacobian: np.ndarray
+    tangent: np.ndarray
 
 
 BENT = next(given for given in planted() if "bent" in given.name)
@@ -57,9 +66,16 @@ def test_points_and_tangents_of_one_curve_belong_together():
 def test_orientation_changes_where_curves_cross_and_not_at_a_fold():
     """Along p = x^2, and along p = 0 through x p = 0."""
     x = np.array([-0.5, 0.5])
-    fold = np.stack([np.stack([-2 * x, np.ones(2)], axis=1)], axis=1), np.stack([np.ones(2), 2 * x], axis=1)
-    cross = np.stack([np.stack([0 * x, x], axis=1)], axis=1), np.stack([np.ones(2), 0 * x], axis=1)
-    assert np.prod(orientation(*fold)) == 1 and np.prod(orientation(*cross)) == -1
+    fold = Points(np.stack([-2 * x, np.ones(2)], axis=1)[:, None], np.stack([np.ones(2), 2 * x], axis=1))
+    cross = Points(np.stack([0 * x, x], axis=1)[:, None], np.stack([np.ones(2), 0 * x], axis=1))
+    assert np.prod(orientation(fold)) == 1 and np.prod(orientation(cross)) == -1
+
+
+def test_the_place_of_a_crossing_is_foreseen():
+    """Along x = 0 through x p = 0, of whose derivative and tangent the determinant is p; not beyond it."""
+    at = lambda *p: Points(np.array([[[x, 0.0]] for x in p]), np.array([[0.0, 1.0]] * len(p)))
+    found = to_crossing(at(-0.5, 0.2, 0.7), at(-0.3, 0.3, 0.7))  # the step was 0.2, 0.1 and nothing
+    np.testing.assert_allclose(found, [1.5, np.inf, np.inf])
 
 
 @pytest.mark.parametrize("lowest, looked_at", [(0.0327, [(0, 1), (1, 2)]), (0.2, [])])

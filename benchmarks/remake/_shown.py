@@ -38,6 +38,13 @@ class Shown:
         return self.commands[0] in (SPEED, STUDY)
 
     @property
+    def parts(self) -> tuple[str, ...]:
+        """Parts of the package that its commands run."""
+        if self.name.startswith("bearing-"):
+            return ("bearing",)
+        return ("cage",) if self.commands[0] in (SWEEP, CRISES) else ("cage", "orbits")
+
+    @property
     def in_place(self) -> list[str]:
         """Files that its commands write in the checkout."""
         own = [self.page] if self.whole and not self.commands[0].startswith("jaxcage") else []

@@ -21,6 +21,8 @@ from ._validate import is_concrete, require_positive
 CELSIUS_40 = 313.15
 CELSIUS_100 = 373.15
 WALTHER_CONSTANT = 0.7
+THINNEST = 2e-6
+"""Kinematic viscosity above which the law of Walther holds [m^2/s]."""
 
 
 def walther_viscosity(
@@ -97,6 +99,16 @@ class Lubricant(eqx.Module):
     def dynamic_viscosity(self) -> Array:
         """Dynamic viscosity at the operating temperature: density times the kinematic [Pa s]."""
         return jnp.asarray(self.density * self.kinematic_viscosity)
+
+    def doubts(self) -> list[str]:
+        """A sentence where the oil is thinner than its law holds for, none elsewhere; concrete values."""
+        viscosity = float(self.kinematic_viscosity)
+        if viscosity >= THINNEST * (1 - ROUNDING):
+            return []
+        return [
+            f"The oil has {1e6 * viscosity:.3g} mm²/s at {float(self.temperature) - 273.15:.4g} °C, but its law, ASTM "
+            f"D341, holds above {1e6 * THINNEST:g} mm²/s: the films are uncertain."
+        ]
 
 
 def vg(grade: Scalar, temperature: Scalar = CELSIUS_40) -> Lubricant:

@@ -263,7 +263,7 @@ def _whole_subject(given: str, command: str) -> tuple[str, BearingModel, Bearing
     if not _is_file(given):
         return given.lower(), whole_bearing(given), None
     file = read_whole_bearing(given)
-    _say_broken_rule(file.model)
+    _say_doubts(file.model)
     return _shown_name(given), file.model, file
 
 
@@ -288,7 +288,7 @@ class Subject(NamedTuple):
 
 
 def read_subject(given: str) -> Subject:
-    """A case or TOML file by its name; a broken design rule is said on standard error.
+    """A case or TOML file by its name; a broken design rule and an oil too thin are said on standard error.
 
     **Raises:** `InputError`.
     """
@@ -301,7 +301,7 @@ def read_subject(given: str) -> Subject:
     else:
         known = ", ".join(PUBLISHED_CASES)
         raise InputError(f"Case '{given}' is unknown: it must be one of {known}, or the path of a TOML file.")
-    _say_broken_rule(model)
+    _say_doubts(model)
     return Subject(name, model, published, file)
 
 
@@ -310,9 +310,11 @@ def _shown_name(path: str) -> str:
     return "".join(c if c.isprintable() and c != "$" else "_" for c in Path(path).stem)
 
 
-def _say_broken_rule(model: CageModel | BearingModel) -> None:
+def _say_doubts(model: CageModel | BearingModel) -> None:
     if broken := design_rule_violations(model.bearing, model.guidance_gap):
         say("Warning: the design rule T > C_r > G_r is broken: " + " ".join(broken))
+    for doubt in model.lubricant.doubts():
+        say(f"Warning: {doubt}")
 
 
 def _method(options: IntegrationOptions) -> AbstractMethod | None:

@@ -148,7 +148,7 @@ def _sections(
                 tables=[report.bearing_gradient_table(title, slopes)],
             )
         )
-    warnings = design_rule_violations(model.bearing, model.guidance_gap)
+    warnings = [*design_rule_violations(model.bearing, model.guidance_gap), *model.lubricant.doubts()]
     return [
         *sections,
         report.Section("design", "The design", warnings, tables=[report.bearing_parameters_table(model)]),

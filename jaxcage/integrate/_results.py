@@ -17,7 +17,8 @@ class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
     )
     inaccurate = (
         "A revolution still moves by more than the tolerance when its steps are halved, on the finest steps allowed: "
-        "allow a larger error or finer steps, or look for a contact or spring that is stiffer than meant."
+        "allow a larger error or finer steps, or look for a contact or spring that is stiffer than meant, or for a "
+        "motion that grows without bound."
     )
 
 

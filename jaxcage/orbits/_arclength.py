@@ -20,8 +20,8 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
-from ._astray import ASIDE, CROSSED, classified
-from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, solve
+from ._astray import ASIDE, CROSSED, classified, to_crossing
+from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, across, solve
 from ._steps import GIVEN_UP, Counts, by_steps
 
 
@@ -44,6 +44,9 @@ GROWTH = 1.8
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
+UPRIGHT = 0.8
+"""A self-excited orbit that meets the plane on which it begins at a smaller cosine begins on another one: it may become
+tangent to any plane."""
 MOVED = 0.1
 """What half the steps change in a point, over the step's length: more, and what is followed may be their error."""
 
@@ -80,9 +83,17 @@ class Corrected(NamedTuple):
 
 
 def _correct(
-    curve: AbstractMapEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
+    curve: AbstractMapEquations,
+    given: Any,
+    at: Array,
+    normal: Array,
+    tolerance: Array,
+    steps: Array,
+    halved: Array,
+    kept: Array,
 ) -> Corrected:
     """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
+    curve = across(curve, at, given, kept)
 
     def turn(plane: tuple[Array, Array], half: Array) -> tuple[tuple[Array, Array], Corrected]:
         at, normal = plane
@@ -102,8 +113,9 @@ def _correct(
 
 
 _axes = eqx.if_array(0)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, 0, None, None)), "correct shared")
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, 0, None, None)), "correct own")
+_lanes = (0, 0, 0, None, None, None)
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, *_lanes)), "correct shared")
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, *_lanes)), "correct own")
 
 
 def take(tree: Any, lanes: Any) -> Any:
@@ -160,11 +172,13 @@ def correct(
     steps: np.ndarray,
     tolerance: Any = TOLERANCE,
     measured: bool = False,
+    kept: bool = False,
 ) -> Corrected:
     """Points of many curves on planes across them.
 
     **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step, of all or
-    each; whether errors are wanted too, by one step of Newton's method with half the steps.
+    each; whether errors are wanted too, by one step of Newton's method with half the steps; whether self-excited orbits
+    begin where the equations say, and not on the plane through `at`.
     """
     run = _correct_own if curves.own_given else _correct_shared
     measured = measured and int(curves.counts.last) > 1
@@ -177,7 +191,7 @@ def correct(
 
     def part(k: np.ndarray) -> Corrected:
         some = curves.take(k)
-        numbers = (np.asarray(x) for x in (at[k], normal[k], tolerance[k], steps[k[0]], measured))
+        numbers = (np.asarray(x) for x in (at[k], normal[k], tolerance[k], steps[k[0]], measured, kept))
         return jax.tree.map(np.asarray, run(some.equations, some.given, *numbers))
 
     if len(chunks) == 1:
@@ -249,7 +263,8 @@ class Trace(NamedTuple):
     points: Corrected
     ended: str
     """`range`: it left the range; `closed`: it came back to where it began; `steps`: the number of steps was reached;
-    `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step."""
+    `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step; `equilibrium`:
+    a self-excited orbit shrank to one, at a Hopf bifurcation."""
 
 
 def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
@@ -265,6 +280,22 @@ def _closed(points: list[Corrected]) -> bool:
     first, before, last = points[0], points[-2], points[-1]
     same = np.dot(last.u - before.u, first.tangent) > 0
     return len(points) >= 8 and bool(same) and passes(before.u, last.u, first.u[None])
+
+
+def through(curves: AbstractMapEquations, points: Corrected, lanes: np.ndarray) -> AbstractMapEquations:
+    """The curves, the orbits of these lanes now on planes through these points across the flow."""
+    n = curves.problem.dimension
+    flow = -points.jacobian[:, :n, n]  # the speed's column: what a longer way would add
+    new = points.u[:, :n], flow / np.linalg.norm(flow, axis=1, keepdims=True)
+    plane = lambda e: (e.frame.phase_point, e.frame.phase_direction)
+    return eqx.tree_at(plane, curves, put(plane(curves), lanes, new))
+
+
+def upright(curves: AbstractMapEquations, points: Corrected) -> Float[np.ndarray, " lanes"]:
+    """Cosine of the angle between the flow at each point and the normal of the plane on which its orbit begins."""
+    n = curves.problem.dimension
+    flow = -points.jacobian[:, :n, n]
+    return np.sum(flow * curves.frame.phase_direction, axis=1) / np.linalg.norm(flow, axis=1)
 
 
 def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -318,22 +349,40 @@ def follow(
         """Solve for the last points again, by the steps that hold now."""
         last = [points[i][-1] for i in lanes]
         u, tangent = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent"))
-        again = correct(curves.take(lanes), u, tangent, count[lanes])
+        again = correct(curves.take(lanes), u, tangent, count[lanes], kept=True)
         for k, i in enumerate(lanes):
             if again.converged[k]:
                 points[i][-1] = measured_as(take(again, np.array(k)), points[i][-1])
 
+    free = curves.equations.problem.free_speed
+    fresh = np.ones(lanes, dtype=bool)  # whether the last point is the first on its plane
+
+    def begin_planes(lanes: np.ndarray) -> None:
+        """Have the self-excited orbits of these lanes begin on planes through their last points."""
+        nonlocal curves
+        last: Corrected = jax.tree.map(lambda *x: np.stack(x), *(points[i][-1] for i in lanes))
+        curves = curves._replace(equations=through(curves.equations, last, lanes))
+        fresh[lanes] = True
+        go_over(lanes)
+
+    if free and np.any(start.converged):
+        begin_planes(np.flatnonzero(start.converged))
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
-        some = [points[i] for i in index]
+        some = [points[i][-1:] if fresh[i] else points[i][-2:] for i in index]
         last: Corrected = jax.tree.map(lambda *x: np.stack(x), *(p[-1] for p in some))
         ways = [predicted(p[-1], p[-2] if len(p) > 1 else None, length[i]) for p, i in zip(some, index, strict=True)]
         apart = np.array([np.linalg.norm(p[-1].u - p[-2].u) if len(p) > 1 else np.inf for p in some])
         ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
         closely = np.clip(OF_A_STEP * length[index], 2 * TOLERANCE, FOLLOWING)
-        got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True)
+        got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True, kept=True)
         missed, turned, sure, same = classified(steps, last, got, ahead, normal, length[index], apart)
-        same |= update is not None  # new equations have an orientation of their own
+        if update is None:  # new equations have an orientation of their own
+            before: Corrected = jax.tree.map(lambda *x: np.stack(x), *(p[-2] if len(p) > 1 else p[-1] for p in some))
+            sure &= ~(same & (length[index] > apart * to_crossing(before, last)))
+        else:
+            same[:] = True
+        straight = upright(curves.take(index).equations, got) if free else np.ones(index.size)
         good = sure & (same | crosses[index])
         finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)
         for k, i in enumerate(index):
@@ -354,12 +403,16 @@ def follow(
                     ended[i] = "" if may else "stuck"
                 continue
             points[i].append(take(got, np.array(k)))
+            fresh[i] = False
             crosses[i] &= bool(same[k])
             coarser[i] = curves.chooses and count[i] > least and excess < 1 / COARSER
             # What a cubic leaves out grows with the fourth power of the step.
             growth = min((AIM / max(missed[k], 1e-12)) ** 0.25, VEER / max(turned[k], 1e-12))
             length[i] = min(steps.longest, length[i] * np.clip(growth, 0.5, GROWTH))
-            if not inside(got.u[k][None])[0]:
+            if straight[k] < 0:  # on the other side of the equilibrium
+                points[i].pop()
+                ended[i] = "equilibrium"
+            elif not inside(got.u[k][None])[0]:
                 ended[i] = "range"
             elif stop(int(i), points[i]):
                 ended[i] = "stopped"
@@ -373,4 +426,6 @@ def follow(
         count = np.where(finer, 2 * count, np.where(coarser, count // 2, count))
         if np.any(finer | coarser):
             go_over(np.flatnonzero(finer | coarser))
+        if np.any(aslant := accepted & (straight < UPRIGHT)):
+            begin_planes(index[aslant])
     return [Trace(jax.tree.map(lambda *x: np.stack(x), *p), str(e)) for p, e in zip(points, ended, strict=True)]

@@ -37,7 +37,7 @@ def classified(
     off = astray(got.u - ahead, got.tangent - normal, normal, length, apart)
     belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length), OF_MISSED * missed)
     sure = got.converged & (turned < 1) & (missed < steps.bend * length) & smooth & belongs
-    same = orientation(got.jacobian, got.tangent) == orientation(last.jacobian, last.tangent)
+    same = orientation(got) == orientation(last)
     return missed, turned, sure, same
 
 
@@ -54,8 +54,30 @@ def astray(
     return np.linalg.norm(missed - share[:, None] * across, axis=1)
 
 
-def orientation(jacobian: np.ndarray, tangent: np.ndarray) -> Float[np.ndarray, " lanes"]:
+def to_crossing(before: Any, last: Any) -> Float[np.ndarray, " lanes"]:
+    """How far beyond its last point a curve crosses another, over the step that led there: where its equations with its
+    tangent are singular if they change on as they did. Infinite where they are not.
+
+    A step that leads beyond that place and has the orientation kept is not on the curve any more but on the other:
+    from a branch that forks off to its stem.
+    """
+    there = bordered(last)
+    change = there - bordered(before)
+    known = np.all(np.isfinite(change), axis=(1, 2)) & (orientation(last) != 0)
+    there, change = (np.where(known[:, None, None], x, np.eye(there.shape[-1])) for x in (there, change))
+    rates = np.linalg.eigvals(np.linalg.solve(there, change))
+    falls = np.where(np.abs(rates.imag) <= 1e-9 * np.abs(rates), -rates.real, 0.0).max(axis=-1)
+    with np.errstate(divide="ignore"):
+        return np.where(known & (falls > 0), 1 / falls, np.inf)
+
+
+def bordered(points: Any) -> Float[np.ndarray, "lanes n n"]:
+    """A curve's equations with its tangent, which are singular only where it crosses another."""
+    return np.concatenate([points.jacobian, points.tangent[:, None]], axis=1)
+
+
+def orientation(points: Any) -> Float[np.ndarray, " lanes"]:
     """Sign of the determinant of a curve's equations with its tangent: a fold does not change it, a crossing does."""
-    whole = np.concatenate([jacobian, tangent[:, None]], axis=1)
+    whole = bordered(points)
     known = np.all(np.isfinite(whole), axis=(1, 2), keepdims=True)
     return np.linalg.slogdet(np.where(known, whole, 0.0))[0]

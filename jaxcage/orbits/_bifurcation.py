@@ -20,9 +20,20 @@ from ._implicit import AbstractMapEquations, Found, as_root, differentiated, set
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, value_at
-from ._problem import Frame, Given, OrbitProblem, Prepared, across_orbit, frozen, is_traced, make_frame, returned
+from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
-from ._steps import ENOUGH, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
+from ._steps import (
+    BY_OTHERS,
+    ENOUGH,
+    MOST_OF_A_POINT,
+    POINT,
+    SETTLED,
+    Counts,
+    by_steps,
+    from_steps,
+    other_steps,
+    that_serves,
+)
 from ._walk import walk
 
 
@@ -134,8 +145,8 @@ def bifurcation(
         raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
     if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
-    free = is_free(period)
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
+    free = is_free(period, system, first)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)
@@ -147,13 +158,32 @@ def bifurcation(
             begin = jnp.asarray(speed, dtype=float)
             numbers = frozen((given, state, begin, at))
             found, equations, u, known = _find_point(problem, counts, cast(Kind, kind), *numbers, periods, spin)
-            if not is_traced(given):
-                return found
+            if not is_traced((given, found)):
+                return by_others(found, problem, counts)
             u, _ = as_root(given, equations=equations, u=u, aux=known)
             place = _place(equations, u, given, found.converged)
             return dataclasses.replace(found, **dict(zip(("value", "speed", "state"), place, strict=True)))
 
         return that_serves(by, method, MOST_OF_A_POINT)
+
+    def by_others(found: Point, problem: OrbitProblem, counts: Counts) -> Point:
+        """The point with what other steps make of it in its error."""
+        if not (bool(found.converged) and counts.tolerance > 0):
+            return found
+        steps = other_steps(found.steps)
+        other = _find_point(
+            problem,
+            Counts(steps, steps, jnp.zeros_like(counts.tolerance)),
+            cast(Kind, kind),
+            *(given, found.state, jnp.asarray(found.speed), jnp.asarray(found.value)),
+            periods,
+            False,
+        )[0]
+        apart = jnp.where(other.converged, BY_OTHERS * jnp.abs(other.value - found.value), jnp.inf)
+        error = jnp.maximum(found.error, apart)
+        far = error > SETTLED * jnp.maximum(jnp.abs(found.value), jnp.abs(at) if at else 1.0)
+        outcome = jnp.where(far, NOT_CONVERGED, found.outcome)
+        return dataclasses.replace(found, error=error, outcome=outcome)
 
     def around(value: float, part: float, speed: Scalar = given.speed) -> Follower:
         away = part * (abs(value) or 1.0)
@@ -172,7 +202,7 @@ def bifurcation(
         if there is not None:
             looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
             again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
-            found = again if bool(again.converged) else found
+            found = again if bool(again.converged) else there  # Newton's method may fail at a kink of the law
         found = found if bool(found.converged) else dataclasses.replace(found, looked=looked)
     classed = bool(found.converged) and kind in KINDS_WITH_ONE
     return _classed(found, around(float(found.value), 0.1, found.speed)) if classed else found
@@ -187,8 +217,8 @@ def _classed(point: Point, follower: Follower) -> Point:
     if not orbit.converged[0]:
         follower = stable_steps(follower, place, int(point.periods))
         orbit = again(follower)
-    across = across_orbit(follower.problem, frame)
-    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size, across=across)[0]
+    free = follower.problem.free_speed
+    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size, free=free)[0]
     return dataclasses.replace(point, coefficient=jnp.asarray(found[0]), coefficient_error=jnp.asarray(found[1]))
 
 
@@ -204,6 +234,8 @@ def _read_guess(
         state, at = guess
     else:
         spin, state, at = True, None, guess
+    if isinstance(guess, Point) and not bool(guess.converged) and not np.isfinite(float(at)):
+        raise ArgumentError("guess", said=f"must be a point that was found, but this {guess.kind} was not.")
     if wrong("guess", Scalar, at):
         said = "must be a number, a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")

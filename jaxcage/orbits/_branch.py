@@ -33,7 +33,7 @@ from ._located import Seen, account
 from ._normal_form import coefficients
 from ._orbit import NearOrbit, Orbit, guess_state
 from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
-from ._problem import Frame, Given, across_orbit
+from ._problem import Frame, Given
 from ._steps import SETTLED
 
 
@@ -54,7 +54,7 @@ class Branch:
     """Bifurcations, in order along the branch."""
     periods: int
     ended: tuple[str, str]
-    """Why the branch ends where it begins and where it ends."""
+    """Why the branch ends where it begins and where it ends: as for `Trace`, or `doubling`, where it forks off."""
     steps: Int[np.ndarray, " points"]
     """Steps per revolution."""
     error: Float[np.ndarray, " points"]
@@ -68,7 +68,8 @@ class Branch:
     def __str__(self) -> str:
         head = (
             f"Branch of period-{self.periods} orbits: {self.value.size} points, {self.parameter} from "
-            f"{self.value.min():.6g} to {self.value.max():.6g}, {np.mean(self.stable):.0%} stable"
+            f"{self.value.min():.6g} to {self.value.max():.6g}, {np.mean(self.stable):.0%} stable, "
+            f"ends: {', '.join(self.ended)}"
         )
         rows = [
             f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
@@ -237,8 +238,8 @@ def describe(
         scales = [scale_at(i, u[-1]) if own else frame.scale for i, u in zip(lane, places.u, strict=True)]
         finer = np.asarray(frame.scale) / np.array([[float(c) for c in row] for row in scales])
         n = follower.problem.dimension
-        across = across_orbit(follower.problem, frame)
-        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer, across=across))
+        free = follower.problem.free_speed
+        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer, free=free))
     return [
         _branch(follower, frame, points, [(s, next(cubic).tolist()) for s in seen], ended)
         for (points, seen), (_, ended) in zip(rows, traces, strict=True)

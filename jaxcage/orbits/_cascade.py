@@ -11,11 +11,12 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, follow, settle_on
+from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
 from ._follower import Follower, make_follower, require_range
 from ._point import Point
+from ._problem import Frame
 from ._singularity import test_functions
 
 
@@ -28,12 +29,14 @@ class Cascade:
     """Period doublings of orbits of period 1, 2, 4, ... times the first one's."""
 
     points: tuple[Point, ...]
-    """Fewer than asked for where the doubled branch was lost or does not double again."""
+    """Fewer than asked for where the doubled branch was lost or does not double again (`ended`)."""
     limit: float
     """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
     error: float
     """Distance of the last two extrapolations, with the errors of the last two points in it; infinite with fewer than
     three points."""
+    ended: str = ""
+    """Why there are not as many points as were asked for."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -51,7 +54,8 @@ class Cascade:
             f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g} +- {float(p.error):.1g}"
             for p in self.points
         ]
-        return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}"])
+        last = [f"  ended: {self.ended}"] if self.ended else []
+        return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}", *last])
 
     _repr_html_ = notebook_html
 
@@ -105,7 +109,8 @@ def doubled_branch(
     across /= np.linalg.norm(across)
     while amplitude > SMALLEST_AMPLITUDE:
         start = settle_on(curves, u + amplitude * across, across, int(point.steps))
-        if start.converged[0] and _doubling(follower, start)[0] > 0 and abs(start.u[0, -1] - u[0, -1]) < 1.0:
+        near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
+        if near and _doubling(follower, start)[0] > 0 and _half_way(follower, frame, start, across) > amplitude:
             break
         amplitude /= 4
     else:
@@ -114,6 +119,19 @@ def doubled_branch(
     (trace,) = follow(curves, start, steps=steps, inside=follower.inside, stop=stop)
     (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])
     return found
+
+
+def _half_way(follower: Follower, frame: Frame, start: Corrected, across: np.ndarray) -> float:
+    """How far an orbit is from where it began after half of its revolutions, beside the flow, in units of the system's
+    scale: twice the amplitude if it doubled, nothing if it is the orbit that doubles, there or later."""
+    n = follower.problem.dimension
+    half = follower.curves(frame._replace(periods=frame.periods // 2), [0])
+    once = correct(half, start.u, across, start.steps, ONCE)
+    away = once.jacobian[0, :n] @ (start.u - once.u)[0]
+    if follower.problem.free_speed:
+        flow = once.jacobian[0, :n, n]
+        away = away - flow * (flow @ away) / (flow @ flow)
+    return float(np.linalg.norm(away))
 
 
 def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
@@ -140,9 +158,10 @@ def cascade(
     """
     require_x64()
     require_range(parameter, lower, upper)
-    fixed = None if parameter == SPEED else (point.speed if speed is None else speed)
+    own = parameter == SPEED or period == "free"  # each orbit has a speed of its own
+    fixed = None if own else (point.speed if speed is None else speed)
     points = [point]
-    amplitude = 0.02
+    amplitude, ended = 0.02, ""
     while len(points) < levels:
         try:
             doubled = doubled_branch(
@@ -157,13 +176,15 @@ def cascade(
                 until_doubling=True,
                 method=method,
             )
-        except ValueError:
+        except ValueError as error:
+            ended = str(error)
             break
         following = [p for p in doubled.special if p.kind == "period-doubling" and p.status == "converged"]
         if not following:
+            ended = f"the branch of period {doubled.periods} does not double again (ends: {doubled.ended[1]})"
             break
         points.append(following[0])
         amplitude /= 2
     limit, error = extrapolated(tuple(float(p.value) for p in points))
     located = sum(w * float(np.nan_to_num(p.error)) for w, p in zip((1 + 1 / (FEIGENBAUM - 1), 0.3), points[::-1]))
-    return Cascade(tuple(points), limit, error + located)
+    return Cascade(tuple(points), limit, error + located, ended)

@@ -18,12 +18,12 @@ from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Curves, Steps, follow, put, settle_on, stack, take
 from ._bifurcation import PointEquations, critical_matrix
 from ._by_name import SPEED, value as value_of
-from ._follower import eigenvalues, in_a_row, turned
+from ._follower import eigenvalues, in_a_row, turned, without_trivial
 from ._illinois import zeros
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
 from ._point import Point
-from ._problem import Frame, Given, OrbitProblem, across_orbit, make_frame, returned
+from ._problem import Frame, Given, OrbitProblem, make_frame, returned
 from ._singularity import Kind, null_vectors, test_functions
 from ._steps import ENOUGH, Counts, by_steps, counted
 
@@ -116,7 +116,7 @@ def curve(
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
     units = (high - low) / 20
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), (x, y))
+    problem = OrbitProblem(chosen, system.dimension, is_free(period, system, point.speed), (x, y))
     given = Given(system, jnp.asarray(point.speed, dtype=float))
     frame = make_frame(problem, given, jnp.asarray(point.state), given.speed, jnp.asarray(units), point.periods)
     tracer = _Tracer(problem, counts, given, frame, point.kind, units)
@@ -145,7 +145,7 @@ def curve(
         y_value=points.u[:, -1] * units[1],
         state=points.u[:, : system.dimension] * np.asarray(frame.scale),
         multipliers=multipliers,
-        genuine=np.array([point.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) <= 1 for mu in multipliers]),
+        genuine=tracer.genuine(points),
         special=tuple(special),
         steps=points.steps,
         error=points.error * units[0],
@@ -190,10 +190,9 @@ class _Tracer(NamedTuple):
 
     def cubic(self, points: Corrected) -> Float[np.ndarray, "points 2"]:
         """Coefficients of the normal form and their errors."""
-        known = [self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) < 1 for mu in eigenvalues(points.aux.monodromy)]
-        kinds = [self.kind if k else "" for k in known]
-        across = across_orbit(self.problem, self.frame)
-        return coefficients(self.curves(_borders(points)), points, kinds, self.problem.dimension, FEW, across=across)
+        kinds = [self.kind if known else "" for known in self.genuine(points)]
+        n, free = self.problem.dimension, self.problem.free_speed
+        return coefficients(self.curves(_borders(points)), points, kinds, n, FEW, free=free)
 
     def special(self, points: Corrected, cubic: Float[np.ndarray, "points 2"]) -> list[CodimensionTwo]:
         """Codimension-2 points between the points of one direction, located."""
@@ -218,7 +217,7 @@ class _Tracer(NamedTuple):
             if p is not None and kind in TURNS.values():  # and not the pole that it has at a fold-flip
                 at = abs(signal(i, jax.tree.map(lambda x: np.asarray(x)[None], p))[0])
                 p = p if at < 0.01 * np.min(np.abs(cubic[[k, m], 0])) else None
-            if p is not None and _real(kind, self.kind, eigenvalues(p.aux.monodromy)):
+            if p is not None and _real(kind, self.kind, self.multipliers(p)):
                 x, y = p.u[-2:] * self.units
                 found.append(CodimensionTwo(kind, float(x), float(y), eigenvalues(p.aux.monodromy)))
         # At a cusp the curve turns back in every parameter.
@@ -226,9 +225,18 @@ class _Tracer(NamedTuple):
         near = lambda p, q: abs(p.x_value - q.x_value) < 1e-4 * self.units[0]
         return [p for p in found if p.kind != "extreme" or not any(near(p, q) for q in cusps)]
 
+    def genuine(self, points: Corrected) -> Bool[np.ndarray, " points"]:
+        """Whether points of a curve of Neimark-Sacker bifurcations are no neutral saddles."""
+        return np.array([self.kind != "Neimark-Sacker" or abs(_pair(mu)[1]) <= 1 for mu in self.multipliers(points)])
+
+    def multipliers(self, points: Corrected) -> np.ndarray:
+        """Those of each orbit, without the one at 1 of a self-excited orbit."""
+        found = eigenvalues(points.aux.monodromy)
+        return without_trivial(found) if self.problem.free_speed else found
+
     def signals(self, points: Corrected) -> dict[str, np.ndarray]:
         """Functions along the curve that change sign at codimension-2 points."""
-        rows = [_others(self.kind, mu) for mu in eigenvalues(points.aux.monodromy)]
+        rows = [_others(self.kind, mu) for mu in self.multipliers(points)]
         others = test_functions(np.array([o for o, _ in rows]))
         flip, fold, pairs = (others[kind] for kind in ("period-doubling", "fold", "Neimark-Sacker"))
         found = {"extreme": points.tangent[..., -2]}

@@ -18,6 +18,7 @@ from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._by_name import SPEED, Parameter, with_value
 from ._orbit import OrbitEquations, is_free
 from ._problem import Frame, Given, OrbitProblem, make_frame
+from ._singularity import test_functions
 from ._steps import Counts, counted, stiff
 
 
@@ -69,13 +70,27 @@ class Follower(eqx.Module):
         """Those of each orbit, the largest first."""
         return eigenvalues(self.monodromy(points))
 
+    def nontrivial(self, points: Corrected) -> np.ndarray:
+        """The same without the one at 1 of a self-excited orbit."""
+        multipliers = self.multipliers(points)
+        return without_trivial(multipliers) if self.problem.free_speed else multipliers
+
+    def tests(self, points: Corrected) -> dict[str, np.ndarray]:
+        """Functions of each orbit that change sign at bifurcations (see `test_functions`)."""
+        found = test_functions(self.nontrivial(points))
+        if self.problem.free_speed:  # two multipliers near 1 cannot be told apart, but the equations are singular
+            m = self.problem.equations
+            found["fold"] = np.linalg.det(points.jacobian[..., :m, :m])
+        return found
+
+    @property
+    def certain(self) -> float:
+        """How near to 1 the multiplier of a fold is known to be: two that meet there are less certain."""
+        return 0.02 if self.problem.free_speed else 1e-3
+
     def unstable(self, points: Corrected, circle: float = 1.0) -> Any:
         """How many multipliers of each orbit are outside a circle, without the one at 1 of a self-excited orbit."""
-        multipliers = self.multipliers(points)
-        size = np.abs(multipliers)
-        if self.problem.free_speed:
-            np.put_along_axis(size, np.argmin(np.abs(multipliers - 1), axis=-1)[..., None], 0.0, axis=-1)
-        return np.sum(~(size < circle), axis=-1)
+        return np.sum(~(np.abs(self.nontrivial(points)) < circle), axis=-1)
 
 
 AT_THE_END = 1e-9
@@ -111,7 +126,7 @@ def make_follower(
     method: AbstractMethod | None = None,
 ) -> Follower:
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, is_free(period), (parameter,))
+    problem = OrbitProblem(chosen, system.dimension, is_free(period, system, speed), (parameter,))
     given = Given(system, jnp.asarray(speed, dtype=float))
     return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
 
@@ -154,3 +169,10 @@ def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
     """Multipliers, the largest first."""
     mu = np.linalg.eigvals(monodromy).astype(complex)
     return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
+
+
+def without_trivial(multipliers: np.ndarray) -> np.ndarray:
+    """Multipliers of self-excited orbits without the one at 1 that each has."""
+    trivial = np.argmin(np.abs(multipliers - 1), axis=-1)[..., None]
+    others = np.arange(multipliers.shape[-1]) != trivial
+    return multipliers[others].reshape(*multipliers.shape[:-1], -1)

@@ -10,8 +10,9 @@ second derivatives are derivatives of it.
 """
 
 import abc
+import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -60,6 +61,18 @@ class AbstractMapEquations(AbstractEquations):
         **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
         or of NumPy.
         """
+
+
+M = TypeVar("M", bound=AbstractMapEquations)
+
+
+def across(equations: M, u: Float[Array, " n"], given: Any, kept: Bool[Array, ""]) -> M:
+    """The equations on the plane through u (see `OrbitProblem.across`), if the one at hand is not to be kept."""
+    if not equations.problem.free_speed:
+        return equations
+    new = equations.problem.across(u, given, equations.frame)
+    frame = jax.tree.map(lambda own, through: jnp.where(kept, own, through), equations.frame, new)
+    return dataclasses.replace(equations, frame=frame)
 
 
 def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:

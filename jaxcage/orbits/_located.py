@@ -13,8 +13,8 @@ from ._follower import Follower
 from ._illinois import LOCATED, zeros
 from ._point import UNEXPLAINED
 from ._problem import Frame
-from ._singularity import matches, test_functions
-from ._steps import MOST_OF_A_POINT, POINT
+from ._singularity import matches
+from ._steps import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
 
 WIDER = (0, 1, 3)
@@ -81,8 +81,15 @@ def account(
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
             middle = take(row, np.array(k))._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Seen(k, UNEXPLAINED, middle, far))
-        found.append((row, _in_order(row, mine)))
+        found.append((row, _in_order(row, _without_forks(mine))))
     return found
+
+
+def _without_forks(seen: Sequence[Seen]) -> list[Seen]:
+    """Without the folds that a branch has where it forks off another: the branch point is named there."""
+    points = [s.point.u for s in seen if s.kind == "branch-point"]
+    forks = lambda s: s.kind == "fold" and any(np.linalg.norm(s.point.u - u) < LOOKED for u in points)
+    return [s for s in seen if not forks(s)]
 
 
 def _in_order(row: Corrected, seen: Sequence[Seen]) -> list[Seen]:
@@ -134,7 +141,7 @@ def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -
 
 def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     """What was seen, without products of two multipliers that pass 1 while no complex pair leaves the circle."""
-    mu = follower.multipliers(row)
+    mu = follower.nontrivial(row)
     pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
     return [(k, kind) for k, kind in brackets(follower, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
@@ -142,9 +149,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     """Steps over which a test function may vanish twice: two special points of a kind, whose effects on the count may
     cancel."""
-    tests = test_functions(follower.multipliers(row))
-    if follower.problem.free_speed:
-        del tests["fold"]  # zero along the branch
+    tests = follower.tests(row)
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
     found = dips(np.stack([*tests.values(), row.tangent[:, -1]]), length)
     return [(a, b) for a, b in found if length[a] > LOOKED]
@@ -208,18 +213,16 @@ def _located(follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes:
     places = locate(follower, frame, [(lanes[i], rows[i], k, kind) for i, k, kind in wanted])
     seen: list[list[Seen]] = [[] for _ in rows]
     for (i, k, kind), place in zip(wanted, places, strict=True):
-        if place is not None and matches(kind, follower.multipliers(place[0])):
+        if place is not None and matches(kind, follower.nontrivial(place[0]), follower.certain):
             seen[i].append(Seen(k, kind, *place))
     return seen
 
 
 def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
     """Functions along a branch that change sign at its special points."""
-    tests = test_functions(follower.multipliers(points))
+    tests = follower.tests(points)
     tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
     tests["fold"] = points.tangent[..., -1]
-    if follower.problem.free_speed:
-        del tests["branch-point"]
     return tests
 
 
@@ -284,6 +287,13 @@ def locate(
             if p is not None and before is not None:
                 moved[i] = max(float(np.linalg.norm(p.u - before.u)), LOCATED)
                 within[i] = max(PART * moved[i], LOCATED)
+    # A branch point, where the curve's equations are singular, may be found by some steps and not by others.
+    there = [i for i, p in enumerate(found) if chooses and p is not None and kinds[i] != "branch-point"]
+    steps[there] = [other_steps(steps[i]) for i in there]
+    for i, p in zip(there, at(there), strict=True):
+        before = found[i]
+        assert before is not None
+        error[i] = np.inf if p is None else max(error[i], BY_OTHERS * abs(p.u[-1] - before.u[-1]))
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
 
 

@@ -113,37 +113,44 @@ def criticality(kind: str, value: float | np.floating, error: float | np.floatin
     return "supercritical" if (value > 0) == (kind == "period-doubling") else "subcritical"
 
 
-class _Plane(NamedTuple):
-    """The plane of a return map: all of the state of a driven system, across the orbit of a self-excited one."""
+class _Planes(NamedTuple):
+    """The planes of return maps: all of the state of a driven system, across the orbit of a self-excited one."""
 
-    basis: Float[np.ndarray, "n k"]
-    across: Float[np.ndarray, " n"] | None
+    basis: Float[np.ndarray, "points n k"]
+    across: Float[np.ndarray, "points n"] | None
 
     @classmethod
-    def of(cls, n: int, across: Float[np.ndarray, " n"] | None) -> "_Plane":
-        if across is None:
-            return cls(np.eye(n), None)
-        return cls(np.linalg.svd(across[None])[2][1:].T, across)
+    def of(cls, points: Corrected, n: int, free: bool) -> "_Planes":
+        """Through some orbits, which may be `free` to have any period."""
+        if not free:
+            return cls(np.broadcast_to(np.eye(n), (len(points.u), n, n)), None)
+        flow = points.jacobian[:, :n, n]  # the speed's column: the flow at the end, but for its length
+        return cls(np.swapaxes(np.linalg.svd(flow[:, None])[2][:, 1:], 1, 2), flow)
+
+    def of_lanes(self, lanes: np.ndarray) -> "_Planes":
+        """Some of them."""
+        return _Planes(self.basis[lanes], None if self.across is None else self.across[lanes])
 
     def derivative(self, points: Corrected) -> Float[np.ndarray, "points k k"]:
-        """Of the return map, NaN where a point is none: what ends beside the plane is led to it along the flow."""
-        n = len(self.basis)
+        """Of the return maps, NaN where a point is none: what ends beside the plane is led to it along the flow."""
+        n = self.basis.shape[1]
         moved = points.jacobian[:, :n, :n] + np.eye(n)
         if self.across is not None:
-            flow = points.jacobian[:, :n, n]  # the speed's column: the flow at the end, but for its length
-            moved = moved - flow[:, :, None] * ((self.across @ moved) / (flow @ self.across)[:, None])[:, None]
+            flow, along = points.jacobian[:, :n, n], self.across[:, None]
+            moved = moved - flow[:, :, None] * (along @ moved) / (along @ flow[:, :, None])
         there = points.converged[:, None, None]
-        return np.where(there, self.basis.T @ moved @ self.basis, np.nan)
+        return np.where(there, np.swapaxes(self.basis, 1, 2) @ moved @ self.basis, np.nan)
 
     def returned(self, curves: Curves, at: np.ndarray, normal: np.ndarray, count: np.ndarray) -> Corrected:
         """One step of Newton's method from `at`, whose derivatives are those at the place itself, after the speeds with
         which they return to the plane."""
-        n = len(self.basis)
+        n = self.basis.shape[1]
+        along = lambda x: np.sum(x * self.across, axis=1)
         for _ in range(0 if self.across is None else RETURNS):
             found = correct(curves, at, normal, count, ONCE)
             closing = np.einsum("pij,pj->pi", found.jacobian[:, :n], at - found.u)
             at = at.copy()
-            at[:, n] -= (closing @ self.across) / (found.jacobian[:, :n, n] @ self.across)
+            at[:, n] -= along(closing) / along(found.jacobian[:, :n, n])
         return correct(curves, at, normal, count, ONCE)
 
 
@@ -154,32 +161,35 @@ def coefficients(
     n: int,
     steps: tuple[float, ...] = STEPS,
     finer: Float[np.ndarray, "#points n"] | None = None,
-    across: Float[np.ndarray, " n"] | None = None,
+    free: bool = False,
 ) -> Float[np.ndarray, "points 2"]:
     """The coefficients at points of curves and their errors, NaN for kinds that have none.
 
     **Arguments:** curves, one per point, whose first equations and unknowns are those of an orbit; points; kinds;
     dimension of the state; lengths of the differences; the curves' scale over that in whose units the coefficients
-    are wanted, by default their own; for self-excited orbits the direction across the plane on which they begin.
+    are wanted, by default their own; whether the orbits are self-excited, of any period.
     """
-    plane = _Plane.of(n, across)
     known = np.all(np.isfinite(points.jacobian), axis=(1, 2))
     mine = [i for i, kind in enumerate(kinds) if kind in KINDS_WITH_ONE and known[i]]
     found = np.full((len(kinds), 2), np.nan)
     if mine:
-        derivatives = plane.derivative(take(points, mine))
+        planes = _Planes.of(take(points, mine), n, free)
+        derivatives = planes.derivative(take(points, mine))
         critical = [critical_vectors(kinds[i], m) for i, m in zip(mine, derivatives, strict=True)]
         ways = [normal_form_places(c, steps) for c in critical]
-        lane, counts = np.repeat(mine, [len(w) for w in ways]), np.cumsum([len(w) for w in ways])
-        at = points.u[lane]
-        at[:, :n] += np.concatenate(ways) @ plane.basis.T
+        counts = [len(w) for w in ways]
+        lane, planes = np.repeat(mine, counts), planes.of_lanes(np.repeat(np.arange(len(mine)), counts))
+        at, counts = points.u[lane], np.cumsum(counts)
+        at[:, :n] += (planes.basis @ np.concatenate(ways)[:, :, None])[..., 0]
         each = []
         for count in (points.steps[lane], (points.steps[lane] + 1) // 2):
-            moved = plane.returned(curves.take(lane), at, points.tangent[lane], count)
-            parts = np.split(plane.derivative(moved), counts[:-1])
+            moved = planes.returned(curves.take(lane), at, points.tangent[lane], count)
+            parts = np.split(planes.derivative(moved), counts[:-1])
             each.append([normal_form_coefficient(c, part, steps) for c, part in zip(critical, parts, strict=True)])
         found[mine] = [(f.value, f.error + abs(f.value - half.value)) for f, half in zip(*each, strict=True)]
         if finer is not None:
-            longer = np.stack([plane.basis @ c.right for c in critical]) * np.broadcast_to(finer, (len(kinds), n))[mine]
+            own = planes.basis[np.concatenate([[0], counts[:-1]])]
+            longer = np.stack([b @ c.right for b, c in zip(own, critical, strict=True)])
+            longer = longer * np.broadcast_to(finer, (len(kinds), n))[mine]
             found[mine] /= np.sum(np.abs(longer) ** 2, axis=1, keepdims=True)
     return found

@@ -324,7 +324,7 @@ def periodic_orbit(
     """
     require_x64()
     require_speeds(system, speed)
-    free = is_free(period)
+    free = is_free(period, system, speed)
     if revolutions is not None and is_concrete(revolutions) and revolutions < 0:
         raise ArgumentError("revolutions", said=f"must be at least 0, but {int(revolutions)} was given.")
     given = Given(system, jnp.asarray(speed, dtype=float))
@@ -351,10 +351,25 @@ def periodic_orbit(
     return that_serves(find, method, serves=lambda found: found.converged | found.equilibrium)
 
 
-def is_free(period: str) -> bool:
-    """Whether the period of an orbit is unknown."""
+PHASES, PLACE = (0.4, 1.9, 3.4), (0.3, -0.7, 0.5)
+"""Where it is looked whether a law depends on the phase: in a state of these parts of its scale, in turn."""
+
+
+def is_free(period: str, system: AbstractForcedSystem, speed: Scalar) -> bool:
+    """Whether the period of an orbit is unknown.
+
+    **Raises:** `ValueError` where that cannot be, the law depending on the phase of the revolution.
+    """
     if period not in get_args(Period):
         raise ArgumentError("period", said=f"must be one of driven, free, but '{period}' was given.")
+    if period == "free" and not is_traced((system, speed)):
+        y = tuple(PLACE[i % 3] * jnp.asarray(s) for i, s in enumerate(system.scale(speed)))
+        field = system.at_speed(speed)
+        rates = np.array([[float(c) for c in field(jnp.asarray(phase), y)] for phase in PHASES])
+        if np.any(abs(rates - rates[0]) > 1e-9 * abs(rates).max(axis=0)):
+            raise ArgumentError(
+                "period", said="must be `driven` where the law depends on the phase, but `free` was given."
+            )
     return period == "free"
 
 

@@ -15,7 +15,6 @@ import equinox as eqx
 import jax
 import jax.extend as jex
 import jax.numpy as jnp
-import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
@@ -126,6 +125,13 @@ class OrbitProblem(eqx.Module):
             system, speed = with_value(system, speed, parameter, values[i])
         return system, speed
 
+    def across(self, u: Float[Array, " n"], given: Given, frame: Frame) -> Frame:
+        """The frame with the plane on which a self-excited orbit begins through u, across the flow there."""
+        z = u[: self.dimension]
+        y = tuple(z[i] * frame.scale[i] for i in range(z.size))
+        flow = jnp.stack([jnp.asarray(c) for c in self.prepare(u, given, frame).field(jnp.zeros(()), y)]) / frame.scale
+        return frame._replace(phase_point=z, phase_direction=flow / jnp.linalg.norm(flow))
+
     def prepare(self, u: Float[Array, " n"], given: Given, frame: Frame) -> StrobeMap:
         """The strobe map at the unknowns u: all that depends on speed and design."""
         return strobe_map(*self._located(u, given, frame), self.method)
@@ -169,8 +175,3 @@ def make_frame(
     else:
         direction = jnp.zeros_like(z)
     return frozen(Frame(scale, at, units, z, direction, jnp.asarray(periods, dtype=int)))
-
-
-def across_orbit(problem: OrbitProblem, frame: Frame) -> Float[np.ndarray, " dim"] | None:
-    """Direction across the plane on which a self-excited orbit begins; None for a driven one, whose phase is given."""
-    return np.asarray(frame.phase_direction) if problem.free_speed else None

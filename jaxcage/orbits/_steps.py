@@ -32,6 +32,14 @@ POINT = 1e-7
 SETTLED = 2e-4
 """A point whose place changes by more, relative, is not known; nor is an orbit with a larger error."""
 STIFF_FIRST = 512
+BY_OTHERS = 2.0
+"""A point is no more certain than this many times its distance to that by `other_steps`."""
+
+
+def other_steps(steps: Any) -> Any:
+    """A number of steps that shares no ends of steps with those before it: where a motion meets a kink of the law near
+    an end that all of them share, doubling them again and again changes nothing, and all are wrong."""
+    return (3 * steps // 4) | 1
 
 
 class Counts(NamedTuple):

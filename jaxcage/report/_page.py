@@ -125,7 +125,10 @@ def _context(
         ],
         "slope_tables": [in_units(t, units) for t in slopes],
         "statics": None if statics is None else both(statics_table(at_rest, model, statics)),
-        "warnings": [units.in_text(w) for w in design_rule_violations(model.bearing, model.guidance_gap)],
+        "warnings": [
+            *(units.in_text(w) for w in design_rule_violations(model.bearing, model.guidance_gap)),
+            *model.lubricant.doubts(),
+        ],
         "parameters": [
             (group, [row.in_units(units) for row in rows])
             for group, rows in itertools.groupby(parameter_rows(model, table, left), key=lambda row: row.group)
