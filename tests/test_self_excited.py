@@ -143,6 +143,33 @@ def test_a_cascade_goes_on_from_every_phase_and_never_back_to_the_parent(guess):
     assert whole < 1e-4 < 1e-2 < half
 
 
+class Rows(eqx.Module):
+    """The same with b in a row."""
+
+    p: jnp.ndarray
+    b: jnp.ndarray
+
+    def __call__(self, tau, y, speed):
+        return Bautin(self.p, self.b[0])(tau, y, speed)
+
+
+def test_what_is_no_parameter_and_no_point_is_refused():
+    system = jc.ForcedSystem(Rows(jnp.asarray(-0.2), jnp.asarray([1.0])), dimension=2)
+    follow = lambda parameter: jc.branch(
+        system, ((0.85, 0.0), -0.2), parameter, lower=-0.3, upper=0.1, speed=1.0, period="free"
+    )
+    for parameter, said in (
+        ("b", "must be one of speed, p, but 'b' was given"),
+        (lambda s: s.rates.b[0], "must pick a number that the system holds"),
+        (lambda s: 2 * s.rates.p, "must pick a number that the system holds"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            follow(parameter)
+    nothing = jc.Point("period-doubling", float("nan"), np.zeros(2), parameter="p")
+    with pytest.raises(ValueError, match="this period-doubling was not"):
+        jc.orbits.cascade(system, nothing, "p", lower=-0.3, upper=0.1)
+
+
 def test_a_law_that_depends_on_the_phase_has_no_free_period():
     def law(tau, q, v, speed):
         return (-0.3 * v[0] + q[0] - q[0] ** 3 + 0.5 * jnp.cos(tau),)

@@ -26,7 +26,7 @@ def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
     for path, leaf in leaves:
         names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
         public = len(names) == len(path) and not any(name.startswith("_") for name in names)
-        if public and (isinstance(leaf, float) or eqx.is_inexact_array(leaf)):
+        if public and (isinstance(leaf, float) or eqx.is_inexact_array(leaf)) and jnp.ndim(leaf) == 0:
             paths.append(names)
     last = [path[-1] for path in paths]
     return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
@@ -35,9 +35,13 @@ def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
 def pick(system: AbstractForcedSystem, parameter: Parameter) -> Callable[[Any], Any]:
     """The function that picks `parameter` from a system.
 
-    **Raises:** `ValueError` for a name the system does not have.
+    **Raises:** `ValueError` for a name the system does not have, and for a function that picks no number of it.
     """
     if callable(parameter):
+        picked = parameter(system)
+        if not any(picked is leaf for leaf in jax.tree.leaves(system)) or jnp.ndim(picked):
+            said = "must pick a number that the system holds as it is, such as `lambda s: s.acceleration.force`"
+            raise ArgumentError("parameter", said=f"{said}, but picks something else.")
         return parameter
     paths = parameter_paths(system) or _by_field_name(system)
     if parameter not in paths:

@@ -15,7 +15,7 @@ from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
 from ._by_name import SPEED, Parameter
 from ._follower import Follower, make_follower, require_range
-from ._point import Point
+from ._point import Point, require_found
 from ._problem import Frame
 from ._singularity import test_functions
 
@@ -97,6 +97,7 @@ def doubled_branch(
     require_range(parameter, lower, upper)
     if point.kind != "period-doubling":
         raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
+    require_found(point)
     at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
@@ -158,6 +159,9 @@ def cascade(
     """
     require_x64()
     require_range(parameter, lower, upper)
+    require_found(point)
+    if levels < 1:
+        raise ArgumentError("levels", said=f"must be at least 1, but {levels} was given.")
     own = parameter == SPEED or period == "free"  # each orbit has a speed of its own
     fixed = None if own else (point.speed if speed is None else speed)
     points = [point]

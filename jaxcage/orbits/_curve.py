@@ -22,7 +22,7 @@ from ._follower import eigenvalues, in_a_row, turned, without_trivial
 from ._illinois import zeros
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
-from ._point import Point
+from ._point import Point, require_found
 from ._problem import Frame, Given, OrbitProblem, make_frame, returned
 from ._singularity import Kind, null_vectors, test_functions
 from ._steps import ENOUGH, Counts, by_steps, counted
@@ -111,6 +111,7 @@ def curve(
         raise ArgumentError(
             "point", said=f"must be a period-doubling, Neimark-Sacker or fold, but it is a {point.kind}."
         )
+    require_found(point)
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])

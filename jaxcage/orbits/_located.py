@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
+from ._astray import ASIDE
 from ._follower import Follower
 from ._illinois import LOCATED, zeros
 from ._point import UNEXPLAINED
@@ -36,6 +37,8 @@ SUNK = 0.75
 """Where it says that the function falls below this part of its lesser end, it is not believed about the rest."""
 
 
+AT_FORK = 1e-6
+"""A fold and a branch point are one if their parameters differ by less, in the unknowns' units."""
 LOOKED = 1e-4
 """Steps below this length, in the unknowns' units, are not halved for what a parabola says: where orbits cross, the
 functions are their rounding there."""
@@ -86,10 +89,11 @@ def account(
 
 
 def _without_forks(seen: Sequence[Seen]) -> list[Seen]:
-    """Without the folds that a branch has where it forks off another: the branch point is named there."""
-    points = [s.point.u for s in seen if s.kind == "branch-point"]
-    forks = lambda s: s.kind == "fold" and any(np.linalg.norm(s.point.u - u) < LOOKED for u in points)
-    return [s for s in seen if not forks(s)]
+    """Without the folds that a branch has where it forks off another: the branch point is named there. Both are at the
+    vertex of a parabola, whose place along it is less certain than across."""
+    ways = [[s.point.u - b.point.u for b in seen if b.kind == "branch-point"] for s in seen]
+    near = [any(np.linalg.norm(way) < ASIDE and abs(way[-1]) < AT_FORK for way in row) for row in ways]
+    return [s for s, is_near in zip(seen, near, strict=True) if not (s.kind == "fold" and is_near)]
 
 
 def _in_order(row: Corrected, seen: Sequence[Seen]) -> list[Seen]:

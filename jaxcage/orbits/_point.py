@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
+from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..analysis import Edge
@@ -143,6 +144,12 @@ class Point(eqx.Module):
         )
 
     _repr_html_ = notebook_html
+
+
+def require_found(point: Point) -> None:
+    """**Raises:** `ValueError` for a point that was looked for and not found."""
+    if not np.isfinite(float(point.value)):
+        raise ArgumentError("point", said=f"must be one that was found, but this {point.kind} was not.")
 
 
 def value_at(orbit: Any, system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
