@@ -42,7 +42,8 @@ class Shown:
         """Parts of the package that its commands run."""
         if self.name.startswith("bearing-"):
             return ("bearing",)
-        return ("cage",) if self.commands[0] in (SWEEP, CRISES) else ("cage", "orbits")
+        alone = self.commands[0] in (SWEEP, CRISES) or self.commands[0] == REPRODUCE and self.name != "both-kinds"
+        return ("cage",) if alone else ("cage", "orbits")
 
     @property
     def in_place(self) -> list[str]:
