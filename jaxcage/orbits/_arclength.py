@@ -384,7 +384,7 @@ def follow(
             same[:] = True
         straight = upright(curves.take(index).equations, got) if free else np.ones(index.size)
         good = sure & (same | crosses[index])
-        finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)
+        finer, coarser, gone_back = np.zeros((3, lanes), dtype=bool)
         for k, i in enumerate(index):
             may = curves.chooses and count[i] < most
             excess = max(got.over[k] / LOOSE, got.moved[k] / (MOVED * length[i]))
@@ -394,7 +394,7 @@ def follow(
             if sure[k] and not good[k] and length[i] < CROSSED:
                 while len(points[i]) > 1 and np.linalg.norm(points[i][-1].u - got.u[k]) < ASIDE:
                     points[i].pop()
-                crosses[i], length[i] = True, 2 * ASIDE
+                crosses[i], length[i], gone_back[i] = True, 2 * ASIDE, True
                 continue
             if not good[k]:
                 length[i] /= 2 if got.converged[k] else 4
@@ -426,6 +426,6 @@ def follow(
         count = np.where(finer, 2 * count, np.where(coarser, count // 2, count))
         if np.any(finer | coarser):
             go_over(np.flatnonzero(finer | coarser))
-        if np.any(aslant := accepted & (straight < UPRIGHT)):
-            begin_planes(index[aslant])
+        if free and np.any(new := accepted & (straight < UPRIGHT) | gone_back[index]):
+            begin_planes(index[new])
     return [Trace(jax.tree.map(lambda *x: np.stack(x), *p), str(e)) for p, e in zip(points, ended, strict=True)]
