@@ -3,8 +3,9 @@
 For a change of when lanes are run, or beside which others, or of another part of the package: what the package before
 it printed need not be made again (`SAME` in `benchmarks/remake/_stamps.py`). `cage`: sweeps of all cases, by several
 methods, with and without exponents, short and long, confirmed and followed; some four minutes. `bearing`: sweeps of the
-whole bearing, its histories by explicit and implicit steps, ramps and gradients; two minutes. Prints which fields
-differ, with status 1.
+whole bearing, its histories by explicit and implicit steps, ramps and gradients; two minutes. `orbits`: synchronous
+orbits of two cases, their branches, bifurcations, sensitivities and curves; two minutes. Prints which fields differ,
+with status 1.
 """
 
 import argparse
@@ -65,7 +66,23 @@ def bearings() -> Runs:
     }
 
 
-PARTS: dict[str, Callable[[], Runs]] = {"cage": sweeps, "bearing": bearings}
+def orbits() -> Runs:
+    """Of periodic orbits, by name."""
+    model = jc.case("1a")
+    reach = dict(zip(("lower", "upper"), jc.rpm(15000, 21000), strict=True))
+    found = jc.synchronous_orbits(model, *jc.rpm(17000, 21000), count=9)
+    fold = jc.bifurcation(model, "fold", jc.rpm(18686.3))
+    return {
+        "synchronous orbits": lambda: found.branches,
+        "of another case": lambda: jc.synchronous_orbits(jc.case("3a"), *jc.rpm(12000, 15000), count=9).branches,
+        "branch": lambda: jc.branch(model, jc.periodic_orbit(model, jc.rpm(15000)), **reach),
+        "bifurcation": lambda: fold,
+        "sensitivities": lambda: jc.orbits.sensitivities(model, {"fold": fold}),
+        "loss": lambda: jc.loss_zones(found),
+    }
+
+
+PARTS: dict[str, Callable[[], Runs]] = {"cage": sweeps, "bearing": bearings, "orbits": orbits}
 
 
 def digests(part: str) -> dict[str, str]:

@@ -268,4 +268,8 @@ def test_bad_arguments(fold):
     with pytest.raises(ValueError, match="`parameter` must be one of speed, d, k, b, g, but 'stiffness'"):
         jc.curve(duffing(), fold, "speed", "stiffness", **limits)
     with pytest.raises(ValueError, match="`point` must be a fold of the system, but Newton's method finds none there"):
+        jc.curve(duffing(d=2.0), fold, "speed", "g", **limits)
+    with pytest.raises(ValueError, match="must have the system's g between them, 0.02, but are 0.2 and 0.4"):
         jc.curve(duffing(g=0.02), fold, "speed", "g", **limits)
+    with pytest.raises(ValueError, match="`point` must begin from 1 to 1.2"):
+        jc.curve(duffing(), fold, "speed", "g", **(limits | dict(x_upper=1.2)))

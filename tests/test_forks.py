@@ -59,6 +59,28 @@ def test_orbits_of_twice_the_period_end_where_the_period_doubles(force, lower):
     assert branch.value.min() > 0.26558
 
 
+class Oval(eqx.Module):
+    """Orbits e on Cassini's oval (e^2 + p^2)^2 - 2 (p^2 - e^2) + r = 0: one closed curve with a narrow waist."""
+
+    p: jnp.ndarray
+    r: jnp.ndarray
+
+    def __call__(self, tau, y, speed):
+        e, p2 = y[0] - 0.3 * jnp.cos(tau), self.p**2
+        return ((e * e + p2) ** 2 - 2 * (p2 - e * e) + self.r - 0.3 * speed * jnp.sin(tau),)
+
+
+@pytest.mark.parametrize("r", wide_but([-1e-5, -1e-6, -1e-7, -1e-8], -1e-6))
+@pytest.mark.parametrize("p", wide_but([1.0, 0.5, 1.2, -1.0], 0.5))
+def test_a_closed_branch_with_a_waist_is_gone_round_once(p, r):
+    e = np.sqrt(-(p * p + 1) + np.sqrt((p * p + 1) ** 2 - (p**4 - 2 * p * p + r)))
+    system = jc.ForcedSystem(Oval(jnp.asarray(p), jnp.asarray(r)), dimension=1)
+    branch = jc.branch(system, ((0.3 + e,), p), "p", lower=-2.0, upper=2.0, speed=2.0)
+    turns = np.unwrap(np.arctan2(3 * (branch.state[:, 0] - 0.3), branch.value))
+    assert branch.ended == ("closed", "closed") and abs(abs(turns[-1] - turns[0]) / (2 * np.pi) - 1) < 0.02
+    assert sorted(round(float(q.value), 4) for q in branch.special) == [-1.4142, 1.4142]
+
+
 class Stop(eqx.Module):
     """An oscillator that meets a stiff spring behind a gap."""
 

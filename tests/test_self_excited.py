@@ -62,6 +62,49 @@ class Lorenz(eqx.Module):
         return 10 * (z - x), self.r * x - z - x * w, x * z - 8 / 3 * w
 
 
+class BogdanovTakens(eqx.Module):
+    """Cycles that grow from a focus until they meet the saddle at x = 1, whose trace b - 1 keeps them all stable."""
+
+    b: jnp.ndarray
+
+    def __call__(self, tau, y, speed):
+        x, v = y
+        return v, -1 + self.b * v + x * x - x * v
+
+
+class FitzHughNagumo(eqx.Module):
+    current: jnp.ndarray
+
+    def __call__(self, tau, y, speed):
+        v, w = y
+        return v - v**3 / 3 - w + self.current, 0.2 * (v + 0.7 - 0.8 * w)
+
+
+def settled_on(law, start, long=300.0):
+    return solve_ivp(lambda t, y: law(0.0, y, 1.0), (0, long), start, "DOP853", rtol=1e-9, atol=1e-9).y[:, -1]
+
+
+def test_a_branch_towards_a_homoclinic_orbit_ends_where_it_is_not_known_any_more():
+    """It went on within rounding: hundreds of points, half of them called unstable."""
+    start = settled_on(BogdanovTakens(-0.97), [-1.4, 0.0])
+    system = jc.ForcedSystem(BogdanovTakens(jnp.asarray(-0.97)), dimension=2)
+    orbit = jc.periodic_orbit(system, 1.4, guess=tuple(start), period="free")
+    branch = jc.branch(system, orbit, "b", lower=-1.2, upper=-0.3, period="free")
+    assert branch.special == () and np.all(branch.stable)
+    assert set(branch.ended) == {"equilibrium", "inaccurate"} and branch.value.size < 100
+    assert 2 * np.pi / branch.speed.min() > 23 and branch.error.max() < 1e-3
+
+
+@pytest.mark.wide
+def test_multipliers_of_a_branch_are_those_at_its_orbits():
+    """Where a canard grows the map's derivative changes by itself within the last step of Newton's method."""
+    start = settled_on(FitzHughNagumo(0.7), [1.0, 0.0])
+    system = jc.ForcedSystem(FitzHughNagumo(jnp.asarray(0.7)), dimension=2)
+    orbit = jc.periodic_orbit(system, 2 * np.pi / 20, guess=tuple(start), revolutions=30, period="free")
+    branch = jc.branch(system, orbit, "current", lower=0.2, upper=1.6, period="free")
+    assert np.max(np.min(np.abs(branch.multipliers - 1), axis=1)) < 1e-3
+
+
 def test_orbits_are_followed_where_they_leave_the_plane_they_began_on():
     system = jc.ForcedSystem(Moving(jnp.asarray(0.0)), dimension=2)
     orbit = jc.periodic_orbit(system, 1.1, guess=(1.0, 0.1), period="free")

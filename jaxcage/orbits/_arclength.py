@@ -22,7 +22,7 @@ from ..integrate import compiled
 from ..sweeps import cores
 from ._astray import ASIDE, CROSSED, classified, to_crossing
 from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, across, solve
-from ._steps import GIVEN_UP, Counts, by_steps
+from ._steps import GIVEN_UP, SETTLED, Counts, by_steps
 
 
 LANES, FEW = (8, 32), 40
@@ -264,7 +264,8 @@ class Trace(NamedTuple):
     ended: str
     """`range`: it left the range; `closed`: it came back to where it began; `steps`: the number of steps was reached;
     `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step; `equilibrium`:
-    a self-excited orbit shrank to one, at a Hopf bifurcation."""
+    a self-excited orbit shrank to one, at a Hopf bifurcation; `inaccurate`: by the finest steps allowed the next point
+    is not known any more, as towards a homoclinic orbit."""
 
 
 def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
@@ -376,6 +377,13 @@ def follow(
         ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
         closely = np.clip(OF_A_STEP * length[index], 2 * TOLERANCE, FOLLOWING)
         got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True, kept=True)
+        unknown = curves.chooses & got.converged & (count[index] >= most) & ~(got.error <= SETTLED)
+        if np.any(unknown):  # by the steps, or by what Newton's method left
+            far = np.flatnonzero(unknown)
+            closer = correct(
+                curves.take(index[far]), got.u[far], normal[far], count[index[far]], measured=True, kept=True
+            )
+            got = put(got, far, closer)
         missed, turned, sure, same = classified(steps, last, got, ahead, normal, length[index], apart)
         if update is None:  # new equations have an orientation of their own
             before: Corrected = jax.tree.map(lambda *x: np.stack(x), *(p[-2] if len(p) > 1 else p[-1] for p in some))
@@ -384,17 +392,20 @@ def follow(
             same[:] = True
         straight = upright(curves.take(index).equations, got) if free else np.ones(index.size)
         good = sure & (same | crosses[index])
-        finer, coarser = np.zeros(lanes, bool), np.zeros(lanes, bool)
+        finer, coarser, gone_back = np.zeros((3, lanes), dtype=bool)
         for k, i in enumerate(index):
             may = curves.chooses and count[i] < most
             excess = max(got.over[k] / LOOSE, got.moved[k] / (MOVED * length[i]))
             if may and got.converged[k] and excess > 1:
                 finer[i] = True
                 continue
+            if unknown[k] and not got.error[k] <= SETTLED:
+                ended[i] = "inaccurate"
+                continue
             if sure[k] and not good[k] and length[i] < CROSSED:
                 while len(points[i]) > 1 and np.linalg.norm(points[i][-1].u - got.u[k]) < ASIDE:
                     points[i].pop()
-                crosses[i], length[i] = True, 2 * ASIDE
+                crosses[i], length[i], gone_back[i] = True, 2 * ASIDE, True
                 continue
             if not good[k]:
                 length[i] /= 2 if got.converged[k] else 4
@@ -426,6 +437,6 @@ def follow(
         count = np.where(finer, 2 * count, np.where(coarser, count // 2, count))
         if np.any(finer | coarser):
             go_over(np.flatnonzero(finer | coarser))
-        if np.any(aslant := accepted & (straight < UPRIGHT)):
-            begin_planes(index[aslant])
+        if free and np.any(new := accepted & (straight < UPRIGHT) | gone_back[index]):
+            begin_planes(index[new])
     return [Trace(jax.tree.map(lambda *x: np.stack(x), *p), str(e)) for p, e in zip(points, ended, strict=True)]

@@ -179,7 +179,8 @@ def bifurcation(
             periods,
             False,
         )[0]
-        apart = jnp.where(other.converged, BY_OTHERS * jnp.abs(other.value - found.value), jnp.inf)
+        lost = found.error if kind == "branch-point" else jnp.inf  # its equations are all but singular
+        apart = jnp.where(other.converged, BY_OTHERS * jnp.abs(other.value - found.value), lost)
         error = jnp.maximum(found.error, apart)
         far = error > SETTLED * jnp.maximum(jnp.abs(found.value), jnp.abs(at) if at else 1.0)
         outcome = jnp.where(far, NOT_CONVERGED, found.outcome)

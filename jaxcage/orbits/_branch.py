@@ -211,7 +211,8 @@ def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple
 
     A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
     """
-    if up.ended == "closed":
+    if "closed" in (up.ended, down.ended):
+        up = up if up.ended == "closed" else down
         stable = follower.unstable(up.points) == 0
         count = stable.size - 1  # the last point is past the first
         order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count

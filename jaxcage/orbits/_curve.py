@@ -18,7 +18,7 @@ from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Curves, Steps, follow, put, settle_on, stack, take
 from ._bifurcation import PointEquations, critical_matrix
 from ._by_name import SPEED, value as value_of
-from ._follower import eigenvalues, in_a_row, turned, without_trivial
+from ._follower import eigenvalues, in_a_row, require_within, turned, without_trivial
 from ._illinois import zeros
 from ._normal_form import FEW, coefficients, criticality
 from ._orbit import is_free
@@ -114,6 +114,11 @@ def curve(
     require_found(point)
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
+    require_within("point", float(point.value), x_lower, x_upper)
+    own = float(value_of(system, point.speed, y))
+    if not lower <= own <= upper:
+        said = f"must have the system's {y} between them, {own:g}, but are {lower:g} and {upper:g}."
+        raise ArgumentError("lower", "upper", said=said)
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
     units = (high - low) / 20
     chosen, counts = counted(method)

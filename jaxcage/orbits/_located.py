@@ -39,6 +39,9 @@ SUNK = 0.75
 
 AT_FORK = 1e-6
 """A fold and a branch point are one if their parameters differ by less, in the unknowns' units."""
+STEEP = 30.0
+"""A map whose derivative is larger than this may have another one at the orbit than at the last step before it, which
+is as far from it as 1e-6."""
 LOOKED = 1e-4
 """Steps below this length, in the unknowns' units, are not halved for what a parabola says: where orbits cross, the
 functions are their rounding there."""
@@ -66,6 +69,7 @@ def account(
     the list, of the kind `unexplained`: there the branch cannot be trusted to be one. Between any two bifurcations
     there is an orbit, that tells whether those between them are stable.
     """
+    rows = [_at_the_root(follower, frame, row, lane) for row, lane in zip(rows, lanes, strict=True)]
     rows = [_halved(follower, frame, row, lane) for row, lane in zip(rows, lanes, strict=True)]
     seen = _located(follower, frame, rows, lanes)
     left = lambda i: _gaps(follower, rows[i], [(s.after, s.kind) for s in seen[i]])
@@ -94,6 +98,16 @@ def _without_forks(seen: Sequence[Seen]) -> list[Seen]:
     ways = [[s.point.u - b.point.u for b in seen if b.kind == "branch-point"] for s in seen]
     near = [any(np.linalg.norm(way) < ASIDE and abs(way[-1]) < AT_FORK for way in row) for row in ways]
     return [s for s, is_near in zip(seen, near, strict=True) if not (s.kind == "fold" and is_near)]
+
+
+def _at_the_root(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
+    """The orbits with derivatives at them, where those of the last step before them are not the same."""
+    steep = np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP)
+    if not steep.size:
+        return row
+    got = correct(follower.curves(frame, [lane] * steep.size), row.u[steep], row.tangent[steep], row.steps[steep])
+    good = got.converged
+    return put(row, steep[good], measured_as(take(got, good), take(row, steep[good])))
 
 
 def _in_order(row: Corrected, seen: Sequence[Seen]) -> list[Seen]:
@@ -241,6 +255,9 @@ def locate(
 ) -> list[tuple[Corrected, float] | None]:
     """Where the test functions of (lane, points, index, kind) vanish, and the distance [SI] to the place by half the
     steps; None where that could not be found.
+
+    A branch point, where the curve's equations are singular, may be found by some steps and not by others: its error is
+    from those that find it.
     """
     if not wanted:
         return []
@@ -287,17 +304,20 @@ def locate(
         steps[again] = np.minimum(2 * steps[again], most)
         for i, p in zip(again, at(again), strict=True):
             before, found[i] = found[i], p if p is not None else found[i]
-            error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
+            if p is not None or kinds[i] != "branch-point":
+                error[i] = np.inf if p is None or before is None else abs(p.u[-1] - before.u[-1])
             if p is not None and before is not None:
                 moved[i] = max(float(np.linalg.norm(p.u - before.u)), LOCATED)
                 within[i] = max(PART * moved[i], LOCATED)
-    # A branch point, where the curve's equations are singular, may be found by some steps and not by others.
-    there = [i for i, p in enumerate(found) if chooses and p is not None and kinds[i] != "branch-point"]
+    there = [i for i, p in enumerate(found) if chooses and p is not None]
     steps[there] = [other_steps(steps[i]) for i in there]
     for i, p in zip(there, at(there), strict=True):
         before = found[i]
         assert before is not None
-        error[i] = np.inf if p is None else max(error[i], BY_OTHERS * abs(p.u[-1] - before.u[-1]))
+        if kinds[i] == "branch-point":
+            error[i] = max(error[i], LOCATED)
+        if p is not None or kinds[i] != "branch-point":
+            error[i] = np.inf if p is None else max(error[i], BY_OTHERS * abs(p.u[-1] - before.u[-1]))
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
 
 
