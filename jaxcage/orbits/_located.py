@@ -312,12 +312,12 @@ def locate(
     there = [i for i, p in enumerate(found) if chooses and p is not None]
     steps[there] = [other_steps(steps[i]) for i in there]
     for i, p in zip(there, at(there), strict=True):
-        before = found[i]
+        before, crossing = found[i], kinds[i] == "branch-point"
         assert before is not None
-        if kinds[i] == "branch-point":
-            error[i] = max(error[i], LOCATED)
-        if p is not None or kinds[i] != "branch-point":
-            error[i] = np.inf if p is None else max(error[i], BY_OTHERS * abs(p.u[-1] - before.u[-1]))
+        if p is not None:
+            error[i] = max(error[i], BY_OTHERS * abs(p.u[-1] - before.u[-1]), LOCATED * crossing)
+        elif not crossing:
+            error[i] = np.inf
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
 
 
