@@ -45,15 +45,8 @@ def rows_of(fitted: list[StatisticGradient], other: dict[str, dict[str, tuple[fl
         value, error = differenced[fitted[0].name]
         cells = [pair(each.elasticity[i], each.elasticity_error[i]) for each in fitted]
         z = [(each.elasticity[i] - value) / np.hypot(each.elasticity_error[i], error) for each in fitted]
-        rows.append(
-            (
-                fitted[0].name,
-                direction,
-                *cells,
-                pair(value, error),
-                " ".join(f"{x:+.1f}" if np.isfinite(x) else "-" for x in z),
-            )
-        )
+        apart = " ".join(f"{x:+.1f}" if np.isfinite(x) else "-" for x in z)
+        rows.append((fitted[0].name, direction, *cells, pair(value, error), apart))
     return rows
 
 

@@ -4,8 +4,8 @@ For a change of when lanes are run, or beside which others, or of another part o
 it printed need not be made again (`SAME` in `benchmarks/remake/_stamps.py`). `cage`: sweeps of all cases, by several
 methods, with and without exponents, short and long, confirmed and followed; some four minutes. `bearing`: sweeps of the
 whole bearing, its histories by explicit and implicit steps, ramps and gradients; two minutes. `orbits`: synchronous
-orbits of two cases, their branches, bifurcations, sensitivities and curves; two minutes. Prints which fields differ,
-with status 1.
+orbits of two cases, their branches and bifurcations, a sensitivity, stretches without a stable one; two minutes. Prints
+which fields differ, with status 1.
 """
 
 import argparse

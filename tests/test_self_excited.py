@@ -213,6 +213,21 @@ def test_what_is_no_parameter_and_no_point_is_refused():
         jc.orbits.cascade(system, nothing, "p", lower=-0.3, upper=0.1)
 
 
+def test_a_point_found_under_jit_is_a_guess_for_another():
+    system = jc.ForcedSystem(Bautin(jnp.asarray(-0.24), jnp.asarray(1.0)), dimension=2)
+    how = dict(speed=1.0, period="free")
+
+    @eqx.filter_jit
+    def twice(system):
+        first = jc.bifurcation(system, "fold", ((0.7072, 0.0), -0.25), "p", **how)
+        return jc.bifurcation(system, "fold", first, "p", **how).value
+
+    assert float(twice(system)) == pytest.approx(-0.25, abs=1e-7)
+    nothing = jc.Point("fold", float("nan"), np.zeros(2), parameter="p")
+    with pytest.raises(ValueError, match="`guess` must be one that was found, but this fold was not"):
+        jc.bifurcation(system, "fold", nothing, "p", **how)
+
+
 def test_a_law_that_depends_on_the_phase_has_no_free_period():
     def law(tau, q, v, speed):
         return (-0.3 * v[0] + q[0] - q[0] ** 3 + 0.5 * jnp.cos(tau),)

@@ -19,7 +19,7 @@ from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
 from ._normal_form import KINDS_WITH_ONE, coefficients
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
-from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, value_at
+from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
 from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import (
@@ -235,8 +235,8 @@ def _read_guess(
         state, at = guess
     else:
         spin, state, at = True, None, guess
-    if isinstance(guess, Point) and not bool(guess.converged) and not np.isfinite(float(at)):
-        raise ArgumentError("guess", said=f"must be a point that was found, but this {guess.kind} was not.")
+    if isinstance(guess, Point) and not is_traced((guess, at)):
+        require_found(guess, at, "guess")
     if wrong("guess", Scalar, at):
         said = "must be a number, a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")

@@ -97,7 +97,7 @@ def doubled_branch(
     require_range(parameter, lower, upper)
     if point.kind != "period-doubling":
         raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
-    require_found(point)
+    require_found(point, point.value)
     at, periods = float(point.value), int(point.periods)
     follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
     frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
@@ -159,7 +159,7 @@ def cascade(
     """
     require_x64()
     require_range(parameter, lower, upper)
-    require_found(point)
+    require_found(point, point.value)
     if levels < 1:
         raise ArgumentError("levels", said=f"must be at least 1, but {levels} was given.")
     own = parameter == SPEED or period == "free"  # each orbit has a speed of its own

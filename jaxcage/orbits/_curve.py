@@ -111,7 +111,7 @@ def curve(
         raise ArgumentError(
             "point", said=f"must be a period-doubling, Neimark-Sacker or fold, but it is a {point.kind}."
         )
-    require_found(point)
+    require_found(point, point.value)
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
     require_within("point", float(point.value), x_lower, x_upper)

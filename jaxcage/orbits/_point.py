@@ -147,10 +147,10 @@ class Point(eqx.Module):
     _repr_html_ = notebook_html
 
 
-def require_found(point: Point) -> None:
-    """**Raises:** `ValueError` for a point that was looked for and not found."""
-    if not np.isfinite(float(point.value)):
-        raise ArgumentError("point", said=f"must be one that was found, but this {point.kind} was not.")
+def require_found(point: Point, value: Scalar, name: str = "point") -> None:
+    """**Raises:** `ValueError` for a point that was looked for and not found, so that its value is none."""
+    if not np.isfinite(float(value)):
+        raise ArgumentError(name, said=f"must be one that was found, but this {point.kind} was not.")
 
 
 def value_at(orbit: Any, system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
