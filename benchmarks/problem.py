@@ -6,10 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-
-jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_enable_compilation_cache", False)  # or times of compiling would be those of reading a disk
-
 import jaxcage as jc
 
 
@@ -49,12 +45,18 @@ class Problem:
         return scale(self.model, self.speeds)
 
 
+def _begin() -> None:
+    jc.enable_x64()
+    jax.config.update("jax_enable_compilation_cache", False)  # or times of compiling would be those of reading a disk
+
+
 def make_problem(lanes: int) -> Problem:
     """Lanes over the case's speeds, the model's three starts taken in turn, each run onto its attractor.
 
     Some attractors reach past the clearance circle, which the contact allows but `sweep` does not as a start: of a few
     more lanes than asked for those inside are kept.
     """
+    _begin()
     model = jc.case(CASE, "preliminary")
     speeds = jc.rpm(FIRST_RPM, LAST_RPM, lanes + lanes // 64 + 8)
     table = jax.vmap(lambda s: jnp.stack([jnp.stack(y) for y in model.starts(s)]))
@@ -75,6 +77,7 @@ def save(problem: Problem, file: str) -> None:
 
 def load(file: str) -> Problem:
     """The lanes that `save` kept."""
+    _begin()
     with np.load(file) as kept:
         return Problem(jc.case(CASE, "preliminary"), kept["speeds"], kept["states"])
 
