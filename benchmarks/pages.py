@@ -68,7 +68,7 @@ def every_kind(text: str) -> str:
 
 def readings(text: str) -> str:
     """The readings of case 1a that `jaxcage reproduce` tried."""
-    rows = [("reading", "chaotic", "zones", *EDGES)]
+    rows: list[tuple[str, ...]] = [("reading", "chaotic", "zones", *EDGES)]
     for r in (r for r in json.loads(text)["readings"] if r["case"] == "1a"):
         at = ("-" if r["edges"].get(e) is None else f"{r['edges'][e]:.0f}" for e in EDGES)
         name = f"{r['question']}: {r['answer']}".removesuffix(": -")
@@ -129,7 +129,7 @@ def refresh(page: str) -> None:
         if where == page and (new := part(output(command))) is not None:
             print(f"{new}\n", flush=True)
             marks = f"<!-- made: {name} -->", "<!-- end -->"
-            text = re.sub(rf"(?s)({marks[0]}\n).*?(\n{marks[1]})", lambda m: m[1] + new + m[2], text, count=1)
+            text = re.sub(rf"(?s)({marks[0]}\n).*?(\n{marks[1]})", lambda m, new=new: m[1] + new + m[2], text, count=1)
     text = re.sub(r"(?m)^Numbers on this page were made with .*$", lambda m: made_with(), text)
     path.write_text(text, encoding="utf-8")
 

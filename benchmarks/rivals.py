@@ -99,7 +99,7 @@ class Diffrax(Rival):
 
         def run(revolutions: int, tolerance: float) -> np.ndarray:
             until, bound = jnp.asarray(2 * np.pi * revolutions), jnp.asarray(tolerance)
-            one = lambda batch: np.asarray(_advance(problem.model, self.solver, *batch, until, bound))
+            one = lambda batch: np.asarray(_advance(problem.model, self.solver, batch[0], batch[1], until, bound))
             with concurrent.futures.ThreadPoolExecutor(self.cores) as pool:
                 return np.concatenate(list(pool.map(one, batches)))[:lanes]
 
