@@ -194,16 +194,14 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=2, help="n-th speed")
     parser.add_argument("--discard", type=int, default=2)
     parser.add_argument("--revolutions", type=int, default=10, help=f"observed, a multiple of {BLOCK}")
-    parser.add_argument("--no-sweep", action="store_true", help="the arcs only")
     given = parser.parse_args()
     jc.enable_x64()
     model, speeds = jc.whole_bearing("nu2310"), np.asarray(jc.rpm(4000.0, 16000.0, SPEEDS))
-    if not given.no_sweep:
-        if given.whole:
-            show_sweep(model, speeds, 100, 200)
-        else:
-            show_sweep(model, speeds[:: given.every], given.discard, given.revolutions)
-        print()
+    if given.whole:
+        show_sweep(model, speeds, 100, 200)
+    else:
+        show_sweep(model, speeds[:: given.every], given.discard, given.revolutions)
+    print()
     show_rivals(model, speeds[[0, SPEEDS // 2, SPEEDS - 1]])
 
 

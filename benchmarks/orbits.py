@@ -1,7 +1,7 @@
-"""One branch of orbits by every program: `python -m benchmarks.orbits [--only cage,duffing-folds] [--quick]`.
+"""One branch of orbits by every program: `python -m benchmarks.orbits [--only cage,duffing-folds]`.
 
 AUTO-07p (its Debian package), single shooting with SciPy and `jaxcage.branch` start at the same orbit and go on to the
-same speed. Writes `benchmarks/orbits.md`, unless `--quick` or `--only` is given. Times are those of the processor:
+same speed. Writes `benchmarks/orbits.md`, unless `--only` is given. Times are those of the processor:
 
 - cold: a new process without compiled programs; for AUTO, its equations compiled and linked, then the run;
 - new process: with the programs kept from an earlier one; AUTO's run;
@@ -145,7 +145,7 @@ def ours(task: Task, state: list[float]) -> dict[str, Any]:
     return {"points": found.value.size, "special": special, "warm": statistics.median(spent), "repeats": sum(spent)}
 
 
-def compare(name: str, quick: bool) -> tuple[list[list[str]], list[str]]:
+def compare(name: str) -> tuple[list[list[str]], list[str]]:
     """Lines of the table and what to say below it, of one task."""
     task = TASKS[name]
     orbit = jc.periodic_orbit(task.make(), task.speed, guess=task.guess, revolutions=200)
@@ -156,8 +156,7 @@ def compare(name: str, quick: bool) -> tuple[list[list[str]], list[str]]:
         rates = shooting.compiled(folder, task.law)
         orbits = shooting.history(rates, state / task.scale())
         autos = by_auto(task, folder, orbits)
-        others = [] if quick else [by_shooting(task, folder, state / task.scale())]
-        rows = [*autos, *others, by_us(name, state)]
+        rows = [*autos, by_shooting(task, folder, state / task.scale()), by_us(name, state)]
     return [line(task, row, autos[-1]) for row in rows], [verdict(task, rows[-1], autos)]
 
 
@@ -211,7 +210,6 @@ def main() -> None:
     """Follow the branches and report."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.orbits", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--only", metavar="A,B", help=f"branches: {', '.join(TASKS)}")
-    parser.add_argument("--quick", action="store_true", help="without shooting, nothing written")
     parser.add_argument("--ours", help=argparse.SUPPRESS)
     parser.add_argument("--state", help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -224,12 +222,12 @@ def main() -> None:
         parser.error(f"--only takes {', '.join(TASKS)}, but not {', '.join(sorted(unknown))}")
     lines, notes = [], []
     for name in names:
-        found = compare(name, given.quick)
+        found = compare(name)
         lines += found[0]
         notes += found[1]
     report = page(lines, notes)
     print(report)
-    if not given.quick and not given.only:
+    if not given.only:
         PAGE.write_text(report)
 
 

@@ -53,6 +53,7 @@ PRICE = 1000.0
 BEARINGS = ("1b", "3a", "spindle")
 """The spindle was not looked at while the searches were made."""
 RIVALS = ("CMA-ES", "differential evolution")
+HEAD = f"search,seeds,after {SHORT},after {BUDGET},checked,reached after,10^6 lane-rev,processor s".split(",")
 RELATIVE = {
     "land_width": (0.7, 1.5),
     "cage_mass": (0.8, 1.2),
@@ -228,19 +229,10 @@ def table(ledger: Sequence[dict[str, Any]]) -> str:
             f"{bearing}: {own['best']:.0f} rpm as it is, {own['check']['value']:.0f} by the finer check; "
             f"to be reached: {goal:.0f}"
         )
-        rows = [_row(name, [r for r in runs if r["search"] == name], goal) for name in _names(runs)]
+        names = dict.fromkeys(r["search"] for r in runs)
+        rows = [_row(name, [r for r in runs if r["search"] == name], goal) for name in names]
         parts.append(f"{head}\n{columns([HEAD, *rows], right=True)}")
     return "\n\n".join(parts)
-
-
-HEAD = [
-    *("search", "seeds", f"after {SHORT}", f"after {BUDGET}", "checked", "reached after"),
-    *("10^6 lane-rev", "processor s"),
-]
-
-
-def _names(runs: Sequence[dict[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(r["search"] for r in runs))
 
 
 def _row(name: str, runs: Sequence[dict[str, Any]], goal: float) -> list[str]:
