@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxcage as jc
-from benchmarks.remake._runs import commit
+from benchmarks.common import commit
 from jaxcage.io import configuration
 from jaxcage.models.whole import BearingState, Bodies, Rollers, state_scale
 

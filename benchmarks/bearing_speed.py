@@ -23,8 +23,7 @@ from scipy.integrate import solve_ivp
 from scipy.sparse import csr_matrix
 
 import jaxcage as jc
-from benchmarks.bearing_trends import table
-from benchmarks.rivals_c import FAST_MATH
+from benchmarks.common import FAST_MATH, columns
 from jaxcage.models.whole import state_scale
 from tests.reference import WholeBearing
 
@@ -150,7 +149,7 @@ def show_sweep(model: jc.BearingModel, speeds: np.ndarray, discard: int, revolut
         ("wall time here", f"{wall:.0f}", "s", f"{wall * share / 60:.0f}", "min"),
         ("half the processor time", "", "", f"{processor * share / 120:.0f} (aim {MINUTES:.0f})", "min"),
     ]
-    table(rows)
+    print(columns(rows))
     mean = lambda x: f"{np.nanmin(x):.3g} to {np.nanmax(x):.3g}"
     print(f"\nSlip {mean(found.cage_slip)}, largest pocket force {mean(found.pocket_force_max_N)} N")
     print(f"Exponent {mean(found.exponent)}, its error {mean(found.exponent_error)}; steps {mean(found.steps)}")
@@ -182,7 +181,7 @@ def show_rivals(model: jc.BearingModel, speeds: np.ndarray) -> None:
             sparse = ", sparse Jacobian" if method == "Radau" else ""
             name = f"SciPy, {method}{sparse}"
             rows.append((name, f"rtol {rtol:.0e}", words(apart(found, some)), f"{1e3 * 16 * spent / len(some):.0f}"))
-    table(rows)
+    print(columns(rows))
     print(
         f"\n{len(begin)} arcs, {len(some)} of them by SciPy; DOP853 is {words(apart(exact, some))} from the reference"
     )
@@ -195,16 +194,14 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=2, help="n-th speed")
     parser.add_argument("--discard", type=int, default=2)
     parser.add_argument("--revolutions", type=int, default=10, help=f"observed, a multiple of {BLOCK}")
-    parser.add_argument("--no-sweep", action="store_true", help="the arcs only")
     given = parser.parse_args()
     jc.enable_x64()
     model, speeds = jc.whole_bearing("nu2310"), np.asarray(jc.rpm(4000.0, 16000.0, SPEEDS))
-    if not given.no_sweep:
-        if given.whole:
-            show_sweep(model, speeds, 100, 200)
-        else:
-            show_sweep(model, speeds[:: given.every], given.discard, given.revolutions)
-        print()
+    if given.whole:
+        show_sweep(model, speeds, 100, 200)
+    else:
+        show_sweep(model, speeds[:: given.every], given.discard, given.revolutions)
+    print()
     show_rivals(model, speeds[[0, SPEEDS // 2, SPEEDS - 1]])
 
 

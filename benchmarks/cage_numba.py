@@ -1,6 +1,6 @@
 """The cage's equations for numba: rates and their Jacobian, lengths in clearances, phase for time.
 
-A lane's constants `p` come in the order of `problem.CONSTANTS`. Nothing here imports JAX: worker processes load it.
+A lane's constants `p` come in the order of `problem.constants`. Nothing here imports JAX: worker processes load it.
 """
 
 import math

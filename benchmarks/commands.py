@@ -53,11 +53,8 @@ def main() -> None:
         units.append(seconds(earlier, UNIT, unit_folder))
     unit = sum(units) / 2
     print(f"unit: {unit:.1f} s ({units[0]:.1f} and {units[1]:.1f})")
-    print(
-        "\n".join(
-            f"{words}: {cold / unit:.2f} units cold, {warm / unit:.2f} warm" for words, (cold, warm) in found.items()
-        )
-    )
+    for words, (cold, warm) in found.items():
+        print(f"{words}: {cold / unit:.2f} units cold, {warm / unit:.2f} warm")
 
 
 if __name__ == "__main__":

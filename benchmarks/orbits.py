@@ -1,14 +1,11 @@
-"""One branch of orbits by every program: `python -m benchmarks.orbits [--only cage,duffing-folds] [--quick]`.
+"""One branch of orbits by every program: `python -m benchmarks.orbits [--only cage,duffing-folds]`.
 
 AUTO-07p (its Debian package), single shooting with SciPy and `jaxcage.branch` start at the same orbit and go on to the
-same speed. Writes `benchmarks/orbits.md`, unless `--quick` or `--only` is given. Times are those of the processor:
+same speed. Writes `benchmarks/orbits.md`, unless `--only` is given. Times are those of the processor:
 
 - cold: a new process without compiled programs; for AUTO, its equations compiled and linked, then the run;
 - new process: with the programs kept from an earlier one; AUTO's run;
 - warm: the branch once more in the same process.
-
-Collocation by a Python package is jaxcont's, on the Duffing oscillators: its matrices are dense. PyDSTool 0.91, the
-other one that pip has, does not run with NumPy 2.
 """
 
 import argparse
@@ -28,15 +25,14 @@ import numpy as np
 import jaxcage as jc
 from jaxcage.sweeps import cores as available_cores
 
-from . import auto, collocation, shooting
+from . import auto, shooting
+from .common import machine, made_with
 from .orbit_tasks import TASKS, Task, prepare
 
 
 INTERVALS = (200, 400, 800)
 """Mesh intervals of AUTO; the first one's time is the measure, the last one's points are."""
 REPEATS = 3
-DENSE, PATIENCE = {"intervals": 40, "longest": 0.2}, 120.0
-"""How jaxcont is run, and the seconds that it may take."""
 COLUMNS = ("branch", "program", "points", "special points", "off", "cold [s]", "new process [s]", "warm [s]")
 PAGE = pathlib.Path(__file__).with_suffix(".md")
 
@@ -107,23 +103,6 @@ def by_shooting(task: Task, folder: pathlib.Path, state: np.ndarray) -> Row:
     return Row("SciPy shooting", found["points"], special, (), float("nan"), auto.spent() - began, found["warm"])
 
 
-def by_collocation(name: str, orbit: np.ndarray) -> Row:
-    """jaxcont in a process of its own, within a limit of time."""
-    if why := collocation.missing():
-        return Row("jaxcont", absent=why)
-    task, began = TASKS[name], auto.spent()
-    numbers = {"task": name, "orbit": orbit.tolist(), **DENSE}
-    try:
-        found = ask("benchmarks.collocation", json.dumps(numbers), limit=PATIENCE)
-    except subprocess.TimeoutExpired:
-        return Row("jaxcont", absent=f"not done in {PATIENCE:.0f} s")
-    except RuntimeError as error:
-        return Row("jaxcont", absent="out of memory" if "Out of memory" in str(error) else "failed")
-    special = tuple((kind, ratio * task.begin) for kind, ratio in found["special"])
-    name = f"jaxcont, {DENSE['intervals']} intervals"
-    return Row(name, found["points"], special, (), float("nan"), auto.spent() - began)
-
-
 def by_us(name: str, state: np.ndarray) -> Row:
     """`jaxcage.branch` in two new processes, the first without programs."""
     found, seconds = {}, []
@@ -139,11 +118,11 @@ def by_us(name: str, state: np.ndarray) -> Row:
     return Row("jaxcage.branch", found["points"], special, errors, cold, process, found["warm"])
 
 
-def ask(module: str, *words: str, cache: str = "off", limit: float | None = None) -> dict[str, Any]:
+def ask(module: str, *words: str, cache: str = "off") -> dict[str, Any]:
     """What a process of its own prints last."""
     command = [sys.executable, "-m", module, *words]
     environment = {**os.environ, "JAXCAGE_CACHE": cache}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=limit)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
     if done.returncode:
         raise RuntimeError(f"`{' '.join(command)}` failed:\n{done.stderr}")
     return json.loads(done.stdout.splitlines()[-1])
@@ -166,7 +145,7 @@ def ours(task: Task, state: list[float]) -> dict[str, Any]:
     return {"points": found.value.size, "special": special, "warm": statistics.median(spent), "repeats": sum(spent)}
 
 
-def compare(name: str, quick: bool) -> tuple[list[list[str]], list[str]]:
+def compare(name: str) -> tuple[list[list[str]], list[str]]:
     """Lines of the table and what to say below it, of one task."""
     task = TASKS[name]
     orbit = jc.periodic_orbit(task.make(), task.speed, guess=task.guess, revolutions=200)
@@ -177,10 +156,7 @@ def compare(name: str, quick: bool) -> tuple[list[list[str]], list[str]]:
         rates = shooting.compiled(folder, task.law)
         orbits = shooting.history(rates, state / task.scale())
         autos = by_auto(task, folder, orbits)
-        others = [] if quick else [by_shooting(task, folder, state / task.scale())]
-        if task.dimension == 2 and not quick:
-            others.append(by_collocation(name, orbits))
-        rows = [*autos, *others, by_us(name, state)]
+        rows = [*autos, by_shooting(task, folder, state / task.scale()), by_us(name, state)]
     return [line(task, row, autos[-1]) for row in rows], [verdict(task, rows[-1], autos)]
 
 
@@ -212,20 +188,19 @@ def verdict(task: Task, ours: Row, autos: list[Row]) -> str:
 
 def page(lines: list[list[str]], notes: list[str]) -> str:
     """The tables as Markdown."""
-    from .report import machine  # not above: the other benchmarks switch the cache of programs off
-
-    about = ", ".join(f"{k}: {v}" for k, v in machine(available_cores()).items())
     table = [list(COLUMNS), ["---"] * 2 + ["---:"] + ["---"] + ["---:"] * 4, *lines]
     return "\n".join(
         [
             "# Orbits: one branch by every program",
             "",
-            f"Made by `python -m benchmarks.orbits`. {about}.",
+            f"Made by `python -m benchmarks.orbits`: {machine(available_cores())}.",
             "Processor seconds; `off` is the largest distance of the special points from AUTO's at its finest mesh.",
             "",
             *("| " + " | ".join(cells) + " |" for cells in table),
             "",
             *(f"- {note}" for note in notes),
+            "",
+            made_with(),
             "",
         ]
     )
@@ -235,7 +210,6 @@ def main() -> None:
     """Follow the branches and report."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.orbits", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--only", metavar="A,B", help=f"branches: {', '.join(TASKS)}")
-    parser.add_argument("--quick", action="store_true", help="without shooting, nothing written")
     parser.add_argument("--ours", help=argparse.SUPPRESS)
     parser.add_argument("--state", help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -248,12 +222,12 @@ def main() -> None:
         parser.error(f"--only takes {', '.join(TASKS)}, but not {', '.join(sorted(unknown))}")
     lines, notes = [], []
     for name in names:
-        found = compare(name, given.quick)
+        found = compare(name)
         lines += found[0]
         notes += found[1]
     report = page(lines, notes)
     print(report)
-    if not given.quick and not given.only:
+    if not given.only:
         PAGE.write_text(report)
 
 

@@ -6,10 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-
-jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_enable_compilation_cache", False)  # or times of compiling would be those of reading a disk
-
 import jaxcage as jc
 
 
@@ -19,11 +15,6 @@ TRANSIENT = 216
 """Revolutions from a start to its attractor."""
 TARGET = 1e-4
 """Reached error at which rivals are compared, over the clearance."""
-CONSTANTS = (
-    *("film", "contact", "hysteresis", "onset", "width", "centre2", "spring_x", "spring_y", "cubic", "damping"),
-    *("cross", "turning", "impact", "weight"),
-)
-"""Columns of `constants`, in the order in which the compiled rivals read them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,8 +36,14 @@ class Problem:
 
     @property
     def scale(self) -> np.ndarray:
-        """Magnitude of each state component, shape (lanes, 4)."""
-        return scale(self.model, self.speeds)
+        """Clearance [m] and clearance times speed [m/s] for each lane, shape (lanes, 4)."""
+        c = np.full_like(self.speeds, float(self.model.clearance))
+        return np.stack([c, c, c * self.speeds, c * self.speeds], axis=-1)
+
+
+def _begin() -> None:
+    jc.enable_x64()
+    jax.config.update("jax_enable_compilation_cache", False)  # or times of compiling would be those of reading a disk
 
 
 def make_problem(lanes: int) -> Problem:
@@ -55,6 +52,7 @@ def make_problem(lanes: int) -> Problem:
     Some attractors reach past the clearance circle, which the contact allows but `sweep` does not as a start: of a few
     more lanes than asked for those inside are kept.
     """
+    _begin()
     model = jc.case(CASE, "preliminary")
     speeds = jc.rpm(FIRST_RPM, LAST_RPM, lanes + lanes // 64 + 8)
     table = jax.vmap(lambda s: jnp.stack([jnp.stack(y) for y in model.starts(s)]))
@@ -75,6 +73,7 @@ def save(problem: Problem, file: str) -> None:
 
 def load(file: str) -> Problem:
     """The lanes that `save` kept."""
+    _begin()
     with np.load(file) as kept:
         return Problem(jc.case(CASE, "preliminary"), kept["speeds"], kept["states"])
 
@@ -103,16 +102,11 @@ def our_map(problem: Problem, method: jc.integrate.AbstractMethod | None, revolu
     ).last[:, 0]
 
 
-def scale(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
-    """Clearance [m] and clearance times speed [m/s] for each lane, shape (lanes, 4)."""
-    c = float(model.clearance)
-    return np.stack([np.full_like(speeds, c), np.full_like(speeds, c), c * speeds, c * speeds], axis=-1)
-
-
 def constants(model: jc.CageModel, speeds: np.ndarray) -> np.ndarray:
     """Numbers of the equations of motion in units of clearance and cage revolution, shape (lanes, constants).
 
-    With lengths over c and phase tau for time, a force F becomes F / (M c omega^2). All come from `model.cage_at`.
+    In the order of `Constants` in `rosenbrock.c`. With lengths over c and phase tau for time, a force F becomes
+    F / (M c omega^2). All come from `model.cage_at`.
     """
     cage = jax.vmap(model.cage_at)(jnp.asarray(speeds))
     film, contact, support, impact = (cage.law(name) for name in ("film", "contact", "support", "impact"))

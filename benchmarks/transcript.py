@@ -24,24 +24,15 @@ VALUES = {
     "temperature": "60 degC",
 }
 """What is edited in the template."""
-
-
-def edit(path: pathlib.Path) -> None:
-    """Put the values in."""
-    text = path.read_text(encoding="utf-8")
-    for name, value in VALUES.items():
-        text, count = re.subn(rf"^{name} = .*$", f'{name} = "{value}"', text, count=1, flags=re.M)
-        if not count:
-            raise ValueError(f"The template has no line that sets `{name}`.")
-    path.write_text(text, encoding="utf-8")
+SHOWN = "^(guidance|ecc|cage_mass|bore|outside|width|roller_|rib|inner|pocket|temp)"
 
 
 def show(command: str, folder: str) -> None:
     """Run a command of the package and print it with what it says."""
     words = [sys.executable, "-m", "jaxcage", *shlex.split(command)[1:]]
-    done = subprocess.run(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    print(f"$ {command}\n{done.stdout}", flush=True)
-    done.check_returncode()
+    print(f"$ {command}", flush=True)
+    subprocess.run(words, cwd=folder, stderr=subprocess.STDOUT, check=True)
+    print(flush=True)
 
 
 def main() -> None:
@@ -49,13 +40,15 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         show(f"jaxcage init {FILE}", folder)
         path = pathlib.Path(folder, FILE)
-        edit(path)
-        pattern = "^(guidance|ecc|cage_mass|bore|outside|width|roller_|rib|inner|pocket|temp)"
-        print(f'$ grep -E "{pattern}" {FILE}  # after editing')
-        print("\n".join(x for x in path.read_text(encoding="utf-8").splitlines() if re.match(pattern, x)), end="\n\n")
-        show(f"jaxcage statics {FILE}", folder)
-        show(f"jaxcage sweep {FILE} --nominal", folder)
-        show(f"jaxcage design {FILE} --quick --starts 2 --steps 8", folder)
+        text = path.read_text(encoding="utf-8")
+        for name, value in VALUES.items():
+            text, count = re.subn(rf"^{name} = .*$", f'{name} = "{value}"', text, count=1, flags=re.M)
+            assert count, f"the template has no line that sets {name}"
+        path.write_text(text, encoding="utf-8")
+        print(f'$ grep -E "{SHOWN}" {FILE}  # after editing')
+        print("\n".join(x for x in text.splitlines() if re.match(SHOWN, x)), end="\n\n", flush=True)
+        for words in ("statics F", "sweep F --nominal", "design F --quick --starts 2 --steps 8"):
+            show(f"jaxcage {words.replace('F', FILE)}", folder)
         show(f"jaxcage report {FILE} --quick --operating '5000-8000 rpm'", folder)
 
 

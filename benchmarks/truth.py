@@ -31,17 +31,6 @@ SECTIONS: dict[str, Section] = {
 }
 
 
-def run(sections: Sequence[str], found: Sequence[Subject], quick: bool) -> list[str]:
-    """What is wrong, of all sections."""
-    wrong = []
-    for name in sections:
-        begin = time.perf_counter()
-        new = SECTIONS[name](found, quick)
-        print(f"{name}: {'; '.join(new) or 'nothing is wrong'} ({time.perf_counter() - begin:.0f} s)", flush=True)
-        wrong += [f"{name}: {text}" for text in new]
-    return wrong
-
-
 def main(arguments: Sequence[str] | None = None) -> list[str]:
     """Run the sections that were asked for; what is wrong."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.truth", description=(__doc__ or "").split("\n")[0])
@@ -58,7 +47,13 @@ def main(arguments: Sequence[str] | None = None) -> list[str]:
     kinds = [kind for kind in given.kinds if not (few and kind == "wide")]
     seeds = range(given.seed, given.seed + (1 if few else given.models))
     found = list(subjects(kinds, seeds, CASES[:1] if few else CASES))
-    return run([name for name in SECTIONS if getattr(given, name)] or list(SECTIONS), found, few)
+    wrong = []
+    for name in [name for name in SECTIONS if getattr(given, name)] or SECTIONS:
+        begin = time.perf_counter()
+        new = SECTIONS[name](found, few)
+        print(f"{name}: {'; '.join(new) or 'nothing is wrong'} ({time.perf_counter() - begin:.0f} s)", flush=True)
+        wrong += [f"{name}: {text}" for text in new]
+    return wrong
 
 
 if __name__ == "__main__":

@@ -13,8 +13,7 @@ import jaxcage as jc
 from jaxcage.analysis import start_tangents
 from tests import reference
 
-from .truth_models import Subject, by_kind
-from .truth_sweeps import pair
+from .truth_models import Subject, by_kind, pair
 
 
 SOFT = {"stiffness_x": 1e7, "stiffness_y": 1e7}

@@ -13,8 +13,7 @@ import numpy as np
 import jaxcage as jc
 from jaxcage.analysis import LIFE_BLOCK, Comparison, compare, survival
 
-from .truth_models import Subject, by_kind
-from .truth_sweeps import fine, pair
+from .truth_models import Subject, by_kind, fine, pair
 
 
 STARTS = 2

@@ -16,8 +16,7 @@ from jaxcage.analysis import CLOSING_TOLERANCE
 from tests import reference
 
 from .truth_exponents import settled
-from .truth_models import Subject, by_kind
-from .truth_sweeps import fine, pair
+from .truth_models import Subject, by_kind, fine, pair
 
 
 OFF = {"force": 1e-2, "whirl": 1e-3, "film": 1e-3, "closure": 1e-3}

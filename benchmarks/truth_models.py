@@ -1,12 +1,14 @@
-"""What the sections of `benchmarks.truth` look at: the six cases, and random models by seed."""
+"""What the sections of `benchmarks.truth` look at: the six cases, random models by seed, and their sweeps."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 import jaxcage as jc
+from jaxcage.integrate import ControlledSteps, controlled, finer
 from jaxcage.models import CageModel, fastest_speed
 from tests import reference
 
@@ -15,6 +17,12 @@ CASES = ("1a", "1b", "2a", "2b", "3a", "3b")
 KINDS = ("cases", "narrow", "wide")
 LOWEST, HIGHEST = 300.0, 60000.0
 """Speeds of the cases and of wide models [rpm]."""
+TIMES = 3
+"""Steps are halved so often: 8 times the steps at 16^-3 of the tolerance."""
+GRID = 8
+"""Speeds of each model."""
+FEW = 3
+"""Of them where it is to be quick."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,3 +74,17 @@ def by_kind(found: Sequence[Subject]) -> dict[str, list[Subject]]:
     """In the order of `KINDS`, those that there are."""
     groups = {kind: [s for s in found if s.kind == kind] for kind in KINDS}
     return {kind: group for kind, group in groups.items() if group}
+
+
+def fine() -> ControlledSteps:
+    """What the default method is compared with."""
+    return finer(controlled(), TIMES)
+
+
+@functools.cache
+def pair(subject: Subject, quick: bool) -> tuple[jc.Sweep, jc.Sweep]:
+    """A model over its grid of speeds as by default, its labels confirmed, and by the finer steps."""
+    grid = subject.grid(FEW if quick else GRID)
+    return jc.sweep(subject.model, grid, horizon=0), jc.sweep(
+        subject.model, grid, horizon=0, confirm=False, method=fine()
+    )

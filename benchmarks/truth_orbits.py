@@ -13,8 +13,7 @@ import jaxcage as jc
 from jaxcage.integrate import FixedSteps
 from tests import reference
 
-from .truth_models import Subject, by_kind
-from .truth_sweeps import pair
+from .truth_models import Subject, by_kind, pair
 
 
 TIMES = 8

@@ -1,6 +1,5 @@
 """What every experiment shares: its size, its folder, kept programs, and figures that are saved and shown."""
 
-import json
 import os
 import sys
 import time
@@ -41,11 +40,9 @@ class Picture:
 
 
 def save(figure: Figure, name: str) -> Picture:
-    """Save a figure as PNG, in it where its axes are: left, bottom, width and height as parts of the whole."""
+    """Save a figure as PNG."""
     FOLDER.mkdir(exist_ok=True)
     path = FOLDER / f"{name}.png"
-    figure.draw_without_rendering()
-    axes = [[round(part, 4) for part in ax.get_position().bounds] for ax in figure.axes]
-    figure.savefig(path, dpi=110, metadata={"Axes": json.dumps(axes)})
+    figure.savefig(path, dpi=110)
     print(f"{path.name} after {time.perf_counter() - BEGAN:.0f} s")
     return Picture(path)

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
+import store_faults as faults
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from benchmarks import faults
 from jaxcage.studies import Plan, Study, check_study, open_study, run_study
 
 

@@ -4,7 +4,6 @@ import pathlib
 import shutil
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -21,9 +20,7 @@ START = np.array([0.636641, 0.161231])
 
 def law(name: str, folder: pathlib.Path) -> shooting.Rates:
     """The equations in C of a task."""
-    cache = jax.config.jax_enable_compilation_cache  # pyright: ignore[reportAttributeAccessIssue]
     prepare(TASKS[name], folder)
-    jax.config.update("jax_enable_compilation_cache", cache)  # the other benchmarks switch it off
     return shooting.compiled(folder, TASKS[name].law)
 
 

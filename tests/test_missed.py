@@ -1,15 +1,16 @@
 """Nothing is missed: planted points are found, and a branch stays on its own side of one that runs close by."""
 
+import math
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import wide_but
+from jaxtyping import Array
 
 import jaxcage as jc
-from benchmarks.missed import followed, judged
-from benchmarks.missed_models import comb, crossing, imperfect, planted
 from jaxcage.orbits._astray import astray, orientation, to_crossing
 from jaxcage.orbits._located import dips
 
@@ -21,26 +22,61 @@ class Points(NamedTuple):
     tangent: np.ndarray
 
 
-BENT = next(given for given in planted() if "bent" in given.name)
+class Comb(eqx.Module):
+    """x = X + cos(tau), X' = -sin(pi (X - h) / apart) apart / pi, h = tanh(20 p) / 2: orbits at X = h + n apart."""
+
+    p: Array
+    apart: Array
+
+    def __call__(self, tau, y, speed):
+        x = (y[0] - jnp.cos(tau) - jnp.tanh(20 * self.p) / 2) * jnp.pi / self.apart
+        return (-jnp.sin(x) * self.apart / jnp.pi - speed * jnp.sin(tau),)
+
+
+class Curve(eqx.Module):
+    """x = X + cos(tau), X' = c0 + c1 p X + c2 p^2 + c3 X^2 + c4 X^3: orbits where the polynomial is zero."""
+
+    p: Array
+    c: Array
+
+    def __call__(self, tau, y, speed):
+        x, p = y[0] - jnp.cos(tau), self.p
+        return (self.c @ jnp.stack([jnp.ones_like(p), p * x, p**2, x**2, x**3]) - speed * jnp.sin(tau),)
+
+
+def followed(law, x, p):
+    """The branch from X = x at p, from -1 to 1."""
+    system = jc.ForcedSystem(law, dimension=1)
+    return jc.branch(system, ((1 + x,), p), "p", lower=-1.0, upper=1.0, speed=1.1)
 
 
 @pytest.mark.parametrize("apart", [1e-2, 1e-3, 1e-4])
 def test_branch_does_not_jump_to_its_copies(apart):
     """Copies of one curve, every other stable, closer to each other than a prediction is to its point."""
-    given = comb(apart)
-    branch = followed(given, jc.orbits.Steps())
+    branch = followed(Comb(jnp.array(-0.9), jnp.array(apart)), -0.5, -0.9)
     assert branch.special == () and np.all(branch.stable) and branch.ended == ("range", "range")
     np.testing.assert_allclose(branch.state[:, 0] - 1 - np.tanh(20 * branch.value) / 2, 0.0, atol=1e-7)
 
 
+def lines(gap, side):
+    """(X - p) (X - p/5) = +-gap^2: two lines that cross, or nearly."""
+    return [side * gap**2, 1.2, -0.2, -1.0, 0.0], 0.3 + math.sqrt(0.04 + side * gap**2)
+
+
+def pitchfork(gap, side):
+    """gap + p X - X^3, with the root next to side/sqrt(2) at p = 1/2."""
+    roots = np.roots([-1.0, 0.0, 0.5, gap]).real
+    return [gap, 1.0, 0.0, 0.0, -1.0], float(roots[np.argmin(abs(roots - side * math.sqrt(0.5)))])
+
+
 NEAR = {
-    "lines that cross": crossing(0.0, 1),
-    "lines that pass": crossing(1e-3, 1),
-    "lines that turn": crossing(1e-3, -1),
-    "lines that turn sharply": crossing(1e-4, -1),
-    "what is left of a pitchfork, passing": imperfect(1e-4, 1),
-    "what is left of a pitchfork, turning": imperfect(1e-4, -1),
-    "pitchfork along the side that turns": BENT,
+    "lines that cross": (lines(0.0, 1), [("branch-point", 0.0)]),
+    "lines that pass": (lines(1e-3, 1), []),
+    "lines that turn": (lines(1e-3, -1), [("fold", 2.5e-3)]),
+    "lines that turn sharply": (lines(1e-4, -1), [("fold", 2.5e-4)]),
+    "what is left of a pitchfork, passing": (pitchfork(1e-4, 1), []),
+    "what is left of a pitchfork, turning": (pitchfork(1e-4, -1), [("fold", 3 * (1e-4 / 2) ** (2 / 3))]),
+    "pitchfork along the side that turns": (pitchfork(0.0, 1), [("branch-point", 0.0)]),
 }
 
 
@@ -48,10 +84,16 @@ NEAR = {
     "name", wide_but(NEAR, "lines that cross", "lines that pass", "pitchfork along the side that turns")
 )
 def test_branches_that_cross_and_branches_that_nearly_do(name):
-    branch = followed(NEAR[name], jc.orbits.Steps())
-    row = judged(NEAR[name], branch, branch)
-    assert not row.bad, row
+    (terms, x), points = NEAR[name]
+    branch = followed(Curve(jnp.array(0.5), jnp.array(terms)), x, 0.5)
+    assert [p.kind for p in branch.special] == [kind for kind, _ in points]
+    for found, (_, place) in zip(branch.special, points, strict=True):
+        assert found.status == "converged" and abs(found.value - place) <= found.error + 1e-8
     assert branch.ended == ("range", "range") and branch.value.size < 100
+    if name == "lines that pass":
+        assert np.all(branch.state[:, 0] - 1 > 0.6 * branch.value)
+    elif name.endswith("passing"):
+        assert np.all(branch.state[:, 0] > 1)
 
 
 def test_points_and_tangents_of_one_curve_belong_together():

@@ -29,7 +29,7 @@ def closing_period(
     A lane that spirals towards an orbit of period j returns after k > j revolutions, if these bring it nearly round,
     before it returns after j: its states move away from where they were j revolutions ago as those of an orbit of
     period k do. But that distance dies out with the one after k revolutions, where an orbit keeps it. Such lanes have
-    the period j (`python -m benchmarks.periods` looks at lanes of four cases 3000 revolutions later).
+    the period j.
 
     Coordinates and velocities alike are compared in units of `scale`.
     """

@@ -262,7 +262,7 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
 
     - `solver`: `rodas3`, `rodas4` (ours, structured), `rk4` (classical), `newmark` (the paper's), `tsit5`, `kvaerno3`,
         `kvaerno5`, `kencarp4` (diffrax's).
-    - `steps`: equal steps per revolution; the default was chosen with `benchmarks/convergence.py`.
+    - `steps`: equal steps per revolution, by default 1024.
     - `tolerance`: if given, steps are adaptive with this relative and absolute tolerance, the latter in units of the
         system's own scale.
 

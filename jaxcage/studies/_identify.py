@@ -4,7 +4,7 @@ Approximate Bayesian computation by rejection (S. A. Sisson, Y. Fan and M. A. Be
 Computation (2018)): even draws from the ranges run at the measured speeds, and a draw is accepted if every measurement
 is met within its tolerance. Where few are, the ranges close around the best of them, with a margin, and are drawn from
 again. A box keeps less than what was learned: values that only matter together stay wide. What it gives up may have
-held the truth; how often is counted on planted bearings by `python -m benchmarks.own`.
+held the truth.
 """
 
 import dataclasses

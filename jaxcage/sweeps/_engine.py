@@ -25,7 +25,7 @@ from ..models import ESCAPE, AbstractForcedSystem
 
 
 CHUNKS = (16, 32, 64, 128, 256, 384, 512)
-"""Lanes per call on a CPU: few sizes, as each is compiled (`python -m benchmarks.chunks` times them)."""
+"""Lanes per call on a CPU: few sizes, as each is compiled."""
 CALL = 32
 """What a call costs beside its lanes, in lanes."""
 

@@ -1,0 +1,149 @@
+"""Tables and figures of README and docs, made again: `python -m benchmarks.pages [PAGE ...]`.
+
+A block stands between `<!-- made: NAME -->` and `<!-- end -->`. Its command is run, and what belongs into the block is
+taken from what it prints; the figure of a block that shows one is copied to `experiments`. Each block is printed too,
+and the last line of its page says with which version it was made. All pages together take hours.
+"""
+
+import argparse
+import functools
+import json
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from .common import ROOT, columns, made_with, markdown
+
+
+Part = Callable[[str], str | None]
+"""From what a command printed to the text of a block; None if the text stays."""
+EDGES = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
+RIVALS = "jaxcage, default|diffrax Tsit5, vmap|SciPy LSODA, numba|diffrax Kvaerno3, vmap|C, rodas4|C, rk4".split("|")
+
+
+def printed(text: str) -> str:
+    """All of it; there must be something."""
+    if not text.strip():
+        raise ValueError("The command printed nothing for this block.")
+    return f"```text\n{text.strip()}\n```"
+
+
+def tables(*titles: str) -> Part:
+    """The tables whose titles begin so."""
+    return lambda text: printed("\n\n".join(part for part in text.split("\n\n") if part.startswith(titles)))
+
+
+def figure(left: str, shown: str = "") -> Part:
+    """The figure that the command left in `out`, under the name that it has in `experiments`."""
+    return lambda text: shutil.copy(ROOT / "out" / left, ROOT / "experiments" / (shown or left)) and None
+
+
+def _ours(edge: dict[str, Any], apart: str) -> str:
+    return "none" if edge["ours_rpm"] is None else f"{edge['ours_rpm']:.0f}{apart.format(edge['error_percent'])}"
+
+
+def against_paper(text: str) -> str:
+    """The edges of lasting chaos of `jaxcage reproduce`, a case to a row."""
+    cases: dict[str, list[str]] = {}
+    for edge in (e for e in json.loads(text)["edges"] if e["kind"] == "lasting"):
+        cases.setdefault(edge["case"], []).append(f"{edge['published_rpm']:.0f} / {_ours(edge, ' ({:+.1f} %)')}")
+    return markdown(("case", "zone 1 from", "to", "zone 2 from"), [(name, *row) for name, row in cases.items()])
+
+
+def every_kind(text: str) -> str:
+    """The edges of every kind of `jaxcage reproduce`."""
+    document = json.loads(text)
+    kinds, rows = list(document["summary"]), {}
+    for edge in document["edges"]:
+        key = (edge["case"], edge["edge"], f"{edge['published_rpm']:.0f}")
+        rows.setdefault(key, {})[edge["kind"]] = _ours(edge, " {:+.1f} %")
+    body = [(*key, *(found.get(kind, "none") for kind in kinds)) for key, found in rows.items()]
+    return printed(columns([("case", "edge", "published", *kinds), *body], right=True))
+
+
+def readings(text: str) -> str:
+    """The readings of case 1a that `jaxcage reproduce` tried."""
+    rows: list[tuple[str, ...]] = [("reading", "chaotic", "zones", *EDGES)]
+    for r in (r for r in json.loads(text)["readings"] if r["case"] == "1a"):
+        at = ("-" if r["edges"].get(e) is None else f"{r['edges'][e]:.0f}" for e in EDGES)
+        name = f"{r['question']}: {r['answer']}".removesuffix(": -")
+        rows.append((name, f"{100 * r['chaotic_share']:.0f} %", str(r["zones"]), *at))
+    return printed(columns(rows, right=True))
+
+
+def speed(text: str) -> str:
+    """Microseconds of some rivals, from the first table of `python -m benchmarks`."""
+    rows = [[c.strip() for c in x.strip("|").split("|")] for x in text.split("\n## ")[1].splitlines() if x[:2] == "| "]
+    us = {row[0].removesuffix(" (below)"): row[rows[0].index("us")] for row in rows[1:]}
+    return markdown(RIVALS, [[us[name] if float(us[name]) < 10 else f"{float(us[name]):.0f}" for name in RIVALS]])
+
+
+README, EDGE, DESIGN, PAPER = "README.md", "docs/edges.md", "docs/design.md", "docs/reproduction.md"
+REPRODUCE = "jaxcage reproduce --json"
+LEDGER = "python experiments/identify_nu2310.py --trade-off --ledger experiments/lasting_search"
+BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
+CHAOS = ("Chaotic zones of", "Transient chaos of")
+BLOCKS: dict[str, tuple[str, str, Part]] = {
+    "sweep-1a-figure": (README, "jaxcage sweep 1a", figure("sweep_1a.png")),
+    "sweep-1a": (README, "jaxcage sweep 1a", tables(*CHAOS)),
+    "zones-1a": (README, "jaxcage zones 1a", tables("Elasticities", *CHAOS)),
+    "against-paper": (README, REPRODUCE, against_paper),
+    "reproduce-figure": (README, REPRODUCE, figure("fig7a.png", "reproduce_7a.png")),
+    "speed": (README, "python -m benchmarks", speed),
+    "guide-zones-1a": (EDGE, "jaxcage zones 1a", tables("Synchronous-loss", "Elasticities", *CHAOS)),
+    "bifurcations-1a-figure": (EDGE, "jaxcage bifurcations 1a", figure("bifurcations_1a.png")),
+    "design-1b": (DESIGN, "jaxcage design 1b", tables("Design of", "Optima", "Chaotic zones", "Synchronous-loss")),
+    "design-1b-figure": (DESIGN, "jaxcage design 1b", figure("design_1b.png")),
+    "searches-of-eight": (DESIGN, "python -m benchmarks.pay --table", printed),
+    "both-kinds": (PAPER, REPRODUCE, every_kind),
+    "reproduction-figure": (PAPER, REPRODUCE, figure("fig7a.png", "reproduce_7a.png")),
+    "readings": (PAPER, REPRODUCE, readings),
+    "without-1b": (PAPER, f"{LEDGER}_without_1b.csv".replace("trade-off", "check"), printed),
+    "trade-off": (PAPER, f"{LEDGER}.csv", printed),
+    "trade-off-physical": (PAPER, f"{LEDGER}_physical.csv", printed),
+    "bearing-design": ("docs/whole-bearing.md", BETTER, tables("Design of", "Before and after")),
+    "transcript": ("docs/transcript.md", "python -m benchmarks.transcript", printed),
+}
+"""Of each block the page, the command that makes it, and which part of its output it is."""
+
+
+@functools.cache
+def output(command: str) -> str:
+    """What a command prints, run once."""
+    program, *words = shlex.split(command)
+    words = ["-m", "jaxcage", *words] if program == "jaxcage" else words
+    print(f"$ {command}", flush=True)
+    done = subprocess.run([sys.executable, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout
+
+
+def refresh(page: str) -> None:
+    """Make the blocks of a page again."""
+    path, text = ROOT / page, (ROOT / page).read_text(encoding="utf-8")
+    for name, (where, command, part) in BLOCKS.items():
+        if where == page and (new := part(output(command))) is not None:
+            print(f"{new}\n", flush=True)
+            marks = f"<!-- made: {name} -->", "<!-- end -->"
+            text = re.sub(rf"(?s)({marks[0]}\n).*?(\n{marks[1]})", lambda m, new=new: m[1] + new + m[2], text, count=1)
+    text = re.sub(r"(?m)^Numbers on this page were made with .*$", lambda m: made_with(), text)
+    path.write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    """Make the pages that are named, or all."""
+    pages = {pathlib.Path(page).stem.lower(): page for page, _, _ in BLOCKS.values()}
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.pages", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help=", ".join(pages))
+    for name in parser.parse_args().pages or pages:
+        if name not in pages:
+            parser.error(f"there is no page {name}; pages with blocks: {', '.join(pages)}")
+        refresh(pages[name])
+
+
+if __name__ == "__main__":
+    main()
