@@ -2,12 +2,13 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.analysis import closing_period, closing_width, label_lanes, lives_in_words
+from jaxcage.analysis import closing_period, closing_width, decay, label_lanes, lives_in_words, on_torus
 
 
 def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
@@ -27,7 +28,7 @@ def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
             strobe[i], growth[i], outcome[i] = np.nan, np.nan, 1
         else:
             strobe[i, 0, :, 0] = wiggle
-            growth[i, 0, :, 0] = {"#": 0.4, "q": 0.0, "?": -0.1}[sign] + noise
+            growth[i, 0, :, 0] = {"#": 0.4, "q": 0.0, "?": -0.1}[sign] + (0.0 if sign == "q" else noise)
     return jc.Sweep(
         speed=speed,
         strobe=strobe,
@@ -90,28 +91,105 @@ def test_period_nine_and_nan_do_not_close():
     assert closing_period(np.full((64, 1), np.nan), np.ones(1)) == 0
 
 
+CIRCLE = spiral(0.618, 1.0, shrinks=1.0)
+
+
 @pytest.mark.parametrize(
     "exponent, error, expected",
     [
         (0.05, 0.01, "chaotic"),
         (0.05, 0.02, "undecided"),
         (0.004, 0.0, "quasi-periodic"),
-        (-0.004, 0.0, "quasi-periodic"),
-        (0.03, 0.02, "quasi-periodic"),
+        (-0.004, 0.002, "quasi-periodic"),
+        (0.0, 0.003, "undecided"),
+        (0.03, 0.02, "undecided"),
+        (0.5, np.inf, "undecided"),
         (-0.1, 0.01, "undecided"),
+        (np.nan, np.nan, "undecided"),
     ],
 )
 def test_labels_by_exponent_and_error(exponent: float, error: float, expected: str):
-    got = label_lanes(np.array([0]), np.array([0]), np.array([exponent]), np.array([error]))
+    """A strobe orbit on a circle: its label follows from the exponent, and zero must be resolved."""
+    got = label_lanes(np.array([0]), CIRCLE[None], np.ones(2), np.array([exponent]), np.array([error]))
     assert got[0] == expected
 
 
 def test_failure_comes_first_and_closing_before_the_exponent():
     """But what closes while its neighbours part is too small to be told from an orbit, or rests on an unstable one."""
+    twice = np.tile([[0.0, 1.0], [1.0, 0.0]], (32, 1))
     label = label_lanes(
-        np.array([1, 0, 0, 0]), np.array([1, 2, 2, 2]), np.array([0.5, 0.5, 0.03, -1]), np.full(4, 0.01)
+        np.array([1, 0, 0, 0]),
+        np.stack([np.full((64, 2), np.nan), twice, twice, twice]),
+        np.ones(2),
+        np.array([0.5, 0.5, 0.03, -1]),
+        np.full(4, 0.01),
     )
     assert list(label) == ["failed", "undecided", "periodic-2", "periodic-2"]
+
+
+@pytest.mark.parametrize("shrinks", [0.95, 0.98, 0.99, 0.995, 0.998, 0.999, 1.001])
+@pytest.mark.parametrize("turn", [0.03, 0.2, 0.497, 0.618])
+def test_a_spiral_is_no_torus_however_slow(shrinks: float, turn: float):
+    states = spiral(turn, 0.1, shrinks)
+    factor, error = decay(states)
+    assert factor == pytest.approx(shrinks, abs=error) and error < 2e-4
+    assert not on_torus(states[None], np.ones(2), np.zeros(1), np.zeros(1))[0]
+    assert on_torus(spiral(turn, 0.1, 1.0)[None], np.ones(2), np.zeros(1), np.zeros(1))[0]
+
+
+class SlowSpirals(eqx.Module):
+    """A forced, hardening oscillator whose multipliers go from 0.95 to 0.999 as the speed goes from 1 to 2."""
+
+    def __call__(self, tau, q, v, speed):
+        multiplier = 0.95 + 0.049 * (speed - 1)
+        damping = -speed * jnp.log(multiplier) / jnp.pi
+        return (-damping * v[0] - 0.3 * q[0] - 0.2 * q[0] ** 3 + 0.1 * jnp.cos(tau),)
+
+
+@pytest.mark.parametrize("revolutions", [20, 60, 120, 300, 600])
+def test_slow_spirals_are_not_called_quasi_periodic(revolutions: int):
+    """50 lanes, multipliers from 0.95 to 0.999: periodic-1 once they have closed, undecided with a cure before that."""
+    system = jc.ForcedOscillator(SlowSpirals(), coordinates=1)
+    settings = dict(discard=revolutions, revolutions=revolutions, confirm=False, horizon=0, starts=1)
+    found = jc.sweep(system, np.linspace(1, 2, 50), **settings, method=jc.method("rk4", steps=64))
+    assert set(found.label.ravel()) <= {"periodic-1", "undecided"}
+    open_ = found.label == "undecided"
+    assert np.array_equal(found.too_short, open_) and np.all(found.revolutions_to_decide[open_] > revolutions)
+    if np.any(open_):
+        assert "lanes need more revolutions: about" in str(found)
+
+
+def test_the_estimate_of_revolutions_is_what_a_spiral_needs():
+    system = jc.ForcedOscillator(SlowSpirals(), coordinates=1)
+    settings = dict(confirm=False, horizon=0, starts=1, method=jc.method("rk4", steps=64))
+    speed = np.array([1.5, 1.8])  # multipliers 0.9745 and 0.9892
+    few = jc.sweep(system, speed, discard=60, revolutions=60, **settings)
+    assert np.all(few.label == "undecided")
+    for i, needed in enumerate(few.revolutions_to_decide[:, 0]):
+        enough, half = 20 * int(np.ceil(needed / 20) + 4), 20 * int(np.ceil(needed / 40))
+        assert jc.sweep(system, speed[i], discard=60, revolutions=enough, **settings).label[0, 0] == "periodic-1"
+        assert jc.sweep(system, speed[i], discard=60, revolutions=half, **settings).label[0, 0] == "undecided"
+
+
+def test_labels_of_short_runs_of_a_cage_are_undecided_and_the_default_decides():
+    """Case 1a from 13 000 to 18 000 rpm: slow spirals onto periodic orbits, the slowest with a multiplier of 0.997."""
+    model, speeds = jc.case("1a"), jc.rpm(13000, 18000, 11)
+    short = jc.sweep(model, speeds, discard=200, revolutions=60, confirm=False, horizon=0)
+    assert not np.any(short.label == "quasi-periodic") and np.mean(short.label == "undecided") > 0.8
+    assert np.all(jc.sweep(model, speeds).label == "periodic-1")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-5])
+def test_small_motion_is_labelled_by_its_own_size(scale: float):
+    """A forced oscillator of van der Pol with an amplitude of 2e-5: quasi-periodic at either scale."""
+
+    def law(tau, q, v, speed):
+        return (0.5 * (1 - (1e5 * q[0]) ** 2) * v[0] - q[0] + 3e-6 * jnp.cos(tau),)
+
+    system = jc.ForcedOscillator(law, coordinates=1, scale=scale, starts=((1e-5, 0.0),))
+    found = jc.sweep(system, np.array([1.9, 2.3]), confirm=False)
+    assert np.all(found.label == "quasi-periodic")
+    assert np.all(found.small) == (scale == 1.0) == ("choose a smaller `scale`" in str(found))
 
 
 def test_windows_of_slow_bearings_are_closed_below_a_part_of_their_speed():

@@ -483,7 +483,7 @@ def test_ends_are_calm_as_their_labels_say():
     }
     strobe, growth = (np.stack(part) for part in zip(*kinds.values(), strict=True))
     error = np.std(growth, axis=1, ddof=1) / 8**0.5
-    label = label_lanes(np.zeros(3, dtype=int), np.array([2, 0, 0]), np.mean(growth, axis=1), error)
+    label = label_lanes(np.zeros(3, dtype=int), strobe, np.ones(2), np.mean(growth, axis=1), error)
     assert label.tolist() == list(kinds)
     assert calm_at_the_end(strobe, np.ones(2), growth, BLOCK).tolist() == [True, True, False]
     # Still on its way to an orbit, or on one of period 16: it does not close, but does not grow either.

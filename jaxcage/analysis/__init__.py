@@ -78,7 +78,10 @@ from ._labels import (
     CLOSING_TOLERANCE as CLOSING_TOLERANCE,
     LONGEST_PERIOD as LONGEST_PERIOD,
     closing_period as closing_period,
+    decay as decay,
     label_lanes as label_lanes,
+    on_torus as on_torus,
+    scatter as scatter,
     too_few_revolutions as too_few_revolutions,
 )
 from ._measures import (

@@ -1,24 +1,49 @@
-"""What a lane does, judged from its strobe states and exponents.
+"""Labels of lanes: periodic, chaotic, quasi-periodic, undecided, failed or inaccurate.
 
-Labels are given in this order: `inaccurate`, `failed`, `periodic-k`, `chaotic`, `quasi-periodic`, `undecided`. A lane
-that closes while its neighbours part is undecided: its motion is too small for the scale, or it sits on an unstable
-orbit.
+The rule, in this order: `inaccurate` and `failed` by the outcome; `periodic-k` if the strobe orbit closes after k
+revolutions; `chaotic` if the largest exponent is above 0.02 by two standard errors; `quasi-periodic` if it is zero
+within 0.005, two standard errors are below 0.005, and the strobe orbit neither shrinks nor grows; else `undecided`. A
+lane that closes while its neighbours part is undecided: its motion is too small for the scale, or it sits on an
+unstable orbit.
 """
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Bool, Float, Int, Shaped
 
 from ..integrate import OUTCOMES
 
 
 CLOSING_TOLERANCE = 1e-4
-"""A strobe orbit counts as closed if it returns to within this fraction of the system's scale (the clearance)."""
+"""A strobe orbit counts as closed if it returns to within this fraction of the size of its motion."""
+SMALLEST_MOTION = 1e-6
+"""Motion below this fraction of the system's scale closes by the tolerance of motion of this size: what is smaller is
+not told from a fixed point."""
 LONGEST_PERIOD = 8
 CHAOS_THRESHOLD = 0.02
 """Exponent per revolution that must be exceeded by two standard errors."""
 TORUS_THRESHOLD = 0.005
+"""Largest exponent per revolution, and largest two standard errors of it, that count as zero."""
 FEWEST_REVOLUTIONS = 20
 """With fewer, one error bar in forty is three times too small (256 lanes of Ueda's oscillator)."""
+RANK_TOLERANCE = 1e-3
+"""Parts of a strobe orbit below this fraction of the largest one are left out of its linear model."""
+
+
+def motion_size(
+    strobe: Float[np.ndarray, "*lanes keep dim"], scale: Float[np.ndarray, "*#lanes dim"]
+) -> Float[np.ndarray, "*lanes"]:
+    """Size of the motion in units of the system's scale: the largest norm of a strobe state."""
+    return np.max(np.linalg.norm(strobe / scale[..., None, :], axis=-1), axis=-1)
+
+
+def closing_tolerance(
+    strobe: Float[np.ndarray, "*lanes keep dim"], scale: Float[np.ndarray, "*#lanes dim"]
+) -> Float[np.ndarray, "*lanes"]:
+    """Distance within which a strobe orbit must return, in units of the scale: 1e-4 of the size of the motion.
+
+    The size is taken to be at most the scale and at least 1e-6 of it.
+    """
+    return CLOSING_TOLERANCE * np.clip(motion_size(strobe, scale), SMALLEST_MOTION, 1.0)
 
 
 def closing_period(
@@ -26,20 +51,21 @@ def closing_period(
 ) -> Int[np.ndarray, "*lanes"]:
     """Smallest k <= 8 for which every kept strobe state returns after k revolutions; 0 where there is none.
 
-    A lane that spirals towards an orbit of period j returns after k > j revolutions, if these bring it nearly round,
+    A lane that spirals towards an orbit of period j may return after k > j revolutions, if these bring it nearly round,
     before it returns after j: its states move away from where they were j revolutions ago as those of an orbit of
     period k do. But that distance dies out with the one after k revolutions, where an orbit keeps it. Such lanes have
     the period j.
 
-    Coordinates and velocities alike are compared in units of `scale`.
+    Coordinates and velocities alike are compared in units of `scale`, to within `closing_tolerance`.
     """
     states = strobe / scale[..., None, :]
+    tolerance = closing_tolerance(strobe, scale)[..., None]
     period = np.zeros(strobe.shape[:-2], dtype=np.int64)
     longest = min(LONGEST_PERIOD, strobe.shape[-2] // 2)
     remains = {}
     for k in range(longest, 0, -1):
         apart = np.linalg.norm(states[..., k:, :] - states[..., :-k, :], axis=-1)
-        closed = np.all(apart <= CLOSING_TOLERANCE, axis=-1)  # false for NaN
+        closed = np.all(apart <= tolerance, axis=-1)  # false for NaN
         period, remains[k] = np.where(closed, k, period), _remains(apart)
     for k in range(2, longest + 1):
         closed = period == k
@@ -50,10 +76,39 @@ def closing_period(
 
 
 def _remains(apart: Float[np.ndarray, "*lanes some"]) -> Float[np.ndarray, "*lanes"]:
-    """What is left of distances in the second half of the kept states; 1 where there were none."""
+    """Largest distance in the second half of the kept states over that in the first; 1 where there were none."""
     half = max(apart.shape[-1] // 2, 1)
     before, after = (np.max(x, axis=-1) for x in (apart[..., :half], apart[..., -half:]))
     return np.divide(after, before, out=np.ones_like(after), where=before > 0)
+
+
+def decay(states: Float[np.ndarray, "keep dim"]) -> tuple[float, float]:
+    """Factor by which a strobe orbit shrinks in a revolution, and an error of it: (0.98, 1e-4), say, for a slow spiral
+    onto an orbit with a multiplier of 0.98, and 1 within the error for a torus.
+
+    A linear model x[n+1] = A x[n] of the steps from state to state, with delayed steps as further components, is fitted
+    by least squares on the leading singular vectors (dynamic mode decomposition, P. J. Schmid, J. Fluid Mech. 656, 2010).
+    The factor is the modulus of the eigenvalue of its largest mode; the error is half the relative residual of the fit
+    and 1e-4.
+
+    **Arguments:** strobe states in units of the scale, twelve or more; with fewer the error is infinite.
+    """
+    steps = np.diff(states, axis=0)
+    count, dim = steps.shape
+    if count < 11 or not np.any(steps):
+        return 1.0, np.inf
+    delays = max(1, count // (4 * dim))
+    stacked = np.concatenate([steps[i : count - delays + 1 + i] for i in range(delays)], axis=1)
+    before, after = stacked[:-1].T, stacked[1:].T
+    left, size, right = np.linalg.svd(before, full_matrices=False)
+    rank = min(int(np.sum(size > RANK_TOLERANCE * size[0])), before.shape[1] // 2)
+    left, size, right = left[:, :rank], size[:rank], right[:rank]
+    model = left.T @ after @ right.T / size
+    residual = np.linalg.norm(after - left @ (model @ (left.T @ before))) / np.linalg.norm(after)
+    multipliers, modes = np.linalg.eig(model)
+    weights = np.linalg.lstsq(modes, left.T @ before, rcond=None)[0]
+    largest = np.argmax(np.linalg.norm(weights, axis=1))
+    return float(abs(multipliers[largest])), float(1e-4 + residual / 2)
 
 
 def scatter(blocks: Float[np.ndarray, "..."], axis: int = -1) -> Float[np.ndarray, "..."]:
@@ -66,14 +121,19 @@ def scatter(blocks: Float[np.ndarray, "..."], axis: int = -1) -> Float[np.ndarra
 
 def label_lanes(
     outcome: Int[np.ndarray, "*lanes"],
-    period: Int[np.ndarray, "*lanes"],
+    strobe: Float[np.ndarray, "*lanes keep dim"],
+    scale: Float[np.ndarray, "*#lanes dim"],
     exponent: Float[np.ndarray, "*lanes"],
     standard_error: Float[np.ndarray, "*lanes"],
 ) -> Shaped[np.ndarray, "*lanes"]:
-    """Labels from the code of the outcome, the closing period, and the largest exponent per revolution with its
-    standard error."""
+    """Labels of lanes, by the rule at the top of this file.
+
+    **Arguments:** codes of the outcomes; the last strobe states, and the scale of each component; largest exponents per
+    revolution with their standard errors, NaN where none was computed.
+    """
+    period = closing_period(strobe, scale)
     labels = np.full(np.shape(period), "undecided", dtype="<U14")
-    labels[np.abs(exponent) <= np.maximum(2 * standard_error, TORUS_THRESHOLD)] = "quasi-periodic"
+    labels[on_torus(strobe, scale, exponent, standard_error)] = "quasi-periodic"
     parting = exponent - 2 * standard_error > CHAOS_THRESHOLD
     labels[parting] = "chaotic"
     for k in range(1, LONGEST_PERIOD + 1):
@@ -84,15 +144,46 @@ def label_lanes(
     return labels
 
 
-def too_few_revolutions(
-    label: Shaped[np.ndarray, "*lanes"],
+def on_torus(
+    strobe: Float[np.ndarray, "*lanes keep dim"],
+    scale: Float[np.ndarray, "*#lanes dim"],
     exponent: Float[np.ndarray, "*lanes"],
     standard_error: Float[np.ndarray, "*lanes"],
+) -> Bool[np.ndarray, "*lanes"]:
+    """Lanes whose exponent is resolved as zero, and whose strobe orbit neither shrinks nor grows."""
+    states = strobe / scale[..., None, :]
+    resolved = (np.abs(exponent) <= TORUS_THRESHOLD) & (2 * standard_error <= TORUS_THRESHOLD)
+    found = np.zeros(resolved.shape, dtype=bool)
+    for lane in zip(*np.nonzero(resolved & np.all(np.isfinite(states), axis=(-2, -1))), strict=True):
+        factor, error = decay(states[lane])
+        found[lane] = abs(factor - 1) <= error < np.inf
+    return found
+
+
+def too_few_revolutions(label: Shaped[np.ndarray, "*lanes"], revolutions: int) -> Bool[np.ndarray, "*lanes"]:
+    """Lanes whose label needs more revolutions than were observed: they are undecided, or rest on an exponent of so few
+    revolutions that its standard error is not known."""
+    by_exponent = np.isin(label, ("quasi-periodic", "chaotic"))
+    return (label == "undecided") | (by_exponent & (revolutions < FEWEST_REVOLUTIONS))
+
+
+def revolutions_to_decide(
+    strobe: Float[np.ndarray, "keep dim"],
+    scale: Float[np.ndarray, " dim"],
+    exponent: float,
+    standard_error: float,
     revolutions: int,
-) -> Shaped[np.ndarray, "*lanes"]:
-    """Lanes whose label wants more revolutions than were observed: not called chaotic although they may be within two
-    standard errors, or judged by an exponent of so few revolutions that its standard error means nothing.
+) -> float:
+    """Estimate of the revolutions to be observed until an undecided lane has a label; infinite without an estimate.
+
+    A strobe orbit that shrinks closes when its steps have shrunk to the tolerance. Otherwise the exponent decides: its
+    standard error falls as the square root of the number of revolutions.
     """
-    calm = np.isin(label, ("quasi-periodic", "undecided"))
-    doubtful = calm & (exponent + 2 * standard_error > CHAOS_THRESHOLD)
-    return doubtful | ((calm | (label == "chaotic")) & (revolutions < FEWEST_REVOLUTIONS))
+    factor, error = decay(strobe / scale)
+    apart = np.linalg.norm(np.diff(strobe[-LONGEST_PERIOD:] / scale, axis=0), axis=-1).max()
+    tolerance = float(closing_tolerance(strobe, scale))
+    if error < 1 - factor < 1 and apart > tolerance:
+        return revolutions + float(np.log(tolerance / apart) / np.log(factor))
+    gap = exponent - CHAOS_THRESHOLD if exponent > CHAOS_THRESHOLD + TORUS_THRESHOLD else TORUS_THRESHOLD
+    ratio = 2 * standard_error / gap
+    return revolutions * max(ratio**2, 2.0) if np.isfinite(ratio) else np.inf

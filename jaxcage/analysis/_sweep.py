@@ -10,10 +10,12 @@ from jaxtyping import Bool, Float, Int, Shaped
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..integrate import OUTCOMES
-from ._labels import closing_period, label_lanes, scatter, too_few_revolutions
+from ._labels import label_lanes, motion_size, revolutions_to_decide, scatter, too_few_revolutions
 from ._transients import Survival, survival
 
 
+SMALL = 1e-3
+"""Size of the motion, in units of the scale, below which it is reported."""
 LIFE_BLOCK = 30
 """Revolutions within which an escape from chaos is known."""
 
@@ -106,11 +108,10 @@ class Sweep:
     def observed_label(self) -> Shaped[np.ndarray, "speeds starts"]:
         """What each lane does while observed: `periodic-k`, `chaotic`, `quasi-periodic`, `undecided`, `failed` or
         `inaccurate`."""
-        period = closing_period(self.strobe, self.scale[:, None, :])
         growth = self.exponents.shape[-1] > 0
-        unknown = np.full(period.shape, np.nan)
+        unknown = np.full(self.outcome.shape, np.nan)
         exponent, error = (self.exponents[..., 0], self.standard_error[..., 0]) if growth else (unknown, unknown)
-        return label_lanes(self.outcome, period, exponent, error)
+        return label_lanes(self.outcome, self.strobe, self.scale[:, None, :], exponent, error)
 
     @property
     def label(self) -> Shaped[np.ndarray, "speeds starts"]:
@@ -146,10 +147,24 @@ class Sweep:
 
     @property
     def too_short(self) -> Shaped[np.ndarray, "speeds starts"]:
-        """Lanes whose label rests on too few revolutions for the error bar of its exponent."""
+        """Lanes that are undecided, or labelled by an exponent of too few revolutions for its error bar."""
         if self.exponents.shape[-1] == 0:
             return np.zeros(self.outcome.shape, dtype=bool)
-        return too_few_revolutions(self.label, self.exponents[..., 0], self.standard_error[..., 0], self.revolutions)
+        return too_few_revolutions(self.label, self.revolutions)
+
+    @property
+    def revolutions_to_decide(self) -> Float[np.ndarray, "speeds starts"]:
+        """Estimate of the revolutions to be observed until each undecided lane has a label, 0 for the other lanes."""
+        needed = np.zeros(self.outcome.shape)
+        for i, j in zip(*np.nonzero((self.label == "undecided") & (self.exponents.shape[-1] > 0)), strict=True):
+            lane = float(self.exponents[i, j, 0]), float(self.standard_error[i, j, 0]), self.revolutions
+            needed[i, j] = revolutions_to_decide(self.strobe[i, j], self.scale[i], *lane)
+        return needed
+
+    @property
+    def small(self) -> Bool[np.ndarray, "speeds starts"]:
+        """Lanes whose motion is below a thousandth of the system's scale: the scale does not fit it."""
+        return motion_size(self.strobe, self.scale[:, None, :]) < SMALL
 
     @property
     def chaotic_share(self) -> Float[np.ndarray, " speeds"]:
@@ -172,7 +187,11 @@ class Sweep:
             lines.append(f"  {over:6d} lanes went beyond eps = 1, at most to {np.nanmax(self.peak):.3f}")
         short = int(np.sum(self.too_short))
         if short:
-            lines.append(f"  {short:6d} labels rest on too few revolutions: their exponents are too uncertain")
+            needed = np.max(self.revolutions_to_decide)
+            cure = f"about {needed:.2g} observed revolutions would decide" if np.isfinite(needed) and needed else ""
+            lines.append(f"  {short:6d} lanes need more revolutions" + (f": {cure}" if cure else ""))
+        if small := int(np.sum(self.small)):
+            lines.append(f"  {small:6d} lanes move by less than {SMALL:g} of the scale: choose a smaller `scale`")
         lines += [f"  {n:6d} lanes failed: {OUTCOMES[code]}" for code, n in sorted(codes.items())]
         lines += [f"  confirmed by finer steps: {each}" for each in self.confirmed]
         finished = self.error[~self.failed]

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from .._notebook import notebook_html
+from ._labels import CHAOS_THRESHOLD
 from ._sweep import Sweep
 
 
@@ -235,8 +236,10 @@ def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:
 
 
 def _undecided(sweep: Sweep, restless: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
-    """Speeds at which lanes left chaos, after a mean life that may be on either side of the horizon."""
-    undecided = np.zeros_like(restless)
+    """Speeds at which lanes left chaos after a mean life that may be on either side of the horizon, and calm ones with a
+    lane that is undecided and may be chaotic within two standard errors."""
+    open_ = (sweep.label == "undecided") & (sweep.exponents + 2 * sweep.standard_error > CHAOS_THRESHOLD)[..., 0]
+    undecided = ~restless & np.any(open_, axis=1)
     if sweep.escape is not None:
         for i in np.flatnonzero(restless).tolist():
             lives = sweep.survival(i)

@@ -57,9 +57,9 @@ def tell_of_kept_programs() -> None:
 
 
 def warn_of_short(labels: int) -> None:
-    """Say how many labels rest on too few revolutions, if any."""
+    """Warn of lanes that need more revolutions for a label, if there are any."""
     if labels:
-        say(f"Warning: {labels} labels rest on too few revolutions: choose more --revolutions.")
+        say(f"Warning: {labels} lanes need more revolutions to have a label: choose more --revolutions.")
 
 
 def leave_at_once_when_interrupted() -> None:

@@ -182,7 +182,7 @@ class Study(AbstractStudy):
         error = np.full(exponents.shape, np.inf)
         if self.blocks > 1:
             error = np.hypot(np.std(growth, axis=1, ddof=1) / np.sqrt(self.blocks), doubt)
-        label = label_lanes(outcome, period, exponents[:, 0], error[:, 0])
+        label = label_lanes(outcome, strobe[:, -CLOSING:], scale, exponents[:, 0], error[:, 0])
         several = {"exponents": exponents, "standard_errors": error} if self.exponents > 1 else {}
         kept = {"strobe": strobe[:, -self.strobe :]} if self.strobe else {}
         return {
@@ -201,7 +201,7 @@ class Study(AbstractStudy):
 def too_short(found: Mapping[str, np.ndarray], revolutions: int) -> Bool[np.ndarray, "*lanes"]:
     """Lanes whose label rests on too few revolutions for the error bar of its exponent; not those still to be run."""
     label = np.array([*LABELS, "pending"])[found["label"].astype(int)]
-    return too_few_revolutions(label, found["largest_exponent"], found["standard_error"], revolutions)
+    return too_few_revolutions(label, revolutions)
 
 
 def with_values(system: AbstractForcedSystem, values: dict[str, Any]) -> AbstractForcedSystem:

@@ -17,6 +17,8 @@ from ..analysis import (
     calm_threshold,
     closing_period,
     escape_times,
+    on_torus,
+    scatter,
 )
 
 
@@ -36,8 +38,9 @@ def follow(
 ) -> tuple[Float[np.ndarray, " lanes"], int]:
     """Follow the lanes that are not settled, and put where they end in place of what was `seen` of them.
 
-    They are run on in stages of `STAGE` blocks; one that has closed on a periodic orbit by the end of a stage, its
-    growth calm for as long as an escape takes to be confirmed, stays there and is not run any further.
+    They are run on in stages of `STAGE` blocks. One that has closed on a periodic orbit by the end of a stage, its
+    growth calm for as long as an escape takes to be confirmed, stays there and is not run any further; nor is one that
+    was undecided and is seen to be on a torus. Exponents of lanes that were undecided are those of the longer run.
 
     **Arguments:** labels; what was seen by which plan; scale of each lane's state; horizon [revolutions of the whole
     run]; `run(plan, lanes, states)` runs lanes on from their states.
@@ -48,7 +51,8 @@ def follow(
     early = _coarse(np.asarray(seen.growth)[:, 0], plan.block)
     observed = plan.discard + plan.block * plan.blocks
     blocks = -(-(horizon - observed) // LIFE_BLOCK) + CONFIRM  # to the horizon, and those that confirm an escape
-    late = np.full((blocks, label.size), CALM)
+    late, ran = np.full((blocks, label.size), CALM), np.zeros(label.size, dtype=int)
+    undecided = label == "undecided"
     calm = np.ones(label.size, dtype=bool)
     active = np.flatnonzero(np.isin(label, ("chaotic", "undecided")))
     for first in range(0, blocks, STAGE):
@@ -56,19 +60,35 @@ def follow(
             break
         stage = slice(first, min(first + STAGE, blocks))
         new = run(Plan(0, LIFE_BLOCK, stage.stop - first, plan.keep, 1), active, np.asarray(seen.last).T[active])
-        ran = np.asarray(new.strobe)[-min(plan.keep, LIFE_BLOCK * (stage.stop - first)) :]  # a stage may be shorter
-        _put(seen, active, new, ran, label[active] == "undecided")
-        late[stage, active] = new.growth[:, 0]
-        strobe = np.moveaxis(ran, -1, 0)
+        kept = np.asarray(new.strobe)[-min(plan.keep, LIFE_BLOCK * (stage.stop - first)) :]  # a stage may be shorter
+        _put(seen, active, new, kept, undecided[active])
+        late[stage, active], ran[active] = new.growth[:, 0], stage.stop
+        strobe = np.moveaxis(kept, -1, 0)
         end = late[: stage.stop, active].T
         calm[active] = calm_at_the_end(strobe, scale[active], end, LIFE_BLOCK)
         closed = closing_period(strobe, scale[active]) > 0
         still = np.all(end[:, -CONFIRM:] <= calm_threshold(LIFE_BLOCK), axis=1)
-        active = active[~(closed & still) & (new.outcome == 0)]
+        torus = np.zeros(active.size, dtype=bool)
+        if len(rows := _aligned(end.T, plan.blocks)):
+            torus = undecided[active] & on_torus(strobe, scale[active], np.mean(rows, axis=0), scatter(rows, axis=0))
+        active = active[~(closed & still) & ~torus & (new.outcome == 0)]
+    for lane in np.flatnonzero(undecided & (ran > 0) & (np.asarray(seen.outcome) == 0)):
+        if len(rows := _aligned(late[: ran[lane], lane], plan.blocks)):
+            seen.growth[:, 0, lane] = rows  # pyright: ignore
     failed = np.asarray(seen.outcome) != 0
     times, end = escape_times(np.concatenate([early, late]).T, calm, LIFE_BLOCK, failed=failed)
     begin = plan.discard + plan.block * plan.blocks % LIFE_BLOCK
     return begin + times, begin + end
+
+
+def _aligned(late: Float[np.ndarray, "ran *lanes"], count: int) -> Float[np.ndarray, "rows *lanes"]:
+    """Growth in `count` equal parts of the run, the first block of each stage left out: tangent vectors still turn to
+    their direction there. Empty where there are fewer blocks."""
+    blocks = late[np.arange(len(late)) % STAGE > 0]
+    size = len(blocks) // count
+    if size == 0:
+        return blocks[:0]
+    return blocks[len(blocks) - size * count :].reshape(count, size, *late.shape[1:]).mean(axis=1)
 
 
 def _put(
