@@ -33,7 +33,7 @@ def motion_size(
     strobe: Float[np.ndarray, "*lanes keep dim"], scale: Float[np.ndarray, "*#lanes dim"]
 ) -> Float[np.ndarray, "*lanes"]:
     """Size of the motion in units of the system's scale: the largest norm of a strobe state."""
-    return np.max(np.linalg.norm(strobe / scale[..., None, :], axis=-1), axis=-1)
+    return np.asarray(np.max(np.linalg.norm(strobe / scale[..., None, :], axis=-1), axis=-1))
 
 
 def closing_tolerance(
@@ -43,7 +43,7 @@ def closing_tolerance(
 
     The size is taken to be at most the scale and at least 1e-6 of it.
     """
-    return CLOSING_TOLERANCE * np.clip(motion_size(strobe, scale), SMALLEST_MOTION, 1.0)
+    return np.asarray(CLOSING_TOLERANCE * np.clip(motion_size(strobe, scale), SMALLEST_MOTION, 1.0))
 
 
 def closing_period(
