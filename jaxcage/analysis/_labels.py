@@ -87,8 +87,8 @@ def decay(states: Float[np.ndarray, "keep dim"]) -> tuple[float, float]:
     onto an orbit with a multiplier of 0.98, and 1 within the error for a torus.
 
     A linear model x[n+1] = A x[n] of the steps from state to state, with delayed steps as further components, is fitted
-    by least squares on the leading singular vectors (dynamic mode decomposition, P. J. Schmid, J. Fluid Mech. 656, 2010).
-    The factor is the modulus of the eigenvalue of its largest mode; the error is half the relative residual of the fit
+    by least squares on the leading singular vectors (dynamic mode decomposition, P. J. Schmid, J. Fluid Mech. 656,
+    2010). The factor is the modulus of the eigenvalue of its largest mode; the error is half the relative residual of the fit
     and 1e-4.
 
     **Arguments:** strobe states in units of the scale, twelve or more; with fewer the error is infinite.

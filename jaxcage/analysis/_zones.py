@@ -236,8 +236,8 @@ def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:
 
 
 def _undecided(sweep: Sweep, restless: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
-    """Speeds at which lanes left chaos after a mean life that may be on either side of the horizon, and calm ones with a
-    lane that is undecided and may be chaotic within two standard errors."""
+    """Speeds at which lanes left chaos after a mean life that may be on either side of the horizon, and calm speeds
+    with a lane that is undecided and may be chaotic within two standard errors."""
     open_ = (sweep.label == "undecided") & (sweep.exponents + 2 * sweep.standard_error > CHAOS_THRESHOLD)[..., 0]
     undecided = ~restless & np.any(open_, axis=1)
     if sweep.escape is not None:

@@ -81,7 +81,7 @@ def follow(
     return begin + times, begin + end
 
 
-def _aligned(late: Float[np.ndarray, "ran *lanes"], count: int) -> Float[np.ndarray, "rows *lanes"]:
+def _aligned(late: Float[np.ndarray, "ran ..."], count: int) -> Float[np.ndarray, "rows ..."]:
     """Growth in `count` equal parts of the run, the first block of each stage left out: tangent vectors still turn to
     their direction there. Empty where there are fewer blocks."""
     blocks = late[np.arange(len(late)) % STAGE > 0]
