@@ -56,6 +56,7 @@ from .orbits import (
     sensitivity as sensitivity,
     synchronous_orbits as synchronous_orbits,
 )
+from .solve import native as native
 from .studies import label_map as label_map, open_study as open_study, study as study
 from .sweeps import (
     rpm as rpm,

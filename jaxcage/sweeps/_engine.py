@@ -22,6 +22,8 @@ from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
 from ..integrate import BLOCK, AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
+from ..solve import NativeSteps
+from ._native import observe_native
 
 
 CHUNKS = (16, 32, 64, 128, 256, 384, 512)
@@ -74,6 +76,14 @@ class Designs(eqx.Module):
 
     systems: AbstractForcedSystem
     count: int = eqx.field(static=True)
+
+    @property
+    def each(self) -> list[AbstractForcedSystem]:
+        """The systems one by one."""
+        if self.count == 1:
+            return [self.systems]
+        one = lambda i: jax.tree.map(lambda x: x[i] if eqx.is_array(x) else x, self.systems)
+        return [one(i) for i in range(self.count)]
 
     @classmethod
     def of(cls, systems: Sequence[AbstractForcedSystem]) -> "Designs":
@@ -199,6 +209,38 @@ def _room(count: int) -> int:
     return 1 << max(5, (count - 1).bit_length())
 
 
+def _run_native(
+    systems: Sequence[AbstractForcedSystem] | Designs,
+    method: NativeSteps,
+    plan: Plan,
+    speed: Float[np.ndarray, " lanes"],
+    y0: Float[np.ndarray, "lanes dim"],
+    progress: Progress | None,
+    which: Int[np.ndarray, " lanes"] | None,
+    onward: bool,
+) -> Observation:
+    """Lanes in machine code; those that need an implicit method, or all where a law cannot be translated, by JAX."""
+    alone = systems.each if isinstance(systems, Designs) else list(systems)
+    which = np.zeros(speed.size, int) if which is None else which
+    plan = Plan(*map(int, plan))
+    each, done = plan.discard + plan.block * plan.blocks, 0.0
+
+    def report(revolutions: int) -> None:
+        nonlocal done
+        done += revolutions / max(each, 1)
+        if progress is not None:
+            progress(min(int(done + 1e-9), speed.size), speed.size)
+
+    def otherwise(lanes: Int[np.ndarray, " some"]) -> Observation:
+        return run_lanes(systems, method.instead, plan, speed[lanes], y0[lanes], None, which[lanes], onward)
+
+    limit = ESCAPE if onward else 1.0
+    seen = observe_native(
+        alike(alone, "systems", "systems"), method, plan, speed, y0, which, limit, cores(), report, otherwise
+    )
+    return run_lanes(systems, method.instead, plan, speed, y0, progress, which, onward) if seen is None else seen
+
+
 def run_lanes(
     systems: AbstractForcedSystem | Sequence[AbstractForcedSystem] | Designs,
     method: AbstractMethod,
@@ -221,6 +263,8 @@ def run_lanes(
     """
     lanes, dim = y0.shape
     systems = systems if isinstance(systems, Sequence | Designs) else [systems]
+    if isinstance(method, NativeSteps):
+        return _run_native(systems, method, plan, speed, y0, progress, which, onward)
     designs = systems if isinstance(systems, Designs) else Designs.of(systems)
     which = np.zeros(lanes, int) if which is None else which
     size = chunk_size(lanes) if size is None else size

@@ -19,8 +19,9 @@ from .._errors import ArgumentError
 from .._recent import jitted
 from .._types import State
 from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
-from ..integrate import AbstractMethod, controlled, finer
+from ..integrate import AbstractMethod
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
+from ..solve import native, refined
 from ._confirm import Labelled, confirm as confirm_lanes, doubtful
 from ._engine import Progress, chunk_size, run_lanes
 from ._lasting import follow
@@ -121,7 +122,7 @@ def sweep(
     - `blocks`: blocks of revolutions from whose scatter the standard error comes.
     - `keep`: number of strobe states kept, the last ones; a period k is only seen with at least 2 k of them, all up to
         8 with 16.
-    - `method`: integration method, by default `jaxcage.controlled()`.
+    - `method`: integration method, by default `jaxcage.native()`.
     - `progress`: called with lanes done and lanes in all.
 
     **Returns:** `Sweep`. Lanes that fail are NaN with an outcome and leave their neighbours untouched.
@@ -171,7 +172,7 @@ def sweep_designs(
         raise ArgumentError("systems", said="must hold at least one system, but it is empty.")
     speed = _speeds_of_each(speeds, len(systems))
     require_speeds(systems[0], speed, "speeds")
-    chosen = controlled() if method is None else method
+    chosen = native() if method is None else method
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
     _require_settled(settled, discard, confirm, horizon)
@@ -204,7 +205,7 @@ def sweep_designs(
         labelled = _labelled(found)
 
         def again(lanes: np.ndarray, times: int) -> Labelled:
-            _put(seen, lanes, run(plan, lanes, finer(chosen, times)))
+            _put(seen, lanes, run(plan, lanes, refined(chosen, times)))
             return _labelled(each_system(seen)).at(lanes)
 
         wanted = doubtful(labelled.label.reshape(len(systems), *shape))

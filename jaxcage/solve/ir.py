@@ -1,0 +1,313 @@
+"""LLVM IR of a traced scalar function, written for vectors of lanes.
+
+A number that all lanes share stays a scalar, every other one is a vector with an element for each lane. What only one
+side of a `select` needs is computed only if some lane of the vector takes that side (`branches`): the contact force,
+say, is skipped while no cage of the vector touches its land.
+"""
+
+import functools
+import struct
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax.extend as jex
+import numpy as np
+
+
+FLAGS = "nsz arcp contract"
+"""Licence of LLVM's optimiser: fuse multiplications and additions, divide by multiplying, ignore the sign of zero. NaN
+and infinity keep their meaning."""
+WORTH_A_BRANCH = 12
+"""Operations that must be saved for a branch to pay."""
+COST = {"div": 6, "sqrt": 6, "rsqrt": 6, "exp": 20, "log": 20, "sin": 20, "cos": 20, "tan": 20, "pow": 40, "atan2": 40}
+"""Operations that count as several."""
+ARITHMETIC = {"add": "add", "add_any": "add", "sub": "sub", "mul": "mul", "div": "div", "rem": "rem"}
+COMPARISONS = {"lt": "lt", "le": "le", "gt": "gt", "ge": "ge", "eq": "eq", "ne": "ne"}
+BITWISE = {
+    "and": "and",
+    "or": "or",
+    "xor": "xor",
+    "shift_left": "shl",
+    "shift_right_logical": "lshr",
+    "shift_right_arithmetic": "ashr",
+}
+SAME_NAME = ("sqrt", "floor", "ceil", "exp", "exp2", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2")
+INTRINSICS = {
+    **{name: name for name in (*SAME_NAME, "sinh", "cosh", "tanh", "pow", "copysign")},
+    "abs": "fabs",
+}
+CASTS = {("double", "i64"): "fptosi", ("i64", "double"): "sitofp", ("i1", "double"): "uitofp", ("i1", "i64"): "zext"}
+
+Path = tuple[tuple[Any, int], ...]
+"""Masks, and the value of each for which something is needed."""
+
+
+class UnknownOperation(Exception):
+    """A traced function uses an operation that has no translation; the argument is its name."""
+
+
+def is_variable(atom: Any) -> bool:
+    """True for a variable of a jaxpr, false for a literal."""
+    return not isinstance(atom, jex.core.Literal)
+
+
+def branches(equations: Sequence[Any], results: Sequence[Any]) -> dict[Any, Path]:
+    """For each variable the masks under which it is needed; () for a variable that is always needed."""
+    path: dict[Any, Path] = {v: () for v in results if is_variable(v)}
+    for e in reversed(equations):
+        own = path[e.outvars[0]]
+        for k, v in enumerate(e.invars):
+            if is_variable(v):
+                always = e.primitive.name != "select_n" or k == 0 or any(m is e.invars[0] for m, _ in own)
+                needed = own if always else (*own, (e.invars[0], k - 1))
+                path[v] = _common(path[v], needed) if v in path else needed
+    kinds = {path[e.outvars[0]] for e in equations}
+    for p in sorted({p[:n] for p in kinds for n in range(1, len(p) + 1)}, key=len, reverse=True):
+        inside = [e for e in equations if path[e.outvars[0]][: len(p)] == p]
+        if sum(COST.get(e.primitive.name, 1) for e in inside) < WORTH_A_BRANCH:
+            path.update({e.outvars[0]: p[:-1] for e in inside})
+    return path
+
+
+def _common(a: Path, b: Path) -> Path:
+    """The beginning that two paths share."""
+    n = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    return a[:n]
+
+
+def in_groups(equations: Sequence[Any], path: dict[Any, Path]) -> list[tuple[Path, list[Any]]]:
+    """The equations in groups of one path each, as few as possible; what is always needed comes first."""
+    waiting, missing = list(equations), {v for e in equations for v in e.outvars}
+    groups: list[tuple[Path, list[Any]]] = []
+    while waiting:
+        for p in sorted({path[e.outvars[0]] for e in waiting}, key=len):
+            taken, left = [], []
+            for e in waiting:
+                reads = (v for v in (*e.invars, *(m for m, _ in p)) if is_variable(v))
+                ready = path[e.outvars[0]] == p and not any(v in missing for v in reads)
+                (taken if ready else left).append(e)
+                missing.difference_update(e.outvars if ready else ())
+            if taken:
+                groups.append((p, taken))
+                waiting = left
+                break
+    return groups
+
+
+class Value(NamedTuple):
+    """An operand: its text, its scalar type, and whether it is a vector of lanes."""
+
+    text: str
+    kind: str
+    wide: bool
+
+    @property
+    def known(self) -> bool:
+        """True for a number that is written out."""
+        return not self.text.startswith("%")
+
+
+def number(x: Any) -> Value:
+    """A constant."""
+    x = np.asarray(x)
+    if x.dtype == bool:
+        return Value("true" if x else "false", "i1", False)
+    if x.dtype.kind in "iu":
+        return Value(str(int(x)), "i64", False)
+    return Value(f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}", "double", False)
+
+
+class Writer:
+    """Lines of a function's body. An operation is one on vectors where any of its operands is a vector."""
+
+    def __init__(self, width: int):
+        self.width, self.lines, self.names, self.declarations = width, [], 0, set[str]()
+
+    def type(self, kind: str, wide: bool) -> str:
+        return f"<{self.width} x {kind}>" if wide else kind
+
+    def typed(self, v: Value) -> str:
+        return f"{self.type(v.kind, v.wide)} {v.text}"
+
+    def line(self, text: str) -> None:
+        self.lines.append(text if text.endswith(":") else f"  {text}")
+
+    def let(self, text: str, kind: str, wide: bool) -> Value:
+        self.names += 1
+        self.line(f"%v{self.names} = {text}")
+        return Value(f"%v{self.names}", kind, wide)
+
+    def widened(self, v: Value) -> Value:
+        """A scalar as a vector of equal elements."""
+        if v.wide:
+            return v
+        if v.known:
+            return Value(f"splat ({v.kind} {v.text})", v.kind, True)
+        one = self.let(f"insertelement {self.type(v.kind, True)} poison, {v.kind} {v.text}, i64 0", v.kind, True)
+        zeros = f"<{self.width} x i32> zeroinitializer"
+        return self.let(f"shufflevector {self.typed(one)}, {self.typed(one)}, {zeros}", v.kind, True)
+
+    def alike(self, x: Sequence[Value]) -> list[Value]:
+        """Operands of one shape."""
+        return [self.widened(v) for v in x] if any(v.wide for v in x) else list(x)
+
+    def simple(self, op: str, *operands: Value, kind: str | None = None) -> Value:
+        """An instruction whose operands are all of one type."""
+        x = self.alike(operands)
+        rest = "".join(f", {v.text}" for v in x[1:])
+        return self.let(f"{op} {self.typed(x[0])}{rest}", kind or x[0].kind, x[0].wide)
+
+    def call(self, name: str, *operands: Value) -> Value:
+        """A call of one of LLVM's functions of numbers."""
+        x = self.alike(operands)
+        t = self.type(x[0].kind, x[0].wide)
+        full = f"llvm.{name}.{f'v{self.width}' if x[0].wide else ''}{'f64' if x[0].kind == 'double' else x[0].kind}"
+        flags = f"{FLAGS} " if x[0].kind == "double" else ""
+        self.declarations.add(f"declare {t} @{full}({', '.join([t] * len(x))})")
+        return self.let(f"call {flags}{t} @{full}({', '.join(map(self.typed, x))})", x[0].kind, x[0].wide)
+
+    def arithmetic(self, op: str, *x: Value) -> Value:
+        if x[0].kind == "double":
+            return self.simple(f"f{op} {FLAGS}", *x)
+        return self.simple({"div": "sdiv", "rem": "srem"}.get(op, op), *x)
+
+    def add(self, *x: Value) -> Value:
+        return functools.reduce(lambda a, b: self.arithmetic("add", a, b), x)
+
+    def sub(self, a: Value, b: Value) -> Value:
+        return self.arithmetic("sub", a, b)
+
+    def mul(self, *x: Value) -> Value:
+        return functools.reduce(lambda a, b: self.arithmetic("mul", a, b), x)
+
+    def div(self, a: Value, b: Value) -> Value:
+        return self.arithmetic("div", a, b)
+
+    def compare(self, op: str, a: Value, b: Value) -> Value:
+        """A comparison; every one with NaN is false but `ne`."""
+        if a.kind == "double":
+            return self.simple(f"fcmp {'une' if op == 'ne' else 'o' + op}", a, b, kind="i1")
+        if a.kind == "i1":
+            return self.simple(f"icmp {op}", a, b, kind="i1")
+        return self.simple(f"icmp {op if op in ('eq', 'ne') else 's' + op}", a, b, kind="i1")
+
+    def both(self, *masks: Value) -> Value:
+        return functools.reduce(lambda a, b: self.simple("and", a, b), masks)
+
+    def negated(self, mask: Value) -> Value:
+        return self.simple("xor", mask, number(True))
+
+    def select(self, mask: Value, yes: Value, no: Value) -> Value:
+        yes, no = (self.widened(yes), self.widened(no)) if mask.wide else self.alike((yes, no))
+        flags = f"{FLAGS} " if yes.kind == "double" else ""
+        return self.let(f"select {flags}{self.typed(mask)}, {self.typed(yes)}, {self.typed(no)}", yes.kind, yes.wide)
+
+    def larger(self, a: Value, b: Value) -> Value:
+        """The larger number; b where a is NaN."""
+        return self.select(self.compare("gt", a, b), a, b)
+
+    def smaller(self, a: Value, b: Value) -> Value:
+        """The smaller number; b where a is NaN."""
+        return self.select(self.compare("lt", a, b), a, b)
+
+    def extreme(self, op: str, a: Value, b: Value) -> Value:
+        """The larger (`gt`) or smaller (`lt`) number, NaN if either is."""
+        if a.known or b.known:
+            known, other = (a, b) if a.known else (b, a)
+            return self.select(self.compare(op, known, other), known, other)
+        return self.call("maximum" if op == "gt" else "minimum", a, b)
+
+    def power(self, x: Value, n: int) -> Value:
+        if n < 0:
+            return self.div(number(1.0), self.power(x, -n))
+        if n == 0:
+            return number(1.0)
+        half = x if n < 2 else self.power(self.mul(x, x), n // 2)
+        return half if n == 1 or n % 2 == 0 else self.mul(half, x)
+
+    def any(self, mask: Value) -> Value:
+        """Whether a mask holds for some lane."""
+        if not mask.wide:
+            return mask
+        bits = self.let(f"bitcast {self.typed(mask)} to i{self.width}", f"i{self.width}", False)
+        return self.let(f"icmp ne i{self.width} {bits.text}, 0", "i1", False)
+
+    def convert(self, op: str, x: Value, kind: str) -> Value:
+        return self.let(f"{op} {self.typed(x)} to {self.type(kind, x.wide)}", kind, x.wide)
+
+    def equation(self, e: Any, x: list[Value]) -> Value:
+        """The result of one operation of a jaxpr.
+
+        **Raises:** `UnknownOperation`.
+        """
+        name = e.primitive.name
+        if name in ARITHMETIC:
+            return self.arithmetic(ARITHMETIC[name], *x)
+        if name in COMPARISONS:
+            return self.compare(COMPARISONS[name], *x)
+        if name in BITWISE:
+            return self.simple(BITWISE[name], *x)
+        if name in INTRINSICS and x[0].kind == "double":
+            return self.call(INTRINSICS[name], *x)
+        if name in ("max", "min") and x[0].kind == "double":
+            return self.extreme("gt" if name == "max" else "lt", *x)
+        if name == "select_n" and len(x) == 3 and x[0].kind == "i1":
+            return self.select(x[0], x[2], x[1])
+        if name == "clamp":
+            return self.extreme("lt", self.extreme("gt", x[1], x[0]), x[2])
+        if name == "neg" and x[0].kind == "double":
+            return self.simple(f"fneg {FLAGS}", *x)
+        if name == "sign" and x[0].kind == "double":
+            one = self.call("copysign", number(1.0), x[0])
+            return self.select(self.compare("ne", x[0], number(0.0)), self.add(one, self.mul(x[0], number(0.0))), x[0])
+        if name == "not" and x[0].kind == "i1":
+            return self.negated(x[0])
+        if name == "integer_pow":
+            return self.power(x[0], e.params["y"])
+        if name == "square":
+            return self.mul(x[0], x[0])
+        if name == "rsqrt":
+            return self.div(number(1.0), self.call("sqrt", *x))
+        if name == "is_finite":
+            return self.compare("lt", self.call("fabs", *x), number(np.inf))
+        if name in ("stop_gradient", "copy"):
+            return x[0]
+        if name in ("bitcast_convert_type", "convert_element_type"):
+            kind = {"f": "double", "i": "i64", "u": "i64", "b": "i1"}[np.dtype(e.params["new_dtype"]).kind]
+            if kind == x[0].kind:
+                return x[0]
+            cast = "bitcast" if name[0] == "b" else CASTS.get((x[0].kind, kind))
+            if cast:
+                return self.convert(cast, x[0], kind)
+        raise UnknownOperation(name)
+
+    def program(self, program: Any, arguments: Sequence[Value], block: str) -> tuple[list[Value], str]:
+        """The results of a traced function, and the name of the block in which its code ends."""
+        jaxpr = program.jaxpr
+        known: dict[Any, Value] = dict(zip(jaxpr.invars, arguments, strict=True))
+        known |= {v: number(c) for v, c in zip(jaxpr.constvars, program.consts, strict=True)}
+        read = lambda atom: known[atom] if is_variable(atom) else number(atom.val)
+        for path, equations in in_groups(jaxpr.eqns, branches(jaxpr.eqns, jaxpr.outvars)):
+            before = block
+            if path:
+                some = self.any(self.both(*(known[m] if side else self.negated(known[m]) for m, side in path)))
+                self.names += 1
+                block, after = f"some{self.names}", f"after{self.names}"
+                self.line(f"br i1 {some.text}, label %{block}, label %{after}, !prof !0")
+                self.line(f"{block}:")
+            for e in equations:
+                known[e.outvars[0]] = self.equation(e, [read(v) for v in e.invars])
+            if path:
+                self.line(f"br label %{after}")
+                self.line(f"{after}:")
+                for e in equations:
+                    v = known[e.outvars[0]]
+                    merged = f"phi {self.type(v.kind, v.wide)} [ {v.text}, %{block} ], [ poison, %{before} ]"
+                    known[e.outvars[0]] = self.let(merged, v.kind, v.wide)
+                block = after
+        return [read(v) for v in jaxpr.outvars], block
+
+    def taken(self) -> str:
+        """The lines written since the last call."""
+        lines, self.lines = self.lines, []
+        return "\n".join(lines)

@@ -1,0 +1,504 @@
+"""The integration loop: whole revolutions of many lanes by an embedded explicit pair, as LLVM IR.
+
+Each lane of a vector has a phase, a step size and a revolution of its own, and leaves the vector when it has finished
+or failed; the next lane of a queue, which all threads share, takes its place. Steps are controlled by the estimated
+error (PI controller), in units of the system's scale, and end near places where the law changes abruptly. At the end of
+a revolution the strobe state is stored, and tangent vectors are orthonormalised and their growth stored. What a lane
+does depends neither on its neighbours nor on the number of threads.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import diffrax as dfx
+import numpy as np
+
+from .ir import Value, Writer, is_variable, number
+
+
+REVOLUTION = 2 * math.pi
+PAIRS: dict[str, tuple[type[dfx.AbstractERK], int]] = {
+    "tsit5": (dfx.Tsit5, 5),
+    "dopri5": (dfx.Dopri5, 5),
+    "bosh3": (dfx.Bosh3, 3),
+    "dopri8": (dfx.Dopri8, 8),
+}
+"""Embedded explicit pairs by name, with their order."""
+SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.9, 0.2, 6.0
+"""Step sizes change by the safety factor times what the error asks for, within these factors."""
+TANGENT_TOLERANCE = 30.0
+"""Tolerance of tangent vectors relative to their length, as a multiple of that of the state."""
+NEAREST = 1e-4
+"""Time to an abrupt change of the law [rad] below which steps are not shortened any further."""
+FINISHED, OUTSIDE, NOT_FINITE, STUCK = 1.0, 2.0, 3.0, 4.0
+"""Marks of lanes that leave: all revolutions done; far outside what the model holds for; step size below the smallest
+one because the state is not finite, or because the error cannot be met; also too many steps in a revolution."""
+
+
+class Layout(NamedTuple):
+    """Rows of a lane's numbers in the working memory of a vector, by name: first row, number of rows."""
+
+    rows: dict[str, tuple[int, int]]
+
+    @classmethod
+    def of(cls, **sizes: int) -> "Layout":
+        rows, at = {}, 0
+        for name, size in sizes.items():
+            rows[name], at = (at, size), at + size
+        return cls(rows)
+
+    def __getitem__(self, name: str) -> range:
+        first, size = self.rows[name]
+        return range(first, first + size)
+
+    @property
+    def total(self) -> int:
+        return sum(size for _, size in self.rows.values())
+
+    def end(self, name: str) -> int:
+        """The row after the last one of `name`."""
+        return sum(self.rows[name])
+
+
+class Tableau(NamedTuple):
+    """Coefficients of an embedded pair whose last stage is the first of the next step."""
+
+    phase: list[float]
+    stages: list[list[float]]
+    error: list[float]
+    order: int
+
+    @classmethod
+    def named(cls, name: str) -> "Tableau":
+        solver, order = PAIRS[name]
+        t: Any = solver.tableau
+        floats = lambda row: [float(x) for x in row]
+        phase, stages, error = [0.0, *floats(t.c)], [[], *map(floats, t.a_lower)], floats(t.b_error)
+        if not t.fsal:
+            phase, stages, error = [*phase, 1.0], [*stages, floats(t.b_sol)], [*error, 0.0]
+        return cls(phase, stages, error, order)
+
+
+class Field(NamedTuple):
+    """The programs of a system, traced."""
+
+    prelude: Any
+    """fixed numbers -> what the rates need of them."""
+    rates: Any
+    """phase, state and tangents, fixed numbers, results of the prelude -> rates."""
+    excursion: Any
+    """phase, state, fixed numbers -> excursion."""
+    abrupt: Any | None
+    """phase, state, rates, fixed numbers -> distance from an abrupt change of the law and speed towards it; None where
+    the law has none."""
+    dimension: int
+    tangents: int
+    wide: tuple[bool, ...]
+    """Which of the fixed numbers differ from lane to lane."""
+
+    @property
+    def moving(self) -> int:
+        """Numbers that are integrated."""
+        return self.dimension * (1 + self.tangents)
+
+
+def layout_of(field: Field, stages: int) -> Layout:
+    """Rows of the working memory: those that are stored when a lane leaves come first, then those that are loaded with
+    it, then those that are set to zero."""
+    return Layout.of(
+        state=field.moving,
+        step=1,
+        peak=1,
+        size=1,
+        steps=1,
+        mark=1,
+        fixed=sum(field.wide),
+        phase=1,
+        error=1,
+        revolution=1,
+        first_step=1,
+        lane=1,
+        origin=field.dimension,
+        rate=field.moving * stages,
+        stage=field.moving,
+        again=field.moving,
+        made=len(field.prelude.jaxpr.outvars),
+    )
+
+
+class _Code(Writer):
+    """A writer of code that keeps vectors in rows of memory."""
+
+    def at(self, row: int, base: str = "%memory") -> Value:
+        return self.let(f"getelementptr i8, ptr {base}, i64 {row * self.width * 8}", "ptr", False)
+
+    def get(self, row: int, wide: bool = True, base: str = "%memory") -> Value:
+        return self.let(f"load {self.type('double', wide)}, ptr {self.at(row, base).text}", "double", wide)
+
+    def put(self, row: int, v: Value, wide: bool = True, base: str = "%memory") -> None:
+        v = self.widened(v) if wide else v
+        self.line(f"store {self.typed(v)}, ptr {self.at(row, base).text}")
+
+    def all(self, rows: Sequence[int]) -> list[Value]:
+        return [self.get(r) for r in rows]
+
+    def shared(self, k: int) -> Value:
+        """A fixed number that is the same in all lanes."""
+        at = self.let(f"getelementptr double, ptr %shared, i64 {k}", "ptr", False)
+        return self.let(f"load double, ptr {at.text}", "double", False)
+
+    def log2(self, x: Value) -> Value:
+        """The binary logarithm of a positive number, within 0.09."""
+        bits = self.convert("bitcast", self.convert("fptrunc", x, "float"), "i32")
+        return self.sub(self.mul(self.convert("sitofp", bits, "double"), number(2.0**-23)), number(127.0))
+
+    def exp2(self, x: Value) -> Value:
+        """Two to the power x, within 6 %; the inverse of `log2`."""
+        bits = self.convert("fptosi", self.mul(self.add(x, number(127.0)), number(2.0**23)), "i32")
+        return self.convert("fpext", self.convert("bitcast", bits, "float"), "double")
+
+    def store_if(self, mask: Value, x: Value, base: str, index: Value) -> None:
+        """x to base[index] in the lanes where the mask holds."""
+        at = self.let(f"getelementptr double, ptr {base}, {self.typed(index)}", "ptr", True)
+        v, m = self.type("double", True), self.type("i1", True)
+        name = f"@llvm.masked.scatter.v{self.width}f64.v{self.width}p0"
+        self.declarations.add(f"declare void {name}({v}, <{self.width} x ptr>, {m})")
+        self.line(f"call void {name}({self.typed(self.widened(x))}, {self.typed(at)}, {self.typed(mask)})")
+
+
+def march_ir(field: Field, pair: str, width: int) -> str:
+    """The module of a system: `march` runs lanes off a queue until it is empty.
+
+    `march(queue, lanes, revolutions, keep, settings, shared, loaded, stored, strobe, growth)`: queue holds the next
+    lane and a flag that stops; settings are tolerance, largest step, smallest step, most steps of a revolution; loaded
+    and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep, dimension),
+    written in a ring; growth is (lanes, revolutions, tangents), squared lengths.
+    """
+    tableau = Tableau.named(pair)
+    rows = layout_of(field, len(tableau.phase))
+    parts = [_prelude(field, rows, width), _rates(field, rows, width), _refill(rows, width), _loop(field, rows, tableau, width)]
+    declarations = sorted(set().union(*(declared for _, declared in parts)))
+    return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
+
+
+def _used(*programs: Any) -> set[Any]:
+    """Variables that programs read."""
+    equations = (e for p in programs for e in p.jaxpr.eqns)
+    results = (v for p in programs for v in p.jaxpr.outvars)
+    return {v for v in (*(v for e in equations for v in e.invars), *results) if is_variable(v)}
+
+
+def _fixed(w: _Code, field: Field, rows: Layout, program: Any, first: int, used: set[Any] | None = None) -> list[Value]:
+    """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
+    used = _used(program) if used is None else used
+    values, wide_row, shared = [], iter(rows["fixed"]), 0
+    for v, wide in zip(program.jaxpr.invars[first:], field.wide, strict=False):
+        row, at = next(wide_row) if wide else 0, shared
+        shared += not wide
+        values.append((w.get(row) if wide else w.shared(at)) if v in used else number(0.0))
+    return values
+
+
+def _made(w: _Code, field: Field, rows: Layout) -> list[Value]:
+    """Results of the prelude."""
+    return [w.get(row, wide) for row, wide in zip(rows["made"], _made_wide(field), strict=True)]
+
+
+def _made_wide(field: Field) -> list[bool]:
+    """Which results of the prelude differ from lane to lane: those that follow from a number that does."""
+    jaxpr = field.prelude.jaxpr
+    wide = {v for v, each in zip(jaxpr.invars, field.wide, strict=True) if each}
+    for e in jaxpr.eqns:
+        if any(is_variable(v) and v in wide for v in e.invars):
+            wide.update(e.outvars)
+    return [is_variable(v) and v in wide for v in jaxpr.outvars]
+
+
+def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+    """What follows from the fixed numbers alone."""
+    w = _Code(width)
+    results, _ = w.program(field.prelude, _fixed(w, field, rows, field.prelude, 0), "entry")
+    for row, wide, v in zip(rows["made"], _made_wide(field), results, strict=True):
+        w.put(row, v, wide)
+    head = "define internal void @prelude(ptr noalias %memory, ptr noalias %shared) noinline {\nentry:\n"
+    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+
+
+def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+    """Rates of state and tangents at `place`, stored at `out`."""
+    w = _Code(width)
+    moved = [w.get(j, base="%place") for j in range(field.moving)]
+    arguments = [Value("%phase", "double", True), *moved]
+    fixed = _fixed(w, field, rows, field.rates, len(arguments))
+    results, _ = w.program(field.rates, [*arguments, *fixed, *_made(w, field, rows)], "entry")
+    for j, v in enumerate(results):
+        w.put(j, v, base="%out")
+    head = (
+        f"define internal void @rates({w.type('double', True)} %phase, ptr noalias %place, ptr noalias %memory, "
+        "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
+    )
+    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+
+
+REFILL = """define internal i1 @refill(ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored) noinline {{
+entry:
+  %stop_at = getelementptr i64, ptr %queue, i64 1
+  %marks = getelementptr double, ptr %memory, i64 {mark}
+  %places = getelementptr double, ptr %memory, i64 {lane}
+  br label %element
+element:
+  %j = phi i64 [ 0, %entry ], [ %j_next, %next ]
+  %alive = phi i1 [ false, %entry ], [ %alive_next, %next ]
+  %column = getelementptr double, ptr %memory, i64 %j
+  %mark_at = getelementptr double, ptr %marks, i64 %j
+  %place_at = getelementptr double, ptr %places, i64 %j
+  %mark = load double, ptr %mark_at
+  %through = fcmp une double %mark, 0.0
+  br i1 %through, label %leave, label %next
+leave:
+  %old = load double, ptr %place_at
+  %lane = fptosi double %old to i64
+  %was = icmp sge i64 %lane, 0
+  br i1 %was, label %store, label %fetch
+store:
+  %r = phi i64 [ 0, %leave ], [ %r_next, %store ]
+  %from_row = mul i64 %r, {width}
+  %from = getelementptr double, ptr %column, i64 %from_row
+  %value = load double, ptr %from
+  %to_row = mul i64 %r, %lanes
+  %to_place = add i64 %to_row, %lane
+  %to = getelementptr double, ptr %stored, i64 %to_place
+  store double %value, ptr %to
+  %r_next = add i64 %r, 1
+  %more = icmp slt i64 %r_next, {n_stored}
+  br i1 %more, label %store, label %fetch
+fetch:
+  %stopped = load atomic volatile i64, ptr %stop_at monotonic, align 8
+  %goes_on = icmp eq i64 %stopped, 0
+  br i1 %goes_on, label %ask, label %empty
+ask:
+  %new = atomicrmw add ptr %queue, i64 1 monotonic
+  %some = icmp slt i64 %new, %lanes
+  br i1 %some, label %load, label %empty
+load:
+  %s = phi i64 [ 0, %ask ], [ %s_next, %load ]
+  %in_row = mul i64 %s, %lanes
+  %in_place = add i64 %in_row, %new
+  %in = getelementptr double, ptr %loaded, i64 %in_place
+  %given = load double, ptr %in
+  %out_row = mul i64 %s, {width}
+  %out = getelementptr double, ptr %column, i64 %out_row
+  store double %given, ptr %out
+  %s_next = add i64 %s, 1
+  %rest = icmp slt i64 %s_next, {n_loaded}
+  br i1 %rest, label %load, label %zero
+zero:
+  %z = phi i64 [ {n_loaded}, %load ], [ %z_next, %zero ]
+  %zero_row = mul i64 %z, {width}
+  %zero_at = getelementptr double, ptr %column, i64 %zero_row
+  store double 0.0, ptr %zero_at
+  %z_next = add i64 %z, 1
+  %zeros = icmp slt i64 %z_next, {n_zero}
+  br i1 %zeros, label %zero, label %begin
+begin:
+  %number = sitofp i64 %new to double
+  store double %number, ptr %place_at
+  br label %next
+empty:
+  store double -1.0, ptr %place_at
+  br label %next
+next:
+  %now = load double, ptr %place_at
+  %runs = fcmp oge double %now, 0.0
+  %alive_next = or i1 %alive, %runs
+  %j_next = add i64 %j, 1
+  %again = icmp slt i64 %j_next, {width}
+  br i1 %again, label %element, label %return
+return:
+  ret i1 %alive_next
+}}
+"""
+"""Lanes that are through are stored, and lanes of the queue take their places; true if any lane is left."""
+
+
+def _refill(rows: Layout, width: int) -> tuple[str, set[str]]:
+    return REFILL.format(
+        width=width,
+        mark=rows["mark"][0] * width,
+        lane=rows["lane"][0] * width,
+        n_stored=rows.end("mark"),
+        n_loaded=rows.end("fixed"),
+        n_zero=rows.end("first_step"),
+    ), set()
+
+
+def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:
+    """Steps of a vector of lanes, one after the other, with their control."""
+    w = _Code(width)
+    n, moving, stages = field.dimension, field.moving, len(tableau.phase)
+    one, zero, turn = number(1.0), number(0.0), number(REVOLUTION)
+    row = {name: rows[name][0] for name in rows.rows if len(rows[name]) > 0}
+    vector = w.type("double", True)
+    rates = lambda phase, place, out: w.line(
+        f"call void @rates({w.typed(w.widened(phase))}, ptr {w.at(place).text}, ptr %memory, ptr %shared, "
+        f"ptr {w.at(out).text})"
+    )
+    w.line(f"%memory = alloca {vector}, i64 {rows.total}, align {max(64, width * 8)}")
+    size = rows.total * width * 8
+    w.line(f"call void @llvm.memset.p0.i64(ptr align 8 %memory, i8 0, i64 {size}, i1 false)")
+    w.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
+    for k, name in enumerate(("tolerance", "largest", "smallest", "most")):
+        w.line(f"%{name}_at = getelementptr double, ptr %settings, i64 {k}")
+        w.line(f"%{name} = load double, ptr %{name}_at")
+    tolerance, largest, smallest, most = (
+        Value(f"%{name}", "double", False) for name in ("tolerance", "largest", "smallest", "most")
+    )
+    total, kept = (w.convert("sitofp", Value(f"%{x}", "i64", False), "double") for x in ("revolutions", "keep"))
+    w.put(row["mark"], one)
+    w.put(row["lane"], number(-1.0))
+    w.line("br label %refill")
+
+    w.line("refill:")
+    w.line("%alive = call i1 @refill(ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored)")
+    w.line("br i1 %alive, label %begin, label %return")
+    w.line("begin:")
+    w.line("call void @prelude(ptr %memory, ptr %shared)")
+    rates(w.get(row["phase"]), row["state"], row["again"])
+    begun = w.compare("ne", w.get(row["first_step"]), zero)
+    for q in range(moving):
+        w.put(row["rate"] + q, w.select(begun, w.get(row["rate"] + q), w.get(row["again"] + q)))
+    for q in range(n):
+        w.put(row["origin"] + q, w.select(begun, w.get(row["origin"] + q), w.get(row["state"] + q)))
+    w.put(row["first_step"], one)
+    w.line("br label %step")
+
+    w.line("step:")
+    block = "step"
+    phase, h, lane, mark = (w.get(row[x]) for x in ("phase", "step", "lane", "mark"))
+    y = w.all(rows["state"])
+    runs = w.both(w.compare("ge", lane, zero), w.compare("eq", mark, zero))
+    first = w.all(rows["rate"][:moving])
+    arguments = lambda program, leading: [*leading, *_fixed(w, field, rows, program, len(leading))]
+    limited = h
+    if field.abrupt is not None:
+        (distance, speed), block = w.program(
+            field.abrupt, arguments(field.abrupt, [phase, *y[:n], *first[:n]]), block
+        )
+        time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
+        limited = w.smaller(w.widened(time), h)
+    left = w.sub(turn, phase)
+    ends = w.compare("ge", w.mul(limited, number(1.0001)), left)
+    halves = w.compare("gt", w.mul(limited, number(2.0)), left)
+    step = w.select(ends, left, w.select(halves, w.mul(left, number(0.5)), limited))
+    k = [first]
+    new = y
+    for i in range(1, stages):
+        scaled = [(w.mul(step, number(a)), j) for j, a in enumerate(tableau.stages[i]) if a != 0.0]
+        new = []
+        for q in range(moving):
+            v = w.add(y[q], *(w.mul(a, k[j][q]) for a, j in scaled))
+            w.put(row["stage"] + q, v)
+            new.append(v)
+        rates(w.add(phase, w.mul(step, number(tableau.phase[i]))), row["stage"], row["rate"] + i * moving)
+        k.append([w.get(row["rate"] + i * moving + q) for q in range(moving)])
+    terms = [(w.mul(step, number(e)), j) for j, e in enumerate(tableau.error) if e != 0.0]
+    estimate = lambda q: w.add(*(w.mul(e, k[j][q]) for e, j in terms))
+    size = lambda q: w.add(one, w.larger(w.call("fabs", y[q]), w.call("fabs", new[q])))
+    error = zero
+    for q in range(n):
+        relative = w.div(estimate(q), w.mul(size(q), tolerance))
+        error = w.call("maximum", w.widened(error), w.mul(relative, relative))
+    for first_of in range(n, moving, n):
+        part = range(first_of, first_of + n)
+        length = w.add(number(1e-300), *(w.mul(new[q], new[q]) for q in part))
+        wrong = w.add(zero, *(w.mul(e, e) for e in map(estimate, part)))
+        allowed = w.mul(tolerance, number(TANGENT_TOLERANCE))
+        error = w.call("maximum", error, w.div(wrong, w.mul(length, w.mul(allowed, allowed))))
+    error = w.larger(w.smaller(error, number(1e12)), number(1e-12))  # a NaN becomes the largest error
+    fine = w.compare("le", error, one)
+    moves = w.both(fine, runs)
+    # The factors are powers of the squared error: 0.7/order of this step and -0.4/order of the last one.
+    bits, last = w.log2(error), w.get(row["error"])
+    power = 0.5 / tableau.order
+    grown = w.sub(w.mul(last, number(0.4 * power)), w.mul(bits, number(0.7 * power)))
+    factor = w.add(w.select(fine, grown, w.mul(bits, number(-power))), number(math.log2(SAFETY)))
+    factor = w.smaller(factor, w.select(fine, number(math.log2(MOST_FACTOR)), number(-0.2)))
+    factor = w.exp2(w.larger(factor, number(math.log2(LEAST_FACTOR))))
+    proposed = w.mul(step, factor)
+    shorter = w.simple("or", ends, halves)  # than what the error asked for
+    proposed = w.select(w.both(fine, shorter), w.larger(proposed, limited), proposed)
+    proposed = w.smaller(proposed, largest)
+    w.put(row["step"], w.select(runs, proposed, h))
+    w.put(row["error"], w.select(moves, w.larger(bits, number(-16.0)), last))
+    over = w.both(moves, ends)
+    w.put(row["phase"], w.select(over, zero, w.select(moves, w.add(phase, step), phase)))
+    taken = w.add(w.get(row["steps"]), w.select(runs, one, zero))
+    w.put(row["steps"], taken)
+    for q in range(moving):
+        w.put(row["state"] + q, w.select(moves, new[q], y[q]))
+        w.put(row["rate"] + q, w.select(moves, k[-1][q], first[q]))
+    (far,), block = w.program(field.excursion, arguments(field.excursion, [zero, *new[:n]]), block)
+    far, peak = w.widened(far), w.get(row["peak"])
+    w.put(row["peak"], w.select(w.both(moves, w.compare("gt", far, peak)), far, peak))
+    away = [w.sub(new[q], w.get(row["origin"] + q)) for q in range(n)]
+    away2, extent = w.add(zero, *(w.mul(d, d) for d in away)), w.get(row["size"])
+    w.put(row["size"], w.select(w.both(moves, w.compare("gt", away2, extent)), away2, extent))
+    mark = w.select(w.both(moves, w.compare("gt", far, number(2.0))), number(OUTSIDE), mark)
+    refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
+    finite = w.compare("lt", w.add(zero, *(w.call("fabs", c) for c in (*y, *first))), number(np.inf))
+    mark = w.select(refused, w.select(finite, number(STUCK), number(NOT_FINITE)), mark)
+    mark = w.select(w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(STUCK), mark)
+    w.put(row["mark"], mark)
+    w.line(f"br i1 {w.any(over).text}, label %over, label %check")
+
+    w.line("over:")
+    revolution = w.get(row["revolution"])
+    ring = w.sub(revolution, w.mul(kept, w.call("floor", w.div(w.add(revolution, number(0.5)), kept))))
+    place = w.convert("fptosi", w.mul(w.add(w.mul(lane, kept), ring), number(float(n))), "i64")
+    state = w.all(rows["state"])
+    for q in range(n):
+        w.store_if(over, state[q], "%strobe", w.simple("add", place, number(q)))
+        w.put(row["origin"] + q, w.select(over, state[q], w.get(row["origin"] + q)))
+    if field.tangents:
+        _orthonormalise(w, field, rows, over, w.add(w.mul(lane, total), revolution))
+        rates(w.get(row["phase"]), row["state"], row["again"])
+        for q in range(moving):
+            w.put(row["rate"] + q, w.select(over, w.get(row["again"] + q), w.get(row["rate"] + q)))
+    revolution = w.select(over, w.add(revolution, one), revolution)
+    w.put(row["revolution"], revolution)
+    finished = w.both(over, w.compare("ge", revolution, total), w.compare("eq", mark, zero))
+    w.put(row["mark"], w.select(finished, number(FINISHED), mark))
+    w.line("br label %check")
+
+    w.line("check:")
+    leaves = w.both(w.compare("ge", w.get(row["lane"]), zero), w.compare("ne", w.get(row["mark"]), zero))
+    w.line(f"br i1 {w.any(leaves).text}, label %refill, label %step")
+    head = (
+        "define void @march(ptr %queue, i64 %lanes, i64 %revolutions, i64 %keep, ptr %settings, ptr %shared, "
+        "ptr %loaded, ptr %stored, ptr %strobe, ptr %growth) {\nentry:\n"
+    )
+    return head + w.taken() + "\nreturn:\n  ret void\n}\n", w.declarations
+
+
+def _orthonormalise(w: _Code, field: Field, rows: Layout, over: Value, revolution: Value) -> None:
+    """Gram and Schmidt's method on the tangent vectors of lanes whose revolution is over; each vector is projected
+    twice, which keeps them orthogonal to rounding. Squared lengths go to `growth`."""
+    n, first = field.dimension, rows["state"][0]
+    place = w.convert("fptosi", w.mul(revolution, number(float(field.tangents))), "i64")
+    dot = lambda a, b: w.add(*(w.mul(x, z) for x, z in zip(a, b, strict=True)))
+    done: list[list[Value]] = []
+    for i in range(field.tangents):
+        at = range(first + n * (i + 1), first + n * (i + 2))
+        u = old = w.all(at)
+        for _ in range(2):
+            for v in done:
+                along = dot(u, v)
+                u = [w.sub(x, w.mul(along, z)) for x, z in zip(u, v, strict=True)]
+        length2 = dot(u, u)
+        w.store_if(over, length2, "%growth", w.simple("add", place, number(i)))
+        inverse = w.div(number(1.0), w.call("sqrt", length2))
+        u = [w.mul(x, inverse) for x in u]
+        for q, x, before in zip(at, u, old, strict=True):
+            w.put(q, w.select(over, x, before))
+        done.append(u)

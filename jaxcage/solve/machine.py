@@ -1,0 +1,340 @@
+"""Machine code of a system: traced in JAX, written as LLVM IR, compiled with llvmlite and kept on disk.
+
+The code runs whole revolutions of many lanes (`loop`). It is kept in the user's cache folder, under a key made of the
+IR, the processor and the version of LLVM; an entry that is damaged is compiled again.
+"""
+
+import ctypes
+import dataclasses
+import functools
+import hashlib
+import os
+import pathlib
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import llvmlite.binding as llvm
+import numpy as np
+import platformdirs
+from jaxtyping import Float
+from llvmlite.binding import orcjit
+
+from .._recent import Form, split
+from ..integrate._program import Program, Sizes, program_of
+from ..models import AbstractForcedSystem, ScaledField, multiply
+from .ir import is_variable
+from .loop import FINISHED, OUTSIDE, Field, Layout, layout_of, march_ir, REVOLUTION, Tableau
+
+
+LARGEST_STEP = REVOLUTION / 4
+SMALLEST_STEP = 1e-7
+MOST_STEPS = 20_000.0
+"""Limits of steps [rad] and of the number of steps of a revolution."""
+FIRST_STEP = 0.05
+WIDTH = 8
+"""Lanes of a vector."""
+STARTED, WAKES = 0.05, 0.1
+
+
+# --- tracing ----------------------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class _Rates:
+    """Rates of a state and of tangent vectors, in units of the scale."""
+
+    form: Form
+    dimension: int
+    tangents: int
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        field, _, scale = self.form.filled(fixed)
+        n = self.dimension
+        go = lambda y: tuple(jnp.asarray(c, float) for c in ScaledField(field, scale)(phase, y))
+        if not self.tangents:
+            return go(moved), ()
+        pushed = [jax.jvp(go, (moved[:n],), (moved[i : i + n],)) for i in range(n, len(moved), n)]
+        return (*pushed[0][0], *(c for _, each in pushed for c in each)), ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Excursion:
+    """How far a state, in units of the scale, is towards the edge of what the model holds for."""
+
+    form: Form
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        _, system, scale = self.form.filled(fixed)
+        return (system.excursion(multiply(moved, scale)),), ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Abrupt:
+    """Distance of a state from an abrupt change of the law, and the speed with which it comes there."""
+
+    form: Form
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        _, system, scale = self.form.filled(fixed)
+        n = len(moved) // 2
+        return system.abrupt(multiply(moved[:n], scale), multiply(moved[n:], scale)), ()
+
+
+def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
+    """A program as one of the fixed numbers alone, and one that takes that one's results behind the fixed numbers."""
+    jaxpr = program.jaxpr
+    known, early = {*jaxpr.invars[1 + moving :], *jaxpr.constvars}, []
+    for e in jaxpr.eqns:
+        if all(v in known for v in e.invars if is_variable(v)):
+            early.append(e)
+            known.update(e.outvars)
+    placed = set(map(id, early))
+    late = [e for e in jaxpr.eqns if id(e) not in placed]
+    wanted = {v for e in late for v in e.invars if is_variable(v)} | {v for v in jaxpr.outvars if is_variable(v)}
+    numbers = []
+    for e in reversed(early):
+        if e.outvars[0] in wanted and e.outvars[0].aval.dtype != np.dtype(float):  # masks and integers are made again
+            late = [e, *late]
+            wanted |= {v for v in e.invars if is_variable(v)}
+        else:
+            numbers.append(e)
+    made = [v for e in reversed(numbers) for v in e.outvars if v in wanted]
+    needed, first = set(made), []
+    for e in numbers:
+        if needed & set(e.outvars):
+            first.append(e)
+            needed |= {v for v in e.invars if is_variable(v)}
+    prelude = jaxpr.replace(invars=jaxpr.invars[1 + moving :], eqns=first[::-1], outvars=made)
+    rest = jaxpr.replace(invars=[*jaxpr.invars, *made], eqns=late)
+    return Program(prelude, program.consts, []), Program(rest, program.consts, [])
+
+
+def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
+    """What is integrated at a speed, and its numbers."""
+    return split((system.at_speed(speed), system, system.scale(speed)), eqx.is_inexact_array)
+
+
+class Numbers:
+    """The numbers of a field, as they follow from a system's and a speed."""
+
+    def __init__(self, system: AbstractForcedSystem, several: bool):
+        self._form, row = split(system, eqx.is_inexact_array)
+        self.several = several
+        self.form = _pieces(system, jnp.asarray(1.0))[0]
+
+        def of(speed: Any, row: Sequence[Any]) -> list[Any]:
+            return [jnp.asarray(x, float) for x in _pieces(self._form.filled(row), speed)[1]]
+
+        traced = jax.make_jaxpr(lambda speed: of(speed, row))(1.0).jaxpr
+        moved = set(traced.invars)
+        for e in traced.eqns:
+            if any(is_variable(v) and v in moved for v in e.invars):
+                moved.update(e.outvars)
+        self.wide = tuple(several or (is_variable(v) and v in moved) for v in traced.outvars)
+        self._over = jax.jit(lambda speeds, rows: jax.vmap(of, in_axes=(0, 0 if several else None))(speeds, rows))
+
+    def __call__(
+        self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]
+    ) -> tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]]:
+        """Those that differ from lane to lane, and the others."""
+        count = len(speeds)
+        room = 1 << max(3, (count - 1).bit_length())  # few sizes, as each is compiled
+        pad = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - count, *x.shape[1:]))])
+        filled = [pad(np.asarray(x)) for x in rows] if self.several else list(rows)
+        found = [np.asarray(x) for x in self._over(pad(speeds), filled)]
+        wide = [x[:count] for x, w in zip(found, self.wide, strict=True) if w]
+        shared = [x[0] for x, w in zip(found, self.wide, strict=True) if not w]
+        return np.array(wide).reshape(len(wide), count), np.array(shared, dtype=float)
+
+
+def traced_field(system: AbstractForcedSystem, form: Form, wide: tuple[bool, ...], tangents: int) -> Field:
+    """The programs of a system."""
+    n = system.dimension
+    trace = lambda step, moving: program_of(step, Sizes(moving, 0, len(wide)))
+    prelude, rates = _hoisted(trace(_Rates(form, n, tangents), n * (1 + tangents)), n * (1 + tangents))
+    ones = tuple(jnp.ones(()) for _ in range(n))
+    abrupt = None if system.abrupt(ones, ones) is None else trace(_Abrupt(form), 2 * n)
+    return Field(prelude, rates, trace(_Excursion(form), n), abrupt, n, tangents, wide)
+
+
+# --- machine code -----------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def _machine() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features, target = llvm.get_host_cpu_features().flatten(), llvm.Target.from_default_triple()
+    return target.create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=3, reloc="pic", codemodel="small", jit=True
+    )
+
+
+def _compiled(ir: str) -> bytes:
+    """Object code of a module."""
+    module = llvm.parse_assembly(ir)
+    module.verify()
+    tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+    tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_interleaving = tuning.loop_unrolling = False
+    builder = llvm.create_pass_builder(_machine(), tuning)
+    builder.getModulePassManager().run(module, builder)
+    return _machine().emit_object(module)
+
+
+def cache_folder() -> pathlib.Path | None:
+    """Where object code is kept; None where `JAXCAGE_CACHE=off` says that nothing is."""
+    given = os.environ.get("JAXCAGE_CACHE", "")
+    if given.lower() == "off":
+        return None
+    return pathlib.Path(given or platformdirs.user_cache_dir("jaxcage")) / "native"
+
+
+def object_code(ir: str) -> bytes:
+    """Object code of a module for this processor, from the cache if it is there and whole."""
+    about = f"{ir} {llvm.llvm_version_info} {llvm.get_host_cpu_name()} {_machine().triple}"
+    folder = cache_folder()
+    path = folder and folder / hashlib.sha256(about.encode()).hexdigest()[:40]
+    digest = lambda code: hashlib.sha256(code).digest()
+    if path is not None:
+        try:
+            kept = path.read_bytes()
+            if digest(kept[32:]) == kept[:32]:
+                return kept[32:]
+        except OSError:
+            pass
+    code = _compiled(ir)
+    if path is not None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            new = path.with_name(f"{path.name}.{os.getpid()}.{threading.get_ident()}")
+            new.write_bytes(digest(code) + code)
+            new.replace(path)
+        except OSError:
+            pass  # a folder that cannot be written costs time, no result
+    return code
+
+
+@functools.cache
+def _linker() -> Any:
+    return orcjit.create_lljit_compiler(_machine())
+
+
+@functools.lru_cache(maxsize=64)
+def _loaded(ir: str) -> tuple[Any, Callable[..., None]]:
+    """The library of a module, which must outlive its function."""
+    name = "march" + hashlib.sha256(ir.encode()).hexdigest()[:24]
+    builder = orcjit.JITLibraryBuilder().add_object_img(object_code(ir)).add_current_process()
+    library = builder.export_symbol("march").link(_linker(), name)
+    whole, place = ctypes.c_int64, ctypes.c_void_p
+    kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
+    return library, kind(library["march"])
+
+
+class March(NamedTuple):
+    """What lanes did."""
+
+    state: Float[np.ndarray, "lanes dim"]
+    """At the end, in units of the scale."""
+    tangents: Float[np.ndarray, "lanes tangents dim"]
+    step: Float[np.ndarray, " lanes"]
+    """Step size to go on with [rad]."""
+    peak: Float[np.ndarray, " lanes"]
+    """Largest excursion."""
+    size: Float[np.ndarray, " lanes"]
+    """Largest distance from the strobe state within a revolution, in units of the scale."""
+    steps: Float[np.ndarray, " lanes"]
+    """Number of steps tried."""
+    mark: Float[np.ndarray, " lanes"]
+    """How each lane ended, as in `loop`; 0 if it was not run."""
+    strobe: Float[np.ndarray, "lanes keep dim"]
+    """The last strobe states, the latest last; in units of the scale."""
+    growth: Float[np.ndarray, "lanes revolutions tangents"]
+    """Logarithm of the growth of each tangent vector in each revolution."""
+
+
+class Engine:
+    """The compiled revolutions of a system, with so many tangent vectors."""
+
+    def __init__(self, system: AbstractForcedSystem, tangents: int = 0, several: bool = False, pair: str = "tsit5"):
+        """**Raises:** `UnknownOperation` for a law with an operation that has no translation."""
+        self.numbers = Numbers(system, several)
+        self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents)
+        self.rows: Layout = layout_of(self.field, len(Tableau.named(pair).phase))
+        self._library, self._march = _loaded(march_ir(self.field, pair, WIDTH))
+
+    def __call__(
+        self,
+        numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
+        state: Float[np.ndarray, "lanes dim"],
+        revolutions: int,
+        keep: int,
+        tolerance: float,
+        tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
+        step: Float[np.ndarray, " lanes"] | float = FIRST_STEP,
+        threads: int = 1,
+        report: Callable[[int], None] = lambda done: None,
+    ) -> March:
+        """Run lanes from states in units of their scales."""
+        lanes, n = state.shape
+        moving, rows = self.field.moving, self.rows
+        loaded = np.zeros((rows.end("fixed"), lanes))
+        loaded[:n] = state.T
+        if self.field.tangents:
+            assert tangents is not None
+            loaded[n:moving] = tangents.reshape(lanes, -1).T
+        loaded[rows["step"][0]] = step
+        wide, shared = numbers
+        loaded[rows.end("mark") :] = wide
+        stored = np.zeros((rows.end("mark"), lanes))
+        strobe = np.full((lanes, keep, n), np.nan)
+        growth = np.full((lanes, revolutions, self.field.tangents), np.nan)
+        settings = np.array([tolerance, LARGEST_STEP, SMALLEST_STEP, MOST_STEPS])
+        queue = np.zeros(2, dtype=np.int64)
+        arrays = (queue, settings, np.append(shared, 0.0), loaded, stored, strobe, growth)
+        at = [x.ctypes.data for x in arrays]
+        run = lambda: self._march(at[0], lanes, revolutions, keep, *at[1:])
+        _run_threads(run, min(threads, -(-lanes // WIDTH)), queue, lambda: report(min(int(queue[0]), lanes)))
+        part = lambda name: stored[rows[name][0]]
+        turned = np.roll(strobe, -(revolutions % keep), axis=1) if revolutions > keep else strobe
+        with np.errstate(divide="ignore"):
+            grown = 0.5 * np.log(growth)
+        return March(
+            stored[:n].T.copy(),
+            stored[n:moving].T.reshape(lanes, self.field.tangents, n),
+            *(part(name) for name in ("step", "peak")),
+            np.sqrt(part("size")),
+            *(part(name) for name in ("steps", "mark")),
+            turned,
+            grown,
+        )
+
+
+def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
+    """`run` in threads of its own, interrupted by Ctrl-C within a moment: the flag in `queue` empties it."""
+    errors: list[BaseException] = []
+
+    def guarded() -> None:
+        try:
+            run()
+        except BaseException as error:
+            errors.append(error)
+
+    pool = [threading.Thread(target=guarded, daemon=True) for _ in range(count)]
+    try:
+        for each in pool:
+            each.start()
+        for each in pool:
+            while each.is_alive():
+                each.join(WAKES)
+                report()
+    except BaseException:
+        queue[1] = 1
+        for each in pool:
+            each.join()
+        raise
+    if errors:
+        raise errors[0]

@@ -1,0 +1,157 @@
+"""The integration of lanes in machine code: operations, accuracy, independence of lanes, failures, the cache."""
+
+import threading
+import time
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import jaxcage as jc
+from jaxcage.integrate import OUTCOMES
+from jaxcage.solve import FINISHED, Engine
+from jaxcage.solve.machine import object_code
+from jaxcage.sweeps import engine_of
+
+
+def rows_of(system: Any) -> list[Any]:
+    return [x for x in jax.tree.leaves(system) if eqx.is_inexact_array(x)]
+
+
+def march(system: Any, speed: np.ndarray, y: np.ndarray, revolutions: int, tolerance: float = 1e-8, **more: Any) -> Any:
+    engine = engine_of(system, 0, False, more.pop("pair", "tsit5"))
+    assert engine is not None
+    return engine(engine.numbers(speed, rows_of(system)), y, revolutions, revolutions, tolerance, **more)
+
+
+OPERATIONS = {
+    "arithmetic": lambda x, z: (x + z) * (x - 2 * z) / (1 + z * z),
+    "roots": lambda x, z: jnp.sqrt(1 + x * x) + jax.lax.rsqrt(2 + z * z) + jnp.hypot(x, z),
+    "powers": lambda x, z: x**3 + (1 + z * z) ** -2 + (1 + x * x) ** (10 / 9),
+    "waves": lambda x, z: jnp.sin(x) + jnp.cos(3 * z) + jnp.tanh(x * z) + jnp.arctan2(x, 1 + z * z),
+    "growth": lambda x, z: jnp.exp(-x * x) + jnp.log(2 + z * z) + jnp.log1p(x * x) + jnp.expm1(-z * z),
+    "sides": lambda x, z: jnp.where(x > z, jnp.abs(x), -z) + jnp.maximum(x, 0.1) + jnp.minimum(z, x) + jnp.sign(x),
+    "clipped": lambda x, z: jnp.clip(x, -0.3, 0.2) + jnp.floor(4 * z) + jnp.round(3 * x),
+    "masks": lambda x, z: jnp.where((x > 0) & ~(z > 0) | (x * z > 0.2), jnp.sqrt(jnp.abs(x)) ** 3 / (2 + z), 0.5 * x),
+}
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_operations_are_those_of_jax(name: str):
+    """One tiny step by a law of two components beside JAX's own evaluation: the difference is the rates."""
+    law = OPERATIONS[name]
+    system = jc.ForcedSystem(lambda tau, y, speed: (law(*y), law(y[1], y[0])), 2, scale=1.0)
+    y = np.random.default_rng(0).normal(size=(21, 2))
+    engine = Engine(system)
+    found = np.asarray(_rates(engine, y))
+    expected = np.stack([jax.vmap(law)(*y.T), jax.vmap(law)(y[:, 1], y[:, 0])], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
+
+
+def _rates(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Rates of an engine's field, read off a revolution at a huge speed: the state moves by rates 2 pi/speed."""
+    speed = np.full(len(y), 1e7)
+    moved = engine(engine.numbers(speed, []), y, 1, 1, 1e-12).state
+    return (moved - y) * 1e7 / (2 * np.pi)
+
+
+@pytest.mark.parametrize("pair", ["tsit5", "dopri5", "bosh3", "dopri8"])
+def test_revolutions_are_those_of_scipy(pair: str):
+    """Case 1a off and on its land, three revolutions."""
+    model, speed = jc.case("1a"), jc.rpm(np.array([4000.0, 13000.0, 24000.0]))
+    scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
+    y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speed]) / scale
+    found = march(model, speed, y, 3, tolerance=1e-9 if pair != "bosh3" else 1e-8, pair=pair)
+    assert np.all(found.mark == FINISHED)
+    for i, v in enumerate(speed):
+        field = model.at_speed(jnp.asarray(v))
+        rates = jax.jit(lambda tau, z, field=field, s=scale[i]: jnp.stack(field(tau, tuple(z * s))) / s)
+        exact = solve_ivp(lambda t, z: np.asarray(rates(t, z)), (0, 6 * np.pi), y[i], "DOP853", rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(found.state[i], exact.y[:, -1], rtol=0, atol=2e-5)
+        np.testing.assert_array_equal(found.strobe[i, -1], found.state[i])
+
+
+def test_tangents_grow_as_the_multipliers_of_a_linear_system():
+    """x'' = -2 d x' - x at speed 1: both exponents are -2 pi d, and all strobe states decay so."""
+    system = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.2 * v[0] - q[0],), coordinates=1)
+    found = jc.sweep(system, 1.0, discard=20, revolutions=100, exponents=2, confirm=False, horizon=0)
+    np.testing.assert_allclose(found.exponents[0], -0.2 * np.pi, atol=1e-5)
+
+
+def test_a_lane_does_not_depend_on_its_neighbours_or_threads():
+    model = jc.case("1a")
+    speed = jc.rpm(6000, 26000, 40)
+    together, alone = (
+        jc.sweep(model, v, discard=3, revolutions=20, confirm=False, horizon=0) for v in (speed, speed[17:18])
+    )
+    assert np.array_equal(together.last[17], alone.last[0]) and np.array_equal(together.block_growth[17], alone.block_growth[0])
+    scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
+    y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[1]] for v in speed]) / scale
+    one, two = (march(model, speed, y, 10, threads=threads) for threads in (1, 2))
+    assert np.array_equal(one.strobe, two.strobe) and np.array_equal(one.steps, two.steps)
+
+
+def test_a_lane_that_fails_leaves_its_neighbours_alone():
+    """NaN, a start outside, and an oscillator that blows up in finite time."""
+
+    def law(tau: Any, q: Any, v: Any, speed: Any) -> Any:
+        return (q[0] ** 3 - 0.1 * v[0],)
+
+    system = jc.ForcedOscillator(law, coordinates=1)
+    starts = np.array([[[0.1, 0.0]], [[np.nan, 0.0]], [[3.0, 1.0]], [[-0.1, 0.0]]])
+    found = jc.sweep(system, np.array([1.0, 1.1, 1.2, 1.3]), starts=starts, discard=0, revolutions=1, blocks=1)
+    names = [OUTCOMES[code] for code in found.outcome[:, 0]]
+    assert names[0] == names[3] == "successful" and names[1] == "not_finite" and names[2] != "successful"
+    assert np.all(np.isfinite(found.last[[0, 3]])) and np.all(np.isnan(found.last[[1, 2]]))
+
+
+def test_a_law_with_an_unknown_operation_is_run_by_jax_and_says_so():
+    def law(tau: Any, q: Any, v: Any, speed: Any) -> Any:
+        return (-q[0] - 0.2 * v[0] + jax.scipy.special.i0e(q[0]) * jnp.cos(tau),)
+
+    system = jc.ForcedOscillator(law, coordinates=1)
+    with pytest.warns(UserWarning, match="operation `bessel_i0e`, which has no machine code"):
+        found = jc.sweep(system, 1.5, discard=20, revolutions=20, confirm=False, horizon=0)
+    assert set(found.label.ravel()) == {"periodic-1"}
+
+
+def test_damaged_code_is_compiled_again(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("JAXCAGE_CACHE", str(tmp_path))
+    ir = "define double @march(double %x) {\n  %y = fadd double %x, 1.0\n  ret double %y\n}\n"
+    code = object_code(ir)
+    (kept,) = (tmp_path / "native").iterdir()
+    whole = kept.read_bytes()
+    assert whole[32:] == code
+    for damage in (whole[:-5], whole[:100] + b"x" + whole[101:], b""):
+        kept.write_bytes(damage)
+        assert object_code(ir) == code and kept.read_bytes() == whole
+
+
+def test_an_interrupted_run_stops_within_a_second():
+    model, speed = jc.case("1a"), jc.rpm(6000, 26000, 400)
+    scale = np.array([[float(c) for c in model.scale(jnp.asarray(v))] for v in speed])
+    y = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speed]) / scale
+    begun: list[float] = []
+
+    def interrupt(done: int) -> None:
+        if done > 16:
+            begun.append(time.perf_counter())
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        march(model, speed, y, 1000, threads=2, report=interrupt)
+    assert time.perf_counter() - begun[0] < 1 and threading.active_count() < 20
+
+
+def test_steps_do_not_jump_over_the_land():
+    """A cage thrown at its land: the steps end near the onset, so that a tolerance of 1e-4 finds the contact too."""
+    model, speed = jc.case("1a"), jc.rpm(np.full(50, 9000.0))
+    scale = np.array([float(c) for c in model.scale(jnp.asarray(speed[0]))])
+    y = np.array([[0.9 * np.cos(a), 0.9 * np.sin(a), 2 * np.cos(a), 2 * np.sin(a)] for a in np.linspace(0, 6, 50)])
+    assert np.all(np.abs(scale[:2]) > 0)
+    rough, fine = (march(model, speed, y, 1, tolerance) for tolerance in (1e-4, 1e-10))
+    assert np.all(fine.peak > 0.97) and np.max(np.abs(rough.state - fine.state)) < 0.05
