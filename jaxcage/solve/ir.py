@@ -268,6 +268,20 @@ class Writer:
             return self.mul(x[0], x[0])
         if name == "rsqrt":
             return self.div(number(1.0), self.call("sqrt", *x))
+        if name == "log1p":  # W. Kahan's form, exact where 1 + x is rounded
+            u = self.add(x[0], number(1.0))
+            quotient = self.div(self.mul(x[0], self.call("log", u)), self.sub(u, number(1.0)))
+            return self.select(self.compare("eq", u, number(1.0)), x[0], quotient)
+        if name == "expm1":
+            u = self.call("exp", x[0])
+            less = self.sub(u, number(1.0))
+            quotient = self.div(self.mul(less, x[0]), self.call("log", u))
+            plain = self.simple("or", self.compare("gt", u, number(1e12)), self.compare("lt", u, number(1e-17)))
+            return self.select(self.compare("eq", u, number(1.0)), x[0], self.select(plain, less, quotient))
+        if name == "logistic":
+            return self.div(number(1.0), self.add(number(1.0), self.call("exp", self.simple(f"fneg {FLAGS}", *x))))
+        if name == "round":
+            return self.call("roundeven" if int(e.params["rounding_method"]) else "round", x[0])
         if name == "is_finite":
             return self.compare("lt", self.call("fabs", *x), number(np.inf))
         if name in ("stop_gradient", "copy"):

@@ -177,7 +177,12 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     """
     tableau = Tableau.named(pair)
     rows = layout_of(field, len(tableau.phase))
-    parts = [_prelude(field, rows, width), _rates(field, rows, width), _refill(rows, width), _loop(field, rows, tableau, width)]
+    parts = [
+        _prelude(field, rows, width),
+        _rates(field, rows, width),
+        _refill(rows, width),
+        _loop(field, rows, tableau, width),
+    ]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
@@ -382,9 +387,7 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     arguments = lambda program, leading: [*leading, *_fixed(w, field, rows, program, len(leading))]
     limited = h
     if field.abrupt is not None:
-        (distance, speed), block = w.program(
-            field.abrupt, arguments(field.abrupt, [phase, *y[:n], *first[:n]]), block
-        )
+        (distance, speed), block = w.program(field.abrupt, arguments(field.abrupt, [phase, *y[:n], *first[:n]]), block)
         time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
         limited = w.smaller(w.widened(time), h)
     left = w.sub(turn, phase)
@@ -448,7 +451,9 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
     finite = w.compare("lt", w.add(zero, *(w.call("fabs", c) for c in (*y, *first))), number(np.inf))
     mark = w.select(refused, w.select(finite, number(STUCK), number(NOT_FINITE)), mark)
-    mark = w.select(w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(STUCK), mark)
+    mark = w.select(
+        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(STUCK), mark
+    )
     w.put(row["mark"], mark)
     w.line(f"br i1 {w.any(over).text}, label %over, label %check")
 

@@ -27,7 +27,7 @@ from .._recent import Form, split
 from ..integrate._program import Program, Sizes, program_of
 from ..models import AbstractForcedSystem, ScaledField, multiply
 from .ir import is_variable
-from .loop import FINISHED, OUTSIDE, Field, Layout, layout_of, march_ir, REVOLUTION, Tableau
+from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
 
 
 LARGEST_STEP = REVOLUTION / 4

@@ -26,10 +26,10 @@ from ._bearing_ramp import (
     bearing_up_down as bearing_up_down,
 )
 from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs
-from ._native import engine_of as engine_of
 from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
 from ._motion import Motion as Motion, motions as motions
+from ._native import engine_of as engine_of
 from ._ramps import (
     Ramped as Ramped,
     RampUpDown as RampUpDown,
