@@ -10,7 +10,7 @@ from jaxtyping import Array
 from scipy.optimize import root_scalar
 
 import jaxcage as jc
-from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL_LET_GO, Number
+from tests.literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL_LET_GO, Number
 
 from .missed_models import Planted, Point, numbers
 

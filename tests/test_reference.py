@@ -191,8 +191,3 @@ def test_random_models_are_legal_and_the_same_again():
             for name, value in jc.parameters(model).items():
                 assert info[name].lower <= float(value) <= info[name].upper, name
             assert reference.numbers_of(model) == reference.numbers_of(reference.random_model(seed, wide))
-
-
-def test_the_finite_film_is_not_of_the_reference():
-    with pytest.raises(ValueError, match="finite length"):
-        reference.field(jc.replace(jc.case("1a"), **{"film.model": "finite_length"}), 1000.0)

@@ -15,7 +15,6 @@ from benchmarks.remake._excerpts import (
     fenced,
     lasting_fit,
     printed,
-    readings,
     speed,
     tables,
 )
@@ -69,7 +68,7 @@ def test_everything_that_a_command_prints_is_in_the_table():
 def test_every_page_figure_and_notebook_is_in_the_table():
     made = {s.page for s in SHOWN} | {file for s in SHOWN for file in s.files}
     there = [*ROOT.glob("experiments/*.ipynb"), *ROOT.glob("experiments/*.png"), *ROOT.glob("benchmarks/*.md")]
-    assert {p.relative_to(ROOT).as_posix() for p in there} | {"VALIDATION.md"} <= made
+    assert {p.relative_to(ROOT).as_posix() for p in there} <= made
     assert len({s.name for s in SHOWN}) == len(SHOWN)
 
 
@@ -221,15 +220,6 @@ def test_edges_of_the_reproduction():
         "1a zone 1 exit 100 106 +5.5 % none".split(),
         "1a zone 2 onset 100 none 90 -10.0 %".split(),
     ]
-
-
-def test_readings_of_the_reproduction():
-    one = {"case": "1a", "question": "film", "answer": "none", "chaotic_share": 0.88, "zones": 1}
-    own = one | {"question": "as the cases have it", "answer": "-"}
-    edges = {"zone 1 onset": 6750.0, "zone 1 exit": None}
-    rows = readings([document(readings=[r | {"edges": edges} for r in (own, one, one | {"case": "1b"})])]).splitlines()
-    assert len(rows) == 5 and rows[2].startswith("as the cases have it  ")
-    assert rows[3].split() == "film: none 88 % 1 6750 - -".split()
 
 
 def test_lasting_fits_and_the_row_of_the_speed_table():

@@ -1,6 +1,6 @@
 """Make again what the pages show: `python -m benchmarks.remake [NAME ...] [--list] [--force]`.
 
-A name is that of a block, or of a page: readme, edges, validation, speed.md. Output is kept under `out/remade`, and a
+A name is that of a block, or of a page: readme, edges, speed.md. Output is kept under `out/remade`, and a
 command that ended well with the package as it is does not run again. What changed is printed.
 """
 

@@ -81,22 +81,6 @@ def every_kind(runs: Sequence[Run]) -> str:
     return aligned([("case", "edge", "published", *kinds), *body])
 
 
-def readings(runs: Sequence[Run]) -> str:
-    """The readings of case 1a that `jaxcage reproduce` tried."""
-    number = lambda x: "-" if x is None else f"{x:.0f}"
-    body = [
-        (
-            f"{r['question']}: {r['answer']}".removesuffix(": -"),
-            f"{100 * r['chaotic_share']:.0f} %",
-            str(r["zones"]),
-            *(number(r["edges"].get(e)) for e in EDGES),
-        )
-        for r in runs[0].document["readings"]
-        if r["case"] == "1a"
-    ]
-    return aligned([("reading", "chaotic", "zones", *EDGES), *body])
-
-
 def lasting_fit(runs: Sequence[Run]) -> str:
     """Constants of the package beside those of a search on lasting chaos, case by case, from `identify_nu2310.py`."""
     whose, rows = ("package", "search"), []
