@@ -103,7 +103,7 @@ JEFFCOTT = "H. H. Jeffcott, Phil. Mag. 37 (1919) 304: unbalance response of a ma
 NEWKIRK = "B. L. Newkirk and H. D. Taylor, General Electric Review 28 (1925) 559: oil whirl at half speed"
 ROUTH = "short film of vanishing load: omega = sqrt(24/pi) sqrt(g/c)"
 DAMPING = "mean divergence, -2 B/M times the period, exact"
-POLAR = "(16)-(27) in polar form in NumPy, film by quadrature of the pressure (26), integrated by SciPy's DOP853"
+POLAR = "(16)-(27) in polar form in plain Python (`tests/reference`), integrated by SciPy's DOP853"
 
 # The short bearing, by entry of the stiffness matrix [N/m]; cut off, not rounded.
 SHORT_BEARING = {"xx": 12807959.0, "xy": 16393593.0, "yx": -25060393.0, "yy": 8815302.0}
@@ -563,7 +563,7 @@ def _system(f: Callable[..., Any], dimension: int, **c: float) -> jc.ForcedSyste
 
 def _point(system: Any, kind: Any, near: Any, name: str, **options: Any) -> Any:
     """The value of a constant at a bifurcation."""
-    pick = lambda s: (s.acceleration if isinstance(s, jc.ForcedOscillator) else s.rates).c[name]
+    pick = lambda s: getattr(s, "acceleration" if isinstance(s, jc.ForcedOscillator) else "rates").c[name]
     return jc.bifurcation(system, kind, near, pick, method=FINE, **options).value
 
 
@@ -715,35 +715,6 @@ def whirl() -> Iterator[Row]:
     yield row("whirl of a light cage over its speed, simulated", 0.5, ratio, 0.005, NEWKIRK)
 
 
-def in_polar_form(model: jc.CageModel, speed: float) -> Callable[[float, np.ndarray], np.ndarray]:
-    """dy/dtau of a published case in NumPy, in SI units; constants are read off the model, formulas are not."""
-    s, film, law, c, mass = model.support, model.film, model.impact, float(model.clearance), float(model.cage_mass)
-    size = (0.0921 - float(model.guidance_gap)) / 2 * float(film.land_width) * film.n_lands
-    oil = 3 * float(model.lubricant.dynamic_viscosity) * (float(film.land_width) / c) ** 2 / 6
-    k = np.array([float(s.stiffness_x), float(s.stiffness_y)])
-    cubic = float(forces.cubic_stiffness(s.cubic, s.cubic_stiffness, s.cubic_ratio, float(k.mean()), c))
-    push = float(law.amplitude * (speed / law.reference_speed) ** law.exponent)
-    turning = float(model.cage_at(speed).law("unbalance").unbalance) * speed**2
-    alpha = np.linspace(0, np.pi, 401)  # from the widest gap, opposite to the displacement: the half behind it
-    simpson = np.array([1.0, *[4.0, 2.0] * 199, 4.0, 1.0]) * np.pi / 1200
-
-    def rates(tau: float, y: np.ndarray) -> np.ndarray:
-        r, v = y[:2], y[2:]
-        distance = float(np.hypot(*r))
-        n = r / distance
-        t = np.array([-n[1], n[0]])
-        eps, rate, turn = distance / c, float(v @ n) / c, float(v @ t) / distance
-        drive = (speed - 2 * turn) * eps * np.sin(alpha) - 2 * rate * np.cos(alpha)
-        pressed = simpson * size * oil * drive / (1 + eps * np.cos(alpha)) ** 3
-        force = (pressed @ np.cos(alpha)) * n + (pressed @ np.sin(alpha)) * t
-        force += -(k + cubic * (r @ r)) * r + float(s.cross_stiffness) * np.array([-r[1], r[0]]) - float(s.damping) * v
-        force += turning * np.array([math.cos(tau), math.sin(tau)])
-        force += np.array([push * math.sin(tau), -mass * float(model.gravity)])
-        return np.concatenate([v, force / mass]) / speed
-
-    return rates
-
-
 @eqx.filter_jit
 def _half_a_revolution(model: jc.CageModel, speed: Any, start: Any) -> Any:
     return jc.strobe_map(model, speed, jc.method(steps=1024)).part(start, 0, 2).y
@@ -751,14 +722,16 @@ def _half_a_revolution(model: jc.CageModel, speed: Any, start: Any) -> Any:
 
 def half_a_revolution() -> Iterator[Row]:
     """Off the rib; contact is compared in the contact's own topic."""
+    import reference
+
     for name in bearing.PUBLISHED_CASES:
         model, speed = jc.case(name), 9000 * RPM
         c = float(model.clearance)
-        rates, unit = in_polar_form(model, speed), np.array([c, c, c * speed, c * speed])
-        start = np.array([0.2, 0.1, 0.0, 0.0])
+        field, start = reference.field(model, speed), np.array([0.2, 0.1, 0.0, 0.0])
+        rates = lambda tau, z: np.array(field(tau, (z * field.scale).tolist())) / field.scale
         how: Any = dict(method="DOP853", rtol=1e-10, atol=1e-11)
-        done = solve_ivp(lambda tau, z: rates(tau, z * unit) / unit, (0.0, math.pi), start, **how)
-        ours = _half_a_revolution(model, jnp.asarray(speed), tuple(jnp.asarray(s) for s in start * unit))
+        done = solve_ivp(rates, (0.0, math.pi), start, **how)
+        ours = _half_a_revolution(model, jnp.asarray(speed), tuple(jnp.asarray(s) for s in start * field.scale))
         for i, axis in enumerate("xy"):
             what = f"case {name}, 9000 rpm, {axis} over clearance after half a revolution"
             yield row(what, done.y[i, -1], float(ours[i]) / c, 1e-6, POLAR)

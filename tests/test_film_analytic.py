@@ -35,35 +35,6 @@ def polar_state(eps, phi, eps_rate, phi_rate):
     return eps * radial, eps_rate * radial + eps * phi_rate * tangential, radial, tangential
 
 
-# Unit mu omega R L^3 / c^2, outward radial and tangential, at eps = 0.5.
-TABLE = {
-    (0.0, 0.0): {
-        "fixed_half": (-0.444444, 0.604600),
-        "positive_pressure": (-0.444444, 0.604600),
-        "full": (0.0, 1.209200),
-    },
-    (0.1, 0.0): {
-        "fixed_half": (-0.928124, 0.782378),
-        "positive_pressure": (-1.069483, 0.764804),
-        "full": (-0.967360, 1.209200),
-    },
-    (0.1, 0.5): {
-        "fixed_half": (-0.483680, 0.177778),
-        "positive_pressure": (-0.911573, 0.0),
-        "full": (-0.967360, 0.0),
-    },
-}
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("point", TABLE)
-@pytest.mark.parametrize("phi", [0.0, 2.1])
-def test_regression_table(model, point, phi):
-    r, v, radial, tangential = polar_state(0.5, phi, *point)
-    f = np.asarray(force(model, r, v))
-    np.testing.assert_allclose((f @ radial, f @ tangential), TABLE[point][model], atol=1e-6)
-
-
 def random_states(count=12):
     """Eccentricity ratio, angle and their rates."""
     rng = np.random.default_rng(20160912)

@@ -75,16 +75,6 @@ def test_multipliers_of_the_linear_oscillator_overdamped(omega):
 
 
 @pytest.mark.wide
-def test_steady_state_of_the_linear_oscillator():
-    zeta, natural, omega = 0.2, 1.3, 0.9
-    result = spectrum(linear(zeta, natural), omega, discard=100)
-    response = 1 / (natural**2 - omega**2 + 2j * zeta * natural * omega)
-    expected = [response.real, (1j * omega * response).real]
-    at = np.broadcast_to(expected, result.last.shape)
-    np.testing.assert_allclose(result.last, at, atol=1e-9)
-
-
-@pytest.mark.wide
 def test_first_order_form_gives_the_same_strobe_states():
     """A `ForcedSystem` of the same Duffing oscillator, on its way to periodic motion."""
     law = duffing(0.25, 0.1)

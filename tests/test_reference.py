@@ -13,6 +13,7 @@ from reference._land import pressurised_half
 from scipy.integrate import quad
 
 import jaxcage as jc
+from jaxcage.analysis import start_tangents
 from jaxcage.forces import pulse_spectrum
 
 
@@ -181,6 +182,19 @@ def test_growth_is_that_of_neighbouring_trajectories():
     )
     expected = math.log(np.linalg.norm((ahead - behind) / unit) / 2e-6)
     assert found == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("rpm", [10250.0, 24500.0])
+def test_growth_in_chaos(rpm):
+    """Revolution by revolution, from a state of the attractor: nothing depends on how long one looks."""
+    model, speed = jc.case("1a"), jc.rpm(rpm)
+    settled = jc.sweep(model, speed, discard=150, revolutions=100, horizon=0)
+    at = settled.last[0, list(settled.label[0]).index("chaotic")]
+    brief = dict(discard=0, revolutions=6, blocks=6, confirm=False, horizon=0)
+    ours = jc.sweep(model, speed, starts=at[None, None], method=jc.method("rk4", steps=8192), **brief)
+    theirs = reference.growth(reference.field(model, speed), at, 6, direction=start_tangents(4, 1)[0])
+    np.testing.assert_allclose(ours.block_growth[0, 0, :, 0], theirs, rtol=0, atol=1e-4)
 
 
 def test_random_models_are_legal_and_the_same_again():
