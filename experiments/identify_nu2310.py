@@ -27,7 +27,7 @@ import numpy as np
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.integrate import controlled, finer
-from jaxcage.reproduction import LASTING, compare_edges, wide_zones
+from jaxcage.report import LASTING, compare_edges, wide_zones
 
 
 jc.enable_x64()

@@ -24,7 +24,7 @@ MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
 LEAST: dict[str, int] = {
     **dict.fromkeys(["blocks", "keep", "count", "steps", "lanes", "period", "rows", "columns", "starts", "workers"], 1),
-    **dict.fromkeys(["coordinates", "dimension", "n_rollers", "periods", "profiles", "stations", "substeps"], 1),
+    **dict.fromkeys(["coordinates", "dimension", "n_rollers", "periods", "substeps"], 1),
     **dict.fromkeys(["discard", "horizon", "exponents", "strobe", "samples", "seed", "persist"], 0),
 }
 """Of counts by their names; others have a least value of their own, which their function knows."""
@@ -34,7 +34,7 @@ SPEEDS = frozenset({"speed", "first", "last"})
 """Names of single speeds, which are above 0 and finite."""
 POSITIVE = frozenset(
     "cage_diameter guidance_gap inner_radius outer_radius palmgren_constant pitch_diameter pitch_radius pocket_radius "
-    "raceway_diameter radius rib_diameter roller_diameter slenderness temperature temperature_1 temperature_2 "
+    "raceway_diameter radius rib_diameter roller_diameter temperature temperature_1 temperature_2 "
     "viscosity viscosity_1 viscosity_2 width".split()
 )
 """Names of other numbers that are above 0 and finite in every formula."""

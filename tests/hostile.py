@@ -47,7 +47,6 @@ from jaxcage.cli import (
     _study,
     _sweep,
     _unknowns,
-    _validate,
     _whole,
     _whole_compare,
     _whole_gradient,
@@ -638,7 +637,6 @@ def without_computing() -> Iterator[list[Any]]:
     with contextlib.ExitStack() as stack:
         for module, name in HEAVY:
             stack.enter_context(mock.patch.object(module, name, _would_run))
-        stack.enter_context(mock.patch.object(_validate, "TOPICS", dict.fromkeys(_validate.TOPICS, _would_run)))
         stack.enter_context(mock.patch.object(_main, "_parse", parse))
         stack.enter_context(mock.patch.object(_main, "keep_compiled_programs"))
         yield understood

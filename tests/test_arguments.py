@@ -43,7 +43,7 @@ def test_every_formula_is_in_the_table(layer: Any):
     """But for what makes declarations, what takes no argument, and what only asks about what it is given."""
     public = {n for n, o in vars(layer).items() if inspect.isfunction(inspect.unwrap(o)) and not n.startswith("_")}
     declare = {"parameter", "choice", "count", "check_layer"}
-    asked = {"is_concrete", "require_known", "require_speeds", "divide", "multiply", "axial_profiles"}
+    asked = {"is_concrete", "require_known", "require_speeds", "divide", "multiply"}
     plain = {n for n in public if not inspect.signature(vars(layer)[n]).parameters}
     assert public - declare - asked - plain <= set(FUNCTIONS)
 

@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import slow_but, wide_but
+from literature import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 import jaxcage as jc
 from jaxcage.orbits import critical_vectors, criticality, normal_form_coefficient, normal_form_places
-from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
 METHOD = jc.method("rodas4", steps=256)

@@ -26,7 +26,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 WHOLE = "Interrupted: files of earlier runs are as they were, and the same command starts over.\n"
 COMMANDS = (
     "init, simulate, sweep, zones, bifurcations, gradient, compare, runup, map, study, design, "
-    "sensitivity, unknowns, identify, poincare, statics, impact, reproduce, validate, report"
+    "sensitivity, unknowns, identify, poincare, statics, impact, reproduce, report"
 )
 
 
@@ -62,7 +62,6 @@ COMMANDS = (
         ("simulate 1a --speed 8500 --revolutions 0", "--revolutions must be at least 1, but 0"),
         ("simulate 1a --speed 8500 --discard -1", "--discard must be at least 0, but -1"),
         ("reproduce --constants best", "--constants"),
-        ("validate --topics film,oil", "--topics must be made of film, statics, contact, exponents,"),
         ("impact 1a --speed -1", "--speed must be a speed above 0 rpm, but -1 was given"),
         ("impact 1a --speed 8500 --duration 0", "--duration must lie between 0 and 1000 ms, but 0"),
         ("impact 1a --speed 8500 --duration nan", "--duration must lie between 0 and 1000 ms"),

@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import wide_but
+from literature import DUFFING_DOUBLINGS, DUFFING_FOLDS
 from scipy.interpolate import CubicSpline
 
 import jaxcage as jc
-from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS
 
 
 METHOD = jc.method("rk4", steps=256)

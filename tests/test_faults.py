@@ -26,12 +26,11 @@ import zarr
 from report_example import findings, swept
 
 import jaxcage as jc
-from jaxcage.cli import _page, _sweep, _validate, main
+from jaxcage.cli import _page, _sweep, main
 from jaxcage.cli._job import save_figure
 from jaxcage.io import load_sweep, open_sweep, replacing, save_model, save_sweep, write_columns, write_template
 from jaxcage.plotting import new_figure
 from jaxcage.studies import Plan, Store, Study, open_study, run_study
-from jaxcage.validation import Comparison
 
 
 ROOT = Path(jc.__file__).parent
@@ -128,7 +127,6 @@ COMMANDS = {
     "statics": ["statics", "1a"],
     "sweep": ["sweep", "1a"],
     "report": ["report", "1a"],
-    "validate": ["validate", "--topics", "film"],
 }
 
 
@@ -138,7 +136,6 @@ def nothing_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_sweep, "sweep", lambda *_, **__: swept(count=26))
     monkeypatch.setattr(_page.report, "examine", lambda *_, **__: findings("1a", quick=True))
     monkeypatch.setattr(_page.report, "page", lambda *_, **__: "<p>an hour of work</p>\n" * 100)
-    monkeypatch.setitem(_validate.TOPICS, "film", lambda: [Comparison("a force", "by hand", 1.0, 1.0, 1e-9)] * 40)
 
 
 def failed(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:

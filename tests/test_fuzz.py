@@ -258,7 +258,6 @@ def test_monsters(tmp_path: Path, given: str, said: str):
         ("design 1a --scatter guidance_gap=1% --scatter guidance_gap=2%", "guidance_gap was given twice"),
         ("sensitivity 1a --seed -1", "--seed must be at least 0"),
         ("report 1a --operating ,", "--operating must hold a speed, but ',' was given"),
-        ("validate --topics ,", "--topics must be made of film, statics"),
         ("--tyro-print-completion nonsense", "must be followed by bash, zsh, tcsh, fish, but 'nonsense' was given"),
     ],
 )

@@ -18,8 +18,6 @@ LAYERS = [
     "sweeps",
     "orbits",
     "design",
-    "reproduction",
-    "validation",
     "io",
     "studies",
     "plotting",

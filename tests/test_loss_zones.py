@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from literature import DUFFING_FOLDS
 
 import jaxcage as jc
 from jaxcage.orbits import Point, Stretch, SynchronousOrbits
-from jaxcage.validation import DUFFING_FOLDS
 
 
 METHOD = jc.method("rodas4", steps=256)

@@ -286,7 +286,7 @@ def test_crossing_with_the_cube_is_never_trusted(kind):
 
 @pytest.mark.wide
 @pytest.mark.parametrize("turn", [0.0, 0.5])
-@pytest.mark.parametrize("angle", [0.02, 0.002])
+@pytest.mark.parametrize("angle", [1.7, 0.02, 0.002])
 def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
     """Where the pair is close to 1 or -1, exp(i phi) is a poor unknown; the product of the pair is not."""
     period = 2 * np.pi / 1.1
@@ -295,6 +295,22 @@ def test_torus_bifurcation_with_multipliers_close_to_the_real_axis(turn, angle):
     assert abs(point.value - 1) < 1e-9
     assert abs(point.angle - abs(2 * np.pi * turn - angle)) < 1e-6
     np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("speed", [0.8, 2.5])
+@pytest.mark.parametrize("at, inside", [(1.0, 0.94), (1.4, 1.35)])
+def test_period_doubling_of_either_multiplier(speed, at, inside):
+    """Multipliers -exp(g T) and -exp((g - s) T): exact, with rate T and the orbit known."""
+    system, period = planted(inside, s=0.4), 2 * np.pi / speed
+    orbit = jc.periodic_orbit(system, speed, guess=(0.9, 0.1), method=METHOD)
+    exact = -np.exp([(inside - 1) * period, (inside - 1.4) * period])
+    np.testing.assert_allclose(orbit.multipliers, exact, rtol=1e-8)
+    point = jc.bifurcation(system, "period-doubling", orbit, "a", method=METHOD)
+    assert point.status == "converged" and abs(point.value - at) < 1e-8
+    np.testing.assert_allclose(point.state, [1.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
+    np.testing.assert_allclose(abs(point.direction), [1.0, 0.0] if at == 1 else [0.0, 1.0], atol=1e-6)
 
 
 @pytest.mark.wide

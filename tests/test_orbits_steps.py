@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import reference
 from helpers import even
+from literature import DUFFING_DOUBLINGS
 from reference import bifurcation as shooting
 
 import jaxcage as jc
 from jaxcage.integrate import FixedSteps, strobe_map
 from jaxcage.io import load_model, write_template
 from jaxcage.orbits import Point, SynchronousOrbits, edge_speed, sensitivity
-from jaxcage.validation import DUFFING_DOUBLINGS
 
 
 RPM = np.pi / 30

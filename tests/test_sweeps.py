@@ -6,10 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import raw_sweep
+from literature import DUFFING_FOLDS
 
 import jaxcage as jc
 from jaxcage.models import FirstOrderField
-from jaxcage.validation import DUFFING_FOLDS
 
 
 def duffing(tau, q, v, speed):

@@ -125,12 +125,10 @@ from ._transients import (
 )
 from ._zero_one import mean_square_displacement as mean_square_displacement, zero_one as zero_one
 from ._zones import (
-    CLOSE_BELOW_RPM as CLOSE_BELOW_RPM,
     Edge as Edge,
     MeanLife as MeanLife,
     Zone as Zone,
     Zones as Zones,
-    close_windows as close_windows,
     closing_width as closing_width,
     lives_in_words as lives_in_words,
     zones as zones,

@@ -547,20 +547,12 @@ class ImpactOptions(_AtSpeed):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReproduceOptions(CommonOptions):
-    """The paper beside this model: edges, figures 5, 7, 8 and 9, conclusions, readings."""
+    """The paper beside this model: edges, conclusions, and the orbit diagrams of figures 7 and 8."""
 
     constants: Literal["identified", "preliminary"] = "identified"
     """Set of constants that the paper does not print."""
     quick: bool = False
     """A coarse grid, short runs and no exact edges: for trying."""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class ValidateOptions(CommonOptions):
-    """Numbers of this package beside printed ones, closed forms and other programs, as VALIDATION.md."""
-
-    topics: str = ""
-    """Topics, e.g. "film, statics"; all of them if left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -688,7 +680,6 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "statics": (StaticsOptions, "_bearing.statics"),
     "impact": (ImpactOptions, "_bearing.impact"),
     "reproduce": (ReproduceOptions, "_reproduce.reproduce"),
-    "validate": (ValidateOptions, "_validate.validate"),
     "report": (ReportOptions, "_page.report_on"),
 }
 """Command -> its options, and the function of this package that carries it out for a cage."""

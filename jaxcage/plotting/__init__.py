@@ -20,7 +20,6 @@
 | `_compare`       | two designs beside each other on one scale                              |
 | `_ramp`          | run-up and run-down                                                     |
 | `_design`        | a search for a better design or whole bearing, and what came of it      |
-| `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
 """
 
@@ -80,7 +79,6 @@ from ._orbit_diagram import (
     sweep_figure as sweep_figure,
     zoomed_diagram as zoomed_diagram,
 )
-from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
 from ._ramp import ramp_figure as ramp_figure
 from ._section import START_COLOURS as START_COLOURS, strobe_section as strobe_section
 from ._shaft import add_shaft_axes as add_shaft_axes

@@ -10,9 +10,9 @@ import numpy as np
 from .._parameters import parameter_info, parameter_paths, parameters
 from ..orbits import Sensitivity
 from ..plotting._elasticities import largest_first
-from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
+from ._reproduce import compare_edges
 from ._sources import readings_words, shown
 from ._table import Table, number
 
