@@ -22,10 +22,9 @@ ROOT = pathlib.Path(__file__).parents[1]
 SAMPLE = (
     "test_start",  # tyro, rich
     "test_units_at_the_door",  # pint
-    "test_bearing_errors",  # jax, equinox, optimistix
+    "test_bearing_errors",  # jax, jaxtyping, equinox, optimistix
     "test_io_dataset",  # xarray, zarr, numpy
     "test_cache",  # platformdirs
-    "test_traced",  # flatbuffers, jaxtyping
     "test_studies_damage",  # hypothesis
     "test_optimise",  # scikit-learn, threadpoolctl, optax
     "test_plotting",  # matplotlib
