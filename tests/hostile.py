@@ -465,7 +465,6 @@ TEXTS: dict[str, Sequence[str]] = {
     "vary": VARIED,
     "scatter": ["guidance_gap=10%", "eccentricity=rayleigh", "guidance_gap=nan%", "x=1%", "guidance_gap=0.1", "=", "x"],
     "topics": ["film", "statics, contact", "film,film", ",", "film;oil", "exponents bifurcations"],
-    "table": ["t.csv", "a/t.xlsx", "t.ods", "../t.csv", "t", ".csv", "/t.csv"],
     "at": ["8500", "8500, 12000", "900 rad/s", "21000 rpm shaft", ",", "nan", "5-4", "0", "...", "1e400"],
     "operating": [
         "8500",

@@ -479,9 +479,6 @@ def test_every_file_is_put_in_place_whole():
         ("design/_optimise.py", "save"),
         ("io/_template.py", "open"),  # a new file only
         ("report/_figures.py", "savefig"),  # into memory
-        ("io/_tables.py", "open"),  # both aside: `write_tables` puts them in place
-        ("io/_tables.py", "save"),
-        ("plotting/_bearing.py", "save"),  # an animation, aside by `Job.written`
     }
 
 

@@ -79,7 +79,6 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=START),
     "sweep_bearing": lambda m: jc.sweep_bearing(WHOLE, 1000.0),
     "sweep_bearings": lambda m: jc.sweep_bearings([WHOLE], 1000.0),
-    "waterfall": lambda m: jc.analysis.waterfall(OSCILLATOR, SPEEDS),
 }
 """Every public function that computes in JAX, or makes a model to compute with."""
 

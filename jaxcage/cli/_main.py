@@ -123,10 +123,6 @@ def _complete(job: "Job[Any]", report: "Report") -> "Report":
     said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
     tables = [with_shaft(table, job.ratio) if job.name and job.whole is None else table for table in report.tables]
     tables = [in_units(table, job.units) for table in tables]
-    if (wanted := getattr(job.options, "table", None)) is not None and tables:
-        from ..io import write_tables
-
-        job.listed("table", write_tables(job.folder / wanted, [(t.title, [t.columns, *t.rows]) for t in tables]))
     files = [
         f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in job.files.items() if path is not None
     ]

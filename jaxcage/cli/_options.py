@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 import tyro
 
 from .._errors import InputError
-from ._readers import is_table, is_within, number, text, two, whole
+from ._readers import is_within, number, text, two, whole
 
 
 SIDE = range(2, 10_001)
@@ -76,8 +76,6 @@ class CommonOptions(AnyOptions):
     units: OptionalText = None
     """Units of tables, figures and files, each for its kind of quantity, e.g. "um, mm/s" or "inch, lbf". If left out
     what the TOML file says, else mm and the like. JSON, and data sets that are stored, stay in SI."""
-    table: Annotated[str | None, text("name a .csv or .xlsx file within --out", is_table)] = None
-    """Write the tables that are printed to this file within the output folder too: .csv, or .xlsx with a sheet each."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,7 +130,7 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
     bearing, whose speeds are the shaft's."""
 
-    of_cage: ClassVar[str] = "solver steps waterfall horizon confirm draws seed nominal"
+    of_cage: ClassVar[str] = "solver steps horizon confirm draws seed nominal"
     of_whole: ClassVar[str] = "load"
 
     count: Annotated[int | None, whole(1)] = None
@@ -151,8 +149,6 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
     exponents: FromOne = 1
     """Number of Lyapunov exponents."""
-    waterfall: FromZero = 0
-    """Speeds of a waterfall of spectra of the vertical motion; none by default."""
     load: Load = None
     """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
@@ -519,8 +515,6 @@ class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Revolutions left out at the beginning."""
     load: Load = None
     """Shaft load [N] of a whole bearing, or with a unit, e.g. "4.45 kN"; its own if left out."""
-    animate: bool = False
-    """Of a whole bearing: an animation of one revolution of the cage as well, a GIF."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ from ..analysis import (
 from ..integrate import BearingRun, simulate_bearing
 from ..io import SpeedOf, Whose
 from ..models import FASTEST, BearingModel
-from ..plotting import bearing_animation, bearing_figure
+from ..plotting import bearing_figure
 from ..report import Table, chosen, number
 from ..sweeps import rpm
 from ._job import Job
@@ -85,9 +85,6 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     run, history = found.run, found.history
     job.figure(found.figure, detail=at.ending)
     job.columns(_columns(history), detail=at.ending)
-    if options.animate:
-        with job.written("animation", job.path(f"{at.ending}.gif")) as path:
-            bearing_animation(at.model, run, history, path)
     places = dict(vars(found.circumference))
     document = {
         **at.document,

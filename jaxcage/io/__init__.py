@@ -66,7 +66,6 @@ from ._speeds import (
     shaft_rpm as shaft_rpm,
     split_owner as split_owner,
 )
-from ._tables import write_tables as write_tables
 from ._template import Subject as Subject, template as template, write_template as write_template
 from ._units import to_si as to_si
 from ._write_config import (

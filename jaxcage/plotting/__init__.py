@@ -9,9 +9,8 @@
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
-| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
+| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra             |
 | `_statics`       | load of every roller, impact of one on a cage bar                       |
-| `_waterfall`     | spectra over speed                                                      |
 | `_branches`      | branches of periodic orbits over speed, alone or over an orbit diagram  |
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
 | `_elasticities`  | elasticities of edges, and of a whole bearing's statistics, as bars     |
@@ -25,7 +24,6 @@
 """
 
 from ._bearing import (
-    bearing_animation as bearing_animation,
     bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
     bearing_map_figure as bearing_map_figure,
@@ -104,5 +102,4 @@ from ._style import (
     new_figure as new_figure,
     restyle as restyle,
 )
-from ._waterfall import waterfall_map as waterfall_map
 from ._zone_strip import zone_strip as zone_strip
