@@ -4,8 +4,6 @@ store: 200 000 lanes x 300 revolutions of case 1a over speed, guidance gap and e
 by the clock and by processor time, and peak memory.
 killed: the same study killed twenty times at random and resumed: every file of the store must be the same.
 dask: the same study on a local cluster of two workers, one of them killed half way: every file must be the same.
-map: labels on a grid of 300 x 300, adaptively and in full: share of the label changes found, share of points computed;
-once with every chaos and once with chaos that outlasts 3000 revolutions.
 
 At full size the first takes some 40 minutes on two cores (83 lanes a second were measured), all of them hours;
 `--size 0.05` is what is published.
@@ -14,7 +12,6 @@ At full size the first takes some 40 minutes on two cores (83 lanes a second wer
 import argparse
 import contextlib
 import json
-import math
 import multiprocessing
 import os
 import pathlib
@@ -34,11 +31,9 @@ import jaxcage as jc
 
 CASE = "1a"
 LANES, REVOLUTIONS, DISCARD, KILLS = 200_000, 300, 100, 20
-SIDE, PERSIST = 300, 3000
 STEADY = 0.10
 """Largest change of the rate between the tenths of a run."""
 MEMORY_GIB = 2.0
-FOUND, SPENT = 0.99, 0.15
 
 
 def grid(size: float) -> dict[str, np.ndarray]:
@@ -138,32 +133,11 @@ def on_dask(store: pathlib.Path, size: float) -> dict[str, Any]:
     return {"workers": 2, "killed": len(victims), "seconds": time.perf_counter() - begin}
 
 
-def adaptive_map(size: float, persist: int) -> dict[str, Any]:
-    """An adaptive map and the full grid of the same labels; `persist` as for `jaxcage.label_map`."""
-    from jaxcage.studies import changes, found_share
-
-    side = max(20, round(SIDE * math.sqrt(size)))
-    x, y = {"speed": jc.rpm(4000, 27500, side)}, {"guidance_gap": np.linspace(0.35e-3, 0.60e-3, side)}
-    options: dict[str, Any] = {"discard": 300, "revolutions": REVOLUTIONS, "persist": persist}
-    full = jc.label_map(jc.case(CASE), x, y, refine_by="everything", **options)
-    some = jc.label_map(jc.case(CASE), x, y, **options)
-    truth, known = full.kind.astype(np.int32), some.grid.known
-    return {
-        "side": side,
-        "persist": persist,
-        "cells_with_a_change": float(np.mean(changes(truth))),
-        "computed": some.grid.points / known.size,
-        "found": found_share(some.grid, truth),
-        "same_labels_where_computed": bool(np.array_equal(some.grid.label[known], truth[known])),
-        "claim_met": some.grid.points <= SPENT * known.size and found_share(some.grid, truth) >= FOUND,
-    }
-
-
 def main() -> None:
     """Run what is asked for and print one JSON document."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.study", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--size", type=float, default=1.0, help="part of the full size, e.g. 0.02")
-    parser.add_argument("--only", default="store,killed,dask,map", help="store, killed, dask, map")
+    parser.add_argument("--only", default="store,killed,dask", help="store, killed, dask")
     parser.add_argument("--folder", type=pathlib.Path, help="keep the stores here, and take the whole one from here")
     parser.add_argument("--run", type=pathlib.Path, help="only run the study into this store")
     given = parser.parse_args()
@@ -194,8 +168,6 @@ def main() -> None:
             found["dask"] = on_dask(spread, given.size)
             found["dask"]["same_files"] = contents(whole) == contents(spread)
             print(json.dumps(found), flush=True)
-        if "map" in only:
-            found["map"] = [adaptive_map(given.size, persist) for persist in (0, PERSIST)]
     print(json.dumps(found, indent=2))
 
 

@@ -12,7 +12,7 @@
 | `design`    | constants identified from edges; objectives, optimisation, tolerances               |
 | `validation` | numbers beside printed ones, closed forms and other programs                       |
 | `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
-| `studies`    | sweeps over any parameters, stored as they go; adaptive maps                        |
+| `studies`    | sweeps over any parameters, stored as they go; maps of labels                       |
 | `report`     | tables of what was found; one HTML page about a design                              |
 | `cli`        | the `jaxcage` command                                                               |
 

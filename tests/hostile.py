@@ -449,7 +449,6 @@ VARIED = (
 ).split(", ")
 TEXTS: dict[str, Sequence[str]] = {
     "style": ["light", "dark", "print"],
-    "refine": ["chaos", "label"],
     "executor": ["local", "dask"],
     "constants": ["identified", "preliminary"],
     "solver": ["rodas3", "rodas4", "rk4", "newmark", "tsit5", "kvaerno5", "euler"],

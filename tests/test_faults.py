@@ -330,11 +330,9 @@ def test_ctrl_c_says_one_sentence(driven: Any, name: str):
     assert status == 130 and line.startswith("Interrupted") and line.endswith(".")
     if name == "study":
         assert line == "Interrupted: what is stored stays, and the same command goes on from there."
-    if name == "map of labels":
-        assert line == "Interrupted: the picture and data of the last stage stay."
     if name == "design":
         assert line == "Interrupted: the same command goes on where the search stopped."
-    if name in ("sweep", "map", "report", "a figure"):
+    if name in ("sweep", "map", "map of labels", "report", "a figure"):
         assert line == "Interrupted: files of earlier runs are as they were, and the same command starts over."
 
 

@@ -248,8 +248,6 @@ def test_monsters(tmp_path: Path, given: str, said: str):
         ("map 1a --points 4x4 --persist 300", "--persist must be 0 or above the 1000 of --discard, but 300 was given"),
         ("map 1a --persist 3000", "go with --points"),
         ("sweep 1a --horizon=-1", "--horizon must be at least 0, but -1 was given"),
-        ("map 1a --refine label", "--most and --speed go with --points"),
-        ("map 1a --points 4x4 --refine label", "--refine goes with --adaptive"),
         ("design 1a --seed -5", "--seed must be at least 0"),
         ("design 1a --cost inf", "--cost must be at least 0, but inf was given"),
         ("design 1a --spread inf", "--spread must be above 0 and at most 1"),

@@ -244,7 +244,7 @@ class MapOptions(SearchOptions):
         "columns": (50, 13),
         "revolutions": (100, 20),
     }
-    of_cage: ClassVar[str] = "solver steps count x persist points adaptive refine most speed no_curves"
+    of_cage: ClassVar[str] = "solver steps count x persist points speed no_curves"
 
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
@@ -266,13 +266,7 @@ class MapOptions(SearchOptions):
     persist: FromZero = 0
     """With --points: revolutions that chaos must outlast to count; what has died out by then was a transient."""
     points: Annotated[tuple[int, int] | None, two("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)] = None
-    """Instead of rows and columns: a grid of labels, e.g. 300x300, from a coarse picture to the full grid."""
-    adaptive: bool = False
-    """With --points: only points near a change of label are computed."""
-    refine: Literal["chaos", "label"] = "chaos"
-    """With --adaptive: follow where chaos begins and ends, or where any label changes."""
-    most: Annotated[int | None, whole(4)] = None
-    """With --points: points computed at most."""
+    """Instead of rows and columns: a grid of labels, e.g. 300x300."""
     speed: OptionalSpeed = None
     """With --points and another --x than the speed: the speed of all points [rpm]."""
     no_curves: bool = False
@@ -282,18 +276,13 @@ class MapOptions(SearchOptions):
         super().check()
         given = lambda *names: any(self._given(name) for name in names)
         if self.points is None:
-            if given("adaptive", "refine", "no_curves", "persist", "most", "speed"):
-                raise InputError(
-                    "Options --adaptive, --refine, --no-curves, --persist, --most and --speed go with --points, "
-                    "e.g. --points 300x300."
-                )
+            if given("no_curves", "persist", "speed"):
+                raise InputError("Options --no-curves, --persist and --speed go with --points, e.g. --points 300x300.")
             if self.rows == 1:
                 raise InputError("Option --rows must be 0 or at least 2, but 1 was given.")
             return
         if given("rows", "columns"):
             raise InputError("Options --rows and --columns do not go with --points, which says how many there are.")
-        if given("refine") and not self.adaptive:
-            raise InputError("Option --refine goes with --adaptive.")
         if (self.revolutions or 0) % 10:
             raise InputError(f"Option --revolutions must be a multiple of 10, but {self.revolutions} was given.")
         discard = self.usual["discard"][0] if self.discard is None else self.discard

@@ -16,21 +16,13 @@
 | `_check`    | whether a store is what was written                                           |
 | `_run`      | runs what a store lacks, in this process                                      |
 | `_dask`     | or on dask.distributed                                                        |
-| `_adaptive` | a grid of labels refined where the label changes                              |
 | `_identify` | ranges narrowed by what was measured                                           |
 | `_ensemble` | chances of chaos of a cage that is known within ranges only                   |
-| `_label_map` | that grid over two parameters of a system                                    |
+| `_label_map` | labels and exponents over two parameters of a system                         |
 """
 
 from .._arguments import check_layer
 from .._sobol import sobol as sobol
-from ._adaptive import (
-    UNKNOWN as UNKNOWN,
-    AdaptiveGrid as AdaptiveGrid,
-    changes as changes,
-    found_share as found_share,
-    refine as refine,
-)
 from ._check import (
     DamagedStore as DamagedStore,
     OldStore as OldStore,
