@@ -741,7 +741,7 @@ def check_line(line: Line, understood: list[Any]) -> str:
         check_writes(seen, getattr(options, "out", getattr(options, "path", None)))
     finally:
         _tidy()
-    sentences = [text for text in said.splitlines() if not text.startswith(("Warning: ", "Estimate: "))]
+    sentences = [text for text in said.splitlines() if not text.startswith("Warning: ")]
     if "\u202e" in printed + said:
         raise Unclear(f"the direction of writing is turned: {printed!r}, {said!r}")
     if status == 2:

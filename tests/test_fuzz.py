@@ -273,9 +273,10 @@ def test_too_little_memory_is_said(capsys: pytest.CaptureFixture[str], monkeypat
     def too_much(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(_sweep, "sweep", too_much)
-    assert main(["sweep", "1a", "--out", str(tmp_path), "--no-cache"]) == 1
-    assert "not enough memory for this: ask for fewer" in capsys.readouterr().err
+    for run in (too_much, lambda *_, **__: jax.numpy.ones(10**14)):
+        monkeypatch.setattr(_sweep, "sweep", run)
+        assert main(["sweep", "1a", "--out", str(tmp_path), "--no-cache"]) == 1
+        assert "not enough memory for this: ask for fewer" in capsys.readouterr().err
 
 
 # Files are data.

@@ -35,7 +35,6 @@ from ..models.whole import WHOLE_BEARINGS
 from ..plotting import Style, add_shaft_axes, in_units, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
-from ._limits import Demand, check_demand, demand_of, options_of_size
 from ._options import WHOLE_COMMANDS, AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
@@ -53,8 +52,6 @@ class Job(Generic[Given]):
         """Name of the case, or of the TOML file without its ending and with `_` for what no figure can show."""
         self.files: dict[str, str | None] = {}
         """What was written, by the key under which it is listed; None for what was asked for and could not be made."""
-        self.measured = False
-        """Whether it has been looked at what the command will take."""
         self.asked: AbstractMethod | None = None
         """Integration method, if any option says how to integrate."""
         if isinstance(options, IntegrationOptions):
@@ -136,10 +133,8 @@ class Job(Generic[Given]):
 
     @functools.cached_property
     def folder(self) -> Path:
-        """The folder to write to, tried out, after it has been looked at whether there is room for the computation."""
+        """The folder to write to, tried out."""
         assert isinstance(self.options, CommonOptions)
-        if not self.measured:  # by a command that knows better
-            self.require(demand_of(self.options, getattr(self, "model", None)))
         return check_writable(self.options.out)
 
     @contextlib.contextmanager
@@ -151,15 +146,6 @@ class Job(Generic[Given]):
         at = f"{what} of {self.name}" if what else f"{self.command} {self.name}".rstrip()
         with progress(at, unit, advice) as bar:
             yield bar
-
-    def require(self, demand: Demand) -> None:
-        """Refuse what there is no room for, and say what takes long, once.
-
-        **Raises:** `InputError`.
-        """
-        assert isinstance(self.options, CommonOptions)
-        check_demand(demand, Path(self.options.out), options_of_size(self.options))
-        self.measured = True
 
     @property
     def seconds(self) -> float:

@@ -95,6 +95,10 @@ def _carry_out(options: AnyOptions) -> None:
         report = _complete(job, report)
     except ArgumentError as error:
         raise _of_options(error, options) from error
+    except jax.errors.JaxRuntimeError as error:
+        if "RESOURCE_EXHAUSTED" in str(error):
+            raise MemoryError from error
+        raise
     _print(report, options.json)
     if report.failure:
         raise NoResult(report.failure)

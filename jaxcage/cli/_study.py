@@ -29,11 +29,9 @@ from ..studies import (
 )
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of
-from ._limits import Demand, demand_of_study
 from ._options import StudyOptions
 from ._show import Report
 from ._vary import read_vary
-from ._whole import SWEEPING
 
 
 if TYPE_CHECKING:
@@ -55,11 +53,9 @@ def study(job: Job[StudyOptions], whole: BearingModel | None = None) -> Report:
     if whole is not None:
         given = WHOLE_TOLERANCE if options.tolerance is None else options.tolerance
         work = BearingStudy(whole, _plan(job, whole, len(CAGE_STARTS)), **length, tolerance=given)
-        job.require(_demand(work))
     else:
         plan = _plan(job, job.model, len(job.model.starts(1.0)))
         work = Study(job.model, plan, job.method, **length, strobe=options.strobe)
-        job.require(demand_of_study(work))
     path = job.folder / _name(job)
     before, began = _lanes_stored(path), time.perf_counter()
     with job.computing(unit="lanes", advice=ADVICE) as bar:
@@ -83,14 +79,6 @@ def study(job: Job[StudyOptions], whole: BearingModel | None = None) -> Report:
         f"Open it: jaxcage.open_study({str(path)!r})",
     ]
     return Report(document, [table], notes)
-
-
-def _demand(work: BearingStudy) -> Demand:
-    """What a study of whole bearings takes, about."""
-    lanes, revolutions = work.plan.size, work.discard + work.revolutions
-    stored = 8.0 * len(work.variables) * lanes
-    memory = min(work.plan.lanes, lanes) * (2e4 + 600.0 * revolutions) + stored
-    return Demand(lanes, revolutions, memory, stored, SWEEPING)
 
 
 def _name(job: Job[StudyOptions]) -> str:
