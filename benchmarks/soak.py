@@ -63,7 +63,7 @@ def turn(number: int, folder: pathlib.Path) -> None:
     sweep = jc.sweep(system, np.linspace(1.1, 1.4, 4), confirm=False, horizon=0, **options)
     orbit = jc.periodic_orbit(system, 1.2, guess=sweep.strobe[1, 0, -1], method=method)
     store = folder / "store.zarr"
-    jc.study(system, {"speed": np.linspace(1.1, 1.4, 8)}, store=store, **options).load()
+    jc.study(system, {"speed": np.linspace(1.1, 1.4, 8)}, store=store, name="soak", version="1", **options).load()
     shutil.rmtree(store)
     del sweep, orbit
 

@@ -200,7 +200,7 @@ def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     """Out of room at once, or after two of its chunks: called again, it ends with the files of an unbroken study."""
     plan = Plan({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
     system = jc.ForcedOscillator(_duffing, coordinates=1)
-    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0)
+    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0, "duffing", "1")
     run_study(study, tmp_path / "whole.zarr")
     store = tmp_path / "study.zarr"
     with (

@@ -70,7 +70,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
         "outer_rib", guidance_gap=1.0, pocket_clearance=1.0, radial_clearance=1.0, elastic_approach=1.0
     ),
     "strobe_map": lambda m: jc.strobe_map(OSCILLATOR, 1.0),
-    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere"),
+    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere", name="duffing", version="1"),
     "sweep": lambda m: raw_sweep(OSCILLATOR, SPEEDS),
     "sweep_designs": lambda m: raw_sweeps([OSCILLATOR], SPEEDS),
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),

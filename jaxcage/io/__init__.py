@@ -49,7 +49,6 @@ from ._dataset import (
 )
 from ._files import (
     check_writable as check_writable,
-    put_bytes as put_bytes,
     read_bytes as read_bytes,
     replacing as replacing,
     sync as sync,

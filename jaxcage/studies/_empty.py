@@ -12,11 +12,14 @@ import numpy as np
 
 from .._glossary import quantity
 from .._parameters import parameter_info
-from ..io import put_bytes, sync
-from ._manifest import ABOUT, FOLDER, FORMAT, describing, is_as_marked, make_way, mark, write_entry
+from ..io import sync
 from ._plan import SAMPLE
 from ._stored import PENDING, SPEED, AbstractStudy, Variable
 from ._study import OIL
+
+
+FORMAT = 3
+"""Of stores."""
 
 
 def create(path: Path, study: AbstractStudy) -> None:
@@ -34,31 +37,18 @@ def create(path: Path, study: AbstractStudy) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def mend(path: Path, study: AbstractStudy) -> None:
-    """Write again what describes a store, where it is not what it was."""
-    with tempfile.TemporaryDirectory() as scratch:
-        new = Path(scratch) / "store"
-        _write(new, study)
-        for name in [*describing(new), ABOUT]:
-            there, wanted = path / name, (new / name).read_bytes()
-            if not is_as_marked(there, mark(wanted)):
-                make_way(path, there)
-                put_bytes(there, wanted)
-
-
 def _write(path: Path, study: AbstractStudy) -> None:
     import xarray as xr
     import zarr
+    from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    from ._zarr import compressors
-
-    plan, variables = study.plan, study.variables
+    plan, compressors = study.plan, (ZstdCodec(), Crc32cCodec())  # any reader of zarr compares the checksums
     coordinates = _coordinates(study)
     dataset = xr.Dataset(coords=coordinates, attrs=_attributes(study))
-    checked = {name: {"compressors": compressors()} for name in coordinates}
+    checked = {name: {"compressors": compressors} for name in coordinates}
     dataset.to_zarr(path, mode="w", consolidated=False, encoding=checked)
     group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
-    for name, variable in variables.items():
+    for name, variable in study.variables.items():
         extra = [study.extents[d] for d in variable.within]
         group.create_array(
             name,
@@ -66,22 +56,13 @@ def _write(path: Path, study: AbstractStudy) -> None:
             chunks=(*plan.block, *extra),
             dtype=variable.kind,
             fill_value=np.nan if variable.kind == "float64" else PENDING,
-            compressors=compressors(),
+            compressors=compressors,
             dimension_names=(*plan.axes, *variable.within),
             attributes=_words(variable),
         )
-    group.create_group(FOLDER, attributes={"long_name": "digests of what is finished, by jaxcage.studies.check_study"})
     with warnings.catch_warnings():  # zarr warns that the specification does not have this yet; xarray warns without it
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(path)
-    about = {
-        "format": FORMAT,
-        "fingerprint": study.fingerprint,
-        "blocks": list(plan.blocks),
-        "variables": {name: len(variable.within) for name, variable in variables.items()},
-        "files": describing(path),
-    }
-    write_entry(path / ABOUT, about)
 
 
 def _words(variable: Variable) -> dict[str, Any]:
@@ -116,8 +97,7 @@ def _attributes(study: AbstractStudy) -> dict[str, Any]:
     return {
         "title": "jaxcage study",
         "store_format": FORMAT,
-        "fingerprint": study.fingerprint,
-        "study": json.dumps(described),
+        "study": study.description,
         "discard": study.discard,
         "revolutions": study.revolutions,
         "seed": study.plan.seed,
