@@ -33,6 +33,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from .._arguments import require_above_zero, require_at_least
 from .._errors import ArgumentError
 from .._types import Scalar
 from ._axial import axial_profiles
@@ -148,6 +149,8 @@ def film_pressure_field(
 
     **Raises:** `ValueError` for fewer than 8 stations.
     """
+    require_above_zero(slenderness=slenderness)
+    require_at_least(1, stations=stations, profiles=profiles)
     if stations < 8:
         raise ArgumentError("stations", said=f"must be at least 8, but {stations} was given.")
     cell, axial, follow = 2 * np.pi / stations, axial_profiles(profiles), grooves is None

@@ -12,7 +12,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._parameters import parameter_info
 from ..integrate import AbstractMethod, controlled
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import require_persist
 from ._plan import LANES, Plan
 from ._stored import SPEED
@@ -125,6 +125,8 @@ def label_map(
     """
     require_x64()
     (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())
+    if speed is not None:
+        require_speeds(system, speed)
     shape = (len(x_value), len(y_value), starts)
     if min(shape[:2]) < 2:
         raise ArgumentError("x", "y", said=f"must have at least 2 values each, but have {shape[0]} and {shape[1]}.")

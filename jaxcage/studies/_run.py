@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..integrate import AbstractMethod, controlled
@@ -120,6 +121,8 @@ def run_study(
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
     if executor not in ("local", "dask"):
         raise ArgumentError("executor", said=f"must be local or dask, but {executor!r} was given.")
+    if workers is not None:
+        require_at_least(1, workers=workers)
     store = Store(path, about)
     part = range(about.plan.chunks)[i - 1 :: n]
     mine, pending = set(part), store.pending(part)
