@@ -25,7 +25,6 @@ SAMPLE = (
     "test_bearing_errors",  # jax, jaxtyping, equinox, optimistix
     "test_io_dataset",  # xarray, zarr, numpy
     "test_cache",  # platformdirs
-    "test_fuzz",  # hypothesis
     "test_optimise",  # scikit-learn, threadpoolctl, optax
     "test_plotting",  # matplotlib
     "test_report_page",  # jinja2

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hostile import declared
+from helpers import declared
 from test_init import OPTION
 
 import jaxcage as jc
