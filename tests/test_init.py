@@ -111,7 +111,7 @@ def test_every_table_that_can_be_put_in_place_of_another_is_accepted(name: str, 
 def test_nothing_that_can_be_given_is_missing():
     known = {path[-1] for path in FIELDS}
     written = set(re.findall(r"^(?:# |#: )?([a-z_0-9]+) = ", TEXT, flags=re.M))
-    assert written == known | {"kind", "grade", "base", "designation", "speeds", "units", "stiffness"}
+    assert written == known | {"kind", "grade", "base", "designation", "speeds", "stiffness"}
 
 
 def test_every_choice_names_all_that_it_offers():

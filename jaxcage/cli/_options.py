@@ -73,9 +73,6 @@ class CommonOptions(AnyOptions):
     """Style of the figures: for white pages, dark screens, or black-and-white paper."""
     no_cache: bool = False
     """Compile everything anew instead of using programs kept from earlier runs."""
-    units: OptionalText = None
-    """Units of tables, figures and files, each for its kind of quantity, e.g. "um, mm/s" or "inch, lbf". If left out
-    what the TOML file says, else mm and the like. JSON, and data sets that are stored, stay in SI."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,7 +3,6 @@
 | module          | responsibility                                                            |
 |-----------------|---------------------------------------------------------------------------|
 | `_units`        | texts with a unit to SI numbers                                           |
-| `_shown_units`  | tables, figures and files in the units that are asked for                 |
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
 | `_config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
 | `_write_config` | a model to nested mapping or TOML                                         |
@@ -57,7 +56,6 @@ from ._measurements import Measurement as Measurement, read_measurements as read
 from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
-from ._shown_units import UNIT as UNIT, ShownUnits as ShownUnits
 from ._speeds import (
     SpeedOf as SpeedOf,
     Whose as Whose,

@@ -4,7 +4,6 @@
 |------------------|-------------------------------------------------------------------------|
 | `_style`         | colours, frames, light, dark and print style, no global state           |
 | `_shaft`         | the shaft's speed beneath the cage's                                    |
-| `_in_units`      | a figure in other units                                                 |
 | `_marks`         | zones shaded and published edges marked on a speed axis                 |
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
@@ -64,7 +63,6 @@ from ._history import (
     simulation_figure as simulation_figure,
     time_history as time_history,
 )
-from ._in_units import in_units as in_units
 from ._marks import (
     mark_operating as mark_operating,
     mark_published as mark_published,
