@@ -5,10 +5,9 @@
 | `_units`        | texts with a unit to SI numbers                                           |
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
 | `_config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
-| `_write_config` | a model to nested mapping or TOML                                         |
+| `_write_config` | a model to nested mapping or TOML; a TOML file with other ranges          |
 | `_ranges`       | values that are known within a range only                                 |
 | `_measurements` | what was measured on a machine, from CSV                                  |
-| `_narrow`       | a TOML file with other ranges                                             |
 | `_tables`       | tables as CSV or Excel                                                    |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
@@ -53,7 +52,6 @@ from ._files import (
     sync as sync,
 )
 from ._measurements import Measurement as Measurement, read_measurements as read_measurements
-from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
 from ._speeds import (
@@ -69,4 +67,5 @@ from ._write_config import (
     configuration as configuration,
     save_model as save_model,
     toml_text as toml_text,
+    with_ranges as with_ranges,
 )

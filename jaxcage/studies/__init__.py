@@ -8,7 +8,6 @@
 | `_study`    | what is computed of a cage's lane, the same bits anywhere                     |
 | `_whole_study` | what is computed of a whole bearing's                                      |
 | `_store`    | the zarr folder, whole at any time                                            |
-| `_empty`    | what describes it                                                             |
 | `_run`      | runs what a store lacks, in this process                                      |
 | `_dask`     | or on dask.distributed                                                        |
 | `_identify` | ranges narrowed by what was measured                                           |
