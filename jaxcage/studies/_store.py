@@ -74,11 +74,17 @@ class Store:
 
         **Raises:** `OSError`, one sentence with the reason and how to go on.
         """
-        region = self.study.plan.region(chunk)
         with _going_on(self.path):
-            for name in sorted(results, key=lambda name: name == OUTCOME):
-                self._chunks.arrays[name][region] = results[name]
+            try:
+                self._put(chunk, results)
+            except FileNotFoundError:  # another process has just tidied up what is written aside
+                self._put(chunk, results)
         self._finished.add(chunk)
+
+    def _put(self, chunk: int, results: Results) -> None:
+        region = self.study.plan.region(chunk)
+        for name in sorted(results, key=lambda name: name == OUTCOME):
+            self._chunks.arrays[name][region] = results[name]
 
     def tidy(self) -> None:
         """Remove what kills left behind; for a store that nobody writes to any more."""
