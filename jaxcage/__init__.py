@@ -11,7 +11,7 @@
 | `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
 | `design`    | constants identified from edges; objectives, optimisation, tolerances               |
 | `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
-| `studies`    | sweeps over any parameters, stored as they go; adaptive maps                        |
+| `studies`    | sweeps over any parameters, stored as they go; maps of labels                       |
 | `report`     | tables of what was found; one HTML page about a design                              |
 | `cli`        | the `jaxcage` command                                                               |
 

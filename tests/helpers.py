@@ -2,9 +2,10 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import pint
@@ -99,3 +100,13 @@ def _marked(values: Iterable[Any], quick: tuple[Any, ...], mark: pytest.MarkDeco
     assert all(q in values for q in quick), f"{quick} must be of {values}"
     marked = [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=mark) for v in values]
     return [v if v in quick else m for v, m in zip(values, marked, strict=True)]
+
+
+def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], dataclasses.Field]]:
+    """Every parameter, choice and count of a module with its path of attribute names."""
+    for field in dataclasses.fields(module):
+        value, here = getattr(module, field.name), (*path, field.name)
+        if isinstance(value, eqx.Module):
+            yield from declared(value, here)
+        elif {"parameter", "choice", "count"} & set(field.metadata):
+            yield here, field

@@ -1,5 +1,6 @@
 """Every bad input is refused with one sentence on standard error and exit status 2."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from jaxcage.cli import main
+from jaxcage.io import ConfigError, load_model, read_bytes
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -189,3 +191,21 @@ def test_errors_of_our_own_are_not_taken_for_bad_input(monkeypatch: pytest.Monke
     monkeypatch.setattr(_bearing, "statics", broken)
     with pytest.raises(ValueError, match="a mistake in the library"):
         main(["statics", "1a"])
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "large"])
+def test_only_files_of_a_sensible_size_are_read(capsys: pytest.CaptureFixture[str], tmp_path: Path, kind: str):
+    path = tmp_path / "design.toml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with open(path, "wb") as file:
+            file.truncate(10**12)  # holds nothing, and is a terabyte long
+    why = "it has 1000000000000 bytes, more than the 10000000 that are read" if kind == "large" else "no regular file"
+    with pytest.raises(ConfigError, match=f"must be a readable TOML file, but: .*{why}"):
+        load_model(path)
+    assert why in refused(capsys, "statics", str(path), "--out", str(tmp_path))
+    with pytest.raises(OSError):
+        read_bytes(path)

@@ -197,7 +197,7 @@ def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     """Out of room at once, or after two of its chunks: called again, it ends with the files of an unbroken study."""
     plan = Plan({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
     system = jc.ForcedOscillator(_duffing, coordinates=1)
-    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0)
+    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0, "duffing", "1")
     run_study(study, tmp_path / "whole.zarr")
     store = tmp_path / "study.zarr"
     with (
@@ -327,11 +327,9 @@ def test_ctrl_c_says_one_sentence(driven: Any, name: str):
     assert status == 130 and line.startswith("Interrupted") and line.endswith(".")
     if name == "study":
         assert line == "Interrupted: what is stored stays, and the same command goes on from there."
-    if name == "map of labels":
-        assert line == "Interrupted: the picture and data of the last stage stay."
     if name == "design":
         assert line == "Interrupted: the same command goes on where the search stopped."
-    if name in ("sweep", "map", "report", "a figure"):
+    if name in ("sweep", "map", "map of labels", "report", "a figure"):
         assert line == "Interrupted: files of earlier runs are as they were, and the same command starts over."
 
 
@@ -468,7 +466,7 @@ def test_every_file_is_put_in_place_whole():
         }
         found |= {(name, _called(n)) for n in ast.walk(tree) if _writes(n) and id(n) not in sheltered}
     assert found == {
-        ("studies/_empty.py", "to_zarr"),  # the empty store, made aside
+        ("studies/_store.py", "to_zarr"),  # the empty store, made aside
         ("io/_files.py", "open"),  # aside, in place by `os.replace`
         ("design/_kept.py", "open"),  # a kept search, moved into place
         ("design/_kept.py", "savez"),
@@ -476,9 +474,6 @@ def test_every_file_is_put_in_place_whole():
         ("design/_optimise.py", "save"),
         ("io/_template.py", "open"),  # a new file only
         ("report/_figures.py", "savefig"),  # into memory
-        ("io/_tables.py", "open"),  # both aside: `write_tables` puts them in place
-        ("io/_tables.py", "save"),
-        ("plotting/_bearing.py", "save"),  # an animation, aside by `Job.written`
     }
 
 

@@ -69,7 +69,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
         "outer_rib", guidance_gap=1.0, pocket_clearance=1.0, radial_clearance=1.0, elastic_approach=1.0
     ),
     "strobe_map": lambda m: jc.strobe_map(OSCILLATOR, 1.0),
-    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere"),
+    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere", name="duffing", version="1"),
     "sweep": lambda m: raw_sweep(OSCILLATOR, SPEEDS),
     "sweep_designs": lambda m: raw_sweeps([OSCILLATOR], SPEEDS),
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
@@ -78,7 +78,6 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=START),
     "sweep_bearing": lambda m: jc.sweep_bearing(WHOLE, 1000.0),
     "sweep_bearings": lambda m: jc.sweep_bearings([WHOLE], 1000.0),
-    "waterfall": lambda m: jc.analysis.waterfall(OSCILLATOR, SPEEDS),
 }
 """Every public function that computes in JAX, or makes a model to compute with."""
 

@@ -11,7 +11,7 @@
 | `_transients`   | an attractor or a chaotic transient: mean life with its error, coexisting ends       |
 | `_hazard`       | the rate of escapes as it depends on speed and design                                |
 | `_crisis`       | where a crisis ends an attractor: the mean life extrapolated to its divergence       |
-| `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
+| `_spectra`      | amplitude spectra by order of speed                                                  |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_bearing_history` | forces and slips of every roller of it, around its circumference; its spectra     |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
@@ -106,11 +106,9 @@ from ._observe import (
 from ._spectra import (
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,
-    Waterfall as Waterfall,
     dominant_orders as dominant_orders,
     order_spectrum as order_spectrum,
     spectrum_of as spectrum_of,
-    waterfall as waterfall,
     whirl_spectrum as whirl_spectrum,
 )
 from ._sweep import LIFE_BLOCK as LIFE_BLOCK, Confirmation as Confirmation, Sweep as Sweep
@@ -138,5 +136,5 @@ from ._zones import (
 check_layer(
     globals(),
     "around bearing_history bearing_measures cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
-    "orbit_measures order_spectrum stability_chart survival waterfall zero_one zones",
+    "orbit_measures order_spectrum stability_chart survival zero_one zones",
 )

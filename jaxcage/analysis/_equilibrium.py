@@ -29,7 +29,7 @@ from .._errors import ArgumentError
 from .._parameters import replace
 from .._types import Scalar
 from ..forces import AbstractForcing, FilmModel, SynchronousImpact, film_scale, short_film_force
-from ..models import CageModel, SecondOrderField
+from ..models import CageModel, SecondOrderField, require_speeds
 
 
 LARGEST_WHIRLING = 0.7560303864710124
@@ -317,5 +317,6 @@ def equilibrium(model: CageModel, speed: Scalar, *, start: Float[Array, " coordi
     that depends on the phase alone, an `AbstractForcing`, is left out like the unbalance).
     """
     require_x64()
+    require_speeds(model, speed)
     first = None if start is None else jnp.asarray(start) / model.clearance
     return _equilibrium(model, jnp.asarray(speed, dtype=float), first)

@@ -17,6 +17,7 @@ have died out.
 import numpy as np
 from jaxtyping import Float
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 
 
@@ -86,6 +87,7 @@ def zero_one(
 
     **Raises:** `ValueError` for a series or a number of frequencies that is too short.
     """
+    require_at_least(0, seed=seed)
     n = np.atleast_1d(series).shape[-1]
     if n < SHORTEST:
         raise ArgumentError("series", said=f"must have at least {SHORTEST} values, but it has {n}.")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 import tyro
 
 from .._errors import InputError
-from ._readers import is_table, is_within, number, text, two, whole
+from ._readers import is_within, number, text, two, whole
 
 
 SIDE = range(2, 10_001)
@@ -73,11 +73,6 @@ class CommonOptions(AnyOptions):
     """Style of the figures: for white pages, dark screens, or black-and-white paper."""
     no_cache: bool = False
     """Compile everything anew instead of using programs kept from earlier runs."""
-    units: OptionalText = None
-    """Units of tables, figures and files, each for its kind of quantity, e.g. "um, mm/s" or "inch, lbf". If left out
-    what the TOML file says, else mm and the like. JSON, and data sets that are stored, stay in SI."""
-    table: Annotated[str | None, text("name a .csv or .xlsx file within --out", is_table)] = None
-    """Write the tables that are printed to this file within the output folder too: .csv, or .xlsx with a sheet each."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,7 +127,7 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
     bearing, whose speeds are the shaft's."""
 
-    of_cage: ClassVar[str] = "solver steps waterfall horizon confirm draws seed nominal"
+    of_cage: ClassVar[str] = "solver steps horizon confirm draws seed nominal"
     of_whole: ClassVar[str] = "load"
 
     count: Annotated[int | None, whole(1)] = None
@@ -151,8 +146,6 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
     exponents: FromOne = 1
     """Number of Lyapunov exponents."""
-    waterfall: FromZero = 0
-    """Speeds of a waterfall of spectra of the vertical motion; none by default."""
     load: Load = None
     """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
@@ -248,7 +241,7 @@ class MapOptions(SearchOptions):
         "columns": (50, 13),
         "revolutions": (100, 20),
     }
-    of_cage: ClassVar[str] = "solver steps count x persist points adaptive refine most speed no_curves"
+    of_cage: ClassVar[str] = "solver steps count x persist points speed no_curves"
 
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
@@ -270,13 +263,7 @@ class MapOptions(SearchOptions):
     persist: FromZero = 0
     """With --points: revolutions that chaos must outlast to count; what has died out by then was a transient."""
     points: Annotated[tuple[int, int] | None, two("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)] = None
-    """Instead of rows and columns: a grid of labels, e.g. 300x300, from a coarse picture to the full grid."""
-    adaptive: bool = False
-    """With --points: only points near a change of label are computed."""
-    refine: Literal["chaos", "label"] = "chaos"
-    """With --adaptive: follow where chaos begins and ends, or where any label changes."""
-    most: Annotated[int | None, whole(4)] = None
-    """With --points: points computed at most."""
+    """Instead of rows and columns: a grid of labels, e.g. 300x300."""
     speed: OptionalSpeed = None
     """With --points and another --x than the speed: the speed of all points [rpm]."""
     no_curves: bool = False
@@ -286,18 +273,13 @@ class MapOptions(SearchOptions):
         super().check()
         given = lambda *names: any(self._given(name) for name in names)
         if self.points is None:
-            if given("adaptive", "refine", "no_curves", "persist", "most", "speed"):
-                raise InputError(
-                    "Options --adaptive, --refine, --no-curves, --persist, --most and --speed go with --points, "
-                    "e.g. --points 300x300."
-                )
+            if given("no_curves", "persist", "speed"):
+                raise InputError("Options --no-curves, --persist and --speed go with --points, e.g. --points 300x300.")
             if self.rows == 1:
                 raise InputError("Option --rows must be 0 or at least 2, but 1 was given.")
             return
         if given("rows", "columns"):
             raise InputError("Options --rows and --columns do not go with --points, which says how many there are.")
-        if given("refine") and not self.adaptive:
-            raise InputError("Option --refine goes with --adaptive.")
         if (self.revolutions or 0) % 10:
             raise InputError(f"Option --revolutions must be a multiple of 10, but {self.revolutions} was given.")
         discard = self.usual["discard"][0] if self.discard is None else self.discard
@@ -519,8 +501,6 @@ class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Revolutions left out at the beginning."""
     load: Load = None
     """Shaft load [N] of a whole bearing, or with a unit, e.g. "4.45 kN"; its own if left out."""
-    animate: bool = False
-    """Of a whole bearing: an animation of one revolution of the cage as well, a GIF."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -18,12 +18,11 @@ from ..design import (
 from ..models import BearingModel
 from ..plotting import bearing_design_figure
 from ._job import Job
-from ._limits import Demand
 from ._options import DesignOptions
 from ._search import kept_search, no_worse_balance
 from ._show import Report
 from ._vary import read_cage_bounds
-from ._whole import SWEEPING, at_shaft_speed
+from ._whole import at_shaft_speed
 
 
 CHECKED, LONGER = 8, 2
@@ -51,9 +50,6 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
     )
     runs.require_designs(len(vary))
     fresh = runs.fresh(starts=CHECKED, longer=LONGER)
-    lanes = runs.designs * runs.starts * options.starts
-    length = (runs.discard + runs.revolutions) * (filled["steps"] + 1)
-    job.require(Demand(lanes, length, 2e4 * lanes, rate=2 * SWEEPING))
     kept = kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
         found = optimise(

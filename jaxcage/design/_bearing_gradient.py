@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from .._arguments import require_above_zero, require_at_least
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
@@ -174,6 +175,8 @@ def bearing_gradient(
     **Raises:** `ValueError` for parameters that are unknown or 0, a box of designs that leaves a parameter's range,
     counts that are impossible, too few designs for the directions; if too many of them fail.
     """
+    require_above_zero(speed=speed)
+    require_at_least(0, seed=seed, discard=discard)
     values = _values(model, directions)
     _require(directions, statistics, designs, spread, revolutions)
     moved = spread * moves(designs // 2, len(directions), seed)

@@ -17,6 +17,7 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
 from .._sobol import sobol
@@ -164,6 +165,8 @@ def optimise(
     another search.
     """
     require_x64()
+    require_at_least(0, seed=seed)
+    require_at_least(1, steps=steps)
     space = DesignSpace.of(system, vary)
     chosen = optax.adam(optax.cosine_decay_schedule(0.5, max(steps, 1), 0.1)) if optimiser is None else optimiser
     first = first_places(space, objective, starts, scouts, seed)

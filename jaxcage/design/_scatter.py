@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError, InputError
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
@@ -91,6 +92,7 @@ def global_sensitivity(
 
     **Raises:** `ValueError` for samples that are no power of 2, or an objective that could not be had somewhere.
     """
+    require_at_least(0, seed=seed)
     space = DesignSpace.of(system, vary)
 
     def evaluate(x: np.ndarray) -> np.ndarray:

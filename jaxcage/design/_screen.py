@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -137,6 +138,7 @@ def screen(
     **Raises:** `ValueError` for unknowns that no case has, cases without an edge, or another `by`.
     """
     require_x64()
+    require_at_least(0, seed=seed)
     if by not in ("motion", "edges"):
         raise ArgumentError("by", said=f"must be motion or edges, but '{by}' was given.")
     check_unknowns(systems, unknowns)

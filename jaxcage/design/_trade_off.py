@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
 from ..models import AbstractForcedSystem
@@ -65,6 +66,7 @@ def trade_off(
 
     **Raises:** `ValueError` for bounds that are none, and without objectives or designs.
     """
+    require_at_least(0, seed=seed)
     if not objectives:
         raise ArgumentError("objectives", said="must hold at least one, but it is empty.")
     if designs < 1:

@@ -114,8 +114,8 @@ def _correct(
 
 _axes = eqx.if_array(0)
 _lanes = (0, 0, 0, None, None, None)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, *_lanes)), "correct shared")
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, *_lanes)), "correct own")
+_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, *_lanes)))
+_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, *_lanes)))
 
 
 def take(tree: Any, lanes: Any) -> Any:

@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
-from .._arguments import shown, wrong
+from .._arguments import require_at_least, shown, wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, compiled
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ._by_name import SPEED, Parameter, with_value
 from ._follower import Follower, make_follower, seeds, stable_steps
 from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
@@ -141,6 +141,8 @@ def bifurcation(
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
     require_x64()
+    if periods is not None:
+        require_at_least(1, periods=periods)
     if not 0 <= reach < float("inf"):
         raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
     if kind not in KINDS:
@@ -237,13 +239,14 @@ def _read_guess(
         spin, state, at = True, None, guess
     if isinstance(guess, Point) and not is_traced((guess, at)):
         require_found(guess, at, "guess")
-    if wrong("guess", Scalar, at):
+    if wrong(Scalar, at):
         said = "must be a number, a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")
     if parameter == SPEED:
         known_speed = at
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
+    require_speeds(system, known_speed)
     return guess_state(system, known_speed, state), known_speed, frozen(jnp.asarray(at, dtype=float)), spin
 
 

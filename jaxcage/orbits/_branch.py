@@ -9,12 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, Rodas4
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ._arclength import Corrected, Steps, Trace, follow, passes, take
 from ._by_name import SPEED, Parameter
 from ._follower import (
@@ -109,6 +110,7 @@ def branch(
     **Raises:** `ValueError` if there is no orbit to start from, or none in a finite range.
     """
     require_x64()
+    require_at_least(1, periods=periods)
     require_range(parameter, lower, upper)
     if isinstance(orbit, Orbit | Point):
         speed, periods = orbit.speed, int(orbit.periods)
@@ -118,6 +120,7 @@ def branch(
     known_speed = at if parameter == SPEED else speed
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
+    require_speeds(system, known_speed)
     require_within("orbit", float(at), lower, upper)
     follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
@@ -160,6 +163,7 @@ def branches(
         require_within("orbits", value, lower, upper)
         starts.append((np.asarray(orbit.state), value))
     known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
+    require_speeds(systems[0], known_speed)
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
     single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)

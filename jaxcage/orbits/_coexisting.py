@@ -6,11 +6,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
-from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, compiled, strobe_map
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ._orbit import Orbit, periodic_orbit
 
 
@@ -39,8 +39,9 @@ def coexisting_orbits(
     **Returns:** distinct orbits, the stable ones first. There is no proof that these are all.
     """
     require_x64()
-    if count < 1:
-        raise ArgumentError("count", said=f"must be at least 1, but {count} was given.")
+    require_at_least(0, seed=seed)
+    require_at_least(1, periods=periods, count=count)
+    require_speeds(system, speed)
     scale = np.array([float(c) for c in system.scale(speed)])
     own = np.array([[float(c) for c in y] for y in system.starts(speed)])
     random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale

@@ -12,10 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._parameters import get, parameter_paths
 from ..integrate import AbstractMethod, compiled
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ._by_name import SPEED
 from ._orbit import StateLike
 from ._problem import Frame, Given, OrbitProblem, make_frame
@@ -72,6 +73,8 @@ def leading_multiplier(
     **Returns:** `LeadingMultiplier`. Where two multipliers are equal in size, of one of them.
     """
     require_x64()
+    require_at_least(1, periods=periods)
+    require_speeds(system, speed)
     chosen, counts = counted(method)
     problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
     at, state = jnp.asarray(speed, dtype=float), jnp.asarray(guess, dtype=float)

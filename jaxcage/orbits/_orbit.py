@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
-from .._arguments import shown
+from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -323,6 +323,7 @@ def periodic_orbit(
     the equation P(z) = z.
     """
     require_x64()
+    require_at_least(1, periods=periods)
     require_speeds(system, speed)
     free = is_free(period, system, speed)
     if revolutions is not None and is_concrete(revolutions) and revolutions < 0:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from .._arguments import require_at_least
 from .._notebook import notebook_html
 from ..analysis import Sweep
 from ..integrate import AbstractMethod
@@ -225,6 +226,7 @@ def synchronous_orbits(
     **Returns:** `SynchronousOrbits`. Stable orbits with a small basin can escape the simulations: `missed` counts those
     that were met but not followed; those that were not met cannot be counted.
     """
+    require_at_least(1, count=count)
     say = progress or (lambda what, done, of: None)
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 

@@ -4,14 +4,12 @@
 |------------------|-------------------------------------------------------------------------|
 | `_style`         | colours, frames, light, dark and print style, no global state           |
 | `_shaft`         | the shaft's speed beneath the cage's                                    |
-| `_in_units`      | a figure in other units                                                 |
 | `_marks`         | zones shaded and published edges marked on a speed axis                 |
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
-| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
+| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra             |
 | `_statics`       | load of every roller, impact of one on a cage bar                       |
-| `_waterfall`     | spectra over speed                                                      |
 | `_branches`      | branches of periodic orbits over speed, alone or over an orbit diagram  |
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
 | `_elasticities`  | elasticities of edges, and of a whole bearing's statistics, as bars     |
@@ -24,7 +22,6 @@
 """
 
 from ._bearing import (
-    bearing_animation as bearing_animation,
     bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
     bearing_map_figure as bearing_map_figure,
@@ -65,7 +62,6 @@ from ._history import (
     simulation_figure as simulation_figure,
     time_history as time_history,
 )
-from ._in_units import in_units as in_units
 from ._marks import (
     mark_operating as mark_operating,
     mark_published as mark_published,
@@ -102,5 +98,4 @@ from ._style import (
     new_figure as new_figure,
     restyle as restyle,
 )
-from ._waterfall import waterfall_map as waterfall_map
 from ._zone_strip import zone_strip as zone_strip

@@ -153,9 +153,9 @@ from ._statics import (
     statics_table as statics_table,
 )
 from ._table import (
+    Speeds as Speeds,
     Table as Table,
     chosen as chosen,
-    in_units as in_units,
     number as number,
     shares_table as shares_table,
     shown_unit as shown_unit,

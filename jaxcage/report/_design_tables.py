@@ -8,7 +8,7 @@ from typing import Any
 from .._parameters import parameter_info, parameters
 from ..design import BearingBudget, BeforeAfter, Optimised, SobolIndices, ToleranceBudget, TradeOff
 from ..models import BearingModel, CageModel
-from ._table import Table, chosen, number
+from ._table import Table, chosen, speed
 
 
 MOST = 8
@@ -80,7 +80,7 @@ def before_and_after_tables(document: Mapping[str, Any]) -> list[Table]:
     for kind in ("chaotic", "synchronous_loss"):
         found = document[f"{kind}_zones"]
         rows = [
-            (when, str(i), *map(number, zone.values()))
+            (when, str(i), *map(speed, zone.values()))
             for when, listed in found.items()
             for i, zone in enumerate(listed, start=1)
         ]

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..design import AbstractStatisticalEdge, CrisisEdge, LastingEdge, SolvedEdge, ZoneWidth, zone_width
 from ._slopes import FIRST, FIXED_RHO
-from ._table import Table, chosen
+from ._table import Speeds, Table, chosen
 
 
 def _elasticities(edge: AbstractStatisticalEdge) -> dict[str, tuple[float, float]]:
@@ -25,7 +25,7 @@ def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> 
     """Edges of lasting chaos, and their elasticities."""
     columns = {
         "edge": lambda item: item[0],
-        "speed [rpm]": lambda item: f"{item[1].speed_rpm:.0f} ± {item[1].standard_error_rpm:.0f}",
+        "speed [rpm]": lambda item: Speeds("{:.0f} ± {:.0f}", item[1].speed_rpm, item[1].standard_error_rpm),
         **_elasticity_columns(edges),
         "escapes": lambda item: f"{item[1].fit.escapes} of {item[1].fit.lanes}",
         "status": lambda item: item[1].status,
@@ -38,9 +38,9 @@ def crisis_table(name: str, crises: Mapping[str, CrisisEdge]) -> Table:
     """Where the mean life of chaos diverges beyond each edge, and elasticities; nothing where that is not told."""
     columns = {
         "edge": lambda item: item[0],
-        "crisis [rpm]": lambda item: f"{item[1].speed_rpm:.0f}" if _shown(item[1]) else "-",
+        "crisis [rpm]": lambda item: Speeds("{:.0f}", item[1].speed_rpm) if _shown(item[1]) else "-",
         "95 % interval [rpm]": lambda item: (
-            "{:.0f} to {:.0f}".format(*item[1].interval_rpm) if _shown(item[1]) else "-"
+            Speeds("{:.0f} to {:.0f}", *item[1].interval_rpm) if _shown(item[1]) else "-"
         ),
         "power": lambda item: f"{item[1].fit.power:.2f} ± {item[1].fit.power_error:.2f}" if _shown(item[1]) else "-",
         **_elasticity_columns(crises),
@@ -90,7 +90,9 @@ def width_table(title: str, widths: Mapping[str, ZoneWidth], names: Sequence[str
 def _width_cell(width: ZoneWidth) -> str:
     if width.open:
         return "open"
-    return f"{width.width_rpm:.0f} ± {width.standard_error_rpm:.0f}" if width.trusted else "-"
+    if not width.trusted or width.width_rpm is None or width.standard_error_rpm is None:
+        return "-"
+    return Speeds("{:.0f} ± {:.0f}", width.width_rpm, width.standard_error_rpm)
 
 
 def width_documents(widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> list[dict[str, Any]]:

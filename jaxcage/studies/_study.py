@@ -48,6 +48,8 @@ class Study(AbstractStudy):
     exponents: int
     strobe: int
     """Strobe states stored of each lane, the last ones; 0 for none."""
+    name: str = ""
+    version: str = ""
 
     def __post_init__(self):
         if SPEED not in self.plan.names:
@@ -73,11 +75,6 @@ class Study(AbstractStudy):
         keep = max(CLOSING, self.strobe)
         return make_plan(self.discard, self.revolutions, self.blocks, keep, self.exponents, self.system.dimension)
 
-    @property
-    def law(self) -> dict[str, Any]:
-        """System and method."""
-        return {"model": self.system, "integration": self.method}
-
     def settings(self) -> dict[str, Any]:
         """System, lanes, their length, and method."""
         return {
@@ -88,6 +85,7 @@ class Study(AbstractStudy):
             "blocks": self.blocks,
             "exponents": self.exponents,
             "strobe": self.strobe,
+            "method_numbers": _numbers(self.method),
             **settings_of(self.method),
         }
 
