@@ -27,7 +27,7 @@ from jaxcage.reproduction import (
 
 
 def zone(onset, leaves):
-    edge = lambda rpm: None if rpm is None else Edge(float(rpm), 100.0, "chaotic", "crisis")
+    edge = lambda rpm: None if rpm is None else Edge(float(rpm), 100.0, "chaotic", "fold")
     return Zone("chaotic", edge(onset), edge(leaves), 1.0)
 
 
@@ -55,7 +55,7 @@ def test_errors_are_relative_to_what_was_published():
     assert rows[0].error_percent == pytest.approx(10.0)
     assert rows[1].error_percent == pytest.approx(-5.0)
     assert rows[2].error_percent is None
-    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("crisis", 100.0, "lasting")
+    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("fold", 100.0, "lasting")
 
 
 def test_zones_below_the_range_do_not_count():

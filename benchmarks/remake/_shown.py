@@ -42,7 +42,7 @@ class Shown:
         """Parts of the package that its commands run."""
         if self.name.startswith("bearing-"):
             return ("bearing",)
-        alone = self.commands[0] in (SWEEP, CRISES) or self.commands[0] == REPRODUCE and self.name != "both-kinds"
+        alone = self.commands[0] == SWEEP or self.commands[0] == REPRODUCE and self.name != "both-kinds"
         return ("cage",) if alone else ("cage", "orbits")
 
     @property
@@ -84,7 +84,6 @@ SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxca
 SPEED, STUDY = "python -m benchmarks", "python -m benchmarks.study --size 0.05"
 PAPER_FIGURE = {"experiments/reproduce_7a.png": "out/fig7a.png"}
 CHAOS = ("Chaotic zones of", "Transient chaos of")
-CRISES = "jaxcage gradient 1a --lasting --first 9000 --last 12900 --count 40 --designs 32"
 CHECK = "python experiments/identify_nu2310.py --check"
 TRADE = "python experiments/identify_nu2310.py --trade-off --ledger experiments/lasting_search"
 OPTIMISE = _notebook("optimise_gap_and_balance", "gradient_or_not")
@@ -99,7 +98,6 @@ SHOWN = (
     Shown("speed", README, [SPEED], ex.speed),
     Shown("speed-text", README, [SPEED]),
     Shown("guide-zones-1a", EDGES, [ZONES], ex.tables("Synchronous-loss", "Elasticities", *CHAOS)),
-    Shown("guide-crises-1a", EDGES, [CRISES], ex.tables("Elasticities", "Widths", "Crises")),
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Chaotic zones", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),

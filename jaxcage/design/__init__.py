@@ -12,7 +12,6 @@
 | `_margin`   | how far the synchronous orbit is from losing its stability                    |
 | `_edges`    | widths of zones and distances from edges, exact                               |
 | `_width`    | widths between edges of any kind, and how they answer to the design           |
-| `_crisis_edge` | what all edges told by lanes have in common; those that a crisis makes     |
 | `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
 | `_chaos`    | chaotic widths and shares, statistical                                        |
 | `_bearing_gradient` | slip, impulses, wear and power of the whole bearing by its parameters |
@@ -57,7 +56,6 @@ from ._bearing_sensitivity import (
     bearing_sensitivity as bearing_sensitivity,
 )
 from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
-from ._crisis_edge import AbstractStatisticalEdge as AbstractStatisticalEdge, CrisisEdge as CrisisEdge
 from ._edges import (
     EdgeClearance as EdgeClearance,
     EdgeSum as EdgeSum,

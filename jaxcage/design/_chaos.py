@@ -1,6 +1,6 @@
 """How much of a speed range is chaotic, as a smooth statistic of an ensemble with a slope and error bars.
 
-A chaotic edge has no equation where a crisis or the breakdown of a torus makes it, and the derivative of a chaotic
+A chaotic edge has no equation where the attractor ends or a torus breaks down, and the derivative of a chaotic
 trajectory grows like e^(lambda n), whatever the statistics do. What has a slope is an average. Every speed counts with
 a smooth step of its largest exponent, every design is surrounded by a cloud of others, and the slope is that of a
 least-squares plane through the cloud. The same random numbers are used at every design, so that two designs differ by

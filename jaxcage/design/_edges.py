@@ -92,8 +92,8 @@ def zone_width(
     speed that were looked at, for an open zone of followed edges.
 
     **Returns:** of edges that are solved for, `ZoneWidth`: the width and its change by any parameters, with standard
-    errors. They may be `lasting_edges`, the `crisis()` of each, or `jaxcage.sensitivities` of synchronous-loss edges,
-    and one of a kind with one of another. Of `FollowedEdges`, an objective for searches.
+    errors. They may be `lasting_edges`, or `jaxcage.sensitivities` of synchronous-loss edges, and one of a kind with
+    one of another. Of `FollowedEdges`, an objective for searches.
 
     A zone that is open, its onset or exit beyond the speeds that were looked at, has the slope of its other edge alone.
     As an objective it counts to the end of that range; a `ZoneWidth` has no width then and says that it is open.

@@ -73,7 +73,6 @@ from ._findings import (
     require_some as require_some,
 )
 from ._lasting import (
-    crisis_table as crisis_table,
     lasting_document as lasting_document,
     lasting_table as lasting_table,
     width_documents as width_documents,
