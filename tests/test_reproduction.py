@@ -39,6 +39,7 @@ def test_edges_of_the_zones_that_overlap_most():
     """Published for 1a: 9100 to 12000 and from 25500."""
     assert ours([zone(4500, 5000), zone(9000, 12500), zone(25000, None)]) == [9000, 12500, 25000]
     assert ours([zone(9000, 9500), zone(10000, 13000), zone(26000, 27000)]) == [10000, 13000, 26000]
+    assert ours([zone(9000, 12000), zone(22000, 27000), zone(27400, None)]) == [9000, 12000, 22000]
 
 
 def test_one_zone_over_both_has_no_second():

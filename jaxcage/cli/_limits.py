@@ -81,7 +81,7 @@ def demand_of(options: CommonOptions, model: CageModel | None) -> Demand:
         lanes = max(across * upward * options.starts, options.count * own)
         return Demand(lanes, revolutions + count("persist", 0), _kept(lanes, 16, 20, 1, dimension))
     points = count("count", 0) or count("speeds", 1)
-    lanes = points * own * (1 + count("cloud", 0))
+    lanes = points * own * (1 + count("batch", 0))
     lanes *= count("samples", 1)
     keep = revolutions if isinstance(options, PoincareOptions | ImpactOptions | DesignOptions) else 64
     if isinstance(options, SearchOptions):
@@ -131,7 +131,7 @@ def options_of_size(options: Any) -> str:
     """Options that say how much is computed, as a sentence lists them."""
     if isinstance(options, StudyOptions):
         return "--vary, --sample, --chunk or --revolutions"
-    known = ("points", "count", "speeds", "samples", "cloud", "waterfall", "revolutions", "discard")
+    known = ("points", "count", "speeds", "samples", "batch", "waterfall", "revolutions", "discard")
     names = [f"--{name}" for name in known if getattr(options, name, None)]
     return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]])) if names else "problem"
 

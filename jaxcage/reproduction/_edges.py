@@ -12,7 +12,6 @@ import numpy as np
 
 from ..analysis import Zone
 from ..bearing import PublishedCase
-from ..design import MeasuredEdge, matched
 
 
 ZONE_RANGE_RPM = (4000.0, 27500.0)
@@ -21,8 +20,6 @@ LASTING, AT_FIRST, LOSS = "lasting", "at first", "synchronous-loss"
 """Chaos that lasts beyond the horizon; chaos while observed, lasting or not; loss of the synchronous orbit."""
 WIDE_RPM = 500.0
 """Zones at least so wide are those that a diagram over 25000 rpm shows."""
-READING = 0.02
-"""Relative uncertainty of an edge read off a diagram."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,26 +56,42 @@ def wide_zones(zones: Sequence[Zone]) -> list[Zone]:
 
 def compare_edges(published: PublishedCase, zones: Sequence[Zone], kind: str) -> list[ComparedEdge]:
     """The three published edges of a case beside those of the zones found in the range in which they were published."""
+    low, high, next_low = published.zone_1_onset_rpm, published.zone_1_exit_rpm, published.zone_2_onset_rpm
+    first, second = _matched([(low, high), (next_low, ZONE_RANGE_RPM[1])], zones_in_range(zones))
     rows = (
-        ("zone 1 onset", published.zone_1_onset_rpm),
-        ("zone 1 exit", published.zone_1_exit_rpm),
-        ("zone 2 onset", published.zone_2_onset_rpm),
+        ("zone 1 onset", low, first.onset if first else None),
+        ("zone 1 exit", high, first.exit if first else None),
+        ("zone 2 onset", next_low, second.onset if second else None),
     )
-    of_edge = LOSS if kind == LOSS else "chaotic"
-    measured = [MeasuredEdge(published.name, name, rpm, READING * rpm, of_edge) for name, rpm in rows]
-    found = matched(measured, zones_in_range(zones), ZONE_RANGE_RPM[1])
     return [
         ComparedEdge(
             published.name,
-            m.name,
-            m.rpm,
+            name,
+            rpm,
             kind,
             edge.speed_rpm if edge else None,
             edge.uncertainty_rpm if edge else None,
             edge.mechanism if edge else None,
         )
-        for m, edge in zip(measured, found, strict=True)
+        for name, rpm, edge in rows
     ]
+
+
+def _matched(published: Sequence[tuple[float, float]], found: Sequence[Zone]) -> list[Zone | None]:
+    """For each published zone, in their order, the found one that shares most speeds with it, if any does. A found zone
+    answers for one published zone only, the first."""
+
+    def shared(zone: Zone, low: float, high: float) -> float:
+        onset = zone.onset.speed_rpm if zone.onset else 0.0
+        leaves = zone.exit.speed_rpm if zone.exit else np.inf
+        return min(leaves, high) - max(onset, low)
+
+    taken: list[Zone | None] = []
+    for ends in published:
+        best = max(found, key=lambda zone: shared(zone, *ends), default=None)
+        lost = best is None or shared(best, *ends) <= 0 or any(best is zone for zone in taken)
+        taken.append(None if lost else best)
+    return taken
 
 
 def summary(edges: Sequence[ComparedEdge], kind: str) -> dict[str, Any]:
