@@ -27,7 +27,7 @@ SAMPLE = (
     "test_cache",  # platformdirs
     "test_traced",  # flatbuffers, jaxtyping
     "test_studies_damage",  # hypothesis
-    "test_optimise",  # scikit-learn, threadpoolctl, optax
+    "test_optimise",  # scikit-learn, optax
     "test_plotting",  # matplotlib
     "test_report_page",  # jinja2
     "test_spectra",  # scipy

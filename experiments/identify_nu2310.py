@@ -5,7 +5,7 @@ in 200 revolutions, chaos that lasts 600, and chaos that lasts 3000 on a finer g
 second one. Every design is swept over speed in all cases at once, and its largest exponents are held against the
 published zones. The score is about the mean relative error of the edges, with a price for every band too many. No edge
 is needed for that, so that the search works far from the answer, where zones are missing or too many. A stage begins
-with quasi-random designs and goes on with an evolution strategy (CMA-ES, from `pip install cma`).
+with quasi-random designs and goes on with an evolution strategy (CMA-ES, of the extra `bench`).
 
 Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
 others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the

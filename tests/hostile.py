@@ -605,7 +605,6 @@ HEAVY = (
     (_label_map, "label_map"),
     (_lasting, "sweep"),
     (_design, "_objective"),
-    (_design, "optimise"),
     (_design, "global_sensitivity"),
     (_unknowns, "sobol_of"),
     (_identify, "identify"),

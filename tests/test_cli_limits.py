@@ -43,7 +43,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         ("bifurcations 1a --count 10000000", "GB of memory, but 8 GB are free: choose a smaller --count"),
         ("map 1a --points 10000x10000", "100000000 lanes of 1100 revolutions, about 245 GB of memory"),
         ("report 1a --count 10000000", "30000000 lanes"),
-        ("design 1a --speeds 10000000", " TB of memory, but 8 GB are free: choose a smaller --speeds or --cloud"),
+        ("design 1a --speeds 10000000", " TB of memory, but 8 GB are free: choose a smaller --speeds or --batch"),
         ("study 1a --vary speed=1:2:3000 --vary load=1:2:10000 --strobe 300", " GB on disk, but "),
         ("study 1a --vary speed=1:2:3000000 --chunk 10000000", "GB of memory, but 8 GB are free: choose a smaller"),
     ],

@@ -13,7 +13,6 @@ from benchmarks.remake._excerpts import (
     against_paper,
     every_kind,
     fenced,
-    lasting_fit,
     printed,
     readings,
     speed,
@@ -232,11 +231,7 @@ def test_readings_of_the_reproduction():
     assert rows[3].split() == "film: none 88 % 1 6750 - -".split()
 
 
-def test_lasting_fits_and_the_row_of_the_speed_table():
-    text = "1a: zone 1 onset +6.0 %, zone 1 exit none, zone 2 onset -4.9 %; 4 zones\n"
-    both = lasting_fit([Run(f"{text}{n} of 3 within 10 %", {}, ROOT, {}) for n in (1, 2)])
-    assert both.splitlines()[3].split() == "1a search +6.0 % none -4.9 % 4".split()
-    assert both.endswith("In all, package: 1 of 3 within 10 %; search: 2 of 3 within 10 %.")
+def test_the_row_of_the_speed_table():
     head, _, row = speed([document()]).splitlines()
     assert head.split(" | ")[0] == "| jaxcage sweep" and len(re.findall(r"\d", row)) > 5
 

@@ -1,7 +1,6 @@
 """How the output of commands becomes a block of a page."""
 
 import json
-import re
 from collections.abc import Callable, Sequence
 
 from ._runs import Run
@@ -39,11 +38,6 @@ def tables(*titles: str) -> Excerpt:
         return fenced("\n\n".join(found))
 
     return made
-
-
-def lines(start: str) -> Excerpt:
-    """Of one command's output the lines that begin so."""
-    return lambda runs: fenced("\n".join(x for x in runs[0].text.splitlines() if x.startswith(start)))
 
 
 def printed(runs: Sequence[Run]) -> str:
@@ -97,20 +91,6 @@ def readings(runs: Sequence[Run]) -> str:
     return aligned([("reading", "chaotic", "zones", *EDGES), *body])
 
 
-def lasting_fit(runs: Sequence[Run]) -> str:
-    """Constants of the package beside those of a search on lasting chaos, case by case, from `identify_nu2310.py`."""
-    whose, rows = ("package", "search"), []
-    lines = [run.text.strip().splitlines() for run in runs]
-    for pair in zip(*(each[:-1] for each in lines), strict=True):
-        for constants, line in zip(whose, pair, strict=True):
-            name, rest = line.split(": ", 1)
-            found = dict(re.findall(r"(zone \d \w+) (none|\S+ %)", rest))
-            rows.append((name, constants, *(found[e] for e in EDGES), rest.split("; ")[1].split()[0]))
-    counts = (f"{constants}: {each[-1]}" for constants, each in zip(whose, lines, strict=True))
-    table = aligned([("case", "constants", *EDGES, "wide zones"), *rows])
-    return f"{table}\n\nIn all, {'; '.join(counts)}."
-
-
 RIVALS = {
     "jaxcage sweep": "jaxcage, default",
     "diffrax Tsit5": "diffrax Tsit5, vmap",
@@ -134,20 +114,3 @@ def said(notebook: str) -> str:
     """All that the cells of a notebook printed."""
     outputs = [output for cell in json.loads(notebook)["cells"] for output in cell.get("outputs", ())]
     return "".join("".join(output.get("text", ())) for output in outputs)
-
-
-SEARCHES = {
-    "gradient, from the best scout": "gradient, from the best of the scouts",
-    "gradient, from the design": "gradient, from the given design",
-    "differential evolution": "differential evolution (scipy, 60 designs)",
-    "CMA-ES": "CMA-ES from the given design (60 designs)",
-}
-
-
-def searches(runs: Sequence[Run]) -> str:
-    """What each search of `optimise_gap_and_balance` reached."""
-    text = said((runs[0].folder / "optimise_gap_and_balance.ipynb").read_text(encoding="utf-8"))
-    found = re.findall(r"^(\S.*?) +best +(\S+) rpm, designs until (\S+) rpm: (\S+)$", text, flags=re.M)
-    best = {name: (value, "-" if count == "None" else count) for name, value, _, count in found}
-    head = ("search", "best objective [rpm]", f"designs until {found[0][2]} rpm")
-    return markdown(head, [(words, *best[name]) for name, words in SEARCHES.items()])

@@ -64,8 +64,8 @@ def _whole(name: str, page: str, command: str, left: str) -> Shown:
     return Shown(name, page, [command], ex.page(left), whole=True)
 
 
-def _notebook(name: str, *figures: str) -> Shown:
-    page, files = f"experiments/{name}.ipynb", {f"experiments/{f}.png": "" for f in (name, *figures)}
+def _notebook(name: str) -> Shown:
+    page, files = f"experiments/{name}.ipynb", {f"experiments/{name}.png": ""}
     command = f"python -m jupytext --to ipynb --execute experiments/{name}.py"
     return Shown(name.replace("_", "-"), page, [command], ex.page(f"{name}.ipynb"), whole=True, files=files)
 
@@ -84,9 +84,6 @@ SWEEP, ZONES, DESIGN, REPRODUCE = "jaxcage sweep 1a", "jaxcage zones 1a", "jaxca
 SPEED, STUDY = "python -m benchmarks", "python -m benchmarks.study --size 0.05"
 PAPER_FIGURE = {"experiments/reproduce_7a.png": "out/fig7a.png"}
 CHAOS = ("Chaotic zones of", "Transient chaos of")
-CHECK = "python experiments/identify_nu2310.py --check"
-TRADE = "python experiments/identify_nu2310.py --trade-off --ledger experiments/lasting_search"
-OPTIMISE = _notebook("optimise_gap_and_balance", "gradient_or_not")
 
 SHOWN = (
     _figure("sweep-1a-figure", README, SWEEP, "sweep_1a.png"),
@@ -101,19 +98,12 @@ SHOWN = (
     _figure("bifurcations-1a-figure", EDGES, "jaxcage bifurcations 1a", "bifurcations_1a.png"),
     Shown("design-1b", DESIGNS, [DESIGN], ex.tables("Design of", "Optima", "Chaotic zones", "Synchronous-loss")),
     _figure("design-1b-figure", DESIGNS, DESIGN, "design_1b.png"),
-    Shown("searches-of-eight", DESIGNS, ["python -m benchmarks.pay --table"], ex.printed),
-    OPTIMISE,
-    Shown("searches", DESIGNS, OPTIMISE.commands, ex.searches),
+    _notebook("optimise_gap_and_balance"),
     Shown("studies-text", STUDIES, [STUDY]),
     _whole("validation-page", "VALIDATION.md", "jaxcage validate", "out/VALIDATION.md"),
     Shown("both-kinds", REPRODUCTION, [REPRODUCE], ex.every_kind),
-    Shown("lasting-fit", REPRODUCTION, [CHECK, f"{CHECK} --ledger experiments/lasting_search.csv"], ex.lasting_fit),
-    Shown("without-1b", REPRODUCTION, [f"{CHECK} --ledger experiments/lasting_search_without_1b.csv"], ex.printed),
-    Shown("trade-off", REPRODUCTION, [f"{TRADE}.csv"], ex.printed),
-    Shown("trade-off-physical", REPRODUCTION, [f"{TRADE}_physical.csv"], ex.printed),
     Shown("reproduction-figure", REPRODUCTION, [REPRODUCE], files=PAPER_FIGURE),
     Shown("readings", REPRODUCTION, [REPRODUCE], ex.readings),
-    Shown("identify", REPRODUCTION, ["python -m benchmarks.identify"], ex.lines("+-")),
     Shown("bearing-threshold", WHOLE, [f"{TRENDS} threshold --discard 100 --revolutions 50"], ex.printed),
     Shown("bearing-trends", WHOLE, [f"{TRENDS} trends --starts 1 --discard 10 --revolutions 10"], ex.printed),
     Shown("bearing-gradients", WHOLE, [f"{SLOPES} --cases 0"], ex.printed),
