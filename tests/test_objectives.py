@@ -171,11 +171,6 @@ def test_scatter_laws():
     assert ray.std() == pytest.approx(np.sqrt(4 / np.pi - 1), rel=5e-3)  # of a Rayleigh distribution with mean 1
 
 
-def test_a_scatter_of_all_and_more_is_refused():
-    with pytest.raises(ValueError, match="Argument `half_width` must be at least 0 and below 1, but 3 was given."):
-        jc.design.uniform(3.0)
-
-
 @pytest.mark.parametrize(
     "make, words",
     [
@@ -186,6 +181,7 @@ def test_a_scatter_of_all_and_more_is_refused():
         (lambda: jc.design.chaotic_width(9.0, 14.0, softness=0.0), "must be positive"),
         (lambda: jc.design.chaotic_share([(9.0, 12.0, 1.0), (11.0, 14.0, 1.0)]), "do not overlap"),
         (lambda: jc.design.Robust(jc.design.cost(), {}, draws=1), "at least 2"),
+        (lambda: jc.design.uniform(3.0), "Argument `half_width` must be at least 0 and below 1, but 3 was given."),
         (lambda: jc.design.regular_motion("noise", 1.0, (0.0,)), "must be one of displacement"),
         (lambda: jc.design.StabilityMargin(np.ones(2), np.ones((1, 2))), "a state for each speed"),
     ],

@@ -109,13 +109,6 @@ def test_the_best_of_many_with_noise_is_chosen_anew():
 
 
 @pytest.mark.wide
-def test_starts_that_lead_to_one_optimum_are_one():
-    found = jc.optimise(double_well(), VARY, bowl(), starts=6, steps=200)
-    assert [n for _, n in found.distinct] == [6]
-    assert "6 starts led to 1 optima" in str(found)
-
-
-@pytest.mark.wide
 def test_several_optima_are_listed():
     """Two valleys, in the damping."""
     two = jc.design.Smooth(
@@ -125,7 +118,7 @@ def test_several_optima_are_listed():
     found = jc.optimise(double_well(), {"damping": (0.1, 1.0)}, 100.0 * two, starts=places, steps=300)
     where = sorted(o.values["damping"] for o, _ in found.distinct)
     assert where == pytest.approx([0.3, 0.8], abs=0.03)
-    assert [n for _, n in found.distinct] == [2, 2]
+    assert [n for _, n in found.distinct] == [2, 2] and "4 starts led to 2 optima" in str(found)
 
 
 @pytest.mark.wide

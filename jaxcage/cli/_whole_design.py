@@ -19,10 +19,6 @@ from ._vary import read_cage_bounds
 from ._whole import SWEEPING, at_shaft_speed
 
 
-CHECKED, LONGER = 8, 2
-"""Starts of the check, and how many times as many revolutions it leaves out."""
-
-
 def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
     """Carry out `jaxcage design` of a whole bearing."""
     options = job.options
@@ -35,7 +31,7 @@ def design_bearing(job: Job[DesignOptions], whole: BearingModel) -> Report:
         raise InputError(f"Options {', '.join(f'--{name}' for name in TERMS)} must not all be 0.")
     filled = vars(options)
     runs = BearingRuns(at.speed, starts=filled["ensemble"], **job.given("discard revolutions seed"))
-    fresh = runs.fresh(starts=CHECKED, longer=LONGER)
+    fresh = runs.fresh()
     lanes = filled["batch"] * runs.starts * options.starts
     length = (runs.discard + runs.revolutions) * filled["steps"]
     job.require(Demand(lanes, length, 2e4 * lanes, rate=2 * SWEEPING))

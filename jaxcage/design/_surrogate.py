@@ -34,6 +34,8 @@ BETTER = 1e-3
 LENGTH, NOISE = 0.7, 0.05
 """What the process is taken to be unless the designs say otherwise: its correlation length in each parameter, and the
 variance of its noise beside its own."""
+AMONG = 4
+"""The best designs of a search that a finer objective looks at."""
 UNCONFIRMED = "not confirmed"
 """How a search ended whose best is no better than the design as it is."""
 BESIDE = 5e-3
@@ -77,7 +79,7 @@ def surrogate_search(
         raise ArgumentError("batch", "batches", said=f"must be at least 2 and 1, but {batch} and {batches} were given.")
     space = DesignSpace.of(system, vary)
     first = first_places(space, objective, starts, scouts, seed)
-    searches = [SurrogateSearch(place, batch, (seed, i)) for i, place in enumerate(first)]
+    searches = [_Search(place, batch, (seed, i)) for i, place in enumerate(first)]
     about = {"batches": batches, "batch": batch, "seed": seed, "first": first.tolist()}
     kept = None if keep is None else KeptSearch(keep, space, objective, **about)
     known = None if kept is None else kept.load()
@@ -95,7 +97,7 @@ def surrogate_search(
     return Optimised.of(space, [optimum_of(space, search.history, "batch limit") for search in searches])
 
 
-class SurrogateSearch:
+class _Search:
     """One search, asked for places and told what was found there; what it asks for follows from what it was told."""
 
     def __init__(self, start: Float[np.ndarray, " n"], batch: int, seed: tuple[int, ...]):
@@ -194,21 +196,21 @@ def _fitted(places: np.ndarray, worth: np.ndarray) -> tuple[Any, float]:
     return process, process.kernel_.k2.noise_level
 
 
-def judged(found: Optimised[Design], objective: AbstractObjective, among: int = 4) -> tuple[Optimised[Design], float]:
+def judged(found: Optimised[Design], objective: AbstractObjective) -> tuple[Optimised[Design], float]:
     """The same searches, with the best of each chosen anew by a finer objective.
 
     What a search saw as its best is better than it is, since of many values with noise the least is chosen. The finer
     objective looks at the best few of each search and at the design that the searches began with: where that one is the
     best, it stays.
 
-    **Arguments:** what was found; an objective with more speeds, starts or revolutions; how many designs of each.
+    **Arguments:** what was found; an objective with more speeds, starts or revolutions.
 
     **Returns:** the searches, the best first by the finer objective; and what that says of the design itself.
     """
     space = found.space
     own = np.clip(space.place, 0.0, 1.0)
     picked = [
-        sorted((s for s in o.history if s.status == "ok"), key=lambda s: s.value)[:among] or [o.history[-1]]
+        sorted((s for s in o.history if s.status == "ok"), key=lambda s: s.value)[:AMONG] or [o.history[-1]]
         for o in found.optima
     ]
     values = objective.values(space, np.array([own, *(s.place for steps in picked for s in steps)]))
