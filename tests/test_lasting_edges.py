@@ -183,19 +183,6 @@ def test_an_open_zone_has_no_width_and_the_gradient_of_its_one_edge(planted):
         width.change("gap")
 
 
-def test_change_of_a_width_is_that_of_the_planted_edges(planted):
-    """An onset at half the speed of the exit, with the same elasticities, each from lanes of its own."""
-    z = []
-    for seed in range(12):
-        planted(seed)
-        ends = {end: lasting_edge(CASE, EDGE, 100.0, designs=32, seed=seed) for end in ("onset", "exit")}
-        width = zone_width(ends | {"onset": halved(ends["onset"])})
-        of = [width.change(name) for name in NAMES] + [width.change(*NAMES)]
-        true = [EDGE / 2 * e for e in (*ELASTICITY, 0.2)]
-        z.append([(value - t) / error for (value, error), t in zip(of, true, strict=True)])
-    assert np.mean(np.abs(z) < 2) > 0.85 and np.all(np.sqrt(np.mean(np.square(z), axis=0)) < 1.6)
-
-
 def test_gradient_command_of_lasting_zones(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted
 ):
