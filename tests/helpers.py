@@ -12,6 +12,7 @@ import pint
 import pytest
 
 import jaxcage as jc
+from jaxcage.forces import parameter
 
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
@@ -83,6 +84,29 @@ def unforced(model: jc.CageModel) -> jc.CageModel:
     names = jc.parameters(model)
     chosen = [n if n in names else n.split(".")[-1] for n in zero]
     return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})
+
+
+class DoubleWell(eqx.Module):
+    """m x'' + d x' - k x + b x^3 = g cos(w t), whose small orbit ends in a fold and in a period doubling."""
+
+    mass: float = parameter("kg", 0.0, 1e3, "m")
+    damping: float = parameter("N s/m", 0.0, 1e3, "d")
+    stiffness: float = parameter("N/m", 0.0, 1e3, "k")
+    cubic: float = parameter("N/m^3", 0.0, 1e3, "b")
+    forcing: float = parameter("N", 0.0, 1e3, "g")
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        push = self.forcing * jnp.cos(tau)
+        return ((push - self.damping * u + self.stiffness * x - self.cubic * x**3) / self.mass,)
+
+
+WELL = {"mass": 1.0, "damping": 0.3, "stiffness": 1.0, "cubic": 1.0}
+
+
+def double_well() -> jc.ForcedOscillator:
+    """The oscillator with `WELL` and a forcing of 0.262 N."""
+    return jc.ForcedOscillator(DoubleWell(**WELL, forcing=0.262), coordinates=1)
 
 
 def wide_but(values: Iterable[Any], *quick: Any) -> list[Any]:

@@ -405,14 +405,6 @@ def test_a_store_cannot_run_code(
     assert mark.exists()  # whoever reads it without such care has run it
 
 
-def test_a_kept_search_cannot_run_code(tmp_path: Path):
-    kept, mark = tmp_path / "search.npz", tmp_path / "mark"
-    np.savez(kept, what=np.array([_Touch(mark)], dtype=object), allow_pickle=True)
-    with pytest.raises(ValueError, match="must be a file of this search, but is none"):
-        jc.optimise(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, jc.design.cost(), keep=kept)
-    assert not mark.exists()
-
-
 SOURCES = {str(p.relative_to(ROOT)): p for p in sorted(ROOT.rglob("*.py"))}
 
 

@@ -66,7 +66,7 @@ def test_every_layer_is_on_the_list():
     assert {p.name for p in ROOT.iterdir() if p.is_dir() and p.name != "__pycache__"} == set(LAYERS)
 
 
-FEW = 69
+FEW = 68
 """Imports of private modules from tests and benchmarks: mostly commands without their computation, and kernels."""
 
 

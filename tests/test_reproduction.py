@@ -22,7 +22,7 @@ from jaxcage.report import (
 
 
 def zone(onset, leaves):
-    edge = lambda rpm: None if rpm is None else Edge(float(rpm), 100.0, "chaotic", "crisis")
+    edge = lambda rpm: None if rpm is None else Edge(float(rpm), 100.0, "chaotic", "fold")
     return Zone("chaotic", edge(onset), edge(leaves), 1.0)
 
 
@@ -34,6 +34,7 @@ def test_edges_of_the_zones_that_overlap_most():
     """Published for 1a: 9100 to 12000 and from 25500."""
     assert ours([zone(4500, 5000), zone(9000, 12500), zone(25000, None)]) == [9000, 12500, 25000]
     assert ours([zone(9000, 9500), zone(10000, 13000), zone(26000, 27000)]) == [10000, 13000, 26000]
+    assert ours([zone(9000, 12000), zone(22000, 27000), zone(27400, None)]) == [9000, 12000, 22000]
 
 
 def test_one_zone_over_both_has_no_second():
@@ -50,7 +51,7 @@ def test_errors_are_relative_to_what_was_published():
     assert rows[0].error_percent == pytest.approx(10.0)
     assert rows[1].error_percent == pytest.approx(-5.0)
     assert rows[2].error_percent is None
-    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("crisis", 100.0, "lasting")
+    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("fold", 100.0, "lasting")
 
 
 def test_zones_below_the_range_do_not_count():

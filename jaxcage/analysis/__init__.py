@@ -10,7 +10,6 @@
 | `_escapes`      | when lanes left chaos for good                                                       |
 | `_transients`   | an attractor or a chaotic transient: mean life with its error, coexisting ends       |
 | `_hazard`       | the rate of escapes as it depends on speed and design                                |
-| `_crisis`       | where a crisis ends an attractor: the mean life extrapolated to its divergence       |
 | `_spectra`      | amplitude spectra by order of speed                                                  |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_bearing_history` | forces and slips of every roller of it, around its circumference; its spectra     |
@@ -48,7 +47,6 @@ from ._bearing_sweep import (
     summed_up as summed_up,
 )
 from ._bearing_zones import BearingZone as BearingZone, bearing_zones as bearing_zones
-from ._crisis import Crisis as Crisis, crisis as crisis
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,

@@ -364,7 +364,7 @@ class VaryOptions(_Range):
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DesignOptions(VaryOptions):
     """Change the design so that fewer speeds are chaotic, checked by a fresh sweep. Of a whole bearing (nu2310), make
-    wear, forces, impulses, friction power, slip and unbalance small at one speed, by gradient."""
+    wear, forces, impulses, friction power, slip and unbalance small at one speed."""
 
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
         "wear": (1000.0, 1.0),
@@ -374,14 +374,13 @@ class DesignOptions(VaryOptions):
         "slip": (None, 1.0),
         "balance": (None, 1.0),
         "steps": (10, 12),
-        "cloud": (12, 16),
+        "batch": (12, 16),
         "ensemble": (None, 4),
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[str] = "first last speeds quick cost front scatter worst search"
+    of_cage: ClassVar[str] = "first last speeds quick cost scatter worst"
     of_whole: ClassVar[str] = "speed load impulse slip balance ensemble discard revolutions"
-    called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
 
     cost: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What one unit of manufacturing cost is worth, in rpm of chaotic speeds; the paper's case 1a costs 2 units."""
@@ -400,9 +399,6 @@ class DesignOptions(VaryOptions):
     """Of a whole bearing: what the slip of its cage counts; 1 if left out."""
     balance: Price = None
     """Of a whole bearing: what the balance grade G of its cage counts; 1 if left out."""
-    front: FromZero = 0
-    """Designs spread over the bounds, of which those are listed that no other beats in chaotic speeds, wear load, peak
-    force and cost at once; 0 lists none."""
     worse_balance: bool = False
     """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
     scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()
@@ -410,20 +406,15 @@ class DesignOptions(VaryOptions):
     The mean over it is then minimised."""
     worst: Share = 1.0
     """With --scatter: mean over this share of the manufactured cages, the worst ones."""
-    search: Literal["surrogate", "gradient"] = "surrogate"
-    """How to search: by a surrogate, a Gaussian process that chooses --cloud designs at every step from what was found
-    before; or down the gradient, which is that of a cloud of designs."""
     starts: FromOne = 1
     """Searches: one from the design itself, others from the best of the scouts."""
     scouts: FromZero = 0
     """Designs spread over the bounds that are looked at beforehand; without any, further searches start anywhere."""
     steps: Annotated[int | None, whole(1)] = None
-    """Steps of each search at most; 10 if left out, 12 of a whole bearing."""
-    cloud: Annotated[int | None, whole(4)] = None
-    """Designs of a step: chosen together, or around the one whose gradient is taken; 12 if left out, 16 of a whole
+    """Steps of each search; 10 if left out, 12 of a whole bearing."""
+    batch: Annotated[int | None, whole(2)] = None
+    """Designs of a step, chosen together by a Gaussian process of what was found before; 12 if left out, 16 of a whole
     bearing."""
-    spread: Share = 0.1
-    """Their scatter, as a part of the distance between the bounds: structure that is finer is smoothed away."""
     ensemble: Annotated[int | None, whole(1)] = None
     """Of a whole bearing: drawn starts of each design; 4 if left out."""
     discard: Annotated[int | None, whole(0)] = None

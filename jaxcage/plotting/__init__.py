@@ -49,7 +49,6 @@ from ._design import (
     bearing_design_figure as bearing_design_figure,
     design_figure as design_figure,
     design_history as design_history,
-    trade_off_diagram as trade_off_diagram,
 )
 from ._elasticities import (
     EDGE_COLOURS as EDGE_COLOURS,

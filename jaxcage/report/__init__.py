@@ -62,8 +62,6 @@ from ._design_tables import (
     parameters_table as parameters_table,
     sobol_document as sobol_document,
     sobol_table as sobol_table,
-    trade_off_document as trade_off_document,
-    trade_off_table as trade_off_table,
 )
 from ._findings import (
     AllFailed as AllFailed,
@@ -73,7 +71,6 @@ from ._findings import (
     require_some as require_some,
 )
 from ._lasting import (
-    crisis_table as crisis_table,
     lasting_document as lasting_document,
     lasting_table as lasting_table,
     width_documents as width_documents,
