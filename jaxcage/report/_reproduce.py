@@ -12,7 +12,6 @@ from .._glossary import quantity
 from .._parameters import replace
 from ..analysis import Sweep, Zone, Zones, zones
 from ..bearing import PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM, PublishedCase, load_distribution
-from ..design import MeasuredEdge, matched
 from ..forces import PocketImpact, approach_speed, impact_history
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, synchronous_orbits
@@ -28,8 +27,6 @@ LASTING, AT_FIRST, LOSS = "lasting", "at first", "synchronous-loss"
 """Chaos that lasts beyond the horizon; chaos while observed, lasting or not; loss of the synchronous orbit."""
 WIDE_RPM = 500.0
 """Zones at least so wide are those that a diagram over 25000 rpm shows."""
-READING = 0.02
-"""Relative uncertainty of an edge read off a diagram."""
 SECTION_RPM, SECTION_REVOLUTIONS = 8500.0, (4, 4000)
 """Fig. 9: speed, and first and last revolution of its strobe points."""
 PANELS = {
@@ -74,12 +71,27 @@ def wide_zones(zones: Sequence[Zone]) -> list[Zone]:
 
 def compare_edges(published: PublishedCase, zones: Sequence[Zone], kind: str) -> list[ComparedEdge]:
     """The three published edges of a case beside those of the zones found in the range in which they were published."""
-    of_edge = LOSS if kind == LOSS else "chaotic"
-    edges = published_edges(published).items()
-    measured = [MeasuredEdge(published.name, name, rpm, READING * rpm, of_edge) for name, rpm in edges]
-    found = matched(measured, zones_in_range(zones), ZONE_RANGE_RPM[1])
+    low, high, next_low = published.zone_1_onset_rpm, published.zone_1_exit_rpm, published.zone_2_onset_rpm
+    first, second = _matched([(low, high), (next_low, ZONE_RANGE_RPM[1])], zones_in_range(zones))
+    found = (first and first.onset, first and first.exit, second and second.onset)
     ours = [(e.speed_rpm, e.uncertainty_rpm, e.mechanism) if e else (None, None, None) for e in found]
-    return [ComparedEdge(published.name, m.name, m.rpm, kind, *of) for m, of in zip(measured, ours, strict=True)]
+    edges = published_edges(published).items()
+    return [ComparedEdge(published.name, name, rpm, kind, *of) for (name, rpm), of in zip(edges, ours, strict=True)]
+
+
+def _matched(published: Sequence[tuple[float, float]], found: Sequence[Zone]) -> list[Zone | None]:
+    """For each published zone the found one that shares most speeds with it, if any does; each is taken once."""
+
+    def shared(zone: Zone, low: float, high: float) -> float:
+        onset = zone.onset.speed_rpm if zone.onset else 0.0
+        return min(zone.exit.speed_rpm if zone.exit else np.inf, high) - max(onset, low)
+
+    taken: list[Zone | None] = []
+    for ends in published:
+        best = max(found, key=lambda zone: shared(zone, *ends), default=None)
+        lost = best is None or shared(best, *ends) <= 0 or any(best is zone for zone in taken)
+        taken.append(None if lost else best)
+    return taken
 
 
 @dataclasses.dataclass(frozen=True)
