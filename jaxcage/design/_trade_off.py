@@ -69,8 +69,7 @@ def trade_off(
     require_at_least(0, seed=seed)
     if not objectives:
         raise ArgumentError("objectives", said="must hold at least one, but it is empty.")
-    if designs < 1:
-        raise ArgumentError("designs", said=f"must be at least 1, but {designs} was given.")
+    require_at_least(1, designs=designs)
     space = DesignSpace.of(system, vary)
     points = sobol(len(space.names), designs, seed)
     places = points if beside is None else np.vstack([points, beside])
