@@ -64,10 +64,10 @@ SPEEDS = np.array([1.0, 1.1])
 @pytest.mark.parametrize(
     "call, said",
     [
-        (lambda: jc.sweep(DUFFING, SPEEDS, blocks=-20), "`blocks` must divide the 300 revolutions, but it is -20"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, blocks=-20), "`blocks` must be at least 1, but -20"),
         (
             lambda: jc.sweep(DUFFING, SPEEDS, discard=-1),
-            "`discard` and `revolutions` must be at least 0 and 1",
+            "`discard` must be at least 0, but -1",
         ),
         (lambda: jc.sweep(DUFFING, SPEEDS, horizon=-1), "`horizon` must be at least 0, but -1"),
         (lambda: jc.sweep(DUFFING, SPEEDS, keep=0), "`keep` must be at least 1, but 0"),

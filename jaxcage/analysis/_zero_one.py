@@ -91,8 +91,7 @@ def zero_one(
     n = np.atleast_1d(series).shape[-1]
     if n < SHORTEST:
         raise ArgumentError("series", said=f"must have at least {SHORTEST} values, but it has {n}.")
-    if frequencies < 1:
-        raise ArgumentError("frequencies", said=f"must be at least 1, but {frequencies} was given.")
+    require_at_least(1, frequencies=frequencies)
     finite = np.all(np.isfinite(series), axis=-1)
     safe = np.where(finite[..., None], series, 0.0)
     size = np.max(np.abs(safe), axis=-1) if scale is None else np.full(finite.shape, float(scale))

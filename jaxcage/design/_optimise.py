@@ -186,8 +186,7 @@ def first_places(
         if starts.ndim != 2 or starts.shape[1] != len(space.names) or not np.all((starts >= 0) & (starts <= 1)):
             raise ArgumentError("starts", said="must hold places between 0 and 1, one column for each parameter.")
         return np.clip(starts, INSIDE, 1 - INSIDE)
-    if starts < 1:
-        raise ArgumentError("starts", said=f"must be at least 1, but {starts} was given.")
+    require_at_least(1, starts=starts)
     own = space.place
     if not np.all((own >= 0) & (own <= 1)):
         outside = ", ".join(n for n, p in zip(space.names, own, strict=True) if not 0 <= p <= 1)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import shown
+from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -104,13 +104,8 @@ def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> S
 
 def require_counts(revolutions: int, samples: int, discard: int) -> None:
     """**Raises:** `ValueError` for what no history can have."""
-    if revolutions < 1 or samples < 1 or discard < 0:
-        raise ArgumentError(
-            "revolutions",
-            "samples",
-            "discard",
-            said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
-        )
+    require_at_least(1, revolutions=revolutions, samples=samples)
+    require_at_least(0, discard=discard)
 
 
 def _method(method: AbstractMethod | None, samples: int) -> ControlledSteps:

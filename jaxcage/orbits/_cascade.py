@@ -5,6 +5,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -160,8 +161,7 @@ def cascade(
     require_x64()
     require_range(parameter, lower, upper)
     require_found(point, point.value)
-    if levels < 1:
-        raise ArgumentError("levels", said=f"must be at least 1, but {levels} was given.")
+    require_at_least(1, levels=levels)
     own = parameter == SPEED or period == "free"  # each orbit has a speed of its own
     fixed = None if own else (point.speed if speed is None else speed)
     points = [point]

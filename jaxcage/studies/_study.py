@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._glossary import component_names, quantity
 from .._parameters import replace
@@ -62,8 +63,7 @@ class Study(AbstractStudy):
         own = len(self.system.starts(1.0))
         if self.plan.starts > own:
             raise ArgumentError("starts", said=f"must be at most {own}, but {self.plan.starts} was given.")
-        if self.exponents < 1:
-            raise ArgumentError("exponents", said=f"must be at least 1, but {self.exponents} was given.")
+        require_at_least(1, exponents=self.exponents)
         if not 0 <= self.strobe <= self.revolutions:
             raise ArgumentError(
                 "strobe", said=f"must lie between 0 and the {self.revolutions} revolutions, but is {self.strobe}."

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import BearingRecord, BearingSweep, summed_up
@@ -135,8 +136,7 @@ def sweep_bearings(
     size = min(CHUNKS, key=lambda size: (-(-lanes // (size * cores())) * (size + CALL), size))
     chunks = np.split(np.argsort(table.lane_speed, kind="stable"), range(size, lanes, size))
     counted = _counted(progress, lanes, discard + revolutions)
-    if exponent_revolutions < 1:
-        raise ArgumentError("exponent_revolutions", said=f"must be at least 1, but {exponent_revolutions} was given.")
+    require_at_least(1, exponent_revolutions=exponent_revolutions)
     followed = min(blocks, max(2, -(-exponent_revolutions // block))) if exponents else 0
 
     def run(chunk: np.ndarray) -> dict[str, Any]:

@@ -69,11 +69,9 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
 
 def require_lengths(discard: int, revolutions: int, blocks: int) -> None:
     """**Raises:** `ValueError` for what no sweep can have."""
-    if discard < 0 or revolutions < 1:
-        raise ArgumentError(
-            "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
-        )
-    if blocks < 1 or revolutions % blocks:
+    require_at_least(0, discard=discard)
+    require_at_least(1, revolutions=revolutions, blocks=blocks)
+    if revolutions % blocks:
         raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
 
 
