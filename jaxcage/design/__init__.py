@@ -87,6 +87,7 @@ from ._scatter import (
 from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motion as regular_motion
 from ._surrogate import (
     UNCONFIRMED as UNCONFIRMED,
+    SurrogateSearch as SurrogateSearch,
     judged as judged,
     surrogate_search as surrogate_search,
     unchanged as unchanged,

@@ -79,7 +79,7 @@ def surrogate_search(
         raise ArgumentError("batch", "batches", said=f"must be at least 2 and 1, but {batch} and {batches} were given.")
     space = DesignSpace.of(system, vary)
     first = first_places(space, objective, starts, scouts, seed)
-    searches = [_Search(place, batch, (seed, i)) for i, place in enumerate(first)]
+    searches = [SurrogateSearch(place, batch, (seed, i)) for i, place in enumerate(first)]
     about = {"batches": batches, "batch": batch, "seed": seed, "first": first.tolist()}
     kept = None if keep is None else KeptSearch(keep, space, objective, **about)
     known = None if kept is None else kept.load()
@@ -97,7 +97,7 @@ def surrogate_search(
     return Optimised.of(space, [optimum_of(space, search.history, "batch limit") for search in searches])
 
 
-class _Search:
+class SurrogateSearch:
     """One search, asked for places and told what was found there; what it asks for follows from what it was told."""
 
     def __init__(self, start: Float[np.ndarray, " n"], batch: int, seed: tuple[int, ...]):
