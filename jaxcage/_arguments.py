@@ -91,8 +91,8 @@ def options(annotation: Any) -> tuple[Any, ...]:
     return (annotation,)
 
 
-def wrong(annotation: Any, value: Any) -> str:
-    """What an argument must be, empty if it is that or if its annotation does not say."""
+def wrong(annotation: Any, value: Any, in_row: bool = False) -> str:
+    """What an argument must be, or a thing of a row, empty if it is that or if its annotation does not say."""
     members = options(annotation)
     if _is_traced(value) or (value is None and types.NoneType in members):
         return ""
@@ -110,7 +110,8 @@ def wrong(annotation: Any, value: Any) -> str:
         fits = _is_count(value) or any(not _wrong_one(m, value) for m in rows)
         return "" if fits else f"a whole number of at most {MOST}" if type(value) is int else "a whole number"
     if float in members:
-        return _wrong_number(members, arrays, value)
+        missing = isinstance(value, float) and math.isnan(value)  # as a quantity or a part of a state may be
+        return "a number" if missing and not arrays and not in_row else _wrong_number(members, arrays, value)
     if all(typing.get_origin(m) is typing.Literal for m in members):
         known = [option for m in members for option in typing.get_args(m)]
         return "" if isinstance(value, str) and value in known else f"one of {', '.join(map(str, known))}"
@@ -145,7 +146,7 @@ def _wrong_one(kind: Any, value: Any) -> str:
     each = inside[:1] * len(value) if issubclass(origin, tuple) is False or inside[-1] is ... else inside
     if len(each) != len(value):
         return f"a row of {len(each)}"
-    said = [wrong(kind, x) for kind, x in zip(each, value, strict=True)]
+    said = [wrong(kind, x, in_row=True) for kind, x in zip(each, value, strict=True)]
     return f"a row of things, each {next(filter(None, said))}" if any(said) else ""
 
 
@@ -199,7 +200,7 @@ def _wrong_number(members: tuple[Any, ...], arrays: Sequence[Any], value: Any) -
         return "a number"
     if type(value) is int and not -(2**63) <= value < 2**63:
         return "a number, of 64 bits if it is whole"
-    return "a number" if math.isnan(float(value)) and not arrays else ""  # a quantity may be unknown, a setting not
+    return ""
 
 
 def shown(value: Any) -> str:
