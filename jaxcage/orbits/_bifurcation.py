@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any, NamedTuple, cast
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
@@ -12,15 +13,28 @@ from .._arguments import shown, wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, compiled
+from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
-from ._by_name import SPEED, Parameter, with_value
-from ._follower import Follower, make_follower, seeds, stable_steps
+from ._arclength import Corrected, Steps, follow, take
+from ._branch import describe, joined
+from ._follower import Start, make_follower, seeds, stable_steps, turned
 from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
-from ._normal_form import KINDS_WITH_ONE, coefficients
-from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, is_free, periodic_orbit, settle, sorted_multipliers
+from ._located import brackets
+from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
-from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
+from ._problem import (
+    SPEED,
+    Frame,
+    Given,
+    OrbitProblem,
+    Parameter,
+    Prepared,
+    frozen,
+    is_traced,
+    make_frame,
+    returned,
+    with_value,
+)
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import (
     BY_OTHERS,
@@ -34,7 +48,6 @@ from ._steps import (
     other_steps,
     that_serves,
 )
-from ._walk import walk
 
 
 TANGENTIAL = 1e-2
@@ -42,6 +55,8 @@ TANGENTIAL = 1e-2
 ON_CIRCLE = 1e-5
 SPUN = 200
 """Revolutions of the simulation that finds an orbit."""
+WALK = Steps(first=0.05, longest=0.25, most=250)
+"""Steps along a branch on which a bifurcation is looked for."""
 
 
 class Singular(NamedTuple):
@@ -65,44 +80,25 @@ class PointEquations(AbstractMapEquations):
         strobe = self.problem.prepare(u, given, self.frame)
         if self.kind != "branch-point":
             return strobe, []
-        return strobe, [self.problem.drift(u, given, self.frame, self.problem.equations)]
+        return strobe, [self.problem.drift(u, given, self.frame, self.problem.dimension)]
 
     def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Singular]:
-        strobe, drifts = prepared
-        n, m = self.problem.dimension, self.problem.equations
-        z, monodromy = u[:n], columns[:, :n]
-        closing = self.problem.orbit_residual(z, image, self.frame)
-        a = critical_matrix(self.problem, self.kind, strobe, z, monodromy, self.frame)
-        g, q, p = bordered(a, self.left, self.right)
+        n = self.problem.dimension
+        monodromy, closing = columns[:, :n], image - u[:n]
+        g, q, p = bordered(singular_matrix(self.kind, monodromy), self.left, self.right)
         known = Singular(monodromy, q, p)
-        if not drifts:
+        if self.kind != "branch-point":
             return jnp.append(closing, g), known
-        return jnp.concatenate([closing + u[m + 1] * self.left, jnp.stack([g, p[:n] @ columns[:, n]])]), known
+        return jnp.concatenate([closing + u[n + 1] * self.left, jnp.stack([g, p @ columns[:, n]])]), known
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
         return differentiated(self, u, given)
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the parameters, a unit of which is a tenth of their size."""
-        m = self.problem.equations
-        shift = abs(moved[..., m : m + len(self.problem.parameters)]).max(-1)
+        n = self.problem.dimension
+        shift = abs(moved[..., n : n + len(self.problem.parameters)]).max(-1)
         return shift, shift / (10 * POINT)
-
-
-def critical_matrix(
-    problem: OrbitProblem, kind: Kind, strobe: StrobeMap, z: Array, monodromy: Array, frame: Frame
-) -> Float[Array, "k k"]:
-    """The matrix that is singular at the bifurcation.
-
-    A self-excited orbit always has a multiplier 1; at its fold the derivative of its own equations is singular, in
-    which the flow and the phase condition border M - I.
-    """
-    a = singular_matrix(kind, monodromy)
-    if not problem.free_speed or kind in ("period-doubling", "Neimark-Sacker"):
-        return a
-    y = tuple(z[i] * frame.scale[i] for i in range(z.size))
-    flow = jnp.stack([jnp.asarray(c) for c in strobe.field(jnp.zeros(()), y)]) / frame.scale
-    return jnp.block([[a, flow[:, None]], [frame.phase_direction[None, :], jnp.zeros((1, 1))]])
 
 
 def bifurcation(
@@ -113,7 +109,6 @@ def bifurcation(
     *,
     speed: Scalar | None = None,
     periods: int | Int[Array, ""] | None = None,
-    period: str = "driven",
     reach: float | int = 0.1,
     method: AbstractMethod | None = None,
 ) -> Point:
@@ -130,7 +125,6 @@ def bifurcation(
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
     - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
-    - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
     - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 where that is 0); 0 turns
         this off. It is off under `jit`, `vmap` and `grad`, where it is not known what Newton's method finds.
 
@@ -146,14 +140,13 @@ def bifurcation(
     if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
     start, first, at, spin = _read_guess(system, guess, parameter, speed)
-    free = is_free(period, system, first)
     given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)
 
     def find(state: Any, speed: Any, at: Any, spin: bool) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:
-            problem = OrbitProblem(method, system.dimension, free, (parameter,))
+            problem = OrbitProblem(method, system.dimension, (parameter,))
             counts = from_steps(counts, None if near is None else near.steps)
             begin = jnp.asarray(speed, dtype=float)
             numbers = frozen((given, state, begin, at))
@@ -186,41 +179,65 @@ def bifurcation(
         outcome = jnp.where(far, NOT_CONVERGED, found.outcome)
         return dataclasses.replace(found, error=error, outcome=outcome)
 
-    def around(value: float, part: float, speed: Scalar = given.speed) -> Follower:
-        away = part * (abs(value) or 1.0)
-        return make_follower(system, speed, parameter, value - away, value + away, period, method)
-
     found = find(start, first, at, spin)
-    if is_traced((found, given, start)):
+    if is_traced((found, given, start)) or not reach or int(found.outcome) not in (NO_SUCH_POINT, OTHER_KIND):
         return found
-    if reach and int(found.outcome) in (NO_SUCH_POINT, OTHER_KIND):
-        if spin:
-            here, turning = with_value(system, first, parameter, at)
-            start = periodic_orbit(
-                here, turning, int(periods), guess=start, revolutions=SPUN, period=period, method=method
-            ).state
-        there, looked = walk(around(float(at), float(reach)), (np.asarray(start), float(at)), int(periods), kind)
-        if there is not None:
-            looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
-            again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
-            found = again if bool(again.converged) else there  # Newton's method may fail at a kink of the law
-        found = found if bool(found.converged) else dataclasses.replace(found, looked=looked)
-    classed = bool(found.converged) and kind in KINDS_WITH_ONE
-    return _classed(found, around(float(found.value), 0.1, found.speed)) if classed else found
+    if spin:
+        here, turning = with_value(system, first, parameter, at)
+        start = periodic_orbit(here, turning, int(periods), guess=start, revolutions=SPUN, method=method).state
+    near_by = np.asarray(start), float(at)
+    there, looked = _along_branch(given, parameter, near_by, float(reach), int(periods), kind, method)
+    if there is not None:
+        looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
+        again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
+        found = again if bool(again.converged) else there  # Newton's method may fail at a kink of the law
+    return found if bool(found.converged) else dataclasses.replace(found, looked=looked)
 
 
-def _classed(point: Point, follower: Follower) -> Point:
-    """The point with the coefficient of its normal form."""
-    place = np.asarray(point.state), float(point.value)
-    frame = follower.frame(jnp.asarray(point.state), place[1], int(point.periods))
-    again = lambda follower: seeds(follower, frame, [place], int(point.steps))
-    orbit = again(follower)
-    if not orbit.converged[0]:
-        follower = stable_steps(follower, place, int(point.periods))
-        orbit = again(follower)
-    free = follower.problem.free_speed
-    found = coefficients(follower.curves(frame, [0]), orbit, [point.kind], place[0].size, free=free)[0]
-    return dataclasses.replace(point, coefficient=jnp.asarray(found[0]), coefficient_error=jnp.asarray(found[1]))
+def _along_branch(
+    given: Given,
+    parameter: Parameter,
+    start: Start,
+    reach: float,
+    periods: int,
+    kind: str,
+    method: AbstractMethod | None,
+) -> tuple[Point | None, str]:
+    """The nearest bifurcation of `kind`, by the parameter, on the branch through an orbit.
+
+    Near a superstable orbit the scalar that vanishes at the point is flat, and Newton's steps lead anywhere; the branch
+    itself leads on.
+
+    **Returns:** the point, None where there is none; and what was searched, in words.
+    """
+    name = parameter if isinstance(parameter, str) else "the parameter"
+    say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if name == SPEED else f"{x:.6g}"
+    away = reach * (abs(start[1]) or 1.0)
+    follower = make_follower(given, parameter, start[1] - away, start[1] + away, method)
+    follower = stable_steps(follower, start, periods)
+    frame = follower.frame(start[1], periods)
+    first = seeds(follower, frame, [start])
+    if not first.converged[0]:
+        return None, f"no orbit near the guess at {name} = {say(start[1])} to follow"
+    reached: list[float] = []
+
+    def stop(lane: int, points: list[Corrected]) -> bool:
+        """Past a point of the kind, or further from the guess than the other direction found one."""
+        step: Corrected = jax.tree.map(lambda *x: np.stack(x), *points[-2:])
+        far = float(abs(step.u[1, -1] - first.u[0, -1]))
+        before, after = follower.unstable(step)
+        if before != after and any(k == kind for _, k in brackets(follower, step)):
+            reached.append(far)
+            return True
+        return bool(reached) and far > min(reached)
+
+    both = turned(take(first, np.zeros(2, dtype=int)), np.array([1.0, -1.0]))
+    up, down = follow(follower.curves(frame, [0, 0]), both, steps=WALK, inside=follower.inside, stop=stop)
+    (found,) = describe(follower, frame, [joined(follower, up, down)])
+    low, high = (say(float(f(found.value))) for f in (np.min, np.max))
+    looked = f"looked along the branch of its orbit, {name} from {low} to {high} (ends: {', '.join(found.ended)})"
+    mine = [p for p in found.special if p.kind == kind and p.status == "converged"]
+    return min(mine, key=lambda p: abs(p.value - start[1]), default=None), looked
 
 
 def _read_guess(
@@ -265,18 +282,16 @@ def _find_point(
     system, here = with_value(given.system, speed, parameter, at)
     if spin:
         start = settle(problem, Given(system, here), start, SPUN, counts)
-    frame = make_frame(problem, Given(system, here), start, here, unit[None], periods)
+    frame = make_frame(Given(system, here), unit[None], periods)
     u0 = start / frame.scale
-    if problem.free_speed:
-        u0 = jnp.append(u0, 1.0)
     if spin:  # on the orbit itself, if there is one here
-        fixed = OrbitProblem(problem.method, problem.dimension, problem.free_speed, ())
+        fixed = OrbitProblem(problem.method, problem.dimension, ())
         u1, found = settled(OrbitEquations(fixed, frame), Given(system, here), u0, counts)
         u0 = jnp.where(found.converged, u1, u0)
     u0 = jnp.append(u0, at / unit)
     strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given, frame)
     _, monodromy = returned(strobe, frame, u0[: problem.dimension])
-    a = critical_matrix(problem, kind, strobe, u0[: problem.dimension], monodromy, frame)
+    a = singular_matrix(kind, monodromy)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
@@ -302,18 +317,18 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     matches = is_critical(kind, multipliers)
     borders = equations.left, equations.right
-    rate = critical_rate(kind, problem.equations, found.newton.jacobian, known, borders)
+    rate = critical_rate(kind, problem.dimension, found.newton.jacobian, known, borders)
     at = problem.values(u, frame)[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
     error = found.error * frame.units[0]
     moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * frame.units[0])
-    tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.equations]), 10.0) < TANGENTIAL
+    tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.dimension]), 10.0) < TANGENTIAL
     kept = jnp.where(moving, NOT_CONVERGED, jnp.where(tangential, TANGENT, FOUND))
     outcome = jnp.where(found.converged, jnp.where(matches, kept, OTHER_KIND), NO_SUCH_POINT)
     there = (outcome == FOUND) | (outcome == TANGENT)
     keep = lambda x: jnp.where(there, x, jnp.nan)
     value, speed, state = _place(equations, u, given, there)
-    direction = jnp.zeros(problem.dimension) if kind == "Neimark-Sacker" else known.right[: problem.dimension]
+    direction = jnp.zeros(problem.dimension) if kind == "Neimark-Sacker" else known.right
     length = jnp.linalg.norm(direction)
     (parameter,) = problem.parameters
     return Point(
@@ -343,32 +358,32 @@ def is_critical(kind: Kind, multipliers: Complex[Array, " dim"]) -> Bool[Array, 
     return jnp.min(off) < jnp.sqrt(ON_CIRCLE)  # a double multiplier is only known to the square root of rounding
 
 
-def critical_rate(kind: Kind, equations: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
+def critical_rate(kind: Kind, n: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
     """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
 
     At a fold, where it is infinite, the drift of the map along the critical direction instead.
 
-    **Arguments:** kind; number of the orbit's own equations; derivative of all equations at the point; null vectors;
-    the left and right border.
+    **Arguments:** kind; dimension of the state; derivative of all equations at the point; null vectors; the left and
+    right border.
     """
-    m = equations
-    of_orbit, drift = jacobian[:m, :m], jacobian[:m, m]
+    of_orbit, drift = jacobian[:n, :n], jacobian[:n, n]
     overlap = known.left @ known.right
     if kind == "fold":
-        return jnp.abs(known.left[:m] @ drift / overlap)
-    g = jacobian[m]
+        return jnp.abs(known.left @ drift / overlap)
+    g = jacobian[n]
     if kind == "branch-point":
-        return _branching_rate(m, jacobian, known, borders) / jnp.abs(overlap)
-    along = g[:m] @ -jnp.linalg.solve(of_orbit, drift) + g[m]
+        return _branching_rate(jacobian, known, borders) / jnp.abs(overlap)
+    along = g[:n] @ -jnp.linalg.solve(of_orbit, drift) + g[n]
     rate = -along / overlap
     return rate / 2 if kind == "Neimark-Sacker" else -rate
 
 
-def _branching_rate(m: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
+def _branching_rate(jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
     """Branches leave along a x^2 + 2 b x y + c y^2 = 0, x along the critical direction and y the parameter."""
-    of_orbit, drift, g, h = jacobian[:m, :m], jacobian[:m, m], jacobian[m], jacobian[m + 1]
+    n = known.right.size
+    of_orbit, drift, g, h = jacobian[:n, :n], jacobian[:n, n], jacobian[n], jacobian[n + 1]
     left, right = borders
     whole = jnp.block([[of_orbit, left[:, None]], [right[None, :], jnp.zeros((1, 1))]])
-    w = jnp.linalg.solve(whole, jnp.append(-drift, 0.0))[:m]
-    a, b, c = g[:m] @ known.right[:m], g[:m] @ w + g[m], h[:m] @ w + h[m]
+    w = jnp.linalg.solve(whole, jnp.append(-drift, 0.0))[:n]
+    a, b, c = g[:n] @ known.right, g[:n] @ w + g[n], h[:n] @ w + h[n]
     return jnp.sqrt(jnp.maximum(b**2 + a * c, 0.0))

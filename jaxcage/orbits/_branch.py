@@ -16,7 +16,6 @@ from .._types import Scalar
 from ..integrate import AbstractMethod, Rodas4
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps, Trace, follow, passes, take
-from ._by_name import SPEED, Parameter
 from ._follower import (
     Follower,
     Start,
@@ -30,10 +29,9 @@ from ._follower import (
     turned,
 )
 from ._located import Seen, account
-from ._normal_form import coefficients
 from ._orbit import NearOrbit, Orbit, guess_state
 from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
-from ._problem import Frame, Given
+from ._problem import SPEED, Frame, Given, Parameter
 from ._steps import SETTLED
 
 
@@ -73,7 +71,6 @@ class Branch:
         )
         rows = [
             f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
-            + f", {p.criticality}" * bool(p.criticality)
             for p in self.special
         ]
         return "\n".join([head, *rows])
@@ -90,7 +87,6 @@ def branch(
     upper: float,
     speed: Scalar | None = None,
     periods: int = 1,
-    period: str = "driven",
     steps: Steps = Steps(),
     method: AbstractMethod | None = None,
 ) -> Branch:
@@ -119,7 +115,8 @@ def branch(
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_within("orbit", float(at), lower, upper)
-    follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
+    given = Given(system, jnp.asarray(known_speed, dtype=float))
+    follower = make_follower(given, parameter, lower, upper, method)
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
         follower = by_rodas4(follower)
     state = guess_state(system, known_speed, state)
@@ -162,8 +159,7 @@ def branches(
     known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
     each = [Given(s, known_speed) for s in systems]
     given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
-    single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)
-    follower = dataclasses.replace(single, given=given, designs=True)
+    follower = make_follower(given, parameter, lower, upper, method, designs=True)
     return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
 
 
@@ -176,7 +172,7 @@ def follow_both_ways(
     lane also ends after so many unstable orbits in a row: there is no end to how such a branch can wind.
     """
     follower = stable_steps(follower, starts[0], periods)
-    frame = follower.frame(jnp.asarray(starts[0][0]), starts[0][1], periods)
+    frame = follower.frame(starts[0][1], periods)
     first = seeds(follower, frame, starts)
     count = len(starts)
     lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
@@ -228,48 +224,22 @@ def describe(
 ) -> list[Branch]:
     """Branches from their points and lanes, with special points located, all at once."""
     rows = account(follower, frame, [points for points, _ in traces], lanes)
-    every = [found for _, seen in rows for found in seen]
-    cubic = iter(())
-    if every:
-        lane = [i for i, (_, seen) in zip(lanes, rows, strict=True) for _ in seen]
-        places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(found.point for found in every))
-        kinds = [found.kind for found in every]
-        own = follower.parameter == SPEED  # each in the scale at its own speed
-        scale_at = lambda i, value: follower.of(i).system.scale(value * follower.unit)
-        scales = [scale_at(i, u[-1]) if own else frame.scale for i, u in zip(lane, places.u, strict=True)]
-        finer = np.asarray(frame.scale) / np.array([[float(c) for c in row] for row in scales])
-        n = follower.problem.dimension
-        free = follower.problem.free_speed
-        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer, free=free))
-    return [
-        _branch(follower, frame, points, [(s, next(cubic).tolist()) for s in seen], ended)
-        for (points, seen), (_, ended) in zip(rows, traces, strict=True)
-    ]
+    return [_branch(follower, frame, *row, ended) for row, (_, ended) in zip(rows, traces, strict=True)]
 
 
 def _branch(
-    follower: Follower,
-    frame: Frame,
-    points: Corrected,
-    seen: Sequence[tuple[Seen, list[float]]],
-    ended: tuple[str, str],
+    follower: Follower, frame: Frame, points: Corrected, seen: Sequence[Seen], ended: tuple[str, str]
 ) -> Branch:
-    problem, free = follower.problem, follower.problem.free_speed
     multipliers = follower.multipliers(points)
     stable = follower.unstable(points) == 0
-    n = problem.dimension
+    n = follower.problem.dimension
     scale = np.asarray(frame.scale)
     name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
-
-    def speed(u: np.ndarray) -> np.ndarray:
-        if name == SPEED:
-            return np.asarray(u[..., -1] * follower.unit)
-        found = u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.of(0).speed))
-        return np.asarray(found)
-
+    fixed = None if name == SPEED else float(follower.of(0).speed)
+    speed = lambda u: u[..., -1] * follower.unit if fixed is None else np.full(u.shape[:-1], fixed)
     special = []
-    before = [found.after for found, _ in seen]
-    for i, ((k, kind, p, error), cubic) in enumerate(seen):
+    before = [found.after for found in seen]
+    for i, (k, kind, p, error) in enumerate(seen):
         mu = follower.multipliers(p)
         direction = np.zeros(n)
         if kind in CRITICAL:
@@ -292,8 +262,6 @@ def _branch(
                 error=error,
                 multipliers=mu,
                 direction=direction * scale,
-                coefficient=cubic[0],
-                coefficient_error=cubic[1],
                 outcome=outcome,
                 index=int(k),
                 edge=edge,

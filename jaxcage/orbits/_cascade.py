@@ -13,10 +13,9 @@ from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
-from ._by_name import SPEED, Parameter
 from ._follower import Follower, make_follower, require_range
 from ._point import Point, require_found
-from ._problem import Frame
+from ._problem import SPEED, Frame, Given, Parameter
 from ._singularity import test_functions
 
 
@@ -76,7 +75,6 @@ def doubled_branch(
     lower: float,
     upper: float,
     speed: Scalar | None = None,
-    period: str = "driven",
     steps: Steps = Steps(first=0.01, shortest=1e-7),
     amplitude: float = 0.02,
     until_doubling: bool = False,
@@ -87,7 +85,7 @@ def doubled_branch(
     **Arguments:**
 
     - `point`: a period doubling, of an orbit of any number of revolutions.
-    - `lower`, `upper`, `speed`, `period`, `steps`: as for `branch`.
+    - `lower`, `upper`, `speed`, `steps`: as for `branch`.
     - `amplitude`: how far from the doubling it is entered, in units of the system's scale along the critical direction.
     - `until_doubling`: end with the branch's own first period doubling.
 
@@ -99,12 +97,12 @@ def doubled_branch(
         raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
     require_found(point, point.value)
     at, periods = float(point.value), int(point.periods)
-    follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
-    frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
+    given = Given(system, jnp.asarray(point.speed if speed is None else speed, dtype=float))
+    follower = make_follower(given, parameter, lower, upper, method)
+    frame = follower.frame(at, 2 * periods)
     curves = follower.curves(frame, [0])
     scale = np.asarray(frame.scale)
-    free = [1.0] if follower.problem.free_speed else []
-    u = np.array([[*(np.asarray(point.state) / scale), *free, at / follower.unit]])
+    u = np.array([[*(np.asarray(point.state) / scale), at / follower.unit]])
     across = np.zeros_like(u)
     across[0, : scale.size] = np.asarray(point.direction) / scale
     across /= np.linalg.norm(across)
@@ -123,16 +121,11 @@ def doubled_branch(
 
 
 def _half_way(follower: Follower, frame: Frame, start: Corrected, across: np.ndarray) -> float:
-    """How far an orbit is from where it began after half of its revolutions, beside the flow, in units of the system's
-    scale: twice the amplitude if it doubled, nothing if it is the orbit that doubles, there or later."""
-    n = follower.problem.dimension
+    """How far an orbit is from where it began after half of its revolutions, in units of the system's scale: twice the
+    amplitude if it doubled, nothing if it is the orbit that doubles, there or later."""
     half = follower.curves(frame._replace(periods=frame.periods // 2), [0])
     once = correct(half, start.u, across, start.steps, ONCE)
-    away = once.jacobian[0, :n] @ (start.u - once.u)[0]
-    if follower.problem.free_speed:
-        flow = once.jacobian[0, :n, n]
-        away = away - flow * (flow @ away) / (flow @ flow)
-    return float(np.linalg.norm(away))
+    return float(np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0]))
 
 
 def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
@@ -148,7 +141,6 @@ def cascade(
     upper: float,
     levels: int = 4,
     speed: Scalar | None = None,
-    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Cascade:
     """Follow a period-doubling cascade from its first point.
@@ -162,8 +154,7 @@ def cascade(
     require_found(point, point.value)
     if levels < 1:
         raise ArgumentError("levels", said=f"must be at least 1, but {levels} was given.")
-    own = parameter == SPEED or period == "free"  # each orbit has a speed of its own
-    fixed = None if own else (point.speed if speed is None else speed)
+    fixed = None if parameter == SPEED else (point.speed if speed is None else speed)
     points = [point]
     amplitude, ended = 0.02, ""
     while len(points) < levels:
@@ -175,7 +166,6 @@ def cascade(
                 lower=lower,
                 upper=upper,
                 speed=fixed,
-                period=period,
                 amplitude=amplitude,
                 until_doubling=True,
                 method=method,

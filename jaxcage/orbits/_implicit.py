@@ -7,24 +7,26 @@ The map is expanded around (u, k) by one program that serves equations of every 
 parameters stand behind the few numbers k does not matter, and because the tangent is a matrix times dgiven, reverse
 mode is had by transposing that matrix and not by running revolutions backwards. The rule itself is differentiable:
 second derivatives are derivatives of it.
+
+Roots are found by damped Newton's method, since orbits of stiff systems with contact have small basins, which a full
+step often leaves. A step is taken back by halves until Deuflhard's natural monotonicity test holds,
+|J^-1 f(new)| < |J^-1 f(old)| with the old Jacobian, which does not depend on how the equations are scaled
+(P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3).
 """
 
 import abc
-import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar
 from ..integrate import StrobeMap, compiled
-from ._newton import DampedNewton, NewtonState
 from ._problem import Frame, OrbitProblem, Prepared, frozen, returned
 from ._steps import GIVEN_UP, Counts, by_steps
 
@@ -63,18 +65,6 @@ class AbstractMapEquations(AbstractEquations):
         """
 
 
-M = TypeVar("M", bound=AbstractMapEquations)
-
-
-def across(equations: M, u: Float[Array, " n"], given: Any, kept: Bool[Array, ""]) -> M:
-    """The equations on the plane through u (see `OrbitProblem.across`), if the one at hand is not to be kept."""
-    if not equations.problem.free_speed:
-        return equations
-    new = equations.problem.across(u, given, equations.frame)
-    frame = jax.tree.map(lambda own, through: jnp.where(kept, own, through), equations.frame, new)
-    return dataclasses.replace(equations, frame=frame)
-
-
 def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
     """What `linearised` returns, by differentiating the equations along each unknown."""
 
@@ -89,12 +79,25 @@ def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given
     return r, jacobian, aux
 
 
+class Newton(NamedTuple):
+    """The last point that Newton's method accepted, and what is known there."""
+
+    point: Float[Array, " n"]
+    jacobian: Float[Array, "n n"]
+    step: Float[Array, " n"]
+    """The full step from `point`."""
+    residual: Float[Array, " n"]
+    factor: Float[Array, ""]
+    """Share of `step` that is being tried."""
+    done: Bool[Array, ""]
+
+
 class Found(eqx.Module):
     """How a solve ended; without derivatives."""
 
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
-    newton: NewtonState
+    newton: Newton
     aux: Any
     steps: Int[Array, ""]
     """Steps per revolution."""
@@ -105,6 +108,8 @@ class Found(eqx.Module):
 
 TOLERANCE = 1e-9
 """Newton's last step is below this, in the unknowns' units; the error is of the order of its square."""
+SMALLEST_FACTOR, OF_A_NEAR_GUESS = 2.0**-10, 0.75
+"""Newton's method ends where a smaller share of its step would be tried."""
 
 
 def solve(
@@ -120,21 +125,46 @@ def solve(
     """Newton's method from `guess`; not a step of it in lanes that `skip` it. A guess that is said to be near is given
     up where a full step leads away.
 
+    It ends when the full step is below `tolerance` (1 + |u|) in every component; that step is still taken, so that the
+    error of the result is of the order of its square.
+
     **Returns:** the root and `Found`: its Newton state is that of the last point before the root or, if `at_root`, of
     the root, for one evaluation more.
     """
+    smallest = jnp.where(near, OF_A_NEAR_GUESS, SMALLEST_FACTOR)
+    size = lambda step: jnp.max(jnp.abs(step))
+    tiny = lambda step, u: size(step / (tolerance + tolerance * jnp.abs(u))) <= 1.0
 
-    def fn(u: Array, given: Any) -> tuple[Array, Any]:
+    def ended(tried: Array, newton: Newton) -> tuple[Array, Array]:
+        """Whether the method has ended after `tried`, and whether at a root."""
+        lost = (newton.factor < smallest) | ~jnp.all(jnp.isfinite(tried))
+        return newton.done | lost, newton.done & ~lost
+
+    def turn(carry: tuple) -> tuple:
+        i, _, u, newton, _ = carry
         r, jacobian, aux = equations.linearised(u, given)
-        return r, (jacobian, aux)
+        first = jnp.isinf(newton.step[0])
+        known = jnp.where(first, jnp.eye(u.size), newton.jacobian)
+        nearer = size(jnp.linalg.solve(known, r)) < size(newton.step)
+        there = tiny(newton.step, u)
+        accept = jnp.all(jnp.isfinite(r)) & jnp.all(jnp.isfinite(jacobian)) & (first | nearer | there)
+        step = -jnp.linalg.solve(jacobian, r)
+        done = there if at_root else tiny(step, u)
+        taken = Newton(u, jacobian, step, r, jnp.minimum(1.0, 2 * newton.factor), done)
+        refused = newton._replace(factor=newton.factor / 2)
+        new = jax.tree.map(lambda a, b: jnp.where(accept, a, b), taken, refused)
+        length = size(new.step)
+        share = jnp.minimum(new.factor, 1.0 / jnp.where(length > 0, length, 1.0))
+        onward = new.point + share * new.step
+        return i + 1, u, jnp.where(new.done, u, onward) if at_root else onward, new, aux
 
-    smallest = jnp.where(near, 0.75, DampedNewton.smallest_factor)
-    solver = DampedNewton(tolerance, tolerance, smallest_factor=smallest, at_root=at_root)
-    options = {"skip": skip}
-    got = optx.root_find(fn, solver, guess, given, options, has_aux=True, max_steps=max_steps, throw=False)
-    converged = got.result == optx.RESULTS.successful
-    steps = jnp.zeros((), int)
-    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1], steps, jnp.asarray(jnp.nan))
+    unknown = lambda *shape: jnp.full(shape, jnp.inf)
+    n, like = guess.size, eqx.filter_eval_shape(equations.linearised, guess, given)[2]
+    begin = Newton(guess, unknown(n, n), unknown(n), unknown(n), jnp.ones(()), jnp.asarray(skip))
+    start = 0, guess, guess, begin, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
+    on = lambda carry: (carry[0] < max_steps) & ~ended(carry[1], carry[3])[0]
+    i, tried, u, newton, aux = jax.lax.while_loop(on, turn, start)
+    return u, Found(ended(tried, newton)[1], i, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))
 
 
 def settled(

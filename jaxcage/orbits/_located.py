@@ -1,4 +1,8 @@
-"""Bifurcations along a branch: seen between neighbouring orbits, located, and changes of stability accounted for."""
+"""Bifurcations along a branch: seen between neighbouring orbits, located, and changes of stability accounted for.
+
+They are located by the Illinois variant of regula falsi: the functions that vanish there are evaluated at orbits of the
+branch itself, on planes across the chord between two ends; many places are looked for at a time.
+"""
 
 import itertools
 from collections.abc import Sequence
@@ -9,12 +13,10 @@ import numpy as np
 from jaxtyping import Float
 
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
-from ._astray import ASIDE
 from ._follower import Follower
-from ._illinois import LOCATED, zeros
 from ._point import UNEXPLAINED
 from ._problem import Frame
-from ._singularity import matches
+from ._singularity import matches, test_functions
 from ._steps import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
 
@@ -35,16 +37,18 @@ NEARLY = 0.1
 the steps beside it, and about its place by this part of a step."""
 SUNK = 0.75
 """Where it says that the function falls below this part of its lesser end, it is not believed about the rest."""
-
-
-AT_FORK = 1e-6
-"""A fold and a branch point are one if their parameters differ by less, in the unknowns' units."""
 STEEP = 30.0
 """A map whose derivative is larger than this may have another one at the orbit than at the last step before it, which
 is as far from it as 1e-6."""
 LOOKED = 1e-4
 """Steps below this length, in the unknowns' units, are not halved for what a parabola says: where orbits cross, the
 functions are their rounding there."""
+MOST_TURNS = 40
+LOCATED = 1e-9
+"""As closely as places are refined, in the unknowns' units."""
+BRACKETED = 1e-5
+"""At a branch point the curve's equations are singular, and no point is found where the function vanishes: it is then
+bracketed this closely, and interpolated."""
 
 
 class Seen(NamedTuple):
@@ -88,16 +92,8 @@ def account(
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
             middle = take(row, np.array(k))._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Seen(k, UNEXPLAINED, middle, far))
-        found.append((row, _in_order(row, _without_forks(mine))))
+        found.append((row, _in_order(row, mine)))
     return found
-
-
-def _without_forks(seen: Sequence[Seen]) -> list[Seen]:
-    """Without the folds that a branch has where it forks off another: the branch point is named there. Both are at the
-    vertex of a parabola, whose place along it is less certain than across."""
-    ways = [[s.point.u - b.point.u for b in seen if b.kind == "branch-point"] for s in seen]
-    near = [any(np.linalg.norm(way) < ASIDE and abs(way[-1]) < AT_FORK for way in row) for row in ways]
-    return [s for s, is_near in zip(seen, near, strict=True) if not (s.kind == "fold" and is_near)]
 
 
 def _at_the_root(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
@@ -159,7 +155,7 @@ def _gaps(follower: Follower, row: Corrected, seen: Sequence[tuple[int, str]]) -
 
 def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
     """What was seen, without products of two multipliers that pass 1 while no complex pair leaves the circle."""
-    mu = follower.nontrivial(row)
+    mu = follower.multipliers(row)
     pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
     return [(k, kind) for k, kind in brackets(follower, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
 
@@ -167,7 +163,7 @@ def _likely(follower: Follower, row: Corrected) -> list[tuple[int, str]]:
 def _dips(follower: Follower, row: Corrected) -> list[tuple[int, int]]:
     """Steps over which a test function may vanish twice: two special points of a kind, whose effects on the count may
     cancel."""
-    tests = follower.tests(row)
+    tests = test_functions(follower.multipliers(row))
     length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
     found = dips(np.stack([*tests.values(), row.tangent[:, -1]]), length)
     return [(a, b) for a, b in found if length[a] > LOOKED]
@@ -231,14 +227,14 @@ def _located(follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes:
     places = locate(follower, frame, [(lanes[i], rows[i], k, kind) for i, k, kind in wanted])
     seen: list[list[Seen]] = [[] for _ in rows]
     for (i, k, kind), place in zip(wanted, places, strict=True):
-        if place is not None and matches(kind, follower.nontrivial(place[0]), follower.certain):
+        if place is not None and matches(kind, follower.multipliers(place[0])):
             seen[i].append(Seen(k, kind, *place))
     return seen
 
 
 def signals(follower: Follower, points: Corrected) -> dict[str, np.ndarray]:
     """Functions along a branch that change sign at its special points."""
-    tests = follower.tests(points)
+    tests = test_functions(follower.multipliers(points))
     tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
     tests["fold"] = points.tangent[..., -1]
     return tests
@@ -335,13 +331,80 @@ def _zeros(
     steps: np.ndarray,
     within: Any,
 ) -> list[Corrected | None]:
-    """Where the test functions vanish between two orbits each, these solved for again by so many steps."""
+    """Where the test functions vanish between two orbits each, these solved for again by so many steps.
+
+    Places are refined until they move by less than `within`, in the unknowns' units; one for all or each.
+
+    **Returns:** an orbit per pair, None where the function does not change sign between them, or the curve was lost.
+    """
     both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
-    lanes = np.repeat(np.arange(len(ends)), 2)
-    other = np.flatnonzero(both.steps != steps[lanes])
+    lane = np.repeat(np.arange(len(ends)), 2)
+    other = np.flatnonzero(both.steps != steps[lane])
     if other.size:
-        redone = correct(curves.take(lanes[other]), both.u[other], both.tangent[other], steps[lanes[other]])
+        redone = correct(curves.take(lane[other]), both.u[other], both.tangent[other], steps[lane[other]])
         both = put(both, other, redone)
+    ends = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
     signal = lambda i, points: signals(follower, points)[str(kinds[i])]
-    pairs = [take(both, np.array([2 * i, 2 * i + 1])) for i in range(len(ends))]
-    return zeros(curves, pairs, signal, steps, within)
+    lanes = len(ends)
+    within = np.broadcast_to(within, lanes)
+    values = np.array([signal(i, e) if np.all(e.converged) else [np.nan, np.nan] for i, e in enumerate(ends)])
+    active = np.prod(values, axis=1) < 0
+    f0, f1 = np.where(active[:, None], values, np.nan).T.copy()
+    u0, u1 = np.where(active[:, None], np.stack([e.u for e in ends], axis=1), np.nan)
+    chord = u1 - u0
+    length = np.linalg.norm(chord, axis=1)
+    normal = chord / length[:, None]
+    low, high, last, aside = np.zeros(lanes), np.ones(lanes), np.zeros(lanes), np.zeros(lanes)
+    sides = [[take(e, np.array(j)) for j in (0, 1)] for e in ends]
+    best: list[Corrected | None] = [None] * lanes
+    for _ in range(MOST_TURNS):
+        index = np.flatnonzero(active)
+        if index.size == 0:
+            break
+        margin = 1e-3 * (high - low)
+        aimed = np.clip((low * f1 - high * f0) / (f1 - f0), low + margin, high - margin)
+        share = np.clip(aimed + aside, low, high)
+        at = np.stack([_on_plane(u0[i] + share[i] * chord[i], normal[i], sides[i]) for i in index])
+        got = correct(curves.take(index), at, normal[index], steps[index])
+        for k, i in enumerate(index):
+            if not got.converged[k]:
+                near = (high[i] - low[i]) * length[i] < 4 * BRACKETED
+                best[i] = _between(sides[i], (aimed[i] - low[i]) / (high[i] - low[i])) if near else None
+                active[i] = not near and aside[i] == 0.0
+                aside[i] = BRACKETED / length[i]
+                continue
+            before, best[i] = best[i], take(got, np.array(k))
+            f = float(signal(int(i), take(got, np.array([k])))[0])
+            sides[i][int(f * f1[i] >= 0)] = best[i]
+            if aside[i] != 0.0:
+                aside[i] = -aside[i] if aside[i] > 0 else 0.0
+            halve = 0.5 if f * last[i] > 0 else 1.0  # the same end was kept twice
+            if f * f1[i] < 0:
+                low[i], f0[i], f1[i] = share[i], f, f1[i] * halve
+            else:
+                high[i], f1[i], f0[i] = share[i], f, f0[i] * halve
+            last[i] = f
+            moved = np.inf if before is None else np.linalg.norm(got.u[k] - before.u)
+            active[i] = aside[i] != 0.0 or f != 0.0 and moved > within[i] and (high[i] - low[i]) * length[i] > within[i]
+    return best
+
+
+def _on_plane(at: np.ndarray, normal: np.ndarray, sides: list[Corrected]) -> np.ndarray:
+    """The point of a plane, through `at`, where the cubic through two points of the curve passes it, nearly."""
+    first, second = sides
+    chord = second.u - first.u
+    across = np.dot(chord, normal)
+    if not across > 0:
+        return at
+    share = np.dot(at - first.u, normal) / across
+    length = np.linalg.norm(chord)
+    out, back = length * first.tangent - chord, chord - length * second.tangent
+    aside = share * (1 - share) * ((1 - share) * out + share * back)
+    found = first.u + share * chord + aside
+    return found + np.dot(at - found, normal) * normal
+
+
+def _between(sides: list[Corrected], share: float) -> Corrected:
+    """Linear interpolation of two near points."""
+    mix = lambda x, y: (1 - share) * x + share * y if np.issubdtype(np.asarray(x).dtype, np.floating) else x
+    return jax.tree.map(mix, *sides)

@@ -1,4 +1,5 @@
-"""The synchronous (period-1) orbits of a system over a range of speed, found without a hint of where they are.
+"""Orbits found without a hint of where they are: the synchronous (period-1) ones of a system over a range of speed, and
+all that many starts lead to at one speed.
 
 Newton's method leads from the ends of simulations on a coarse grid, from the system's starts and from their opposites,
 to stable orbits; each is followed both ways by arclength, until every orbit that was met lies on a branch that is
@@ -10,19 +11,26 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
+from .._checks import require_x64
+from .._errors import ArgumentError
 from .._notebook import notebook_html
+from .._types import Scalar
 from ..analysis import Sweep
-from ..integrate import AbstractMethod
+from ..integrate import AbstractMethod, compiled, strobe_map
 from ..models import AbstractForcedSystem
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
-from ._by_name import SPEED
 from ._follower import Follower, Start, make_follower, seeds, stable_steps
+from ._orbit import Orbit, periodic_orbit
 from ._point import Point
+from ._problem import SPEED, Given
 
 
 ROUND = 4
@@ -32,6 +40,11 @@ PATIENCE = 150
 """Unstable orbits in a row after which a branch is left."""
 ON_BRANCH = 0.03
 """An orbit lies on a branch if it is within this distance of it, in units of the system's scale."""
+SPREAD = 0.6
+"""Random starts are spread over this share of the system's scale in every direction."""
+SAME = 1e-4
+"""Orbits are the same within this distance, in units of the system's scale: an orbit that hardly attracts moves by a
+hundred times the error of its map."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Of the state, at a speed [rad/s]."""
@@ -244,7 +257,7 @@ def synchronous_orbits(
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
-    follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
+    follower = make_follower(Given(system, jnp.asarray((lower + upper) / 2)), SPEED, lower, upper, method)
     met = _met(settled)
     if met:
         middle = met[len(met) // 2]
@@ -295,7 +308,7 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
-    frame = follower.frame(jnp.asarray(met[0][0]), met[0][1], 1)
+    frame = follower.frame(met[0][1], 1)
     points = seeds(follower, frame, met)
     good = points.converged.copy()
     good[good] = follower.unstable(take(points, good)) == 0
@@ -326,3 +339,59 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
                 if why == "stopped" and i != j and _covers(other, last, scale(last.speed)):
                     family = [family[j] if f == family[i] else f for f in family]
     return family
+
+
+def coexisting_orbits(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    periods: int = 1,
+    *,
+    count: int = 24,
+    revolutions: int = 5,
+    seed: int = 0,
+    method: AbstractMethod | None = None,
+) -> list[Orbit]:
+    """Orbits that close after `periods` revolutions and not earlier, from the system's own starts and random ones.
+
+    **Arguments:** system and speed [rad/s]; number of random starts and their seed; revolutions of simulation before
+    Newton's method takes over: with few, unstable orbits are found as well.
+
+    **Returns:** distinct orbits, the stable ones first. There is no proof that these are all.
+    """
+    require_x64()
+    if count < 1:
+        raise ArgumentError("count", said=f"must be at least 1, but {count} was given.")
+    scale = np.array([float(c) for c in system.scale(speed)])
+    own = np.array([[float(c) for c in y] for y in system.starts(speed)])
+    random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
+    starts = jnp.asarray(np.concatenate([own, random]))
+    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
+    found = jax.vmap(find)(starts)
+    images = _images(system, speed, periods, found) / scale
+    kept: list[int] = []
+    for i in np.flatnonzero(np.asarray(found.converged)):
+        shorter = any(_near(images[i, 0], images[i, j]) for j in range(1, periods))
+        if not shorter and not any(_near(images[i, 0], image) for k in kept for image in images[k]):
+            kept.append(int(i))
+    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
+    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))
+
+
+def _near(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.max(np.abs(a - b)) < SAME)
+
+
+def _images(
+    system: AbstractForcedSystem, speed: Scalar, periods: int, found: Orbit
+) -> Float[np.ndarray, "orbits periods dim"]:
+    """All strobe states of each orbit [SI]."""
+
+    def step(orbit: Orbit, y: Array) -> Array:
+        strobe = strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)
+        return jnp.stack(strobe(tuple(y[i] for i in range(y.size))).y)
+
+    advance = compiled(jax.vmap(step))
+    rows = [found.state]
+    for _ in range(periods - 1):
+        rows.append(advance(found, rows[-1]))
+    return np.stack([np.asarray(r) for r in rows], axis=1)

@@ -72,16 +72,15 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
     }
 
 
-def matches(kind: str, multipliers: Complex[np.ndarray, " n"], certain: float = 1e-3) -> bool:
+def matches(kind: str, multipliers: Complex[np.ndarray, " n"]) -> bool:
     """Whether the multipliers are those of a bifurcation of `kind`, and not e.g. of a neutral saddle, a real pair whose
     product is 1.
 
-    A double multiplier is known to the square root of rounding only; the tolerance is wider than that, and as near as
-    `certain` at 1.
+    A double multiplier is known to the square root of rounding only; the tolerance is wider than that.
     """
     mu = np.asarray(multipliers)
     if kind == "period-doubling":
         return bool(np.min(np.abs(mu + 1)) < 1e-3)
     if kind != "Neimark-Sacker":
-        return bool(np.min(np.abs(mu - 1)) < certain)
+        return bool(np.min(np.abs(mu - 1)) < 1e-3)
     return bool(np.any((np.abs(np.imag(mu)) > 1e-9) & (np.abs(np.abs(mu) - 1) < 1e-4)))
