@@ -45,7 +45,7 @@ class Row(NamedTuple):
     """Largest error over the stated one."""
     length: int
     wrong: list[str]
-    """Criticalities that are another."""
+    """What is said of the largest error, where it is more than the stated one."""
 
     @property
     def bad(self) -> int:
@@ -68,7 +68,6 @@ def followed(given: Planted, steps: jc.orbits.Steps) -> jc.Branch:
         upper=given.upper,
         speed=speed,
         periods=given.periods,
-        period=given.period,
         steps=steps,
     )
 
@@ -92,8 +91,6 @@ def judged(given: Planted, branch: jc.Branch, fine: jc.Branch) -> Row:
             continue
         left.remove(best)
         worst = max(worst, float(abs(best.value - point.value) / stated))
-        if point.criticality and best.criticality != point.criticality:
-            wrong.append(f"{said(best)} is not {best.criticality or 'without criticality'} but {point.criticality}")
     spurious = [said(p) for p in left] if given.whole else [said(p) for p in left if p.status != "converged"]
     away = 0.0
     if given.lane is not None:

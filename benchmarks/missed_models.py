@@ -23,12 +23,11 @@ import jaxcage as jc
 
 @dataclasses.dataclass(frozen=True)
 class Point:
-    """A special point: its place, how well that is known, and what is known of its criticality."""
+    """A special point: its place, and how well that is known."""
 
     kind: str
     value: float
     tolerance: float = 1e-12
-    criticality: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +46,6 @@ class Planted:
     parameter: str = "p"
     speed: float = 1.1
     periods: int = 1
-    period: str = "driven"
     spin: int = 0
     """Revolutions of the simulation that leads from the state to the first orbit."""
     lane: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
@@ -213,7 +211,7 @@ def kicked_map(y: np.ndarray, p: float, delay: float, times: int = 1) -> tuple[n
     return y, whole
 
 
-def kicked_point(kind: str, guess: Any, delay: float, times: int, criticality: str = "") -> Point:
+def kicked_point(kind: str, guess: Any, delay: float, times: int) -> Point:
     """Where the exact map has the multiplier, from a guess at (state, p)."""
 
     def off(u: np.ndarray) -> np.ndarray:
@@ -226,31 +224,19 @@ def kicked_point(kind: str, guess: Any, delay: float, times: int, criticality: s
 
     found = solved(off, guess)
     assert np.max(np.abs(off(found))) < 1e-11
-    return Point(kind, float(found[4]), 1e-9, criticality)
+    return Point(kind, float(found[4]), 1e-9)
 
 
 def kicked(name: str, delay: float, x: tuple[float, float], p: float, ends, times: int, *wanted) -> Planted:
-    """Orbits of so many revolutions, from near (x, z) at p; special points as (kind, (x, z), p, criticality)."""
+    """Orbits of so many revolutions, from near (x, z) at p; special points as (kind, (x, z), p)."""
     settled = lambda x, p: solved(lambda y: kicked_map(y, p, delay, times)[0] - y, (*x, *x))
-    points = [kicked_point(kind, (*settled(x, q), q), delay, times, sort) for kind, x, q, sort in wanted]
+    points = [kicked_point(kind, (*settled(x, q), q), delay, times) for kind, x, q in wanted]
     system = jc.ForcedSystem(Kicked(**numbers(p=p, delay=delay)), dimension=4, harmonics=4)
     return Planted(name, system, tuple(settled(x, p).tolist()), p, ends[0], ends[1], tuple(points), periods=times)
 
 
-class Cycle(eqx.Module):
-    """A circle with the angular velocity 1.3, and beside it a pair that grows with p +- 0.37 i."""
-
-    p: Array
-
-    def __call__(self, tau, y, speed):
-        x, z, u, v = y
-        growth, aside = 0.3 - x * x - z * z, self.p - u * u - v * v
-        return growth * x - 1.3 * z, growth * z + 1.3 * x, aside * u - 0.37 * v, 0.37 * u + aside * v
-
-
 def planted() -> list[Planted]:
     """All that is known in closed form."""
-    down, up = "subcritical", "supercritical"
     double = (0.0198, 0.0202)
     quick = 0.05
     return [
@@ -264,6 +250,7 @@ def planted() -> list[Planted]:
             0.7,
             0.49,
             Point("branch-point", 0.0),
+            Point("fold", 0.0),
         ),
         *(imperfect(gap, side) for gap in (1e-3, 1e-4) for side in (1, -1)),
         crossing(0.0, 1),
@@ -294,7 +281,7 @@ def planted() -> list[Planted]:
         ),
         turning(
             "two tori 4e-4 apart",
-            Point("Neimark-Sacker", double[0], criticality=up),
+            Point("Neimark-Sacker", double[0]),
             Point("Neimark-Sacker", double[1]),
             a=(-double[0], -double[1]),
             c=(1.0, 1.0),
@@ -304,8 +291,8 @@ def planted() -> list[Planted]:
         turning("two at -1 at once", Point("unexplained", 0.02), a=(-0.3, -0.02), c=(0.0, 1.0), s=(0.1, 0.0)),
         turning(
             "flip and torus at once",
-            Point("period-doubling", 0.05, criticality=down),
-            Point("Neimark-Sacker", 0.05, criticality=up),
+            Point("period-doubling", 0.05),
+            Point("Neimark-Sacker", 0.05),
             a=(-0.05, -0.15),
             c=(1.0, 1.0),
             s=(0.0, 0.1),
@@ -314,7 +301,7 @@ def planted() -> list[Planted]:
         ),
         turning(
             "flip and branch point at once",
-            Point("period-doubling", 0.05, criticality=up),
+            Point("period-doubling", 0.05),
             Point("branch-point", 0.05),
             a=(-0.15, -0.15),
             c=(1.0, 1.0),
@@ -322,7 +309,7 @@ def planted() -> list[Planted]:
         ),
         turning(
             "torus, subcritical",
-            Point("Neimark-Sacker", quick, criticality=down),
+            Point("Neimark-Sacker", quick),
             a=(-quick, -0.3),
             c=(1.0, 0.0),
             s=(0.0, 0.1),
@@ -336,12 +323,10 @@ def planted() -> list[Planted]:
             0.56,
             (-0.5, 1.0),
             1,
-            ("fold", (-0.5, 0.0), -0.24, ""),
-            ("period-doubling", (0.5, 0.0), 0.75, up),
+            ("fold", (-0.5, 0.0), -0.24),
+            ("period-doubling", (0.5, 0.0), 0.75),
         ),
-        kicked(
-            "quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25, up)
-        ),
+        kicked("quadratic map, period 2", 0.0, (1.2, 0.0), 1.1, (0.9, 1.5), 2, ("period-doubling", (1.2, 0.0), 1.25)),
         kicked(
             "quadratic map, period 3",
             0.0,
@@ -349,19 +334,8 @@ def planted() -> list[Planted]:
             1.81,
             (1.75, 1.85),
             3,
-            ("fold", (0.03, 0.0), 1.8055, ""),
-            ("period-doubling", (-0.044, 0.0), 1.8234, up),
+            ("fold", (0.03, 0.0), 1.8055),
+            ("period-doubling", (-0.044, 0.0), 1.8234),
         ),
-        kicked("delayed logistic map", 1.0, (0.47, 0.47), 1.9, (1.5, 2.3), 1, ("Neimark-Sacker", (0.5, 0.5), 2.0, up)),
-        Planted(
-            "limit cycle",
-            jc.ForcedSystem(Cycle(**numbers(p=-0.1)), dimension=4),
-            (math.sqrt(0.3), 0.0, 0.0, 0.0),
-            -0.1,
-            -0.2,
-            0.2,
-            (Point("Neimark-Sacker", 0.0),),
-            speed=1.3,
-            period="free",
-        ),
+        kicked("delayed logistic map", 1.0, (0.47, 0.47), 1.9, (1.5, 2.3), 1, ("Neimark-Sacker", (0.5, 0.5), 2.0)),
     ]

@@ -80,16 +80,16 @@ class VanDerPol(eqx.Module):
 
 TAYLOR = Number(1.0663, 1e-4, "J. R. Taylor, Classical Mechanics (2005), table 12.1, cut off")
 EDGES = (
-    ("branch-point", 1, (-0.6, -0.3), ""),
-    ("period-doubling", -1, (-0.2, 0.0), "subcritical"),
-    ("period-doubling", -1, (1.7, 1.9), "supercritical"),
+    ("branch-point", 1, (-0.6, -0.3)),
+    ("period-doubling", -1, (-0.2, 0.0)),
+    ("period-doubling", -1, (1.7, 1.9)),
 )
-"""Of Mathieu's equation: kind, sign of the multiplier, where it is looked for, criticality."""
+"""Of Mathieu's equation: kind, sign of the multiplier, where it is looked for."""
 
 
-def known(kind: str, number: Number, criticality: str = "") -> Point:
+def known(kind: str, number: Number) -> Point:
     """A printed point."""
-    return Point(kind, number.value, number.tolerance, criticality)
+    return Point(kind, number.value, number.tolerance)
 
 
 def swept(
@@ -120,9 +120,9 @@ def forced(
 
 def published() -> list[Planted]:
     """Oscillators from the literature."""
-    thresholds = [Point(kind, mathieu_edge(sign, ends, 0.1), 1e-11, sort) for kind, sign, ends, sort in EDGES]
+    thresholds = [Point(kind, mathieu_edge(sign, ends, 0.1), 1e-11) for kind, sign, ends in EDGES]
     mathieu = jc.ForcedOscillator(Mathieu(**numbers(p=0.5, z=0.1)), coordinates=1)
-    first = known("period-doubling", DUFFING_DOUBLINGS[1][1], "supercritical")
+    first = known("period-doubling", DUFFING_DOUBLINGS[1][1])
     folds = tuple(known("fold", DUFFING_FOLDS[way]) for way in ("up", "down"))
     double_well, ueda = Duffing(**numbers(d=0.3, k=1.0, p=0.25)), Duffing(**numbers(d=0.05, k=0.0, p=1.0))
     taylor, let_go = known("period-doubling", TAYLOR), known("Neimark-Sacker", VAN_DER_POL_LET_GO)

@@ -1,7 +1,5 @@
 """Nothing is missed: planted points are found, and a branch stays on its own side of one that runs close by."""
 
-from typing import NamedTuple
-
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -10,15 +8,7 @@ from helpers import wide_but
 import jaxcage as jc
 from benchmarks.missed import followed, judged
 from benchmarks.missed_models import comb, crossing, imperfect, planted
-from jaxcage.orbits._astray import astray, orientation, to_crossing
 from jaxcage.orbits._located import dips
-
-
-class Points(NamedTuple):
-    """Of curves: derivatives of their equations, and tangents."""
-
-    jacobian: np.ndarray
-    tangent: np.ndarray
 
 
 BENT = next(given for given in planted() if "bent" in given.name)
@@ -52,30 +42,6 @@ def test_branches_that_cross_and_branches_that_nearly_do(name):
     row = judged(NEAR[name], branch, branch)
     assert not row.bad, row
     assert branch.ended == ("range", "range") and branch.value.size < 100
-
-
-def test_points_and_tangents_of_one_curve_belong_together():
-    """What a cubic leaves out, a s^2 (s + apart)^2, is in the tangent too; the distance to a parallel curve is not."""
-    length, apart, missed = 0.2, 0.1, np.array([[0.0, 1e-3]])
-    slope = missed * (2 / length + 2 / (length + apart))
-    off = lambda turned: astray(missed, turned, np.array([[1.0, 0.0]]), np.array([length]), np.array([apart]))[0]
-    assert off(slope) < 1e-15 and off(0 * slope) == pytest.approx(1e-3)
-    assert off(slope + np.array([[-0.1, 0.0]])) < 1e-15  # along the curve a tangent says nothing
-
-
-def test_orientation_changes_where_curves_cross_and_not_at_a_fold():
-    """Along p = x^2, and along p = 0 through x p = 0."""
-    x = np.array([-0.5, 0.5])
-    fold = Points(np.stack([-2 * x, np.ones(2)], axis=1)[:, None], np.stack([np.ones(2), 2 * x], axis=1))
-    cross = Points(np.stack([0 * x, x], axis=1)[:, None], np.stack([np.ones(2), 0 * x], axis=1))
-    assert np.prod(orientation(fold)) == 1 and np.prod(orientation(cross)) == -1
-
-
-def test_the_place_of_a_crossing_is_foreseen():
-    """Along x = 0 through x p = 0, of whose derivative and tangent the determinant is p; not beyond it."""
-    at = lambda *p: Points(np.array([[[x, 0.0]] for x in p]), np.array([[0.0, 1.0]] * len(p)))
-    found = to_crossing(at(-0.5, 0.2, 0.7), at(-0.3, 0.3, 0.7))  # the step was 0.2, 0.1 and nothing
-    np.testing.assert_allclose(found, [1.5, np.inf, np.inf])
 
 
 @pytest.mark.parametrize("lowest, looked_at", [(0.0327, [(0, 1), (1, 2)]), (0.2, [])])

@@ -319,12 +319,12 @@ def test_bad_arguments():
         jc.bifurcation(system, "Neimark-Sacker", start, "x", speed=1.1)
     with pytest.raises(ValueError, match="`speed` must be given where the parameter is `a`"):
         jc.bifurcation(system, "Neimark-Sacker", start, "a")
-    for find in (
-        lambda: jc.periodic_orbit(system, 1.1, period="long"),
-        lambda: jc.bifurcation(system, "Neimark-Sacker", start, "a", speed=1.1, period="long"),
-    ):
-        with pytest.raises(ValueError, match="`period` must be one of driven, free, but 'long'"):
-            find()
+    for parameter in (lambda s: s.rates.a[None], lambda s: 2 * s.rates.a):
+        with pytest.raises(ValueError, match="must pick a number that the system holds"):
+            jc.bifurcation(system, "Neimark-Sacker", start, parameter, speed=1.1)
+    nothing = jc.Point("fold", float("nan"), np.zeros(2), parameter="a")
+    with pytest.raises(ValueError, match="`guess` must be one that was found, but this fold was not"):
+        jc.bifurcation(system, "fold", nothing, "a", speed=1.1)
     with pytest.raises(ValueError, match="`guess` must be a state of 2 numbers"):
         jc.periodic_orbit(system, 1.1, guess=(1.0, 0.0, 0.0))
 
@@ -382,27 +382,3 @@ def strobe(model, speed, z, method):
     strobe = jc.strobe_map(model, speed, method)
     stretch = strobe(tuple(z[i] * strobe.scale[i] for i in range(4)))
     return jnp.stack([c / s for c, s in zip(stretch.y, strobe.scale, strict=True)]), stretch.peak
-
-
-def van_der_pol(tau, y, speed):
-    x, u = y
-    return u, 0.5 * (1 - x * x) * u - x
-
-
-def test_an_equilibrium_is_no_self_excited_orbit():
-    """It closes after any period, and Newton's method finds it from nearby."""
-    system = jc.ForcedSystem(van_der_pol, dimension=2)
-    still = jc.periodic_orbit(system, 1.0, guess=(0.05, 0.0), period="free")
-    assert still.status == "equilibrium" and not still.converged and not still.stable
-    assert np.all(np.isnan(still.state)) and "led to an equilibrium, which has no period" in str(still)
-    orbit = jc.periodic_orbit(system, 1.0, guess=(1.9, 0.3), period="free")
-    assert orbit.status == "converged" and not orbit.equilibrium and abs(orbit.state[0]) > 1
-    small = jc.ForcedSystem(lambda tau, y, speed: tuple(1e-4 * c for c in van_der_pol(tau, _times(y), speed)), 2)
-    orbit = jc.periodic_orbit(small, 1.0, guess=(1.9e-4, 0.3e-4), period="free")
-    assert orbit.status == "converged" and abs(orbit.state[0]) > 1e-4  # a ten-thousandth of the scale is no rest
-    driven = jc.ForcedSystem(lambda tau, y, speed: (-y[0],), 1)
-    assert jc.periodic_orbit(driven, 1.0, guess=(0.1,)).status == "converged"
-
-
-def _times(y):
-    return tuple(1e4 * c for c in y)

@@ -21,8 +21,6 @@ from jaxcage.validation import (
     DUFFING_DOUBLINGS,
     DUFFING_FOLDS,
     DUFFING_SLOPES,
-    LURE,
-    VAN_DER_POL,
     VAN_DER_POL_LET_GO,
     Number,
 )
@@ -129,49 +127,6 @@ def test_folds_of_the_hardening_duffing(name):
     # The other multiplier follows from the damping.
     assert abs(point.multipliers[1].real - jnp.exp(-0.1 * 2 * jnp.pi / point.speed)) < 1e-6
     assert abs(jnp.linalg.norm(point.direction) - 1) < 1e-12
-
-
-class VanDerPol(eqx.Module):
-    mu: jax.Array
-
-    def __call__(self, tau, y, speed):
-        x, u = y
-        return (u, self.mu * (1 - x * x) * u - x)
-
-
-class Bautin(eqx.Module):
-    """Cycles of radius r with r^4 - r^2 = mu, the faster the larger, in states of other units."""
-
-    mu: jax.Array
-
-    def __call__(self, tau, y, speed):
-        u, v = y[0] / 3.0, y[1] / 0.2
-        square = u * u + v * v
-        growth = self.mu + square - square * square
-        rate = 0.5 + square
-        return 3.0 * (growth * u - rate * v), 0.2 * (growth * v + rate * u)
-
-
-def test_fold_of_cycles_of_the_bautin_normal_form():
-    """At mu = -1/4 and r^2 = 1/2 (Kuznetsov, Elements of Applied Bifurcation Theory, 8.3), whatever the scale."""
-    system = jc.ForcedSystem(Bautin(jnp.asarray(0.0)), 2, scale=(3.0, 0.2))
-    near = (2.13, 0.0), -0.249
-    point = jc.bifurcation(system, "fold", near, "mu", speed=1.0, period="free", reach=0, method=METHOD)
-    assert point.status == "converged" and abs(point.value + 0.25) < 1e-9 and abs(point.speed - 1) < 1e-9
-    assert abs((point.state[0] / 3.0) ** 2 + (point.state[1] / 0.2) ** 2 - 0.5) < 1e-6
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("mu", VAN_DER_POL)
-def test_limit_cycle_of_van_der_pol(mu):
-    period, log_multiplier = VAN_DER_POL[mu]
-    system = jc.ForcedSystem(VanDerPol(**numbers(mu=mu)), dimension=2)
-    orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=20, period="free", method=FINE)
-    assert orbit.status == "converged" and bool(orbit.stable)
-    assert agrees(orbit.period, period)
-    np.testing.assert_allclose(orbit.multipliers[0], 1.0, atol=1e-9)
-    assert agrees(jnp.log(orbit.multipliers[1].real), log_multiplier)
-    assert abs(orbit.liouville) < 1e-8
 
 
 class Entrained(eqx.Module):
@@ -288,64 +243,6 @@ def test_edges_of_damped_mathieu(kind, z, bracket, sign):
     assert point.status == "converged" and bool(point.trusted)
 
 
-class Circle(eqx.Module):
-    """A Stuart-Landau oscillator with a planted pair: x, y on a circle of radius sqrt(r), which drives u, v."""
-
-    r: jax.Array
-    w: jax.Array
-    a: jax.Array
-    b: jax.Array
-    c: jax.Array
-
-    def __call__(self, tau, state, speed):
-        x, y, u, v = state
-        growth = self.r - x * x - y * y
-        return (
-            growth * x - self.w * y,
-            growth * y + self.w * x,
-            self.a * u - self.b * v + self.c * x,
-            self.b * u + self.a * v,
-        )
-
-
-def circle(r=0.3, w=1.3, a=-0.1, b=0.37):
-    return jc.ForcedSystem(Circle(**numbers(r=r, w=w, a=a, b=b, c=0.4)), dimension=4)
-
-
-def cycle_of(system, r):
-    guess = (0.9 * r**0.5, 0.1, 0.1, 0.1)
-    spin = 20 if system.rates.a < 0 else 0  # the drive of an unstable pair would only blow it up
-    return jc.periodic_orbit(system, 1.25, guess=guess, revolutions=spin, period="free", method=METHOD)
-
-
-@pytest.mark.parametrize("r, a, b", [(0.3, -0.1, 0.37), (0.05, 0.2, 1.9), (1.0, -0.7, 0.05)])
-def test_multipliers_of_a_planted_limit_cycle(r, a, b):
-    """1, exp(-2 r T) and exp((a +- i b) T): exact."""
-    orbit = cycle_of(circle(r=r, a=a, b=b), r)
-    period = 2 * np.pi / 1.3
-    assert abs(orbit.period - period) < 1e-8
-    assert abs(jnp.hypot(*orbit.state[:2]) - r**0.5) < 1e-8
-    exact = [1, np.exp(-2 * r * period), np.exp((a + 1j * b) * period), np.exp((a - 1j * b) * period)]
-    for mu in exact:
-        assert np.min(np.abs(np.asarray(orbit.multipliers) - mu)) < 1e-8 * max(1, abs(mu))
-    assert bool(orbit.stable) == (a < 0)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("b", [0.37, 1.9])
-def test_torus_bifurcation_of_a_planted_limit_cycle(b):
-    """The pair leaves the unit circle at a = 0 with angle b T and rate T: exact. The drive is not resonant."""
-    system = circle(b=b, a=-0.05)
-    orbit = cycle_of(system, 0.3)
-    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", period="free", method=METHOD)
-    period = 2 * np.pi / 1.3
-    assert point.status == "converged"
-    assert abs(point.value) < 1e-8
-    assert abs(point.angle - abs(np.angle(np.exp(1j * b * period)))) < 1e-8
-    assert abs(point.transversality - period) < 1e-6
-    assert abs(point.speed - 1.3) < 1e-8
-
-
 class Planted(eqx.Module):
     """A driven orbit p(tau) around which the state turns by half a turn a period, with rates a + s and a - s."""
 
@@ -401,25 +298,3 @@ def test_torus_bifurcation_of_a_planted_driven_orbit(turn):
     critical = np.exp(1j * np.pi * 2 * turn + 0.3j * period)
     assert abs(point.angle - abs(np.angle(critical))) < 1e-8
     np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
-
-
-class Lure(eqx.Module):
-    a: jax.Array
-
-    def __call__(self, tau, y, speed):
-        x, u, f = y
-        return (u, f, -self.a * f - u - x + x * x)
-
-
-@pytest.mark.wide
-def test_period_doubling_of_the_lure_system():
-    """x''' + a x'' + x' + x = x^2, by DOP853, and by MatCont and BifurcationKit off their meshes."""
-    system = jc.ForcedSystem(Lure(**numbers(a=0.65)), dimension=3)
-    guess = (-0.373, 0.0, 0.577)  # a maximum of x'' by simulation, at a period of 6.360
-    orbit = jc.periodic_orbit(system, 2 * np.pi / 6.36, guess=guess, period="free", method=METHOD)
-    assert bool(orbit.stable)
-    point = jc.bifurcation(system, "period-doubling", orbit, "a", period="free", method=METHOD)
-    assert point.status == "converged"
-    assert all(agrees(point.value, theirs) for theirs in LURE)
-    # The divergence is -a everywhere.
-    assert abs(jnp.prod(point.multipliers).real - jnp.exp(-point.value * 2 * jnp.pi / point.speed)) < 1e-8

@@ -43,10 +43,8 @@ from ._literature import (
     FEIGENBAUM as FEIGENBAUM,
     LORENZ as LORENZ,
     LORENZ_DIMENSION as LORENZ_DIMENSION,
-    LURE as LURE,
     ROESSLER as ROESSLER,
     SHORT_BEARING as SHORT_BEARING,
-    VAN_DER_POL as VAN_DER_POL,
     VAN_DER_POL_LET_GO as VAN_DER_POL_LET_GO,
     Number as Number,
 )

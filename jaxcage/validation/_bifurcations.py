@@ -10,17 +10,15 @@ from scipy.special import mathieu_a, mathieu_b
 
 from .._types import Scalar, State
 from ..integrate import method
-from ..models import AbstractForcedSystem, ForcedOscillator, ForcedSystem
-from ..orbits import Orbit, bifurcation, periodic_orbit
+from ..models import ForcedOscillator, ForcedSystem
+from ..orbits import bifurcation, periodic_orbit
 from ._comparison import Comparison, beside, within
 from ._literature import (
     DUFFING_DOUBLINGS,
     DUFFING_FOLDS,
     DUFFING_SLOPES,
     FEIGENBAUM,
-    LURE,
     SHOOTING,
-    VAN_DER_POL,
     VAN_DER_POL_LET_GO,
 )
 from ._shooting import doubling, pendulum as pendulum_in_scipy
@@ -77,18 +75,9 @@ class Mathieu(eqx.Module):
         return (-(self.a - 2 * self.q * jnp.cos(tau)) * q[0],)
 
 
-class Lure(eqx.Module):
-    """x''' + a x'' + x' + x = x^2."""
-
-    a: jax.Array
-
-    def __call__(self, tau: Scalar, y: State, speed: Scalar) -> State:
-        return (y[1], y[2], -self.a * y[2] - y[1] - y[0] + y[0] ** 2)
-
-
 def bifurcation_comparisons() -> list[Comparison]:
     """All comparisons of orbits and their bifurcations."""
-    return [*_doublings(), *pendulum_comparisons(), *_folds(), *_van_der_pol(), *_mathieu(), *_lure()]
+    return [*_doublings(), *pendulum_comparisons(), *_folds(), *_van_der_pol(), *_mathieu()]
 
 
 def _duffing(d: float, k: float, g: float) -> ForcedOscillator:
@@ -155,20 +144,11 @@ def _folds() -> list[Comparison]:
 
 
 def _van_der_pol() -> list[Comparison]:
-    rows = []
-    for mu, (period, log_multiplier) in VAN_DER_POL.items():
-        system = ForcedSystem(VanDerPol(**_numbers(mu=mu, g=0.0)), dimension=2)
-        fine = method("rodas4", steps=2048)
-        orbit = periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=20, period="free", method=fine)
-        name = f"van der Pol, mu {mu:g}"
-        rows.append(beside(f"{name}: period", period, orbit.period))
-        logarithm = jnp.log(orbit.multipliers[1].real)
-        rows.append(beside(f"{name}: logarithm of the multiplier", log_multiplier, logarithm))
     driven = ForcedSystem(VanDerPol(**_numbers(mu=0.3, g=1.2)), dimension=2)
     held = periodic_orbit(driven, 1.3, guess=(-1.3, -0.4), method=FINE)
     point = bifurcation(driven, "Neimark-Sacker", held, "g", method=FINE)
     name = "van der Pol, mu 0.3, g cos 1.3t: g where it is let go (Neimark-Sacker)"
-    return [*rows, beside(name, VAN_DER_POL_LET_GO, point.value)]
+    return [beside(name, VAN_DER_POL_LET_GO, point.value)]
 
 
 def _mathieu() -> list[Comparison]:
@@ -185,12 +165,3 @@ def _mathieu() -> list[Comparison]:
         point = bifurcation(system, kind, ((0.0, 0.0), float(theirs) + 0.03), "a", speed=2.0, method=FINE)
         rows.append(within(f"Mathieu's equation: {name}", MATHIEU, float(theirs), point.value, 1e-8))
     return rows
-
-
-def _lure() -> list[Comparison]:
-    system: AbstractForcedSystem = ForcedSystem(Lure(**_numbers(a=0.65)), dimension=3)
-    start, speed = (-0.373, 0.0, 0.577), 2 * math.pi / 6.36
-    orbit: Orbit = periodic_orbit(system, speed, guess=start, period="free", method=FINE)
-    point = bifurcation(system, "period-doubling", orbit, "a", period="free", method=FINE)
-    name = "Lur'e x''' + a x'' + x' + x = x^2: a where the period doubles"
-    return [beside(name, theirs, point.value) for theirs in LURE]

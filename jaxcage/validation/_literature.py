@@ -34,7 +34,6 @@ SPROTT = "J. C. Sprott, Common Chaotic Systems (2004), sprott.physics.wisc.edu/c
 ENSEMBLE = "2048 runs of 500 periods in NumPy, Runge-Kutta on the variational equation (`validation/_shooting.py`)"
 DOP853 = "SciPy's DOP853 at 1e-12 with Newton's method on the variational equations"
 SHOOTING = f"{DOP853} (`validation/_shooting.py`)"
-COLLOCATION = "BifurcationKit's manual, Lur'e problem, and MatCont: by collocation, off their meshes"
 FEIGENBAUM_1978 = "M. J. Feigenbaum (1978): distances of period doublings shrink by 4.669..."
 
 # The short bearing, by entry of the stiffness matrix [N/m]; cut off, not rounded.
@@ -109,13 +108,5 @@ FEIGENBAUM = Number(4.669201609, 0.25, FEIGENBAUM_1978)
 # x'' + .1 x' + x + x^3 = .3 cos wt: w at the folds where the large orbit ends, and the small one.
 DUFFING_FOLDS = {"up": Number(1.77971952, 2e-8, DOP853), "down": Number(1.3242362, 1e-7, DOP853)}
 
-# Limit cycle of van der Pol's equation. mu: period, logarithm of the second multiplier.
-VAN_DER_POL = {
-    1.0: (Number(6.6632868593, 1e-9, DOP853), Number(-7.05893281, 1e-8, DOP853)),
-    0.1: (Number(6.2871112723, 1e-9, DOP853), Number(-0.6291039210, 1e-8, DOP853)),
-}
 VAN_DER_POL_LET_GO = Number(1.0175566306, 1e-9, DOP853)
 """x'' - .3 (1 - x^2) x' + x = g cos 1.3t: g where the drive lets go of the oscillator."""
-
-LURE = (Number(0.63031334, 2e-5, COLLOCATION), Number(0.6303020062, 1e-9, DOP853))
-"""x''' + a x'' + x' + x = x^2: a where the period doubles."""
