@@ -492,12 +492,6 @@ def test_an_orbit_at_the_end_of_the_range_is_followed():
     assert branch.value.max() > 0.8 and branch.ended == ("range", "steps")
 
 
-def test_many_branches_ask_for_a_range_too():
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    with pytest.raises(ValueError, match="`orbits` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"):
-        jc.orbits.branches([hardening()], [orbit], lower=1.0, upper=2.0, method=METHOD)
-
-
 def test_parameter_without_a_speed():
     with pytest.raises(ValueError, match="`speed` must be given where the parameter is"):
         jc.branch(hardening(), ((0.5, 0.0), 0.3), "g", lower=0.1, upper=0.5, method=METHOD)

@@ -23,7 +23,7 @@
 from .._arguments import check_layer
 from ._arclength import Steps as Steps
 from ._bifurcation import bifurcation as bifurcation
-from ._branch import Branch as Branch, branch as branch, branches as branches
+from ._branch import Branch as Branch, branch as branch
 from ._cascade import Cascade as Cascade, cascade as cascade, doubled_branch as doubled_branch
 from ._curve import Curve as Curve, curve as curve
 from ._loss import Explained as Explained, LossZones as LossZones, explain as explain, loss_zones as loss_zones
@@ -57,6 +57,6 @@ from ._sensitivity import (
 
 check_layer(
     globals(),
-    "bifurcation branch branches cascade coexisting_orbits curve doubled_branch "
+    "bifurcation branch cascade coexisting_orbits curve doubled_branch "
     "explain leading_multiplier loss_zones periodic_orbit sensitivities sensitivity synchronous_orbits",
 )

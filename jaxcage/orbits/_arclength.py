@@ -113,9 +113,7 @@ def _correct(
     return jax.lax.scan(turn, (at, normal), jnp.array([False, True]))[1]
 
 
-_axes = eqx.if_array(0)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, 0, 0, 0, None, None)), "correct shared")
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, 0, 0, 0, None, None)), "correct own")
+_correct_lanes = compiled(eqx.filter_vmap(_correct, in_axes=(eqx.if_array(0), None, 0, 0, 0, None, None)), "correct")
 
 
 def take(tree: Any, lanes: Any) -> Any:
@@ -151,13 +149,10 @@ class Curves(NamedTuple):
     """Their arrays with the lanes first."""
     given: Any
     counts: Counts
-    own_given: bool = False
-    """Whether the lanes come first in what is given too; else it is the same for all."""
 
     def take(self, lanes: Any) -> "Curves":
         """Some of them."""
-        mine = take(self.given, lanes) if self.own_given else self.given
-        return self._replace(equations=take(self.equations, lanes), given=mine)
+        return self._replace(equations=take(self.equations, lanes))
 
     @property
     def chooses(self) -> bool:
@@ -178,7 +173,6 @@ def correct(
     **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step, of all or
     each; whether errors are wanted too, by one step of Newton's method with half the steps.
     """
-    run = _correct_own if curves.own_given else _correct_shared
     measured = measured and int(curves.counts.last) > 1
     tolerance = np.broadcast_to(np.asarray(tolerance, dtype=float), len(at))
     chunks = []
@@ -190,7 +184,7 @@ def correct(
     def part(k: np.ndarray) -> Corrected:
         some = curves.take(k)
         numbers = (np.asarray(x) for x in (at[k], normal[k], tolerance[k], steps[k[0]], measured))
-        return jax.tree.map(np.asarray, run(some.equations, some.given, *numbers))
+        return jax.tree.map(np.asarray, _correct_lanes(some.equations, some.given, *numbers))
 
     if len(chunks) == 1:
         parts = [part(chunks[0])]
@@ -262,7 +256,7 @@ class Trace(NamedTuple):
     ended: str
     """`range`: it left the range; `closed`: it came back to where it began; `steps`: the number of steps was reached;
     `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step; `inaccurate`:
-    by the finest steps allowed the next point is not known any more, as towards a homoclinic orbit."""
+    by the finest steps allowed the next point is not known any more."""
 
 
 def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:

@@ -213,10 +213,9 @@ def _along_branch(
     name = parameter if isinstance(parameter, str) else "the parameter"
     say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if name == SPEED else f"{x:.6g}"
     away = reach * (abs(start[1]) or 1.0)
-    follower = make_follower(given, parameter, start[1] - away, start[1] + away, method)
-    follower = stable_steps(follower, start, periods)
-    frame = follower.frame(start[1], periods)
-    first = seeds(follower, frame, [start])
+    follower = make_follower(given, parameter, start[1] - away, start[1] + away, method, periods)
+    follower = stable_steps(follower.around(start[1]), start)
+    first = seeds(follower, [start])
     if not first.converged[0]:
         return None, f"no orbit near the guess at {name} = {say(start[1])} to follow"
     reached: list[float] = []
@@ -232,8 +231,8 @@ def _along_branch(
         return bool(reached) and far > min(reached)
 
     both = turned(take(first, np.zeros(2, dtype=int)), np.array([1.0, -1.0]))
-    up, down = follow(follower.curves(frame, [0, 0]), both, steps=WALK, inside=follower.inside, stop=stop)
-    (found,) = describe(follower, frame, [joined(follower, up, down)])
+    up, down = follow(follower.curves(2), both, steps=WALK, inside=follower.inside, stop=stop)
+    (found,) = describe(follower, [joined(follower, up, down)])
     low, high = (say(float(f(found.value))) for f in (np.min, np.max))
     looked = f"looked along the branch of its orbit, {name} from {low} to {high} (ends: {', '.join(found.ended)})"
     mine = [p for p in found.special if p.kind == kind and p.status == "converged"]

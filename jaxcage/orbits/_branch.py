@@ -3,8 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -31,7 +29,7 @@ from ._follower import (
 from ._located import Seen, account
 from ._orbit import NearOrbit, Orbit, guess_state
 from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
-from ._problem import SPEED, Frame, Given, Parameter
+from ._problem import SPEED, Given, Parameter
 from ._steps import SETTLED
 
 
@@ -116,64 +114,26 @@ def branch(
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_within("orbit", float(at), lower, upper)
     given = Given(system, jnp.asarray(known_speed, dtype=float))
-    follower = make_follower(given, parameter, lower, upper, method)
+    follower = make_follower(given, parameter, lower, upper, method, periods)
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
         follower = by_rodas4(follower)
     state = guess_state(system, known_speed, state)
-    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], periods, steps)
+    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], steps)
     if found is None:
         raise ArgumentError("orbit", said=f"must be near a periodic orbit, but none is near it at {float(at):g}.")
     return found
 
 
-def branches(
-    systems: Sequence[AbstractForcedSystem],
-    orbits: Sequence[Orbit | Point],
-    parameter: Parameter = SPEED,
-    *,
-    lower: float,
-    upper: float,
-    speed: Scalar | None = None,
-    steps: Steps = Steps(),
-    method: AbstractMethod | None = None,
-) -> list[Branch | None]:
-    """The branches of many designs at a time, each from its own orbit: lanes of one continuation.
-
-    **Arguments:** systems that differ in their numbers only; an orbit of each, all of as many periods; the rest as for
-    `branch`.
-
-    **Returns:** a `Branch` per system; None where Newton's method finds no orbit to start from.
-    """
-    require_x64()
-    require_range(parameter, lower, upper)
-    if not systems or len(systems) != len(orbits):
-        raise ArgumentError(
-            "systems", "orbits", said=f"must be as many, above 0, but are {len(systems)} and {len(orbits)}."
-        )
-    starts = []
-    for system, orbit in zip(systems, orbits, strict=True):
-        at = orbit.speed if speed is None else speed
-        value = float(value_at(orbit, system, at, parameter))
-        require_within("orbits", value, lower, upper)
-        starts.append((np.asarray(orbit.state), value))
-    known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
-    each = [Given(s, known_speed) for s in systems]
-    given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
-    follower = make_follower(given, parameter, lower, upper, method, designs=True)
-    return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
-
-
 def follow_both_ways(
-    follower: Follower, starts: Sequence[Start], periods: int, steps: Steps, patience: int | None = None
+    follower: Follower, starts: Sequence[Start], steps: Steps, patience: int | None = None
 ) -> list[Branch | None]:
     """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one.
 
     A lane that comes upon what another has followed ends there: one branch may come in two parts. With `patience`, a
     lane also ends after so many unstable orbits in a row: there is no end to how such a branch can wind.
     """
-    follower = stable_steps(follower, starts[0], periods)
-    frame = follower.frame(starts[0][1], periods)
-    first = seeds(follower, frame, starts)
+    follower = stable_steps(follower.around(starts[0][1]), starts[0])
+    first = seeds(follower, starts)
     count = len(starts)
     lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
     taken = ~first.converged
@@ -188,17 +148,15 @@ def follow_both_ways(
         unstable[lane] = 0 if calm else unstable[lane] + 1
         if taken[own] or (patience is not None and unstable[lane] >= patience):
             return True
-        if follower.designs:
-            return False
         for other in range(own + 1, count):
             taken[other] |= passes(*step, first.u[other][None])
         others = [p.u for k, row in walked.items() if k % count != own and not taken[k % count] for p in row]
         return bool(others) and passes(*step, np.stack(others))
 
     both = turned(take(first, lanes), sign)
-    traces = follow(follower.curves(frame, lanes), both, steps=steps, inside=follower.inside, stop=stop)
+    traces = follow(follower.curves(2 * count), both, steps=steps, inside=follower.inside, stop=stop)
     kept = [i for i in range(count) if not taken[i]]
-    found = describe(follower, frame, [joined(follower, traces[i], traces[i + count]) for i in kept], kept)
+    found = describe(follower, [joined(follower, traces[i], traces[i + count]) for i in kept])
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
 
 
@@ -216,26 +174,19 @@ def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple
     return in_a_row(down.points, up.points), (down.ended, up.ended)
 
 
-def describe(
-    follower: Follower,
-    frame: Frame,
-    traces: Sequence[tuple[Corrected, tuple[str, str]]],
-    lanes: Sequence[int] = (0,),
-) -> list[Branch]:
-    """Branches from their points and lanes, with special points located, all at once."""
-    rows = account(follower, frame, [points for points, _ in traces], lanes)
-    return [_branch(follower, frame, *row, ended) for row, (_, ended) in zip(rows, traces, strict=True)]
+def describe(follower: Follower, traces: Sequence[tuple[Corrected, tuple[str, str]]]) -> list[Branch]:
+    """Branches from their points, with special points located, all at once."""
+    rows = account(follower, [points for points, _ in traces])
+    return [_branch(follower, *row, ended) for row, (_, ended) in zip(rows, traces, strict=True)]
 
 
-def _branch(
-    follower: Follower, frame: Frame, points: Corrected, seen: Sequence[Seen], ended: tuple[str, str]
-) -> Branch:
+def _branch(follower: Follower, points: Corrected, seen: Sequence[Seen], ended: tuple[str, str]) -> Branch:
     multipliers = follower.multipliers(points)
     stable = follower.unstable(points) == 0
     n = follower.problem.dimension
-    scale = np.asarray(frame.scale)
+    scale, periods = np.asarray(follower.frame.scale), int(follower.frame.periods)
     name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
-    fixed = None if name == SPEED else float(follower.of(0).speed)
+    fixed = None if name == SPEED else float(follower.given.speed)
     speed = lambda u: u[..., -1] * follower.unit if fixed is None else np.full(u.shape[:-1], fixed)
     special = []
     before = [found.after for found in seen]
@@ -255,7 +206,7 @@ def _branch(
                 kind=kind,
                 speed=float(speed(p.u)) * known,
                 state=p.u[:n] * scale,
-                periods=int(frame.periods),
+                periods=periods,
                 steps=int(p.steps),
                 parameter=name,
                 value=at * known,
@@ -277,6 +228,6 @@ def _branch(
         steps=points.steps,
         error=points.error,
         special=tuple(special),
-        periods=int(frame.periods),
+        periods=periods,
         ended=ended,
     )

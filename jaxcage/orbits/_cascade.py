@@ -15,7 +15,7 @@ from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
 from ._follower import Follower, make_follower, require_range
 from ._point import Point, require_found
-from ._problem import SPEED, Frame, Given, Parameter
+from ._problem import SPEED, Given, Parameter
 from ._singularity import test_functions
 
 
@@ -98,10 +98,9 @@ def doubled_branch(
     require_found(point, point.value)
     at, periods = float(point.value), int(point.periods)
     given = Given(system, jnp.asarray(point.speed if speed is None else speed, dtype=float))
-    follower = make_follower(given, parameter, lower, upper, method)
-    frame = follower.frame(at, 2 * periods)
-    curves = follower.curves(frame, [0])
-    scale = np.asarray(frame.scale)
+    follower = make_follower(given, parameter, lower, upper, method).around(at, 2 * periods)
+    curves, half = follower.curves(1), follower.around(at, periods)
+    scale = np.asarray(follower.frame.scale)
     u = np.array([[*(np.asarray(point.state) / scale), at / follower.unit]])
     across = np.zeros_like(u)
     across[0, : scale.size] = np.asarray(point.direction) / scale
@@ -109,22 +108,25 @@ def doubled_branch(
     while amplitude > SMALLEST_AMPLITUDE:
         start = settle_on(curves, u + amplitude * across, across, int(point.steps))
         near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        if near and _doubling(follower, start)[0] > 0 and _half_way(follower, frame, start, across) > amplitude:
+        if (
+            near
+            and _doubling(follower, start)[0] > 0
+            and _half_way(follower.around(at, periods), start, across) > amplitude
+        ):
             break
         amplitude /= 4
     else:
         raise ArgumentError("point", said=f"must be a period doubling, but no doubled branch begins at {at:g}.")
     stop = lambda lane, points: until_doubling and bool(_doubling(follower, points[-1]) < 0)
     (trace,) = follow(curves, start, steps=steps, inside=follower.inside, stop=stop)
-    (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])
+    (found,) = describe(follower, [(trace.points, ("doubling", trace.ended))])
     return found
 
 
-def _half_way(follower: Follower, frame: Frame, start: Corrected, across: np.ndarray) -> float:
+def _half_way(half: Follower, start: Corrected, across: np.ndarray) -> float:
     """How far an orbit is from where it began after half of its revolutions, in units of the system's scale: twice the
     amplitude if it doubled, nothing if it is the orbit that doubles, there or later."""
-    half = follower.curves(frame._replace(periods=frame.periods // 2), [0])
-    once = correct(half, start.u, across, start.steps, ONCE)
+    once = correct(half.curves(1), start.u, across, start.steps, ONCE)
     return float(np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0]))
 
 

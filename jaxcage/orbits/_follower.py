@@ -1,5 +1,6 @@
 """What the lanes of one continuation of orbits over a parameter share, its first points, and multipliers along it."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -28,30 +29,28 @@ class Follower(eqx.Module):
     problem: OrbitProblem
     counts: Counts
     given: Given
+    frame: Frame
     lower: float
     upper: float
-    unit: float
-    designs: bool = eqx.field(static=True, default=False)
-    """Whether every lane has a system of its own, stacked in `given`."""
 
-    def of(self, lanes: Any) -> Given:
-        """What is given in these lanes."""
-        return take(self.given, np.asarray(lanes)) if self.designs else self.given
-
-    def curves(self, frame: Frame, lanes: Any) -> Curves:
-        """The branches of these lanes."""
-        equations = stack(OrbitEquations(self.problem, frame), len(lanes))
-        return Curves(equations, self.of(lanes), self.counts, self.designs)
+    @property
+    def unit(self) -> float:
+        """Unit of the parameter."""
+        return (self.upper - self.lower) / 20
 
     @property
     def parameter(self) -> Parameter:
         return self.problem.parameters[0]
 
-    def frame(self, at: Scalar, periods: Any) -> Frame:
-        """The frame of all lanes, as it is at a value of the parameter."""
-        given = self.of(0)
-        there = with_value(given.system, given.speed, self.parameter, jnp.asarray(at, dtype=float))
-        return make_frame(Given(*there), jnp.full(1, self.unit), periods)
+    def around(self, at: Scalar, periods: Any = None) -> "Follower":
+        """The same in the system's scale at a value of the parameter, with other periods if they are given."""
+        there = with_value(self.given.system, self.given.speed, self.parameter, jnp.asarray(at, dtype=float))
+        periods = self.frame.periods if periods is None else periods
+        return dataclasses.replace(self, frame=make_frame(Given(*there), self.frame.units, periods))
+
+    def curves(self, lanes: int) -> Curves:
+        """The branches of so many lanes."""
+        return Curves(stack(OrbitEquations(self.problem, self.frame), lanes), self.given, self.counts)
 
     def inside(self, u: np.ndarray) -> np.ndarray:
         """Whether the parameter is within the range."""
@@ -95,26 +94,28 @@ def require_within(name: str, at: float, lower: float, upper: float) -> None:
 
 
 def make_follower(
-    given: Given, parameter: Parameter, lower: float, upper: float, method: AbstractMethod | None, designs: bool = False
+    given: Given, parameter: Parameter, lower: float, upper: float, method: AbstractMethod | None, periods: int = 1
 ) -> Follower:
+    """A follower in the system's scale at its own speed."""
     chosen, counts = counted(method)
     problem = OrbitProblem(chosen, given.system.dimension, (parameter,))
-    return Follower(problem, counts, given, lower, upper, (upper - lower) / 20, designs)
+    frame = make_frame(given, jnp.full(1, (upper - lower) / 20), periods)
+    return Follower(problem, counts, given, frame, lower, upper)
 
 
-def seeds(follower: Follower, frame: Frame, starts: Sequence[Start]) -> Corrected:
+def seeds(follower: Follower, starts: Sequence[Start]) -> Corrected:
     """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
-    u = np.array([[*(s / np.asarray(frame.scale)), p / follower.unit] for s, p in starts])
+    u = np.array([[*(s / np.asarray(follower.frame.scale)), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return settle_on(follower.curves(frame, range(len(starts))), u, normal)
+    return settle_on(follower.curves(len(u)), u, normal)
 
 
-def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
+def stable_steps(follower: Follower, start: Start) -> Follower:
     """The follower itself or, where it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
     if not follower.counts.tolerance > 0:
         return follower
-    (u,) = seeds(follower, follower.frame(start[1], periods), [start]).jacobian
+    (u,) = seeds(follower.around(start[1]), [start]).jacobian
     return follower if np.all(np.isfinite(u)) else by_rodas4(follower)
 
 

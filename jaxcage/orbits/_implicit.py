@@ -161,7 +161,7 @@ def solve(
     unknown = lambda *shape: jnp.full(shape, jnp.inf)
     n, like = guess.size, eqx.filter_eval_shape(equations.linearised, guess, given)[2]
     begin = Newton(guess, unknown(n, n), unknown(n), unknown(n), jnp.ones(()), jnp.asarray(skip))
-    start = 0, guess, guess, begin, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
+    start = jnp.zeros((), int), guess, guess, begin, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
     on = lambda carry: (carry[0] < max_steps) & ~ended(carry[1], carry[3])[0]
     i, tried, u, newton, aux = jax.lax.while_loop(on, turn, start)
     return u, Found(ended(tried, newton)[1], i, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))

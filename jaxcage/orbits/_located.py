@@ -15,7 +15,6 @@ from jaxtyping import Float
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
 from ._follower import Follower
 from ._point import UNEXPLAINED
-from ._problem import Frame
 from ._singularity import matches, test_functions
 from ._steps import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
@@ -62,9 +61,7 @@ class Seen(NamedTuple):
     """Distance to the place by half the steps [SI]."""
 
 
-def account(
-    follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes: Sequence[int]
-) -> list[tuple[Corrected, list[Seen]]]:
+def account(follower: Follower, rows: Sequence[Corrected]) -> list[tuple[Corrected, list[Seen]]]:
     """The orbits of branches, and their bifurcations in order.
 
     Where the count of unstable multipliers changes from one orbit to another by what was seen between them does not
@@ -73,20 +70,16 @@ def account(
     the list, of the kind `unexplained`: there the branch cannot be trusted to be one. Between any two bifurcations
     there is an orbit, that tells whether those between them are stable.
     """
-    rows = [_at_the_root(follower, frame, row, lane) for row, lane in zip(rows, lanes, strict=True)]
-    rows = [_halved(follower, frame, row, lane) for row, lane in zip(rows, lanes, strict=True)]
-    seen = _located(follower, frame, rows, lanes)
+    rows = [_halved(follower, _at_the_root(follower, row)) for row in rows]
+    seen = _located(follower, rows)
     left = lambda i: _gaps(follower, rows[i], [(s.after, s.kind) for s in seen[i]])
     doubtful = [i for i in range(len(rows)) if left(i)]
-    of = [lanes[i] for i in doubtful]
-    again = [_again(follower, frame, rows[i], lanes[i], left(i)) for i in doubtful]
-    again = [_halved(follower, frame, row, lane) for row, lane in zip(again, of, strict=True)]
-    for i, row, mine in zip(doubtful, again, _located(follower, frame, again, of), strict=True):
+    again = [_halved(follower, _again(follower, rows[i], left(i))) for i in doubtful]
+    for i, row, mine in zip(doubtful, again, _located(follower, again), strict=True):
         rows[i], seen[i] = row, mine
-    for i, lane in enumerate(lanes):
-        rows[i], seen[i] = _parted(follower, frame, rows[i], lane, seen[i])
     found = []
-    for i, (row, mine) in enumerate(zip(rows, seen, strict=True)):
+    for i in range(len(rows)):
+        rows[i], seen[i] = row, mine = _parted(follower, rows[i], seen[i])
         for a, b in left(i):
             k = a + int(np.argmax(np.diff(follower.unstable(row)[a : b + 1]) != 0))
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1])))) * follower.unit
@@ -96,12 +89,12 @@ def account(
     return found
 
 
-def _at_the_root(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
+def _at_the_root(follower: Follower, row: Corrected) -> Corrected:
     """The orbits with derivatives at them, where those of the last step before them are not the same."""
     steep = np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP)
     if not steep.size:
         return row
-    got = correct(follower.curves(frame, [lane] * steep.size), row.u[steep], row.tangent[steep], row.steps[steep])
+    got = correct(follower.curves(steep.size), row.u[steep], row.tangent[steep], row.steps[steep])
     good = got.converged
     return put(row, steep[good], measured_as(take(got, good), take(row, steep[good])))
 
@@ -112,9 +105,7 @@ def _in_order(row: Corrected, seen: Sequence[Seen]) -> list[Seen]:
     return sorted(seen, key=lambda s: (s.after, along(s)))
 
 
-def _parted(
-    follower: Follower, frame: Frame, row: Corrected, lane: int, seen: Sequence[Seen]
-) -> tuple[Corrected, list[Seen]]:
+def _parted(follower: Follower, row: Corrected, seen: Sequence[Seen]) -> tuple[Corrected, list[Seen]]:
     """The orbits with one more between bifurcations that are in the same step, and the bifurcations after theirs."""
     seen = _in_order(row, seen)
     far = lambda a, b: bool(np.linalg.norm(b.point.u - a.point.u) > APART)
@@ -123,18 +114,18 @@ def _parted(
         return row, seen
     places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(s.point for s in seen))
     after = np.array([seen[k].after for k in pairs])
-    row, good = _with_middles(follower, frame, row, lane, after, take(places, pairs), take(places, pairs + 1))
+    row, good = _with_middles(follower, row, after, take(places, pairs), take(places, pairs + 1))
     return row, [s._replace(after=s.after + int(np.sum(pairs[good] < k))) for k, s in enumerate(seen)]
 
 
 def _with_middles(
-    follower: Follower, frame: Frame, row: Corrected, lane: int, after: np.ndarray, one: Corrected, other: Corrected
+    follower: Follower, row: Corrected, after: np.ndarray, one: Corrected, other: Corrected
 ) -> tuple[Corrected, np.ndarray]:
     """The orbits with further ones `after` these, halfway from one to another; and which of them were found."""
     chord = other.u - one.u
     length = np.linalg.norm(chord, axis=1)
     middle, normal = one.u + chord / 2, chord / length[:, None]
-    got = correct(follower.curves(frame, [lane] * len(after)), middle, normal, np.maximum(one.steps, other.steps))
+    got = correct(follower.curves(len(after)), middle, normal, np.maximum(one.steps, other.steps))
     good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length / 2)
     new = measured_as(take(got, good), take(row, after[good]))
     return jax.tree.map(lambda x, y: np.insert(x, after[good] + 1, y, axis=0), row, new), good
@@ -191,7 +182,7 @@ def dips(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " s
     return sorted(found)
 
 
-def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corrected:
+def _halved(follower: Follower, row: Corrected) -> Corrected:
     """The orbits with further ones in steps over which their stability changes unseen, or may do so twice."""
     for _ in range(HALVINGS):
         gaps = sorted({*_gaps(follower, row, _likely(follower, row)), *_dips(follower, row)})
@@ -202,29 +193,28 @@ def _halved(follower: Follower, frame: Frame, row: Corrected, lane: int) -> Corr
         after = np.array([k for k in longest if length[k] > APART], dtype=int)
         if not after.size:
             break
-        row, good = _with_middles(follower, frame, row, lane, after, take(row, after), take(row, after + 1))
+        row, good = _with_middles(follower, row, after, take(row, after), take(row, after + 1))
         if not np.any(good):
             break
     return row
 
 
-def _again(follower: Follower, frame: Frame, row: Corrected, lane: int, gaps: Sequence[tuple[int, int]]) -> Corrected:
+def _again(follower: Follower, row: Corrected, gaps: Sequence[tuple[int, int]]) -> Corrected:
     """The orbits with those around the gaps solved for once more, each gap by steps of one length and twice as many."""
     for a, b in gaps:
         near = np.arange(max(a - 1, 0), min(b + 2, len(row.u)))
-        most = int(follower.counts.last)
-        steps = np.full(near.size, min(2 * int(row.steps[near].max()), most))
-        got = correct(follower.curves(frame, [lane] * near.size), row.u[near], row.tangent[near], steps)
+        steps = np.full(near.size, min(2 * int(row.steps[near].max()), int(follower.counts.last)))
+        got = correct(follower.curves(near.size), row.u[near], row.tangent[near], steps)
         got = measured_as(got, take(row, near))
         good = np.flatnonzero(got.converged)
         row = put(row, near[good], take(got, good))
     return row
 
 
-def _located(follower: Follower, frame: Frame, rows: Sequence[Corrected], lanes: Sequence[int]) -> list[list[Seen]]:
+def _located(follower: Follower, rows: Sequence[Corrected]) -> list[list[Seen]]:
     """What was seen on each branch, as far as it is there."""
     wanted = [(i, k, kind) for i, row in enumerate(rows) for k, kind in brackets(follower, row)]
-    places = locate(follower, frame, [(lanes[i], rows[i], k, kind) for i, k, kind in wanted])
+    places = locate(follower, [(rows[i], k, kind) for i, k, kind in wanted])
     seen: list[list[Seen]] = [[] for _ in rows]
     for (i, k, kind), place in zip(wanted, places, strict=True):
         if place is not None and matches(kind, follower.multipliers(place[0])):
@@ -246,10 +236,8 @@ def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
     return sorted((int(k), kind) for kind, f in values.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0))
 
 
-def locate(
-    follower: Follower, frame: Frame, wanted: Sequence[tuple[int, Corrected, int, str]]
-) -> list[tuple[Corrected, float] | None]:
-    """Where the test functions of (lane, points, index, kind) vanish, and the distance [SI] to the place by half the
+def locate(follower: Follower, wanted: Sequence[tuple[Corrected, int, str]]) -> list[tuple[Corrected, float] | None]:
+    """Where the test functions of (points, index, kind) vanish, and the distance [SI] to the place by half the
     steps; None where that could not be found.
 
     A branch point, where the curve's equations are singular, may be found by some steps and not by others: its error is
@@ -257,16 +245,16 @@ def locate(
     """
     if not wanted:
         return []
-    curves = follower.curves(frame, [lane for lane, *_ in wanted])
+    curves = follower.curves(len(wanted))
     kinds = [kind for *_, kind in wanted]
     chooses, most = curves.chooses, MOST_OF_A_POINT if curves.chooses else int(curves.counts.last)
     steps = np.full(len(wanted), int(curves.counts.first))
     if chooses:
-        steps = np.array([points.steps[k : k + 2].max() for _, points, k, _ in wanted])
+        steps = np.array([points.steps[k : k + 2].max() for points, k, _ in wanted])
 
     def between(i: int, beyond: int | None) -> Corrected | None:
         """Points on both sides of it: of the branch, so many orbits further out, or close to where it was found."""
-        _, points, k, _ = wanted[i]
+        points, k, _ = wanted[i]
         if beyond is not None:
             return take(points, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(points.u) - 1)]))
         place = found[i]
@@ -286,7 +274,7 @@ def locate(
                 placed.update(zip(some, there, strict=True))
         return list(placed.values())
 
-    moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for _, points, k, _ in wanted])
+    moved = np.array([BESIDE / 2 * np.linalg.norm(points.u[k + 1] - points.u[k]) for points, k, _ in wanted])
     within = np.full(len(wanted), LOCATED)
     found: list[Corrected | None] = [None] * len(wanted)
     found = at(list(range(len(wanted))))

@@ -261,7 +261,7 @@ def synchronous_orbits(
     met = _met(settled)
     if met:
         middle = met[len(met) // 2]
-        follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])), 1)
+        follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])))
     orbits = _stable_orbits(follower, settled, scale)
     waiting = sorted(orbits + _stable_orbits(follower, opposite, scale), key=lambda o: o.speed)
     branches: list[Branch] = []
@@ -269,9 +269,7 @@ def synchronous_orbits(
         if not waiting:
             break
         say("branches", turn, ROUNDS)
-        branches += [
-            b for b in follow_both_ways(follower, _spread(waiting, ROUND), 1, steps, PATIENCE) if b is not None
-        ]
+        branches += [b for b in follow_both_ways(follower, _spread(waiting, ROUND), steps, PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w, scale(w.speed)) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi
@@ -308,11 +306,11 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
-    frame = follower.frame(met[0][1], 1)
-    points = seeds(follower, frame, met)
+    follower = follower.around(met[0][1])
+    points = seeds(follower, met)
     good = points.converged.copy()
     good[good] = follower.unstable(take(points, good)) == 0
-    states = points.u[:, :-1] * np.asarray(frame.scale)
+    states = points.u[:, :-1] * np.asarray(follower.frame.scale)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
 
