@@ -86,13 +86,7 @@ class Corrected(NamedTuple):
 
 
 def _correct(
-    curve: AbstractMapEquations,
-    given: Any,
-    at: Array,
-    normal: Array,
-    tolerance: Array,
-    steps: Array,
-    halved: Array,
+    curve: AbstractMapEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
 ) -> Corrected:
     """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
 

@@ -108,11 +108,7 @@ def doubled_branch(
     while amplitude > SMALLEST_AMPLITUDE:
         start = settle_on(curves, u + amplitude * across, across, int(point.steps))
         near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        if (
-            near
-            and _doubling(follower, start)[0] > 0
-            and _half_way(follower.around(at, periods), start, across) > amplitude
-        ):
+        if near and _doubling(follower, start)[0] > 0 and _half_way(half, start, across) > amplitude:
             break
         amplitude /= 4
     else:

@@ -312,12 +312,7 @@ def _sides(place: Corrected, apart: float) -> Corrected:
 
 
 def _zeros(
-    follower: Follower,
-    curves: Curves,
-    ends: Sequence[Corrected],
-    kinds: Sequence[str],
-    steps: np.ndarray,
-    within: Any,
+    follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray, within: Any
 ) -> list[Corrected | None]:
     """Where the test functions vanish between two orbits each, these solved for again by so many steps.
 

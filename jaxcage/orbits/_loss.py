@@ -72,10 +72,7 @@ class _Group:
 
     def apart(self, other: "_Group") -> float:
         """Width of the gap between two groups [rpm], negative where they overlap."""
-        return max(
-            other.low.lower_rpm - self.high.upper_rpm,
-            self.low.lower_rpm - other.high.upper_rpm,
-        )
+        return max(other.low.lower_rpm - self.high.upper_rpm, self.low.lower_rpm - other.high.upper_rpm)
 
     @property
     def width(self) -> float:

@@ -212,13 +212,7 @@ def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, 
 
 @compiled
 def _find(
-    problem: OrbitProblem,
-    counts: Counts,
-    spinning: Counts,
-    given: Given,
-    guess: Array,
-    periods: Any,
-    revolutions: Any,
+    problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, periods: Any, revolutions: Any
 ) -> tuple[Orbit, OrbitEquations, Array]:
     """The orbit, without derivatives; its equations and unknowns."""
     if revolutions is not None:

@@ -218,10 +218,7 @@ def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMetho
 
 
 def sensitivity(
-    system: AbstractForcedSystem,
-    point: Point,
-    name: str = "edge",
-    method: AbstractMethod | None = None,
+    system: AbstractForcedSystem, point: Point, name: str = "edge", method: AbstractMethod | None = None
 ) -> Sensitivity:
     """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
@@ -263,11 +260,7 @@ def sensitivity(
 
 
 def _nowhere(
-    system: AbstractForcedSystem,
-    kind: str,
-    name: str,
-    status: str = "no such point",
-    error_rpm: float = float("nan"),
+    system: AbstractForcedSystem, kind: str, name: str, status: str = "no such point", error_rpm: float = float("nan")
 ) -> Sensitivity:
     """What is known of an edge that was not found again, or elsewhere."""
     nan = float("nan")
