@@ -34,7 +34,7 @@ from jaxcage.integrate._program import Sizes, pieces, program_of
 from jaxcage.models._field import _columns
 from jaxcage.orbits._implicit import differentiated
 from jaxcage.orbits._orbit import OrbitEquations
-from jaxcage.orbits._problem import Given, OrbitProblem, make_frame
+from jaxcage.orbits._problem import Given, make_problem
 from jaxcage.sweeps import _engine
 
 
@@ -444,15 +444,14 @@ def test_one_program_serves_all_numbers_of_steps():
 @pytest.mark.parametrize("kind", ["cage", slow("elastic rib")])
 def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):
     """The orbit's equations linearised at once, against their derivative by `jacfwd`; away from any orbit."""
-    system, parameters, speed = MODEL, ("speed", "guidance_gap"), jnp.asarray(SPEEDS[2])
+    system, speed = MODEL, jnp.asarray(SPEEDS[2])
     if kind == "elastic rib":
         rib = jc.forces.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=0.0)
         system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.forces.RigidRib))
-    problem = OrbitProblem(method(solver, steps=96), system.dimension, parameters)
-    given = Given(system, speed)
-    frame = make_frame(given, jnp.asarray([float(speed), float(MODEL.guidance_gap)]) / 10, 2)
-    u = jnp.append(jnp.asarray(system.starts(speed)[1]) / frame.scale, jnp.full(2, 10.0))
-    equations = OrbitEquations(problem, frame)
+    given, units = Given(system, speed), jnp.asarray([float(speed), float(MODEL.guidance_gap)]) / 10
+    problem = make_problem(given, ("speed", "guidance_gap"), units, 2, method(solver, steps=96))
+    u = jnp.append(jnp.asarray(system.starts(speed)[1]) / problem.scale, jnp.full(2, 10.0))
+    equations = OrbitEquations(problem)
     r, jacobian, _ = compiled(lambda u: equations.linearised(u, given))(u)
     expected_r, expected, _ = compiled(lambda u: differentiated(equations, u, given))(u)
     np.testing.assert_allclose(r, expected_r, rtol=0, atol=1e-10)

@@ -21,7 +21,7 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
-from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, solve
+from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, SETTLED, Counts, by_steps
 
 
@@ -54,19 +54,6 @@ CROSSED, ASIDE = 1e-4, 0.01
 crosses another, and the step is taken in one from so far off: near the crossing tangents are lost to rounding."""
 
 
-class OnPlane(AbstractEquations):
-    """Equations of a curve, on the plane through `at` across `normal`."""
-
-    curve: AbstractMapEquations
-    at: Float[Array, " n"]
-    normal: Float[Array, " n"]
-
-    def linearised(self, u: Array, given: Any) -> tuple[Array, Array, Any]:
-        r, jacobian, aux = self.curve.linearised(u, given)
-        off = jnp.dot(self.normal, u - self.at)
-        return jnp.append(r, off), jnp.concatenate([jacobian, self.normal[None]]), aux
-
-
 class Corrected(NamedTuple):
     """Points of curves, NumPy arrays with the lanes first: unknowns (n), tangent (n), Jacobian (m x n), and so on."""
 
@@ -79,14 +66,14 @@ class Corrected(NamedTuple):
     steps: Any
     """Steps per revolution."""
     error: Any
-    """Distance to what half the steps give, and the same over what is allowed (see `AbstractMapEquations.apart`)."""
+    """Distance to what half the steps give, and the same over what is allowed (see `AbstractEquations.apart`)."""
     over: Any
     moved: Any
     """The same in the unknowns' units."""
 
 
 def _correct(
-    curve: AbstractMapEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
+    curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
 ) -> Corrected:
     """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
 
@@ -94,8 +81,12 @@ def _correct(
         at, normal = plane
         by = jnp.where(half, (steps + 1) // 2, steps)
         last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
-        across, near = OnPlane(by_steps(curve, by), at, normal), tolerance > TOLERANCE
-        u, found = solve(across, given, at, CORRECTIONS, last, skip=skip, near=near)
+
+        def on_plane(u: Array) -> tuple[Array, Array, Any]:
+            r, jacobian, aux = by_steps(curve, by).linearised(u, given)
+            return jnp.append(r, jnp.dot(normal, u - at)), jnp.concatenate([jacobian, normal[None]]), aux
+
+        u, found = solve(on_plane, at, CORRECTIONS, last, skip=skip, near=tolerance > TOLERANCE)
         jacobian = found.newton.jacobian[:-1]
         whole = jnp.concatenate([jacobian, normal[None]])
         tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
@@ -139,7 +130,7 @@ def stack(tree: Any, lanes: int) -> Any:
 class Curves(NamedTuple):
     """Many curves of one kind, and the numbers of steps that may be tried."""
 
-    equations: AbstractMapEquations
+    equations: AbstractEquations
     """Their arrays with the lanes first."""
     given: Any
     counts: Counts
@@ -337,7 +328,7 @@ def follow(
     steps: Steps,
     inside: Callable[[np.ndarray], np.ndarray],
     stop: Callable[[int, list[Corrected]], bool] = lambda lane, points: False,
-    update: Callable[[AbstractMapEquations, Corrected, np.ndarray], AbstractMapEquations] | None = None,
+    update: Callable[[AbstractEquations, Corrected, np.ndarray], AbstractEquations] | None = None,
 ) -> list[Trace]:
     """Follow many curves from their first points, each in the direction of its tangent.
 

@@ -15,26 +15,14 @@ from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
-from ._arclength import Corrected, Steps, follow, take
-from ._branch import describe, joined
-from ._follower import Start, make_follower, seeds, stable_steps, turned
-from ._implicit import AbstractMapEquations, Found, as_root, differentiated, settled
+from ._arclength import Corrected, Steps
+from ._branch import follow_both_ways
+from ._follower import Start, make_follower
+from ._implicit import AbstractEquations, Found, as_root, differentiated, settled
 from ._located import brackets
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, settle, sorted_multipliers
 from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
-from ._problem import (
-    SPEED,
-    Frame,
-    Given,
-    OrbitProblem,
-    Parameter,
-    Prepared,
-    frozen,
-    is_traced,
-    make_frame,
-    returned,
-    with_value,
-)
+from ._problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, with_value
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
 from ._steps import (
     BY_OTHERS,
@@ -67,20 +55,18 @@ class Singular(NamedTuple):
     left: Float[Array, " k"]
 
 
-class PointEquations(AbstractMapEquations):
+class PointEquations(AbstractEquations):
     """The orbit's equations and g = 0; a branch point has two more, with an imperfection as unknown."""
 
     problem: OrbitProblem
-    frame: Frame
     left: Float[Array, " k"]
     right: Float[Array, " k"]
     kind: Kind = eqx.field(static=True)
 
     def prepare(self, u: Array, given: Given) -> Prepared:
-        strobe = self.problem.prepare(u, given, self.frame)
-        if self.kind != "branch-point":
-            return strobe, []
-        return strobe, [self.problem.drift(u, given, self.frame, self.problem.dimension)]
+        by_parameter = self.kind == "branch-point"
+        drifts = [self.problem.drift(u, given, self.problem.dimension)] if by_parameter else []
+        return self.problem.prepare(u, given), drifts
 
     def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Singular]:
         n = self.problem.dimension
@@ -144,40 +130,35 @@ def bifurcation(
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)
 
+    def point(method: AbstractMethod, counts: Counts, state: Any, speed: Any, at: Any, spin: bool) -> Any:
+        """What `_find_point` finds from there."""
+        known, state, speed, at = frozen((given, state, jnp.asarray(speed, dtype=float), jnp.asarray(at)))
+        there = Given(*with_value(known.system, speed, parameter, at))
+        unit = jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at))
+        problem = make_problem(there, (parameter,), unit[None], periods, method)
+        return _find_point(problem, counts, cast(Kind, kind), known, there, state, at, spin)
+
     def find(state: Any, speed: Any, at: Any, spin: bool) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:
-            problem = OrbitProblem(method, system.dimension, (parameter,))
             counts = from_steps(counts, None if near is None else near.steps)
-            begin = jnp.asarray(speed, dtype=float)
-            numbers = frozen((given, state, begin, at))
-            found, equations, u, known = _find_point(problem, counts, cast(Kind, kind), *numbers, periods, spin)
-            if not is_traced((given, found)):
-                return by_others(found, problem, counts)
-            u, _ = as_root(given, equations=equations, u=u, aux=known)
-            place = _place(equations, u, given, found.converged)
-            return dataclasses.replace(found, **dict(zip(("value", "speed", "state"), place, strict=True)))
+            found, equations, u, known = point(method, counts, state, speed, at, spin)
+            if is_traced((given, found)):
+                u, _ = as_root(given, equations=equations, u=u, aux=known)
+                return dataclasses.replace(found, **_place(equations, u, given, found.converged))
+            return by_others(found, method, counts) if bool(found.converged) and counts.tolerance > 0 else found
 
         return that_serves(by, method, MOST_OF_A_POINT)
 
-    def by_others(found: Point, problem: OrbitProblem, counts: Counts) -> Point:
+    def by_others(found: Point, method: AbstractMethod, counts: Counts) -> Point:
         """The point with what other steps make of it in its error."""
-        if not (bool(found.converged) and counts.tolerance > 0):
-            return found
         steps = other_steps(found.steps)
-        other = _find_point(
-            problem,
-            Counts(steps, steps, jnp.zeros_like(counts.tolerance)),
-            cast(Kind, kind),
-            *(given, found.state, jnp.asarray(found.speed), jnp.asarray(found.value)),
-            periods,
-            False,
-        )[0]
+        others = Counts(steps, steps, jnp.zeros_like(counts.tolerance))
+        other = point(method, others, found.state, found.speed, found.value, False)[0]
         lost = found.error if kind == "branch-point" else jnp.inf  # its equations are all but singular
         apart = jnp.where(other.converged, BY_OTHERS * jnp.abs(other.value - found.value), lost)
         error = jnp.maximum(found.error, apart)
         far = error > SETTLED * jnp.maximum(jnp.abs(found.value), jnp.abs(at) if at else 1.0)
-        outcome = jnp.where(far, NOT_CONVERGED, found.outcome)
-        return dataclasses.replace(found, error=error, outcome=outcome)
+        return dataclasses.replace(found, error=error, outcome=jnp.where(far, NOT_CONVERGED, found.outcome))
 
     found = find(start, first, at, spin)
     if is_traced((found, given, start)) or not reach or int(found.outcome) not in (NO_SUCH_POINT, OTHER_KIND):
@@ -214,25 +195,21 @@ def _along_branch(
     say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if name == SPEED else f"{x:.6g}"
     away = reach * (abs(start[1]) or 1.0)
     follower = make_follower(given, parameter, start[1] - away, start[1] + away, method, periods)
-    follower = stable_steps(follower.around(start[1]), start)
-    first = seeds(follower, [start])
-    if not first.converged[0]:
-        return None, f"no orbit near the guess at {name} = {say(start[1])} to follow"
     reached: list[float] = []
 
-    def stop(lane: int, points: list[Corrected]) -> bool:
+    def stop(points: list[Corrected]) -> bool:
         """Past a point of the kind, or further from the guess than the other direction found one."""
         step: Corrected = jax.tree.map(lambda *x: np.stack(x), *points[-2:])
-        far = float(abs(step.u[1, -1] - first.u[0, -1]))
+        far = float(abs(step.u[1, -1] - points[0].u[-1]))
         before, after = follower.unstable(step)
         if before != after and any(k == kind for _, k in brackets(follower, step)):
             reached.append(far)
             return True
         return bool(reached) and far > min(reached)
 
-    both = turned(take(first, np.zeros(2, dtype=int)), np.array([1.0, -1.0]))
-    up, down = follow(follower.curves(2), both, steps=WALK, inside=follower.inside, stop=stop)
-    (found,) = describe(follower, [joined(follower, up, down)])
+    (found,) = follow_both_ways(follower, [start], WALK, stop=stop)
+    if found is None:
+        return None, f"no orbit near the guess at {name} = {say(start[1])} to follow"
     low, high = (say(float(f(found.value))) for f in (np.min, np.max))
     looked = f"looked along the branch of its orbit, {name} from {low} to {high} (ends: {', '.join(found.ended)})"
     mine = [p for p in found.special if p.kind == kind and p.status == "converged"]
@@ -269,80 +246,75 @@ def _find_point(
     counts: Counts,
     kind: Kind,
     given: Given,
+    there: Given,
     start: Array,
-    speed: Scalar,
     at: Array,
-    periods: Array,
     spin: bool,
 ) -> tuple[Point, PointEquations, Array, Singular]:
-    """The point, without derivatives; its equations, unknowns, and what else is known there."""
-    (parameter,) = problem.parameters
-    unit = jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at))
-    system, here = with_value(given.system, speed, parameter, at)
-    if spin:
-        start = settle(problem, Given(system, here), start, SPUN, counts)
-    frame = make_frame(Given(system, here), unit[None], periods)
-    u0 = start / frame.scale
+    """The point, without derivatives; its equations, unknowns, and what else is known there.
+
+    **Arguments:** the system as given, and as it is at the guess; state and parameter of the guess; whether its orbit
+    is to be found by simulation.
+    """
+    u0 = start / problem.scale
     if spin:  # on the orbit itself, if there is one here
-        fixed = OrbitProblem(problem.method, problem.dimension, ())
-        u1, found = settled(OrbitEquations(fixed, frame), Given(system, here), u0, counts)
+        u0 = settle(problem, there, start, SPUN, counts) / problem.scale
+        fixed = dataclasses.replace(problem, parameters=(), units=jnp.ones(0))
+        u1, found = settled(OrbitEquations(fixed), there, u0, counts)
         u0 = jnp.where(found.converged, u1, u0)
-    u0 = jnp.append(u0, at / unit)
-    strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given, frame)
-    _, monodromy = returned(strobe, frame, u0[: problem.dimension])
+    u0 = jnp.append(u0, at / problem.units)
+    strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given)
+    _, monodromy = problem.returned(strobe, u0[: problem.dimension])
     a = singular_matrix(kind, monodromy)
     left, right = null_vectors(jnp.where(jnp.isfinite(a), a, 0.0))
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
-    equations = PointEquations(problem, frame, left, right, kind)
+    equations = PointEquations(problem, left, right, kind)
     u, found = settled(equations, given, u0, counts, at_root=True)
     u, equations = jnp.where(found.converged, u, jnp.nan), by_steps(equations, found.steps)
     return _describe(equations, u, found, given), equations, u, found.aux
 
 
 @compiled
-def _place(equations: PointEquations, u: Array, given: Given, converged: Array) -> tuple[Array, Array, Array]:
+def _place(equations: PointEquations, u: Array, given: Given, converged: Array) -> dict[str, Array]:
     """The parameter's value, speed and state; NaN, and their derivatives too, where there is no such point."""
-    problem, frame = equations.problem, equations.frame
+    problem = equations.problem
     keep = lambda x: x * jnp.where(converged, 1.0, jnp.nan)
-    speed = jnp.asarray(problem.speed(u, given, frame), dtype=float)
-    return keep(problem.values(u, frame)[0]), keep(speed), keep(problem.state(u, frame))
+    speed = jnp.asarray(problem.at(u, given)[1], dtype=float)
+    return {"value": keep(problem.values(u)[0]), "speed": keep(speed), "state": keep(problem.state(u))}
 
 
 def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -> Point:
-    problem, frame, kind = equations.problem, equations.frame, equations.kind
+    problem, kind = equations.problem, equations.kind
     known: Singular = found.aux
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
     matches = is_critical(kind, multipliers)
     borders = equations.left, equations.right
     rate = critical_rate(kind, problem.dimension, found.newton.jacobian, known, borders)
-    at = problem.values(u, frame)[0]
+    at, unit = problem.values(u)[0], problem.units[0]
     # In the parameter's unit the guess is 10; the value itself may be zero.
-    error = found.error * frame.units[0]
-    moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * frame.units[0])
+    error = found.error * unit
+    moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * unit)
     tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.dimension]), 10.0) < TANGENTIAL
     kept = jnp.where(moving, NOT_CONVERGED, jnp.where(tangential, TANGENT, FOUND))
     outcome = jnp.where(found.converged, jnp.where(matches, kept, OTHER_KIND), NO_SUCH_POINT)
     there = (outcome == FOUND) | (outcome == TANGENT)
     keep = lambda x: jnp.where(there, x, jnp.nan)
-    value, speed, state = _place(equations, u, given, there)
     direction = jnp.zeros(problem.dimension) if kind == "Neimark-Sacker" else known.right
     length = jnp.linalg.norm(direction)
     (parameter,) = problem.parameters
     return Point(
-        value=value,
+        **_place(equations, u, given, there),
         error=error,
         steps=found.steps,
-        speed=speed,
-        state=state,
         multipliers=jnp.where(found.converged, multipliers, jnp.nan),
         residual=jnp.max(jnp.abs(found.newton.residual)),
-        transversality=keep(rate / frame.units[0]),
-        direction=keep(direction / jnp.where(length > 0, length, 1.0) * frame.scale),
+        transversality=keep(rate / unit),
+        direction=keep(direction / jnp.where(length > 0, length, 1.0) * problem.scale),
         outcome=outcome,
         iterations=found.iterations,
-        periods=frame.periods,
+        periods=problem.periods,
         kind=kind,
         parameter=parameter if isinstance(parameter, str) else "parameter",
     )

@@ -1,7 +1,8 @@
 """Branches of periodic orbits over a parameter, stable and unstable, with their bifurcations located and labelled."""
 
 import dataclasses
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -125,12 +126,16 @@ def branch(
 
 
 def follow_both_ways(
-    follower: Follower, starts: Sequence[Start], steps: Steps, patience: int | None = None
+    follower: Follower,
+    starts: Sequence[Start],
+    steps: Steps,
+    patience: float = math.inf,
+    stop: Callable[[list[Corrected]], bool] = lambda points: False,
 ) -> list[Branch | None]:
     """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one.
 
-    A lane that comes upon what another has followed ends there: one branch may come in two parts. With `patience`, a
-    lane also ends after so many unstable orbits in a row: there is no end to how such a branch can wind.
+    A lane that comes upon what another has followed ends there: one branch may come in two parts. It also ends after
+    `patience` unstable orbits in a row, since there is no end to how such a branch can wind, or where `stop` says so.
     """
     follower = stable_steps(follower.around(starts[0][1]), starts[0])
     first = seeds(follower, starts)
@@ -140,13 +145,13 @@ def follow_both_ways(
     walked: dict[int, list[Corrected]] = {}
     unstable = dict.fromkeys(range(2 * count), 0)
 
-    def stop(lane: int, points: list[Corrected]) -> bool:
+    def ends(lane: int, points: list[Corrected]) -> bool:
         walked[lane] = points
         own = lane % count
         step = points[-2].u, points[-1].u
         calm = follower.unstable(points[-1]) == 0
         unstable[lane] = 0 if calm else unstable[lane] + 1
-        if taken[own] or (patience is not None and unstable[lane] >= patience):
+        if taken[own] or unstable[lane] >= patience or stop(points):
             return True
         for other in range(own + 1, count):
             taken[other] |= passes(*step, first.u[other][None])
@@ -154,7 +159,7 @@ def follow_both_ways(
         return bool(others) and passes(*step, np.stack(others))
 
     both = turned(take(first, lanes), sign)
-    traces = follow(follower.curves(2 * count), both, steps=steps, inside=follower.inside, stop=stop)
+    traces = follow(follower.curves(2 * count), both, steps=steps, inside=follower.inside, stop=ends)
     kept = [i for i in range(count) if not taken[i]]
     found = describe(follower, [joined(follower, traces[i], traces[i + count]) for i in kept])
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
@@ -184,7 +189,7 @@ def _branch(follower: Follower, points: Corrected, seen: Sequence[Seen], ended: 
     multipliers = follower.multipliers(points)
     stable = follower.unstable(points) == 0
     n = follower.problem.dimension
-    scale, periods = np.asarray(follower.frame.scale), int(follower.frame.periods)
+    scale, periods = np.asarray(follower.problem.scale), int(follower.problem.periods)
     name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
     fixed = None if name == SPEED else float(follower.given.speed)
     speed = lambda u: u[..., -1] * follower.unit if fixed is None else np.full(u.shape[:-1], fixed)

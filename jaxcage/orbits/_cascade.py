@@ -100,7 +100,7 @@ def doubled_branch(
     given = Given(system, jnp.asarray(point.speed if speed is None else speed, dtype=float))
     follower = make_follower(given, parameter, lower, upper, method).around(at, 2 * periods)
     curves, half = follower.curves(1), follower.around(at, periods)
-    scale = np.asarray(follower.frame.scale)
+    scale = np.asarray(follower.problem.scale)
     u = np.array([[*(np.asarray(point.state) / scale), at / follower.unit]])
     across = np.zeros_like(u)
     across[0, : scale.size] = np.asarray(point.direction) / scale

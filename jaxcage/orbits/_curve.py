@@ -18,7 +18,7 @@ from ._arclength import Corrected, Curves, Steps, follow, put, settle_on, stack,
 from ._bifurcation import PointEquations
 from ._follower import eigenvalues, in_a_row, require_within, turned
 from ._point import Point, require_found
-from ._problem import SPEED, Given, OrbitProblem, make_frame, returned, value_of
+from ._problem import SPEED, Given, make_problem, value_of
 from ._singularity import null_vectors, singular_matrix
 from ._steps import ENOUGH, by_steps, counted
 
@@ -97,16 +97,15 @@ def curve(
     low, high = np.array([x_lower, lower]), np.array([x_upper, upper])
     units = (high - low) / 20
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, (x, y))
     given = Given(system, jnp.asarray(point.speed, dtype=float))
-    frame = make_frame(given, jnp.asarray(units), point.periods)
-    scale = np.asarray(frame.scale)
+    problem = make_problem(given, (x, y), units, point.periods, chosen)
+    scale = np.asarray(problem.scale)
     u = np.array([*(np.asarray(point.state) / scale), *(np.array([float(point.value), own]) / units)])
     count = int(point.steps) or min(int(counts.last), ENOUGH)
-    strobe = by_steps(problem, count).prepare(jnp.asarray(u), given, frame)
-    _, monodromy = returned(strobe, frame, jnp.asarray(u[: scale.size]))
+    strobe = by_steps(problem, count).prepare(jnp.asarray(u), given)
+    _, monodromy = problem.returned(strobe, jnp.asarray(u[: scale.size]))
     borders = null_vectors(singular_matrix(point.kind, monodromy))
-    curves = Curves(stack(PointEquations(problem, frame, *borders, point.kind), 1), given, counts)
+    curves = Curves(stack(PointEquations(problem, *borders, point.kind), 1), given, counts)
     y_kept = np.eye(1, u.size, u.size - 1)
     start = settle_on(curves, u[None], y_kept, count // 2)
     if not bool(start.converged[0]):

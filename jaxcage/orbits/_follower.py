@@ -15,7 +15,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod
 from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._orbit import OrbitEquations
-from ._problem import SPEED, Frame, Given, OrbitProblem, Parameter, make_frame, with_value
+from ._problem import SPEED, Given, OrbitProblem, Parameter, make_problem, with_value
 from ._steps import Counts, counted, stiff
 
 
@@ -29,7 +29,6 @@ class Follower(eqx.Module):
     problem: OrbitProblem
     counts: Counts
     given: Given
-    frame: Frame
     lower: float
     upper: float
 
@@ -44,13 +43,15 @@ class Follower(eqx.Module):
 
     def around(self, at: Scalar, periods: Any = None) -> "Follower":
         """The same in the system's scale at a value of the parameter, with other periods if they are given."""
-        there = with_value(self.given.system, self.given.speed, self.parameter, jnp.asarray(at, dtype=float))
-        periods = self.frame.periods if periods is None else periods
-        return dataclasses.replace(self, frame=make_frame(Given(*there), self.frame.units, periods))
+        there = Given(*with_value(self.given.system, self.given.speed, self.parameter, jnp.asarray(at, dtype=float)))
+        mine = self.problem
+        periods = mine.periods if periods is None else periods
+        problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
+        return dataclasses.replace(self, problem=problem)
 
     def curves(self, lanes: int) -> Curves:
         """The branches of so many lanes."""
-        return Curves(stack(OrbitEquations(self.problem, self.frame), lanes), self.given, self.counts)
+        return Curves(stack(OrbitEquations(self.problem), lanes), self.given, self.counts)
 
     def inside(self, u: np.ndarray) -> np.ndarray:
         """Whether the parameter is within the range."""
@@ -98,14 +99,13 @@ def make_follower(
 ) -> Follower:
     """A follower in the system's scale at its own speed."""
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, given.system.dimension, (parameter,))
-    frame = make_frame(given, jnp.full(1, (upper - lower) / 20), periods)
-    return Follower(problem, counts, given, frame, lower, upper)
+    problem = make_problem(given, (parameter,), [(upper - lower) / 20], periods, chosen)
+    return Follower(problem, counts, given, lower, upper)
 
 
 def seeds(follower: Follower, starts: Sequence[Start]) -> Corrected:
     """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
-    u = np.array([[*(s / np.asarray(follower.frame.scale)), p / follower.unit] for s, p in starts])
+    u = np.array([[*(s / np.asarray(follower.problem.scale)), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
     return settle_on(follower.curves(len(u)), u, normal)

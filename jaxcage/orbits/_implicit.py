@@ -16,6 +16,7 @@ step often leaves. A step is taken back by halves until Deuflhard's natural mono
 
 import abc
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -27,23 +28,14 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar
 from ..integrate import StrobeMap, compiled
-from ._problem import Frame, OrbitProblem, Prepared, frozen, returned
+from ._problem import OrbitProblem, Prepared, frozen
 from ._steps import GIVEN_UP, Counts, by_steps
 
 
 class AbstractEquations(eqx.Module):
-    """As many equations as unknowns."""
-
-    @abc.abstractmethod
-    def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-        """The equations, their derivative, and what else is wanted at the root."""
-
-
-class AbstractMapEquations(AbstractEquations):
     """Equations in an orbit's state and more, split into what is cheap and what runs revolutions."""
 
     problem: eqx.AbstractVar[OrbitProblem]
-    frame: eqx.AbstractVar[Frame]
 
     @abc.abstractmethod
     def prepare(self, u: Float[Array, " n"], given: Any) -> Prepared:
@@ -57,6 +49,10 @@ class AbstractMapEquations(AbstractEquations):
         wanted at the root."""
 
     @abc.abstractmethod
+    def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
+        """The equations, their derivative, and what else is wanted at the root."""
+
+    @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
 
@@ -65,13 +61,12 @@ class AbstractMapEquations(AbstractEquations):
         """
 
 
-def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
+def differentiated(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
     """What `linearised` returns, by differentiating the equations along each unknown."""
 
     def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
-        prepared = equations.prepare(u, given)
-        strobe, drifts = prepared
-        image, columns = returned(strobe, equations.frame, u[: equations.frame.scale.size], drifts)
+        strobe, drifts = prepared = equations.prepare(u, given)
+        image, columns = equations.problem.returned(strobe, u[: equations.problem.dimension], drifts)
         r, aux = equations.closing(u, prepared, image, columns)
         return r, (r, aux)
 
@@ -102,7 +97,7 @@ class Found(eqx.Module):
     steps: Int[Array, ""]
     """Steps per revolution."""
     error: Float[Array, ""]
-    """Distance to the root by half as many (see `AbstractMapEquations.apart`), infinite where none was found; NaN where
+    """Distance to the root by half as many (see `AbstractEquations.apart`), infinite where none was found; NaN where
     that was not looked at."""
 
 
@@ -113,8 +108,7 @@ SMALLEST_FACTOR, OF_A_NEAR_GUESS = 2.0**-10, 0.75
 
 
 def solve(
-    equations: AbstractEquations,
-    given: Any,
+    linearised: Callable[[Array], tuple[Array, Array, Any]],
     guess: Float[Array, " n"],
     max_steps: int = 40,
     tolerance: Scalar = TOLERANCE,
@@ -142,7 +136,7 @@ def solve(
 
     def turn(carry: tuple) -> tuple:
         i, _, u, newton, _ = carry
-        r, jacobian, aux = equations.linearised(u, given)
+        r, jacobian, aux = linearised(u)
         first = jnp.isinf(newton.step[0])
         known = jnp.where(first, jnp.eye(u.size), newton.jacobian)
         nearer = size(jnp.linalg.solve(known, r)) < size(newton.step)
@@ -159,7 +153,7 @@ def solve(
         return i + 1, u, jnp.where(new.done, u, onward) if at_root else onward, new, aux
 
     unknown = lambda *shape: jnp.full(shape, jnp.inf)
-    n, like = guess.size, eqx.filter_eval_shape(equations.linearised, guess, given)[2]
+    n, like = guess.size, eqx.filter_eval_shape(linearised, guess)[2]
     begin = Newton(guess, unknown(n, n), unknown(n), unknown(n), jnp.ones(()), jnp.asarray(skip))
     start = jnp.zeros((), int), guess, guess, begin, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
     on = lambda carry: (carry[0] < max_steps) & ~ended(carry[1], carry[3])[0]
@@ -168,13 +162,14 @@ def solve(
 
 
 def settled(
-    equations: AbstractMapEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
     """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
 
     **Returns:** the root by the last number of steps, and `Found`.
     """
-    once = lambda steps, u, skip: solve(by_steps(equations, steps), given, u, at_root=at_root, skip=skip)
+    by = lambda steps: partial(by_steps(equations, steps).linearised, given=given)
+    once = lambda steps, u, skip: solve(by(steps), u, at_root=at_root, skip=skip)
 
     def turn(carry: tuple) -> tuple:
         i, u, before, done = carry
@@ -199,7 +194,7 @@ def settled(
 # --- derivatives ---------------------------------------------------------------------------------------------------
 
 
-def as_root(given: Any, *, equations: AbstractMapEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
+def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
     """u and what else is known at it, as functions of what is given: a root of the equations there."""
     # `jax.grad` of a Python number traces a number that is no array, and that a filter of arrays would not see
     given = jax.tree.map(lambda x: jnp.asarray(x) if isinstance(x, Tracer) else x, given)
@@ -207,17 +202,16 @@ def as_root(given: Any, *, equations: AbstractMapEquations, u: Float[Array, " n"
 
 
 @eqx.filter_custom_jvp
-def _as_root(given: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> tuple[Array, Any]:
+def _as_root(given: Any, *, equations: AbstractEquations, u: Array, aux: Any) -> tuple[Array, Any]:
     return u, aux
 
 
 @_as_root.def_jvp
-def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> Any:
+def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, u: Array, aux: Any) -> Any:
     (given,), (given_dot,) = primals, tangents
     u, aux = _as_root(given, equations=equations, u=u, aux=aux)
     numbers, moving = eqx.filter_jvp(lambda g: numbers_around(equations, u, g), (given,), (given_dot,))
-    x = jnp.concatenate([u[: equations.frame.scale.size], numbers.k])
-    around, slopes = by_columns(x, f=Slopes(Push(frozen(numbers.like), equations.frame)))
+    around, slopes = expansion(equations.problem, u, numbers)
     return (u, aux), _moved(equations, u, numbers, around, slopes, moving.k)
 
 
@@ -231,19 +225,25 @@ class FieldNumbers(NamedTuple):
 
 
 @compiled
-def numbers_around(equations: AbstractMapEquations, u: Array, given: Any) -> FieldNumbers:
+def numbers_around(equations: AbstractEquations, u: Array, given: Any) -> FieldNumbers:
     """The numbers of the field at the unknowns u, and how they follow from these."""
     row = lambda v: numbers_of(equations.prepare(v, given))[0]
     return FieldNumbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
 
 
+def expansion(problem: OrbitProblem, u: Float[Array, " n"], numbers: FieldNumbers) -> tuple[Any, Any]:
+    """Image of the state and its derivatives, and the slopes of these by the state and by the numbers of the field."""
+    x = jnp.concatenate([u[: problem.dimension], numbers.k])
+    return by_columns(x, f=Slopes(Push(frozen(numbers.like), problem)))
+
+
 @compiled
 def _moved(
-    equations: AbstractMapEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
+    equations: AbstractEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
 ) -> tuple[Array, Any]:
     """Derivatives of a root, and of what else is known there, along `k_dot`."""
     k, k_of_u, like = numbers
-    n, m, remake = equations.frame.scale.size, u.size, numbers_of(like)[1]
+    n, m, remake = equations.problem.dimension, u.size, numbers_of(like)[1]
 
     def closing(moved: Array) -> tuple[Array, Any]:
         """The equations, with the map linear from here."""
@@ -282,12 +282,12 @@ class Push(eqx.Module):
     """Image of a state and its derivatives, as a function of state and numbers of the field in a row."""
 
     like: Prepared
-    frame: Frame
+    problem: OrbitProblem
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        n = self.frame.scale.size
+        n = self.problem.dimension
         strobe, drifts = numbers_of(self.like)[1](x[n:])
-        return returned(strobe, self.frame, x[:n], drifts)
+        return self.problem.returned(strobe, x[:n], drifts)
 
 
 class Slopes(eqx.Module):

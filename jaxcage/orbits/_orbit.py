@@ -18,8 +18,8 @@ from .._types import Scalar, State
 from ..bearing import is_concrete
 from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
-from ._implicit import AbstractMapEquations, as_root, settled
-from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
+from ._implicit import AbstractEquations, as_root, settled
+from ._problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
 from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
@@ -36,14 +36,13 @@ ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
 multiple of so many."""
 
 
-class OrbitEquations(AbstractMapEquations):
+class OrbitEquations(AbstractEquations):
     """P(z) = z: as many equations as unknowns, or, with a parameter of the problem free, those of a branch."""
 
     problem: OrbitProblem
-    frame: Frame
 
     def prepare(self, u: Array, given: Given) -> Prepared:
-        return self.problem.prepare(u, given, self.frame), []
+        return self.problem.prepare(u, given), []
 
     def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Array]:
         """The equations, and the monodromy matrix."""
@@ -51,9 +50,9 @@ class OrbitEquations(AbstractMapEquations):
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
-        problem, frame, n = self.problem, self.frame, self.problem.dimension
-        drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
-        image, columns = returned(problem.prepare(u, given, frame), frame, u[:n], drifts)
+        problem, n = self.problem, self.problem.dimension
+        drifts = [problem.drift(u, given, i) for i in range(n, u.size)]
+        image, columns = problem.returned(problem.prepare(u, given), u[:n], drifts)
         return image - u[:n], columns - jnp.eye(n, u.size), None
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
@@ -195,7 +194,6 @@ def divergence_integral(
 def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts) -> Float[Array, " dim"]:
     """State after `revolutions` from `start` and, while that is not at rest, after as many again by twice the steps."""
     given = frozen(given)
-    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
     counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
 
     def turn(i: Array, carry: tuple) -> tuple:
@@ -205,27 +203,26 @@ def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, 
         row = tuple(begin[k] for k in range(start.size))
         spin = jnp.where(done, 0, revolutions)
         z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
-        return z, done | (jnp.max(jnp.abs(z - y) / scale) < AT_REST * counts.tolerance)
+        return z, done | (jnp.max(jnp.abs(z - y) / problem.scale) < AT_REST * counts.tolerance)
 
     return jax.lax.fori_loop(0, counts.tries, turn, (start, jnp.array(False)))[0]
 
 
 @compiled
 def _find(
-    problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, periods: Any, revolutions: Any
+    problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, revolutions: Any
 ) -> tuple[Orbit, OrbitEquations, Array]:
     """The orbit, without derivatives; its equations and unknowns."""
     if revolutions is not None:
         guess = settle(problem, given, guess, revolutions, spinning)
-    frame = make_frame(given, jnp.ones(0), periods)
-    equations = OrbitEquations(problem, frame)
-    u, found = settled(equations, given, guess / frame.scale, counts, at_root=True)
+    equations = OrbitEquations(problem)
+    u, found = settled(equations, given, guess / problem.scale, counts, at_root=True)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
     u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
     monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
     state, multipliers = _place(equations, u, monodromy)
-    expected = divergence_integral(equations.problem.prepare(u, given, frame), state, frame.periods)
+    expected = divergence_integral(equations.problem.prepare(u, given), state, problem.periods)
     floor = _resolved(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0))
     orbit = Orbit(
         state=state,
@@ -238,7 +235,7 @@ def _find(
         error=found.error,
         converged=converged,
         iterations=found.iterations,
-        periods=frame.periods,
+        periods=problem.periods,
         solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
     )
     return orbit, equations, u
@@ -249,7 +246,7 @@ def _place(equations: OrbitEquations, u: Array, monodromy: Array) -> tuple[Array
     """State and multipliers of an orbit."""
     finite = jnp.isfinite(monodromy)
     multipliers = jnp.where(jnp.all(finite), sorted_multipliers(jnp.where(finite, monodromy, 0.0)), jnp.nan)
-    return equations.problem.state(u, equations.frame), multipliers
+    return equations.problem.state(u), multipliers
 
 
 def periodic_orbit(
@@ -288,11 +285,12 @@ def periodic_orbit(
     spin = None if revolutions is None else jnp.asarray(revolutions)
 
     def find(method: AbstractMethod, counts: Counts) -> Orbit:
-        problem = OrbitProblem(method, system.dimension, ())
+        here, begin = frozen((given, start))
+        problem = make_problem(here, (), jnp.ones(0), periods, method)
         counts = from_steps(counts, guess.steps if isinstance(guess, Orbit) else None)
         enough = jnp.minimum(counts.last, ENOUGH)
         spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
-        found, equations, u = _find(problem, counts, spinning, *frozen((given, start)), jnp.asarray(periods), spin)
+        found, equations, u = _find(problem, counts, spinning, here, begin, spin)
         if not is_traced(given):
             return found
         u, monodromy = as_root(given, equations=equations, u=u, aux=found.monodromy)

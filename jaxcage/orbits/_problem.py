@@ -9,7 +9,7 @@ derivative with respect to any number of design parameters costs no more than on
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import equinox as eqx
 import jax
@@ -105,82 +105,78 @@ class Given(eqx.Module):
     speed: Scalar
 
 
-class Frame(NamedTuple):
-    """Units of the unknowns, on which results do not depend, and the revolutions after which an orbit closes."""
-
-    scale: Float[Array, " dim"]
-    units: Float[Array, " parameters"]
-    periods: Int[Array, ""]
-
-
-def returned(
-    strobe: StrobeMap, frame: Frame, z: Float[Array, " dim"], drifts: Sequence[Any] = ()
-) -> tuple[Array, Array]:
-    """The return map, `periods` applications of the strobe map, in units of the frame.
-
-    **Returns:** the image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each
-    drift of the field's numbers (in a column each).
-    """
-    scale, n = frame.scale, z.size
-    zero = jnp.zeros(())
-    basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
-    start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
-    along = [*[None] * n, *drifts]
-
-    def once(_: Array, carry: tuple) -> tuple:
-        y, tangents = carry
-        moved = pushed(strobe, y, tangents, along)
-        return moved.y, moved.tangents
-
-    y, tangents = jax.lax.fori_loop(0, frame.periods, once, start)
-    columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
-    return jnp.stack(y) / scale, columns / scale[:, None]
-
-
 Prepared: TypeAlias = tuple[StrobeMap, list[Any]]
 """All that the revolutions of a problem need to know: a strobe map, and drifts of its field's numbers."""
 
 
 class OrbitProblem(eqx.Module):
-    """A periodic orbit of a system with free parameters."""
+    """A periodic orbit of a system with free parameters, in units on which results do not depend."""
 
     method: AbstractMethod
-    dimension: int = eqx.field(static=True)
     parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    scale: Float[Array, " dim"]
+    """Units of the state."""
+    units: Float[Array, " parameters"]
+    periods: Int[Array, ""]
+    """Revolutions after which the orbit closes."""
 
-    def speed(self, u: Float[Array, " n"], given: Given, frame: Frame) -> Scalar:
-        """Speed [rad/s] at the unknowns u."""
-        return self._located(u, given, frame)[1]
+    @property
+    def dimension(self) -> int:
+        """Length of the state."""
+        return self.scale.shape[-1]
 
-    def values(self, u: Float[Array, " n"], frame: Frame) -> Float[Array, " parameters"]:
+    def values(self, u: Float[Array, " n"]) -> Float[Array, " parameters"]:
         """Values of the free parameters, in SI units."""
-        return u[self.dimension :][: len(self.parameters)] * frame.units
+        return u[self.dimension :][: len(self.parameters)] * self.units
 
-    def state(self, u: Float[Array, " n"], frame: Frame) -> Float[Array, " dim"]:
+    def state(self, u: Float[Array, " n"]) -> Float[Array, " dim"]:
         """State at phase 0, in SI units."""
-        return u[: self.dimension] * frame.scale
+        return u[: self.dimension] * self.scale
 
-    def _located(self, u: Array, given: Given, frame: Frame) -> tuple[AbstractForcedSystem, Scalar]:
+    def at(self, u: Float[Array, " n"], given: Given) -> tuple[AbstractForcedSystem, Scalar]:
+        """System and speed [rad/s] at the unknowns u."""
         system, speed = given.system, given.speed
-        values = self.values(u, frame)
+        values = self.values(u)
         for i, parameter in enumerate(self.parameters):
             system, speed = with_value(system, speed, parameter, values[i])
         return system, speed
 
-    def prepare(self, u: Float[Array, " n"], given: Given, frame: Frame) -> StrobeMap:
+    def prepare(self, u: Float[Array, " n"], given: Given) -> StrobeMap:
         """The strobe map at the unknowns u: all that depends on speed and design."""
-        return strobe_map(*self._located(u, given, frame), self.method)
+        return strobe_map(*self.at(u, given), self.method)
 
-    def drift(self, u: Float[Array, " n"], given: Given, frame: Frame, i: int) -> list[Any]:
+    def drift(self, u: Float[Array, " n"], given: Given, i: int) -> list[Any]:
         """How the field's numbers change with the i-th unknown; None for those that do not depend on it."""
-        row = lambda x: jax.tree.leaves(
-            eqx.filter(self.prepare(u.at[i].set(x), given, frame).field, eqx.is_inexact_array)
-        )
+        row = lambda x: jax.tree.leaves(eqx.filter(self.prepare(u.at[i].set(x), given).field, eqx.is_inexact_array))
         _, slope = jax.jvp(row, (u[i],), (jnp.ones_like(u[i]),))
         return [s if d else None for s, d in zip(slope, depends_on_input(row, u[i]), strict=True)]
 
+    def returned(self, strobe: StrobeMap, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
+        """The return map, `periods` applications of the strobe map.
 
-def make_frame(given: Given, units: Float[Array, " parameters"], periods: Any) -> Frame:
-    """The frame of orbits of a system near a speed."""
+        **Returns:** the image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along
+        each drift of the field's numbers (in a column each).
+        """
+        scale, n = self.scale, z.size
+        zero = jnp.zeros(())
+        basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
+        start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
+        along = [*[None] * n, *drifts]
+
+        def once(_: Array, carry: tuple) -> tuple:
+            y, tangents = carry
+            moved = pushed(strobe, y, tangents, along)
+            return moved.y, moved.tangents
+
+        y, tangents = jax.lax.fori_loop(0, self.periods, once, start)
+        columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
+        return jnp.stack(y) / scale, columns / scale[:, None]
+
+
+def make_problem(
+    given: Given, parameters: tuple[Parameter, ...], units: Any, periods: Any, method: AbstractMethod
+) -> OrbitProblem:
+    """The problem in a system's scale at a speed."""
     scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
-    return frozen(Frame(scale, units, jnp.asarray(periods, dtype=int)))
+    numbers = frozen((scale, jnp.asarray(units, dtype=float), jnp.asarray(periods, dtype=int)))
+    return OrbitProblem(method, parameters, *numbers)

@@ -310,7 +310,7 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     points = seeds(follower, met)
     good = points.converged.copy()
     good[good] = follower.unstable(take(points, good)) == 0
-    states = points.u[:, :-1] * np.asarray(follower.frame.scale)
+    states = points.u[:, :-1] * np.asarray(follower.problem.scale)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
 

@@ -30,10 +30,10 @@ from ..models import AbstractForcedSystem
 from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._cascade import FEIGENBAUM, Cascade
-from ._implicit import Push, Slopes, by_columns, numbers_around, numbers_of
+from ._implicit import expansion, numbers_around, numbers_of
 from ._orbit import OrbitEquations, StateLike
 from ._point import Point
-from ._problem import SPEED, Frame, Given, OrbitProblem, make_frame
+from ._problem import SPEED, Given, OrbitProblem, make_problem
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
 from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, SLOPE, Counts, by_steps, counted, from_steps, that_serves
 
@@ -95,17 +95,16 @@ class _Expansion(NamedTuple):
     """Derivatives of k with respect to the unknowns."""
 
 
-def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, " n"]) -> _Expansion:
-    k, of_u, like = numbers_around(OrbitEquations(problem, frame), u, given)
-    x = jnp.concatenate([u[: problem.dimension], k])
-    (image, monodromy), (image_slope, monodromy_slope) = by_columns(x, f=Slopes(Push(like, frame)))
-    return _Expansion(image, monodromy, image_slope, monodromy_slope, of_u)
+def _expand(problem: OrbitProblem, given: Given, u: Float[Array, " n"]) -> _Expansion:
+    numbers = numbers_around(OrbitEquations(problem), u, given)
+    (image, monodromy), (image_slope, monodromy_slope) = expansion(problem, u, numbers)
+    return _Expansion(image, monodromy, image_slope, monodromy_slope, numbers.of_u)
 
 
 @compiled
-def _pull_back(problem: OrbitProblem, given: Given, frame: Frame, u: Array, weight: Array) -> AbstractForcedSystem:
+def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> AbstractForcedSystem:
     """d(weight . k) / d system."""
-    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed), frame))[0]
+    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed)))[0]
     _, pull = eqx.filter_vjp(row, given.system)
     return pull(weight)[0]
 
@@ -117,7 +116,7 @@ class _Unfolding(NamedTuple):
     of_unknowns: Float[Array, "m m"]
     of_numbers: Float[Array, "m k"]
     rate: Array
-    """d|mu| / d parameter in the frame's unit (at a fold: the drift along the critical direction)."""
+    """d|mu| / d parameter in the parameter's unit (at a fold: the drift along the critical direction)."""
 
 
 @compiled
@@ -140,7 +139,6 @@ class _Edge(NamedTuple):
 
     problem: OrbitProblem
     given: Given
-    frame: Frame
     u: Array
     unfolding: _Unfolding
     found: bool
@@ -150,7 +148,7 @@ class _Edge(NamedTuple):
 
     @property
     def speed(self) -> float:
-        return float(self.problem.values(self.u, self.frame)[0])
+        return float(self.problem.values(self.u)[0])
 
     @property
     def residual(self) -> Array:
@@ -169,16 +167,15 @@ def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod 
 
 
 def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod, counts: Counts) -> _Edge:
-    problem = OrbitProblem(chosen, system.dimension, (SPEED,))
     first, last, tolerance = (float(c) for c in from_steps(counts, int(point.steps) or None))
     speed, state = jnp.asarray(point.speed, dtype=float), jnp.asarray(point.state)
     given = Given(system, speed)
-    frame = make_frame(given, 0.1 * speed[None], point.periods)
-    begin = jnp.append(state / frame.scale, 10.0)
+    problem = make_problem(given, (SPEED,), 0.1 * speed[None], point.periods, chosen)
+    begin = jnp.append(state / problem.scale, 10.0)
     before, steps = None, int(first)
     while True:
         near = begin if before is None or not before.found else before.u
-        edge = _polished(by_steps(problem, steps), given, frame, point.kind, near)
+        edge = _polished(by_steps(problem, steps), given, point.kind, near)
         if before is not None:
             both = before.found and edge.found
             edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
@@ -189,10 +186,10 @@ def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod,
         before, steps = edge, min(2 * steps, int(last))
 
 
-def _polished(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, first: Array) -> _Edge:
+def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
     """The edge near the unknowns `first`, by the steps of the problem."""
     u = first
-    unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, frame, u))
+    unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, u))
     here = unfold(u)
     for _ in range(POLISHING):
         step = jnp.linalg.solve(here.of_unknowns, here.residual)
@@ -202,7 +199,7 @@ def _polished(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, firs
         u = u - step
         here = unfold(u)
     size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
-    return _Edge(problem, given, frame, u, here, bool(size < SETTLED_TO))
+    return _Edge(problem, given, u, here, bool(size < SETTLED_TO))
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
@@ -237,10 +234,10 @@ def sensitivity(
     edge = _located(system, point, method)
     if edge.status != "converged":
         return _nowhere(system, point.kind, name, edge.status, edge.error / PER_RPM)
-    unit, here, speed = float(edge.frame.units[0]), edge.unfolding, edge.speed
+    unit, here, speed = float(edge.problem.units[0]), edge.unfolding, edge.speed
     adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(edge.u.size).at[-1].set(1.0))
     weight = -(adjoint @ here.of_numbers) * unit
-    pulled = _pull_back(edge.problem, edge.given, edge.frame, edge.u, weight)
+    pulled = _pull_back(edge.problem, edge.given, edge.u, weight)
     slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
     change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
     rate = float(here.rate) / unit
@@ -253,7 +250,7 @@ def sensitivity(
         homogeneity=_homogeneity(system, change),
         transversality=rate,
         status="tangential" if abs(rate * speed) < TANGENTIAL else "converged",
-        state=np.asarray(edge.problem.state(edge.u, edge.frame)),
+        state=np.asarray(edge.problem.state(edge.u)),
         error_rpm=edge.error / PER_RPM,
         steps=edge.steps,
     )
@@ -368,14 +365,13 @@ def leading_multiplier(
     """
     require_x64()
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, (SPEED,))
     at, state = jnp.asarray(speed, dtype=float), jnp.asarray(guess, dtype=float)
     given = Given(system, at)
-    frame = make_frame(given, 0.1 * at[None], periods)
-    first = jnp.append(state / frame.scale, 10.0)
+    problem = make_problem(given, (SPEED,), 0.1 * at[None], periods, chosen)
+    first = jnp.append(state / problem.scale, 10.0)
     before, steps = None, int(counts.first)
     while True:
-        found = _by_newton(by_steps(problem, steps), given, frame, first if before is None else before[0])
+        found = _by_newton(by_steps(problem, steps), given, first if before is None else before[0])
         error = np.inf if found is None or before is None else abs(float(found[1] - before[1]))
         given_up = found is None and steps >= GIVEN_UP
         if steps >= int(counts.last) or error <= SLOPE * float(counts.tolerance) or given_up:
@@ -386,16 +382,16 @@ def leading_multiplier(
         nan = float("nan")
         return LeadingMultiplier(nan, dict.fromkeys(paths, nan), np.full(system.dimension, nan), error, steps)
     u, size, weight = found
-    pulled = _pull_back(by_steps(problem, steps), given, frame, u, weight)
+    pulled = _pull_back(by_steps(problem, steps), given, u, weight)
     slope = {name: float(get(pulled, path)) for name, path in paths.items()}
-    return LeadingMultiplier(float(size), slope, np.asarray(problem.state(u, frame)), error, steps)
+    return LeadingMultiplier(float(size), slope, np.asarray(problem.state(u)), error, steps)
 
 
-def _by_newton(problem: OrbitProblem, given: Given, frame: Frame, first: Array) -> tuple[Array, Array, Array] | None:
+def _by_newton(problem: OrbitProblem, given: Given, first: Array) -> tuple[Array, Array, Array] | None:
     """The orbit near the unknowns `first`, the size of its largest multiplier, and the derivatives of that."""
     n, u = problem.dimension, first
     for _ in range(NEWTON):
-        around = _expand(problem, given, frame, u)
+        around = _expand(problem, given, u)
         step = jnp.linalg.solve(around.image_slope[:, :n] - jnp.eye(n), around.image - u[:n])
         size = float(jnp.max(jnp.abs(step)))
         if not size < FAR or float(jnp.max(jnp.abs(u - first))) > FAR:
