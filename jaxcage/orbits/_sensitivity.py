@@ -109,38 +109,48 @@ def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> 
     return pull(weight)[0]
 
 
+def _pulled_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> dict[str, float]:
+    """d(weight . k) / d parameter [SI]."""
+    pulled = _pull_back(problem, given, u, weight)
+    return {n: float(get(pulled, path)) for n, path in parameter_paths(given.system).items()}
+
+
 class _Unfolding(NamedTuple):
-    """The equations of a bifurcation point and their derivatives at one orbit."""
+    """What is known of a bifurcation point at one orbit."""
 
     residual: Float[Array, " m"]
-    of_unknowns: Float[Array, "m m"]
-    of_numbers: Float[Array, "m k"]
+    """Newton's step to the point, in the unknowns' units."""
+    weight: Float[Array, " k"]
+    """Derivatives of the parameter at the point by the numbers of the field."""
     rate: Array
     """d|mu| / d parameter in the parameter's unit (at a fold: the drift along the critical direction)."""
 
 
 @compiled
-def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
+def _unfold(kind: Kind, unit: Array, z: Array, around: _Expansion) -> _Unfolding:
     n = z.size
-    left, right = null_vectors(singular_matrix(kind, around.monodromy))
-    scalar = lambda m: bordered(singular_matrix(kind, m), left, right)[0]
+    borders = null_vectors(singular_matrix(kind, around.monodromy))
+    scalar = lambda m: bordered(singular_matrix(kind, m), *borders)[0]
     g, slope = jax.value_and_grad(scalar)(around.monodromy)
-    known = Singular(around.monodromy, *bordered(singular_matrix(kind, around.monodromy), left, right)[1:])
+    known = Singular(around.monodromy, *bordered(singular_matrix(kind, around.monodromy), *borders)[1:])
     closing = around.image_slope - jnp.eye(n, around.image_slope.shape[1])
     whole = jnp.concatenate([closing, jnp.einsum("ij,ijx->x", slope, around.monodromy_slope)[None]])
     of_numbers = whole[:, n:]
     of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.of_u[:, n])[:, None]], axis=1)
-    residual = jnp.append(around.image - z, g)
-    return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known, (left, right)))
+    step = jnp.linalg.solve(of_unknowns, jnp.append(around.image - z, g))
+    adjoint = jnp.linalg.solve(of_unknowns.T, jnp.zeros(n + 1).at[-1].set(1.0))
+    return _Unfolding(step, -(adjoint @ of_numbers) * unit, critical_rate(kind, n, of_unknowns, known, borders))
 
 
 class _Edge(NamedTuple):
     """An edge located to rounding, by some number of steps."""
 
     problem: OrbitProblem
-    given: Given
     u: Array
-    unfolding: _Unfolding
+    residual: Array
+    weight: Array
+    rate: float
+    """See `_Unfolding`, here d|mu| / d speed."""
     found: bool
     error: float = float("nan")
     """Distance of the speed to that by half the steps [rad/s]."""
@@ -149,10 +159,6 @@ class _Edge(NamedTuple):
     @property
     def speed(self) -> float:
         return float(self.problem.values(self.u)[0])
-
-    @property
-    def residual(self) -> Array:
-        return self.unfolding.residual
 
     @property
     def status(self) -> str:
@@ -167,39 +173,35 @@ def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod 
 
 
 def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod, counts: Counts) -> _Edge:
-    first, last, tolerance = (float(c) for c in from_steps(counts, int(point.steps) or None))
-    speed, state = jnp.asarray(point.speed, dtype=float), jnp.asarray(point.state)
-    given = Given(system, speed)
-    problem = make_problem(given, (SPEED,), 0.1 * speed[None], point.periods, chosen)
-    begin = jnp.append(state / problem.scale, 10.0)
-    before, steps = None, int(first)
+    counts = from_steps(counts, int(point.steps) or None)
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
+    problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
+    near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
+    before, steps, last = None, int(counts.first), int(counts.last)
     while True:
-        near = begin if before is None or not before.found else before.u
-        edge = _polished(by_steps(problem, steps), given, point.kind, near)
+        edge = _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
         if before is not None:
             both = before.found and edge.found
             edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
-        edge = edge._replace(steps=steps)
         lost = not edge.found and steps >= GIVEN_UP and not (before is not None and before.found)
-        if edge.error <= POINT * edge.speed * tolerance or steps >= last or lost:
+        if edge.error <= POINT * edge.speed * float(counts.tolerance) or steps >= last or lost:
             return edge
-        before, steps = edge, min(2 * steps, int(last))
+        before, near, steps = edge, edge.u if edge.found else begin, min(2 * steps, last)
 
 
 def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
     """The edge near the unknowns `first`, by the steps of the problem."""
-    u = first
-    unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, u))
+    u, unit = first, problem.units[0]
+    unfold = lambda u: _unfold(kind, unit, u[:-1], _expand(problem, given, u))
     here = unfold(u)
     for _ in range(POLISHING):
-        step = jnp.linalg.solve(here.of_unknowns, here.residual)
-        leads = jnp.max(jnp.abs(u - step - first))
-        if not bool((jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)):  # there, lost, or not a number
+        leads = jnp.max(jnp.abs(u - here.residual - first))
+        if not bool((jnp.max(jnp.abs(here.residual)) > POLISHED) & (leads < NEARBY)):  # there, lost, or not a number
             break
-        u = u - step
+        u = u - here.residual
         here = unfold(u)
-    size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
-    return _Edge(problem, given, u, here, bool(size < SETTLED_TO))
+    found = bool(jnp.max(jnp.abs(here.residual)) < SETTLED_TO)
+    return _Edge(problem, u, here.residual, here.weight, float(here.rate) / float(unit), found)
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
@@ -234,13 +236,9 @@ def sensitivity(
     edge = _located(system, point, method)
     if edge.status != "converged":
         return _nowhere(system, point.kind, name, edge.status, edge.error / PER_RPM)
-    unit, here, speed = float(edge.problem.units[0]), edge.unfolding, edge.speed
-    adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(edge.u.size).at[-1].set(1.0))
-    weight = -(adjoint @ here.of_numbers) * unit
-    pulled = _pull_back(edge.problem, edge.given, edge.u, weight)
-    slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
+    speed = edge.speed
+    slope = _pulled_back(edge.problem, Given(system, jnp.asarray(point.speed, dtype=float)), edge.u, edge.weight)
     change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
-    rate = float(here.rate) / unit
     return Sensitivity(
         name=name,
         kind=point.kind,
@@ -248,8 +246,8 @@ def sensitivity(
         derivative={n: s / PER_RPM for n, s in slope.items()},
         elasticity=change,
         homogeneity=_homogeneity(system, change),
-        transversality=rate,
-        status="tangential" if abs(rate * speed) < TANGENTIAL else "converged",
+        transversality=edge.rate,
+        status="tangential" if abs(edge.rate * speed) < TANGENTIAL else "converged",
         state=np.asarray(edge.problem.state(edge.u)),
         error_rpm=edge.error / PER_RPM,
         steps=edge.steps,
@@ -377,13 +375,11 @@ def leading_multiplier(
         if steps >= int(counts.last) or error <= SLOPE * float(counts.tolerance) or given_up:
             break
         before, steps = found, min(2 * steps, int(counts.last))
-    paths = parameter_paths(system)
     if found is None:
-        nan = float("nan")
-        return LeadingMultiplier(nan, dict.fromkeys(paths, nan), np.full(system.dimension, nan), error, steps)
+        nan, names = float("nan"), parameter_paths(system)
+        return LeadingMultiplier(nan, dict.fromkeys(names, nan), np.full(system.dimension, nan), error, steps)
     u, size, weight = found
-    pulled = _pull_back(by_steps(problem, steps), given, u, weight)
-    slope = {name: float(get(pulled, path)) for name, path in paths.items()}
+    slope = _pulled_back(by_steps(problem, steps), given, u, weight)
     return LeadingMultiplier(float(size), slope, np.asarray(problem.state(u)), error, steps)
 
 
