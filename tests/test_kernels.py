@@ -32,7 +32,7 @@ from jaxcage.integrate._march import Tangent, is_elementary, march_p
 from jaxcage.integrate._method import TERM
 from jaxcage.integrate._program import Sizes, pieces, program_of
 from jaxcage.models._field import _columns
-from jaxcage.orbits._implicit import differentiated
+from jaxcage.orbits._implicit import AbstractEquations
 from jaxcage.orbits._orbit import OrbitEquations
 from jaxcage.orbits._problem import Given, make_problem
 from jaxcage.sweeps import _engine
@@ -453,7 +453,7 @@ def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):
     u = jnp.append(jnp.asarray(system.starts(speed)[1]) / problem.scale, jnp.full(2, 10.0))
     equations = OrbitEquations(problem)
     r, jacobian, _ = compiled(lambda u: equations.linearised(u, given))(u)
-    expected_r, expected, _ = compiled(lambda u: differentiated(equations, u, given))(u)
+    expected_r, expected, _ = compiled(lambda u: AbstractEquations.linearised(equations, u, given))(u)
     np.testing.assert_allclose(r, expected_r, rtol=0, atol=1e-10)
     np.testing.assert_allclose(jacobian, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 

@@ -47,8 +47,8 @@ half as many steps do."""
 MOVED = 0.1
 """What half the steps change in a point, over the step's length: more, and what is followed may be their error."""
 ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
-"""How far a point may be from where its tangent says that it is (see `astray`), in the unknowns' units and over the
-step's length, or over its distance from the prediction."""
+"""How far a point may be from where its tangent says that it is, in the unknowns' units and over the step's length, or
+over its distance from the prediction."""
 CROSSED, ASIDE = 1e-4, 0.01
 """A step across which the orientation changes is halved down to this length. Where it changes all the same the curve
 crosses another, and the step is taken in one from so far off: near the crossing tangents are lost to rounding."""
@@ -225,13 +225,8 @@ class Steps:
 
     def __post_init__(self):
         if not 0 < self.shortest <= self.first <= self.longest:
-            raise ArgumentError(
-                "steps",
-                said=(
-                    "must have 0 < shortest <= first <= longest, but has "
-                    f"{self.shortest:g}, {self.first:g} and {self.longest:g}."
-                ),
-            )
+            given = f"{self.shortest:g}, {self.first:g} and {self.longest:g}"
+            raise ArgumentError("steps", said=f"must have 0 < shortest <= first <= longest, but has {given}.")
 
 
 class Trace(NamedTuple):
@@ -270,41 +265,33 @@ def classified(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Steps classified by the points that they begin and end with.
 
-    **Arguments:** what is allowed (`Steps`); last points and new ones (`Corrected`); predictions and their unit
-    tangents; lengths of the steps and of those before, infinite where there was none.
+    What a prediction over `length` from two points `apart` leaves out, a s^2 (s + apart)^2, is nearly as far in the
+    tangent as in the point: a point that is elsewhere than its tangent says is not of this curve. The determinant of
+    the equations with the tangent keeps its sign along a curve, at folds too, but where another curve is crossed.
+
+    **Arguments:** what is allowed; last points and new ones; predictions and their unit tangents; lengths of the steps
+    and of those before, infinite where there was none.
 
     **Returns:** distance of each point from its prediction; angle between the tangents, over the largest allowed;
-    whether the point is on the curve, or on one that crosses it; and whether the orientation is the same.
+    whether the point is on the curve, or on one that crosses it; and whether the determinant has the same sign.
     """
     turned = np.arccos(np.clip(np.sum(got.tangent * last.tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
-    missed = np.linalg.norm(got.u - ahead, axis=1)
+    way, slope = got.u - ahead, got.tangent - normal
+    missed = np.linalg.norm(way, axis=1)
     largest = lambda m: np.max(np.abs(m), axis=(1, 2))
     smooth = largest(got.jacobian - last.jacobian) < steps.swing * (1 + largest(last.jacobian))
-    off = astray(got.u - ahead, got.tangent - normal, normal, length, apart)
+    across = slope - np.sum(slope * normal, axis=1, keepdims=True) * normal
+    share = 1 / (2 / length + 2 / (length + apart))
+    off = np.linalg.norm(way - share[:, None] * across, axis=1)
     belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length), OF_MISSED * missed)
     sure = got.converged & (turned < 1) & (missed < steps.bend * length) & smooth & belongs
-    same = orientation(got) == orientation(last)
-    return missed, turned, sure, same
 
+    def orientation(points: Corrected) -> np.ndarray:
+        whole = np.concatenate([points.jacobian, points.tangent[:, None]], axis=1)
+        known = np.all(np.isfinite(whole), axis=(1, 2), keepdims=True)
+        return np.linalg.slogdet(np.where(known, whole, 0.0))[0]
 
-def astray(
-    missed: np.ndarray, turned: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
-) -> Float[np.ndarray, " lanes"]:
-    """How far points are from where their tangents say that they are.
-
-    What a prediction over `length` from two points `apart` leaves out, a s^2 (s + apart)^2, is nearly as far in the
-    tangent as in the point.
-    """
-    across = turned - np.sum(turned * normal, axis=1, keepdims=True) * normal
-    share = 1 / (2 / length + 2 / (length + apart))
-    return np.linalg.norm(missed - share[:, None] * across, axis=1)
-
-
-def orientation(points: Corrected) -> Float[np.ndarray, " lanes"]:
-    """Sign of the determinant of a curve's equations with its tangent: a fold does not change it, a crossing does."""
-    whole = np.concatenate([points.jacobian, points.tangent[:, None]], axis=1)
-    known = np.all(np.isfinite(whole), axis=(1, 2), keepdims=True)
-    return np.linalg.slogdet(np.where(known, whole, 0.0))[0]
+    return missed, turned, sure, orientation(got) == orientation(last)
 
 
 def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float, Int
+from jaxtyping import Array, Float, Int
 
 from .._arguments import shown, wrong
 from .._checks import require_x64
@@ -18,12 +18,12 @@ from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps
 from ._branch import follow_both_ways
 from ._follower import Start, make_follower
-from ._implicit import AbstractEquations, Found, as_root, differentiated, settled
+from ._implicit import AbstractEquations, Found, as_root, settled
 from ._located import brackets
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, settle, sorted_multipliers
-from ._point import CRITICAL, FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
+from ._point import FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
 from ._problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, with_value
-from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix
+from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix, to_critical
 from ._steps import (
     BY_OTHERS,
     ENOUGH,
@@ -76,9 +76,6 @@ class PointEquations(AbstractEquations):
         if self.kind != "branch-point":
             return jnp.append(closing, g), known
         return jnp.concatenate([closing + u[n + 1] * self.left, jnp.stack([g, p @ columns[:, n]])]), known
-
-    def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Singular]:
-        return differentiated(self, u, given)
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the parameters, a unit of which is a tenth of their size."""
@@ -289,7 +286,7 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     known: Singular = found.aux
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
-    matches = is_critical(kind, multipliers)
+    matches = to_critical(kind, multipliers) < jnp.sqrt(ON_CIRCLE)  # a double one is known to the root of rounding
     borders = equations.left, equations.right
     rate = critical_rate(kind, problem.dimension, found.newton.jacobian, known, borders)
     at, unit = problem.values(u)[0], problem.units[0]
@@ -318,15 +315,6 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         kind=kind,
         parameter=parameter if isinstance(parameter, str) else "parameter",
     )
-
-
-def is_critical(kind: Kind, multipliers: Complex[Array, " dim"]) -> Bool[Array, ""]:
-    """Whether a multiplier is where a bifurcation of `kind` has it."""
-    if kind == "Neimark-Sacker":
-        off = jnp.where(jnp.abs(multipliers.imag) > 1e-9, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf)
-    else:
-        off = jnp.abs(multipliers - CRITICAL[kind])
-    return jnp.min(off) < jnp.sqrt(ON_CIRCLE)  # a double multiplier is only known to the square root of rounding
 
 
 def critical_rate(kind: Kind, n: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:

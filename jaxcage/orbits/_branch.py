@@ -29,8 +29,9 @@ from ._follower import (
 )
 from ._located import Seen, account
 from ._orbit import NearOrbit, Orbit, guess_state
-from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
+from ._point import FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
 from ._problem import SPEED, Given, Parameter
+from ._singularity import CRITICAL
 from ._steps import SETTLED
 
 

@@ -48,9 +48,17 @@ class AbstractEquations(eqx.Module):
         """The equations, with the image of the state and its derivatives (see `returned`), and what else is
         wanted at the root."""
 
-    @abc.abstractmethod
     def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-        """The equations, their derivative, and what else is wanted at the root."""
+        """The equations, their derivative along each unknown, and what else is wanted at the root."""
+
+        def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
+            strobe, drifts = prepared = self.prepare(u, given)
+            image, columns = self.problem.returned(strobe, u[: self.problem.dimension], drifts)
+            r, aux = self.closing(u, prepared, image, columns)
+            return r, (r, aux)
+
+        jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
+        return r, jacobian, aux
 
     @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
@@ -59,19 +67,6 @@ class AbstractEquations(eqx.Module):
         **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
         or of NumPy.
         """
-
-
-def differentiated(equations: AbstractEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-    """What `linearised` returns, by differentiating the equations along each unknown."""
-
-    def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
-        strobe, drifts = prepared = equations.prepare(u, given)
-        image, columns = equations.problem.returned(strobe, u[: equations.problem.dimension], drifts)
-        r, aux = equations.closing(u, prepared, image, columns)
-        return r, (r, aux)
-
-    jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
-    return r, jacobian, aux
 
 
 class Newton(NamedTuple):
@@ -262,20 +257,15 @@ def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any
 
     Of a strobe map these are its field's: system and scale only say how far out a state is and how large an error.
     """
-    numbers, rest = eqx.partition(prepared, jax.tree.map(_matters, prepared, is_leaf=_is_map))
+    is_map = lambda node: isinstance(node, StrobeMap)
+    matters = lambda node: (
+        eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
+        if is_map(node)
+        else eqx.is_inexact_array(node)
+    )
+    numbers, rest = eqx.partition(prepared, jax.tree.map(matters, prepared, is_leaf=is_map))
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: eqx.combine(unravel(row), rest)
-
-
-def _is_map(node: Any) -> bool:
-    return isinstance(node, StrobeMap)
-
-
-def _matters(node: Any) -> Any:
-    """Which parts of `node` matter, as a filter of Equinox."""
-    if not isinstance(node, StrobeMap):
-        return eqx.is_inexact_array(node)
-    return eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
 
 
 class Push(eqx.Module):

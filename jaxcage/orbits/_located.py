@@ -9,13 +9,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ._arclength import Corrected, Curves, correct, measured_as, put, take
 from ._follower import Follower
 from ._point import UNEXPLAINED
-from ._singularity import matches, test_functions
+from ._singularity import test_functions, to_critical
 from ._steps import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
 
@@ -217,7 +218,8 @@ def _located(follower: Follower, rows: Sequence[Corrected]) -> list[list[Seen]]:
     places = locate(follower, [(rows[i], k, kind) for i, k, kind in wanted])
     seen: list[list[Seen]] = [[] for _ in rows]
     for (i, k, kind), place in zip(wanted, places, strict=True):
-        if place is not None and matches(kind, follower.multipliers(place[0])):
+        near = 1e-4 if kind == "Neimark-Sacker" else 1e-3  # a double multiplier is known to the root of rounding
+        if place is not None and to_critical(kind, jnp.asarray(follower.multipliers(place[0]))) < near:
             seen[i].append(Seen(k, kind, *place))
     return seen
 

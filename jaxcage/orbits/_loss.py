@@ -115,6 +115,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
 def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch, close: float) -> LossZones:
     tops = [None, *(g.high for g in groups)]
     bottoms = [*(g.low for g in groups), None]
+    edge = lambda point: None if point is None else point.as_edge("synchronous-loss")
     zones: list[Zone] = []
     edges: dict[str, Point] = {}
     for before, after in zip(tops, bottoms, strict=True):
@@ -124,7 +125,7 @@ def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch,
         open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close
         if open_below or open_above or (before is not None and onset is None):
             continue
-        zones.append(Zone("synchronous-loss", _edge(onset), _edge(leaves), _share(found, onset, leaves)))
+        zones.append(Zone("synchronous-loss", edge(onset), edge(leaves), _share(found, onset, leaves)))
         for name, point in (("onset", onset), ("exit", leaves)):
             if point is not None:
                 edges[f"zone {len(zones)} {name}"] = point
@@ -137,10 +138,6 @@ def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) 
     rpm = found.sweep.rpm
     inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
     return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
-
-
-def _edge(point: Point | None) -> Edge | None:
-    return None if point is None else point.as_edge("synchronous-loss")
 
 
 @dataclasses.dataclass(frozen=True)

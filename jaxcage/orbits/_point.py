@@ -13,6 +13,7 @@ from .._types import Scalar
 from ..analysis import Edge
 from ..models import AbstractForcedSystem
 from ._problem import SPEED, Parameter, value_of
+from ._singularity import CRITICAL
 
 
 Numbers = np.ndarray | Array
@@ -24,9 +25,6 @@ the multipliers are not those of the kind asked for (a neutral saddle instead of
 at which the multiplier hardly crosses, so that its place is not a function of the design; or one that is elsewhere by
 half the steps; the number of unstable multipliers changes and no bifurcation is found; not solved for yet."""
 FOUND, NO_SUCH_POINT, OTHER_KIND, TANGENT, NOT_CONVERGED, NOT_EXPLAINED, GIVEN = range(len(OUTCOMES))
-
-CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
-"""The multiplier that each kind is about, where it is real."""
 
 
 class Point(eqx.Module):

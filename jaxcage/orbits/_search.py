@@ -9,13 +9,12 @@ known. Stable stretches of the branches, bounded by bifurcations, are what the s
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
@@ -27,7 +26,7 @@ from ..models import AbstractForcedSystem
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
-from ._follower import Follower, Start, make_follower, seeds, stable_steps
+from ._follower import Follower, make_follower, seeds, stable_steps
 from ._orbit import Orbit, periodic_orbit
 from ._point import Point
 from ._problem import SPEED, Given
@@ -242,18 +241,9 @@ def synchronous_orbits(
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 
     def simulate(speeds: np.ndarray, sign: float) -> Sweep:
-        return sweep(
-            system,
-            speeds,
-            starts=sign * initial_states(system, speeds, None),
-            discard=discard,
-            revolutions=8,
-            blocks=1,
-            keep=8,
-            exponents=0,
-            method=method,
-            progress=lambda done, of: say("simulations", done, of),
-        )
+        short: dict[str, Any] = {"discard": discard, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
+        starts, told = sign * initial_states(system, speeds, None), lambda done, of: say("simulations", done, of)
+        return sweep(system, speeds, starts=starts, **short, method=method, progress=told)
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
@@ -269,15 +259,17 @@ def synchronous_orbits(
         if not waiting:
             break
         say("branches", turn, ROUNDS)
-        branches += [b for b in follow_both_ways(follower, _spread(waiting, ROUND), steps, PATIENCE) if b is not None]
+        picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
+        starts = [(waiting[i].state, waiting[i].speed) for i in picked]
+        branches += [b for b in follow_both_ways(follower, starts, steps, PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w, scale(w.speed)) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi
     pieces = _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale)
     families = _families(branches, scale)
+    there = [o for o in orbits if o.settled]
     stretches = []
     for piece in pieces:
-        there = [o for o in orbits if o.settled]
         met = [o.start for o in there if piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
         family = families[piece.stretch.branch]
         stretches.append(dataclasses.replace(piece.stretch, family=family, met=len(met), met_first=met.count(0)))
@@ -313,12 +305,6 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     states = points.u[:, :-1] * np.asarray(follower.problem.scale)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
-
-
-def _spread(orbits: Sequence[_Settled], most: int) -> list[Start]:
-    """At most `most` of the orbits, spread over them."""
-    picked = np.unique(np.linspace(0, len(orbits) - 1, min(most, len(orbits))).round().astype(int))
-    return [(orbits[i].state, orbits[i].speed) for i in picked]
 
 
 def _covers(branch: Branch, orbit: _Settled, scale: np.ndarray) -> bool:
@@ -365,31 +351,17 @@ def coexisting_orbits(
     starts = jnp.asarray(np.concatenate([own, random]))
     find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
     found = jax.vmap(find)(starts)
-    images = _images(system, speed, periods, found) / scale
-    kept: list[int] = []
-    for i in np.flatnonzero(np.asarray(found.converged)):
-        shorter = any(_near(images[i, 0], images[i, j]) for j in range(1, periods))
-        if not shorter and not any(_near(images[i, 0], image) for k in kept for image in images[k]):
-            kept.append(int(i))
-    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
-    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))
-
-
-def _near(a: np.ndarray, b: np.ndarray) -> bool:
-    return bool(np.max(np.abs(a - b)) < SAME)
-
-
-def _images(
-    system: AbstractForcedSystem, speed: Scalar, periods: int, found: Orbit
-) -> Float[np.ndarray, "orbits periods dim"]:
-    """All strobe states of each orbit [SI]."""
-
-    def step(orbit: Orbit, y: Array) -> Array:
-        strobe = strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)
-        return jnp.stack(strobe(tuple(y[i] for i in range(y.size))).y)
-
-    advance = compiled(jax.vmap(step))
+    strobe = lambda orbit, y: strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)(tuple(y))
+    advance = compiled(jax.vmap(lambda orbit, y: jnp.stack(strobe(orbit, y).y)))
     rows = [found.state]
     for _ in range(periods - 1):
         rows.append(advance(found, rows[-1]))
-    return np.stack([np.asarray(r) for r in rows], axis=1)
+    images = np.stack([np.asarray(row) / scale for row in rows], axis=1)
+    near = lambda a, b: bool(np.max(np.abs(a - b)) < SAME)
+    kept: list[int] = []
+    for i in np.flatnonzero(np.asarray(found.converged)):
+        shorter = any(near(images[i, 0], images[i, j]) for j in range(1, periods))
+        if not shorter and not any(near(images[i, 0], image) for k in kept for image in images[k]):
+            kept.append(int(i))
+    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
+    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))
