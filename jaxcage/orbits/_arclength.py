@@ -26,9 +26,8 @@ from ._steps import GIVEN_UP, SETTLED, Counts, by_steps
 
 
 LANES, FEW = (8, 32), 40
-"""Lanes per call: two programs for any number of curves, and work for every core; the second where there are more than
-a few lanes, so that one branch needs the first alone. Up to eight lanes cost what one does: they share the processor's
-instructions."""
+"""Lanes per call: two programs for any number of curves; the second where there are more than a few lanes, so that one
+branch needs the first alone. Up to eight lanes cost what one does: they share the processor's instructions."""
 FOLLOWING, OF_A_STEP = 1e-6, 1e-5
 """Newton's last step while following, in the unknowns' units, and over the step's length where that is less: points are
 then good to about its square."""
@@ -190,10 +189,7 @@ def correct(
 
 
 def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: int = 0) -> Corrected:
-    """Points of many curves on planes across them, by as many steps as each needs.
-
-    **Arguments:** as for `correct`; a number of steps to begin with.
-    """
+    """Points of many curves on planes across them, by as many steps as each needs, which are at least `steps`."""
     first = int(curves.counts.first if curves.chooses else curves.counts.last)
     count = np.full(at.shape[0], max(steps, first))
     found = correct(curves, at, normal, count, measured=True)
@@ -319,20 +315,13 @@ def follow(
 ) -> list[Trace]:
     """Follow many curves from their first points, each in the direction of its tangent.
 
-    A step to another curve is refused (see `classified`). The error of each point is measured. Where it is too large
-    the revolutions get twice as many steps, the last point is solved for again by these, and the step along the curve
-    is repeated; where it is small they get half as many.
+    A step to another curve is refused (see `classified`). Where the error of a point is too large the revolutions get
+    twice as many steps, the last point is solved for again by these, and the step along the curve is repeated; where it
+    is small they get half as many.
 
-    **Arguments:**
-
-    - `curves`: as for `correct`.
-    - `start`: first points, the lanes first.
-    - `inside`: tells for unknowns, the lanes first, whether they are within the range; a curve ends with its
-        first point outside.
-    - `stop`: called with a lane and its points after each step.
-    - `update`: new equations from the last points of the lanes given, e.g. with fresh borders.
-
-    **Returns:** a `Trace` per lane.
+    **Arguments:** curves; first points, the lanes first; lengths of steps; whether unknowns, the lanes first, are
+    within the range, a curve ending with its first point outside; whether a lane is to stop, by its points; new
+    equations from the last points of some lanes, e.g. with fresh borders.
     """
     lanes = start.u.shape[0]
     points = [[take(start, np.array(i))] for i in range(lanes)]

@@ -17,7 +17,7 @@ from ..integrate import AbstractMethod, compiled
 from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Steps
 from ._branch import follow_both_ways
-from ._follower import Start, make_follower
+from ._follower import Follower, Start, make_follower
 from ._implicit import AbstractEquations, Found, as_root, settled
 from ._located import brackets
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, settle, sorted_multipliers
@@ -111,9 +111,8 @@ def bifurcation(
     - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 where that is 0); 0 turns
         this off. It is off under `jit`, `vmap` and `grad`, where it is not known what Newton's method finds.
 
-    **Returns:** `Point`; it does not raise if there is none, but says where it looked. Works under `jit` and
-    `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`, by the implicit
-    function theorem.
+    **Returns:** `Point`; it does not raise if there is none, but says where it looked. Works under `jit` and `vmap`;
+    value, speed and state have derivatives of every order with respect to `system` and `speed`.
 
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
@@ -163,8 +162,9 @@ def bifurcation(
     if spin:
         here, turning = with_value(system, first, parameter, at)
         start = periodic_orbit(here, turning, int(periods), guess=start, revolutions=SPUN, method=method).state
-    near_by = np.asarray(start), float(at)
-    there, looked = _along_branch(given, parameter, near_by, float(reach), int(periods), kind, method)
+    away = float(reach) * (abs(float(at)) or 1.0)
+    follower = make_follower(given, parameter, float(at) - away, float(at) + away, method, int(periods))
+    there, looked = _along_branch(follower, (np.asarray(start), float(at)), kind)
     if there is not None:
         looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
         again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
@@ -172,26 +172,14 @@ def bifurcation(
     return found if bool(found.converged) else dataclasses.replace(found, looked=looked)
 
 
-def _along_branch(
-    given: Given,
-    parameter: Parameter,
-    start: Start,
-    reach: float,
-    periods: int,
-    kind: str,
-    method: AbstractMethod | None,
-) -> tuple[Point | None, str]:
-    """The nearest bifurcation of `kind`, by the parameter, on the branch through an orbit.
+def _along_branch(follower: Follower, start: Start, kind: str) -> tuple[Point | None, str]:
+    """The nearest bifurcation of `kind` on the branch through an orbit, if there is one, and what was searched.
 
     Near a superstable orbit the scalar that vanishes at the point is flat, and Newton's steps lead anywhere; the branch
     itself leads on.
-
-    **Returns:** the point, None where there is none; and what was searched, in words.
     """
-    name = parameter if isinstance(parameter, str) else "the parameter"
+    name = follower.parameter if isinstance(follower.parameter, str) else "the parameter"
     say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if name == SPEED else f"{x:.6g}"
-    away = reach * (abs(start[1]) or 1.0)
-    follower = make_follower(given, parameter, start[1] - away, start[1] + away, method, periods)
     reached: list[float] = []
 
     def stop(points: list[Corrected]) -> bool:
@@ -239,19 +227,10 @@ def _read_guess(
 
 @compiled
 def _find_point(
-    problem: OrbitProblem,
-    counts: Counts,
-    kind: Kind,
-    given: Given,
-    there: Given,
-    start: Array,
-    at: Array,
-    spin: bool,
+    problem: OrbitProblem, counts: Counts, kind: Kind, given: Given, there: Given, start: Array, at: Array, spin: bool
 ) -> tuple[Point, PointEquations, Array, Singular]:
-    """The point, without derivatives; its equations, unknowns, and what else is known there.
-
-    **Arguments:** the system as given, and as it is at the guess; state and parameter of the guess; whether its orbit
-    is to be found by simulation.
+    """The point, without derivatives; its equations, unknowns, and what else is known there. Given are the system as it
+    is and as it is at the guess, state and parameter of the guess, and whether its orbit is to be found by simulation.
     """
     u0 = start / problem.scale
     if spin:  # on the orbit itself, if there is one here
@@ -318,12 +297,10 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
 
 
 def critical_rate(kind: Kind, n: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
-    """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
+    """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit; at a fold, where it
+    is infinite, the drift of the map along the critical direction.
 
-    At a fold, where it is infinite, the drift of the map along the critical direction instead.
-
-    **Arguments:** kind; dimension of the state; derivative of all equations at the point; null vectors; the left and
-    right border.
+    **Arguments:** kind; dimension of the state; derivative of all equations at the point; null vectors; borders.
     """
     of_orbit, drift = jacobian[:n, :n], jacobian[:n, n]
     overlap = known.left @ known.right

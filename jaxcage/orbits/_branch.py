@@ -100,8 +100,6 @@ def branch(
     - `speed`: speed [rad/s] where it is not the parameter and `orbit` does not have it.
     - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
 
-    **Returns:** `Branch`.
-
     **Raises:** `ValueError` if there is no orbit to start from, or none in a finite range.
     """
     require_x64()
@@ -167,10 +165,8 @@ def follow_both_ways(
 
 
 def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
-    """Both directions as one row of points.
-
-    A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
-    """
+    """Both directions as one row of points. A closed curve, which was gone round twice, is taken once, from an unstable
+    orbit on, so that no stable part is cut."""
     if "closed" in (up.ended, down.ended):
         up = up if up.ended == "closed" else down
         stable = follower.unstable(up.points) == 0

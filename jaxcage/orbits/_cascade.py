@@ -1,6 +1,7 @@
 """Period-doubling cascades: doubling after doubling along the doubled branches, and where they accumulate."""
 
 import dataclasses
+import itertools
 
 import jax.numpy as jnp
 import numpy as np
@@ -32,8 +33,7 @@ class Cascade:
     limit: float
     """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
     error: float
-    """Distance of the last two extrapolations, with the errors of the last two points in it; infinite with fewer than
-    three points."""
+    """Distance of the last two extrapolations and errors of the last two points; infinite with fewer than three."""
     ended: str = ""
     """Why there are not as many points as were asked for."""
 
@@ -57,14 +57,6 @@ class Cascade:
         return "\n".join(["Period-doubling cascade", *rows, f"  limit {self.limit:.10g} +- {self.error:.1g}", *last])
 
     _repr_html_ = notebook_html
-
-
-def extrapolated(values: tuple[float, ...]) -> tuple[float, float]:
-    """Limit of a cascade from its points, and the distance to the extrapolation with one point less."""
-    limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in zip(values[:-1], values[1:], strict=True)]
-    if not limits:
-        return float("nan"), float("inf")
-    return limits[-1], abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
 
 
 def doubled_branch(
@@ -144,8 +136,6 @@ def cascade(
     """Follow a period-doubling cascade from its first point.
 
     **Arguments:** the first period doubling, of a period-1 orbit; parameter and its range [SI]; number of doublings.
-
-    **Returns:** `Cascade`.
     """
     require_x64()
     require_range(parameter, lower, upper)
@@ -177,6 +167,8 @@ def cascade(
             break
         points.append(following[0])
         amplitude /= 2
-    limit, error = extrapolated(tuple(float(p.value) for p in points))
+    pairs = itertools.pairwise(float(p.value) for p in points)
+    limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in pairs] or [float("nan")]
+    error = abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
     located = sum(w * float(np.nan_to_num(p.error)) for w, p in zip((1 + 1 / (FEIGENBAUM - 1), 0.3), points[::-1]))
-    return Cascade(tuple(points), limit, error + located, ended)
+    return Cascade(tuple(points), limits[-1], error + located, ended)

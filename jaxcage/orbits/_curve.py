@@ -36,8 +36,7 @@ class Curve:
     state: Float[np.ndarray, "points dim"]
     multipliers: Complex[np.ndarray, "points dim"]
     genuine: Bool[np.ndarray, " points"]
-    """False where a curve of Neimark-Sacker bifurcations has gone on, its multipliers having met at 1 or -1, as neutral
-    saddles."""
+    """False where a curve of Neimark-Sacker bifurcations has gone on as neutral saddles."""
     ended: tuple[str, str]
     """Why the curve ends where it begins and where it ends: as for `Trace`."""
     name: str = ""
@@ -76,8 +75,6 @@ def curve(
     - `x`, `y`: the two parameters, by name.
     - `lower`, `upper`, `x_lower`, `x_upper`: the range of `y` and of `x` [SI]; the curve ends where it leaves them.
     - `steps`: step lengths, in units of 1/20 of the ranges and of the system's scale.
-
-    **Returns:** `Curve`.
 
     **Raises:** `ValueError` if Newton's method does not find the point again, or for a kind that cannot be followed.
     """

@@ -62,11 +62,8 @@ class AbstractEquations(eqx.Module):
 
     @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
-
-        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
-        or of NumPy.
-        """
+        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed;
+        from the way from one to the other, shape (..., n), and the derivatives at both, of JAX or of NumPy."""
 
 
 class Newton(NamedTuple):
@@ -159,10 +156,7 @@ def solve(
 def settled(
     equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
-    """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
-
-    **Returns:** the root by the last number of steps, and `Found`.
-    """
+    """The root by as many steps as it needs: solved again by twice as many until it stays where it is."""
     by = lambda steps: partial(by_steps(equations, steps).linearised, given=given)
     once = lambda steps, u, skip: solve(by(steps), u, at_root=at_root, skip=skip)
 
@@ -253,10 +247,8 @@ def _moved(
 
 
 def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any]]:
-    """All numbers of `prepared` that its results depend on in a row, and the function that puts such a row back.
-
-    Of a strobe map these are its field's: system and scale only say how far out a state is and how large an error.
-    """
+    """All numbers of `prepared` that its results depend on in a row, and the function that puts such a row back. Of a
+    strobe map these are its field's: system and scale only say how far out a state is and how large an error."""
     is_map = lambda node: isinstance(node, StrobeMap)
     matters = lambda node: (
         eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
@@ -292,10 +284,8 @@ class Slopes(eqx.Module):
 
 @eqx.filter_custom_jvp
 def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any]) -> Any:
-    """f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode, to any order.
-
-    `f` is a module; what it holds has no derivative.
-    """
+    """f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode, to any order. `f` is a module;
+    what it holds has no derivative."""
     return _evaluated(f, x)
 
 

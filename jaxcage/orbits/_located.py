@@ -259,8 +259,10 @@ def locate(follower: Follower, wanted: Sequence[tuple[Corrected, int, str]]) -> 
         points, k, _ = wanted[i]
         if beyond is not None:
             return take(points, np.array([max(k - beyond, 0), min(k + 1 + beyond, len(points.u) - 1)]))
-        place = found[i]
-        return None if place is None else _sides(place, 2 * moved[i])
+        if (place := found[i]) is None:
+            return None
+        both: Corrected = jax.tree.map(lambda x: np.stack([x, x]), place)
+        return both._replace(u=place.u + np.outer([-2 * moved[i], 2 * moved[i]], place.tangent))
 
     def at(lanes: list[int]) -> list[Corrected | None]:
         """Where those of these lanes vanish: close to where they did by fewer steps, between the two orbits or, by
@@ -268,10 +270,8 @@ def locate(follower: Follower, wanted: Sequence[tuple[Corrected, int, str]]) -> 
         placed: dict[int, Corrected | None] = dict.fromkeys(lanes)
         for beyond in (None, *WIDER):
             ends = {i: e for i in lanes if placed[i] is None and (e := between(i, beyond)) is not None}
-            some = list(ends)
-            if some:
-                closely = within[some] if beyond is None else LOCATED
-                mine = [kinds[i] for i in some]
+            if some := list(ends):
+                closely, mine = within[some] if beyond is None else LOCATED, [kinds[i] for i in some]
                 there = _zeros(follower, curves.take(some), list(ends.values()), mine, steps[some], closely)
                 placed.update(zip(some, there, strict=True))
         return list(placed.values())
@@ -305,12 +305,6 @@ def locate(follower: Follower, wanted: Sequence[tuple[Corrected, int, str]]) -> 
         elif not crossing:
             error[i] = np.inf
     return [None if p is None else (p, float(e * follower.unit)) for p, e in zip(found, error, strict=True)]
-
-
-def _sides(place: Corrected, apart: float) -> Corrected:
-    """Points so far from a place along its tangent, on both sides."""
-    along = np.outer([-apart, apart], place.tangent)
-    return jax.tree.map(lambda x: np.stack([x, x]), place)._replace(u=place.u + along)
 
 
 def _zeros(

@@ -9,8 +9,7 @@ As for chaotic zones, stretches narrower than a stated width do not count and wi
 only between stretches wider than the window. Else a row of slivers, some a tenth of a revolution per minute wide, would
 carry an edge far from the stretch it belongs to, to a bifurcation that every solver has elsewhere.
 
-Edges of chaotic zones, which are statistical, are matched with bifurcations and limits of cascades: these say why a
-zone ends where it does.
+Edges of chaotic zones, which are statistical, are matched with bifurcations and limits of cascades.
 """
 
 import dataclasses
@@ -152,14 +151,12 @@ class Explained:
 def explain(
     zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
 ) -> Explained:
-    """Give each chaotic edge the mechanism it coincides with, within its uncertainty and the resolution of the sweep.
-
-    A bar that is wider than that, for mean lives near the horizon or failed lanes, coincides with anything.
+    """Give each chaotic edge the mechanism it coincides with, within its uncertainty and the resolution of the sweep: a
+    bar that is wider than that, for mean lives near the horizon or failed lanes, coincides with anything.
 
     An onset can be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations themselves are
-    tried first, then the limits of the cascades that begin at period doublings on the calm side.
-
-    **Returns:** `Explained`; edges that coincide with nothing that was located are left as they were.
+    tried first, then the limits of the cascades that begin at period doublings on the calm side. Edges that coincide
+    with nothing that was located are left as they were.
     """
     sources: dict[str, Point | Cascade] = {}
     changed: list[Zone] = []

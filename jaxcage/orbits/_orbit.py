@@ -169,10 +169,9 @@ def divergence_integral(
 ) -> Float[Array, ""]:
     """Integral over `periods` revolutions of the field's divergence along the orbit through `state` (SI).
 
-    By Liouville's identity it is log|det M|; for a mechanical system the divergence is minus damping over mass. It
-    checks every monodromy matrix: integration error, differentiation and, in stiff systems, multipliers lost to
-    rounding show as a disagreement. By the trapezoidal rule at the integration steps, or at as many of them as is
-    enough: on a closed orbit it converges faster than any power of the step where the field is smooth.
+    By Liouville's identity it is log|det M|, which checks every monodromy matrix: integration error, differentiation
+    and, in stiff systems, multipliers lost to rounding show as a disagreement. By the trapezoidal rule at the
+    integration steps, or at as many of them as is enough: on a closed orbit it converges faster than any power of them.
     """
     parts = ADAPTIVE_PARTS
     if isinstance(strobe.method, FixedSteps):
@@ -270,8 +269,7 @@ def periodic_orbit(
         none that stays where it is with more steps, by Rodas4 (which only without `jit` and `vmap`).
 
     **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and
-    `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`, through
-    the equation P(z) = z.
+    `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`.
     """
     require_x64()
     require_speeds(system, speed)

@@ -1,7 +1,6 @@
 """The equations of a periodic orbit, P(z) = z, in the unknowns that Newton's method and continuation work on.
 
-Unknowns are numbers of order one: the state z in units of the system's scale, then the free parameters in units of
-their own.
+Unknowns are numbers of order one: the state z in units of the system's scale, then the free parameters in others.
 
 What is expensive, the revolutions, sees the system only through the numbers of its field at one speed (for a cage some
 twenty of them); how these follow from the design is cheap. `prepare` does the latter, `returned` the former, so that a
@@ -45,10 +44,8 @@ def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
 
 
 def pick(system: AbstractForcedSystem, parameter: Parameter) -> Callable[[Any], Any]:
-    """The function that picks `parameter` from a system.
-
-    **Raises:** `ValueError` for a name the system does not have, and for a function that picks no number of it.
-    """
+    """The function that picks `parameter` from a system; it raises for a name that this does not have, and for a
+    function that picks no number of it."""
     if callable(parameter):
         picked = parameter(system)
         if not any(picked is leaf for leaf in jax.tree.leaves(system)) or jnp.ndim(picked):
@@ -152,11 +149,8 @@ class OrbitProblem(eqx.Module):
         return [s if d else None for s, d in zip(slope, depends_on_input(row, u[i]), strict=True)]
 
     def returned(self, strobe: StrobeMap, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
-        """The return map, `periods` applications of the strobe map.
-
-        **Returns:** the image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along
-        each drift of the field's numbers (in a column each).
-        """
+        """The image of z by the return map, `periods` applications of the strobe map; its derivatives with respect to
+        z, the monodromy matrix, and, behind these, along each drift of the field's numbers (in a column each)."""
         scale, n = self.scale, z.size
         zero = jnp.zeros(())
         basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]

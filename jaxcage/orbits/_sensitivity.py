@@ -5,9 +5,9 @@ exponents a_i of a unit in every parameter p_i
     sum a_i p_i dw/dp_i = 0 for mass and length, = -w for time.
 These hold for every kind of edge and test a gradient without any reference.
 
-The largest multiplier of an orbit has derivatives too. With P(z, k) = z the orbit and M(z, k) the monodromy matrix,
-dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple eigenvalue mu with left and right vectors l, r moves by
-l dM r / l r. One expansion of the return map to second order gives all of it, for edges and for multipliers.
+With P(z, k) = z an orbit and M(z, k) its monodromy matrix, dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple
+multiplier mu with left and right vectors l, r moves by l dM r / l r. One expansion of the return map to second order
+gives all of it, for edges and for the largest multiplier of an orbit.
 """
 
 import concurrent.futures
@@ -177,16 +177,18 @@ def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod,
     given = Given(system, jnp.asarray(point.speed, dtype=float))
     problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
     near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
-    before, steps, last = None, int(counts.first), int(counts.last)
-    while True:
-        edge = _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
+    edge = None
+    for steps in counts.each():
+        before, edge = edge, _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
         if before is not None:
             both = before.found and edge.found
             edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
-        lost = not edge.found and steps >= GIVEN_UP and not (before is not None and before.found)
-        if edge.error <= POINT * edge.speed * float(counts.tolerance) or steps >= last or lost:
-            return edge
-        before, near, steps = edge, edge.u if edge.found else begin, min(2 * steps, last)
+        known = edge.found or (before is not None and before.found)
+        if edge.error <= POINT * edge.speed * float(counts.tolerance) or (steps >= GIVEN_UP and not known):
+            break
+        near = edge.u if edge.found else begin
+    assert edge is not None
+    return edge
 
 
 def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
@@ -221,9 +223,8 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
-    The point is located by Newton's method first, and again with twice the steps until it no longer moves. One
-    expansion of the return map to second order serves this, every kind of bifurcation and all parameters; `bifurcation`
-    gives the same derivatives, and higher ones.
+    The point is located by Newton's method first, and again with twice the steps until it no longer moves.
+    `bifurcation` gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
@@ -367,14 +368,12 @@ def leading_multiplier(
     given = Given(system, at)
     problem = make_problem(given, (SPEED,), 0.1 * at[None], periods, chosen)
     first = jnp.append(state / problem.scale, 10.0)
-    before, steps = None, int(counts.first)
-    while True:
-        found = _by_newton(by_steps(problem, steps), given, first if before is None else before[0])
+    found, error, steps = None, np.inf, 0
+    for steps in counts.each():
+        before, found = found, _by_newton(by_steps(problem, steps), given, first if found is None else found[0])
         error = np.inf if found is None or before is None else abs(float(found[1] - before[1]))
-        given_up = found is None and steps >= GIVEN_UP
-        if steps >= int(counts.last) or error <= SLOPE * float(counts.tolerance) or given_up:
+        if error <= SLOPE * float(counts.tolerance) or (found is None and steps >= GIVEN_UP):
             break
-        before, steps = found, min(2 * steps, int(counts.last))
     if found is None:
         nan, names = float("nan"), parameter_paths(system)
         return LeadingMultiplier(nan, dict.fromkeys(names, nan), np.full(system.dimension, nan), error, steps)
