@@ -128,7 +128,7 @@ def follow_both_ways(
     follower: Follower,
     starts: Sequence[Start],
     steps: Steps,
-    patience: float = math.inf,
+    patience: int | float = math.inf,
     stop: Callable[[list[Corrected]], bool] = lambda points: False,
 ) -> list[Branch | None]:
     """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one.

@@ -10,6 +10,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
+from ..analysis import Edge
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
@@ -47,6 +48,10 @@ class Cascade:
         """Ratios of successive distances, which tend to 4.6692."""
         d = np.diff(self.values)
         return tuple((d[:-1] / d[1:]).tolist())
+
+    def as_edge(self, kind: str) -> Edge:
+        """The chaotic edge that the limit of one over speed is."""
+        return Edge(self.limit * 30 / np.pi, self.error * 30 / np.pi, kind, "period-doubling", "cascade")
 
     def __str__(self) -> str:
         rows = [

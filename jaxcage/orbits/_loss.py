@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._notebook import notebook_html
-from ..analysis import Edge, Zone, Zones, closing_width
+from ..analysis import Zone, Zones, closing_width
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._cascade import Cascade, cascade
@@ -108,10 +108,6 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     groups = _joined([first, *others], close_below_rpm)
     groups = [g for g in groups if principal in g.stretches or g.width >= close_below_rpm]
     groups.sort(key=lambda g: g.low.lower_rpm)
-    return _between(found, groups, principal, close_below_rpm)
-
-
-def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch, close: float) -> LossZones:
     tops = [None, *(g.high for g in groups)]
     bottoms = [*(g.low for g in groups), None]
     edge = lambda point: None if point is None else point.as_edge("synchronous-loss")
@@ -120,8 +116,8 @@ def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch,
     for before, after in zip(tops, bottoms, strict=True):
         onset = None if before is None else before.upper
         leaves = None if after is None else after.lower
-        open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close
-        open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close
+        open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close_below_rpm
+        open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close_below_rpm
         if open_below or open_above or (before is not None and onset is None):
             continue
         zones.append(Zone("synchronous-loss", edge(onset), edge(leaves), _share(found, onset, leaves)))
@@ -129,7 +125,7 @@ def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch,
             if point is not None:
                 edges[f"zone {len(zones)} {name}"] = point
     coexisting = {name: found.coexisting(float(p.speed)) for name, p in edges.items()}
-    return LossZones(tuple(zones), edges, coexisting, principal, close)
+    return LossZones(tuple(zones), edges, coexisting, principal, close_below_rpm)
 
 
 def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
@@ -163,27 +159,22 @@ def explain(
     for number, zone in enumerate(zones.zones, start=1):
         ends = {}
         for end, edge, calm in (("onset", zone.onset, -1), ("exit", zone.exit, 1)):
-            near = 0.0 if edge is None else min(edge.uncertainty_rpm, zones.resolution_rpm)
-            source = None if edge is None else _source(edge.speed_rpm, near, calm, found, system, method)
-            if edge is not None and source is not None:
-                sources[f"zone {number} {end}"] = source
-                edge = _taken(edge, source)
+            if edge is not None:
+                near = min(edge.uncertainty_rpm, zones.resolution_rpm)
+                points = [p for x in found.stretches if (p := x.upper if calm < 0 else x.lower) is not None]
+                source = _source(points, edge.speed_rpm, near, calm, system, method)
+                if source is not None:
+                    sources[f"zone {number} {end}"], edge = source, source.as_edge(edge.kind)
             ends[end] = edge
         changed.append(dataclasses.replace(zone, **ends))
     return Explained(dataclasses.replace(zones, zones=tuple(changed)), sources)
 
 
 def _source(
-    rpm: float,
-    near: float,
-    calm: int,
-    found: SynchronousOrbits,
-    system: AbstractForcedSystem,
-    method: AbstractMethod | None,
+    points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
 ) -> Point | Cascade | None:
-    """What lies within `near` of an edge at `rpm`, whose calm side is above or below it."""
-    ends = [s.upper if calm < 0 else s.lower for s in found.stretches]
-    points = [p for p in ends if p is not None]
+    """What lies within `near` of an edge at `rpm`, whose calm side is above or below it, of the points and cascades
+    that begin at them."""
     away = lambda p: abs(p.speed_rpm - rpm)
     here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
     if here:
@@ -197,12 +188,3 @@ def _source(
         if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - rpm) <= near:
             return tried
     return None
-
-
-def _taken(edge: Edge, source: Point | Cascade) -> Edge:
-    """The chaotic edge at the place of what it coincides with."""
-    if isinstance(source, Cascade):
-        per_rpm = 30 / np.pi
-        limit, error = source.limit * per_rpm, source.error * per_rpm
-        return Edge(limit, error, edge.kind, "period-doubling", "cascade")
-    return source.as_edge(edge.kind)
