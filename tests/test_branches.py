@@ -125,16 +125,6 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
 
 
 @pytest.mark.wide
-def test_parameter_as_a_function(over_speed):
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    named = jc.branch(hardening(), orbit, "g", lower=0.2, upper=0.4, method=METHOD)
-    picked = jc.branch(hardening(), orbit, lambda s: s.acceleration.g, lower=0.2, upper=0.4, method=METHOD)
-    np.testing.assert_array_equal(named.value, picked.value)
-    np.testing.assert_array_equal(named.state, picked.state)
-    assert picked.parameter == "parameter" and np.ptp(named.value) > 0.2
-
-
-@pytest.mark.wide
 def test_period_doublings_over_the_force(over_force):
     points = [p for p in over_force.special if p.kind == "period-doubling"]
     first = min(points, key=lambda p: abs(p.value - DOUBLING))
@@ -193,28 +183,6 @@ def test_cascade_that_does_not_go_on_is_shorter(doubling):
     assert found.error == np.inf and abs(found.limit - 0.2924) < 2e-4
 
 
-class Parabola(eqx.Module):
-    """x' = p - x^2."""
-
-    p: jax.Array
-
-    def __call__(self, tau, y, speed):
-        return (self.p - y[0] ** 2,)
-
-
-@pytest.mark.wide
-def test_system_of_one_state():
-    """Orbits x = +-sqrt(p) with the multiplier exp(-2 x T), and a fold at p = 0: exact."""
-    system = jc.ForcedSystem(Parabola(**numbers(p=0.25)), dimension=1)
-    branch = jc.branch(system, ((0.5,), 0.25), "p", lower=-0.5, upper=0.5, speed=2.0, method=METHOD)
-    (fold,) = branch.special
-    assert fold.kind == "fold" and fold.edge and abs(fold.value) < 1e-9
-    np.testing.assert_allclose(branch.value, branch.state[:, 0] ** 2, atol=1e-9)
-    assert np.array_equal(branch.stable, branch.state[:, 0] > 0)
-    # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
-    np.testing.assert_allclose(branch.multipliers[:, 0], np.exp(-2 * branch.state[:, 0] * np.pi), rtol=2e-3)
-
-
 class Bend(eqx.Module):
     """x' = p + a x - x^3."""
 
@@ -227,7 +195,7 @@ class Bend(eqx.Module):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("start", [-1.3, -1.2, -1.1, -1.0, -0.9])
+@pytest.mark.parametrize("start", [-1.3, -1.1, -0.9])
 def test_two_folds_within_a_step(start):
     """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
     a = 0.001
@@ -514,16 +482,3 @@ def test_lengths_of_steps_must_be_in_order(steps):
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
         jc.orbits.Steps(**steps)
     assert dataclasses.replace(jc.orbits.Steps(), first=0.1).first == 0.1
-
-
-@pytest.mark.slow
-def test_shorter_steps_change_no_bifurcation(over_speed):
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    steps = jc.orbits.Steps(first=0.01, longest=0.04, most=2000)
-    fine = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=steps, method=METHOD)
-    assert fine.value.size > 2 * over_speed.value.size
-    np.testing.assert_allclose(
-        [p.value for p in fine.special], [p.value for p in over_speed.special], rtol=0, atol=1e-9
-    )
-    few = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=jc.orbits.Steps(most=5), method=METHOD)
-    assert few.ended == ("steps", "steps") and few.value.size == 11

@@ -357,12 +357,6 @@ def test_between_two_points_of_a_branch_an_orbit_is_as_stable_as_at_the_nearer(h
             np.testing.assert_array_equal(multipliers, branch.multipliers[nearer])
 
 
-def test_overlapping_stretches_of_one_branch_leave_no_zone(hardening):
-    result = jc.loss_zones(hardening, close_below_rpm=1.0)
-    assert result.zones == () and result.edges == {}
-    assert result.principal in hardening.stretches
-
-
 def test_edges_of_a_range_that_a_fold_ends(hardening):
     """With the upper stretch left out the orbit is lost at the fold; what coexists there is the other branch's part."""
     alone = SynchronousOrbits(hardening.branches, hardening.stretches[:1], hardening.sweep, 0, LOWER / PER_RPM, 22.9)

@@ -101,24 +101,6 @@ def test_period_doubling_from_beyond_a_superstable_orbit():
         find(reach=-1.0)
 
 
-class MorePendulum(eqx.Module):
-    """The same with a force of 1.0805 and some more."""
-
-    more: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        return Pendulum(1.0805 + self.more)(tau, q, v, speed)
-
-
-@pytest.mark.wide
-def test_a_bifurcation_is_looked_for_around_a_parameter_of_zero():
-    """`reach` is a part of the parameter, which for zero is one of its unit."""
-    system = jc.ForcedOscillator(MorePendulum(jnp.asarray(0.0)), coordinates=1)
-    orbit = jc.periodic_orbit(system, 2 * np.pi, 4, guess=(-np.pi / 2, 0.0), revolutions=400)
-    point = jc.bifurcation(system, "period-doubling", orbit, "more", reach=0.01)
-    assert point.status == "converged" and abs(point.value - 0.00158437) < 1e-7
-
-
 @pytest.mark.slow
 def test_a_failing_lane_leaves_its_neighbours_alone():
     """Bit for bit, orbits and points."""
@@ -224,17 +206,12 @@ def test_neutral_saddle_is_no_torus_bifurcation(turn):
 ELSEWHERE = {
     "torus asked as period doubling": ("period-doubling", dict(b=0.3)),
     "torus asked as fold": ("fold", dict(b=0.3, turn=0.0)),
-    "torus asked as branch point": ("branch-point", dict(b=0.3, turn=0.0)),
-    "branch point asked as period doubling": ("period-doubling", dict(s=0.3, turn=0.0)),
     "period doubling asked as fold": ("fold", dict(s=0.3)),
-    "period doubling asked as branch point": ("branch-point", dict(s=0.3)),
 }
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if "branch" in name else name for name in ELSEWHERE]
-)
+@pytest.mark.parametrize("name", ELSEWHERE)
 def test_another_kind_than_asked(name):
     kind, settings = ELSEWHERE[name]
     point = point_of(kind, **settings)
@@ -274,6 +251,19 @@ def test_tangential_crossing(kind, name):
     assert bool(point.converged) and not bool(point.trusted)
     assert abs(point.value - 1) < 1e-5
     np.testing.assert_allclose(point.transversality, TANGENT[name]["slope"] * 2 * np.pi / 1.1, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", CRITICAL)
+def test_crossing_and_its_rate(kind):
+    """The multipliers are -exp((g +- i b) T) or, without b, -exp(g T) and -exp((g - s) T): exact."""
+    point, period = point_of(kind, speed=0.8, **CRITICAL[kind]), 2 * np.pi / 0.8
+    assert point.status == "converged" and abs(point.value - 1) < 1e-8
+    np.testing.assert_allclose(point.state, [1.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
+    turned = np.pi if kind == "period-doubling" else abs(np.angle(-np.exp(0.3j * period)))
+    assert abs(point.angle - turned) < 1e-8
+    if kind == "period-doubling":
+        np.testing.assert_allclose(abs(point.direction), [1.0, 0.0], atol=1e-6)
 
 
 @pytest.mark.wide

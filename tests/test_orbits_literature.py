@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.special import mathieu_a, mathieu_b
 
 import jaxcage as jc
 from jaxcage.validation import (
@@ -181,29 +180,7 @@ def mathieu_trace(a, q=1.0):
     return end[0] + end[3]
 
 
-CHARACTERISTIC = {
-    "b1": ("period-doubling", mathieu_b(1, 1)),
-    "a1": ("period-doubling", mathieu_a(1, 1)),
-    "a0": ("branch-point", mathieu_a(0, 1)),
-    "b2": ("branch-point", mathieu_b(2, 1)),
-    "a2": ("branch-point", mathieu_a(2, 1)),
-}
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("name", CHARACTERISTIC)
-def test_characteristic_values_of_mathieu(name):
-    """DLMF chapter 28: both multipliers are 1 or -1 with a Jordan block, and cross at an infinite rate."""
-    kind, exact = CHARACTERISTIC[name]
-    point = jc.bifurcation(mathieu(), kind, ((0.0, 0.0), exact + 0.03), "a", speed=2.0, method=METHOD)
-    assert bool(point.converged)
-    assert abs(point.value - exact) < 1e-8
-    np.testing.assert_allclose(point.state, 0.0, atol=1e-9)
-    np.testing.assert_allclose(point.multipliers, -1.0 if kind == "period-doubling" else 1.0, atol=1e-4)
-
-
-@pytest.mark.parametrize("a", [-1.0, 0.7, 2.5, 5.0])
-@pytest.mark.parametrize("z", [0.1, 0.6])
+@pytest.mark.parametrize("a, z", [(-1.0, 0.1), (0.7, 0.6), (5.0, 0.1)])
 def test_multipliers_of_damped_mathieu(a, z):
     """x = exp(-z t) y makes it the undamped equation for y at a - z^2: exact."""
     zero = dict(guess=(0.0, 0.0), method=METHOD)
@@ -217,7 +194,6 @@ def test_multipliers_of_damped_mathieu(a, z):
 # Kind, damping, bracket of a, sign of the multiplier.
 DAMPED = [
     ("period-doubling", 0.1, (-0.2, 0.0), -1),
-    ("period-doubling", 0.1, (1.7, 1.9), -1),
     ("period-doubling", 0.2, (1.5, 1.8), -1),
     ("branch-point", 0.1, (-0.6, -0.3), 1),
 ]
@@ -241,60 +217,3 @@ def test_edges_of_damped_mathieu(kind, z, bracket, sign):
     rate = shrink * slope * sign / (2 * sign - shrink * mathieu_trace(at))
     np.testing.assert_allclose(abs(point.transversality), abs(rate), rtol=1e-6)
     assert point.status == "converged" and bool(point.trusted)
-
-
-class Planted(eqx.Module):
-    """A driven orbit p(tau) around which the state turns by half a turn a period, with rates a + s and a - s."""
-
-    a: jax.Array
-    s: jax.Array
-    b: jax.Array
-    turn: jax.Array
-
-    def __call__(self, tau, y, speed):
-        p = (jnp.cos(tau), 0.5 * jnp.sin(tau))
-        drift = (-speed * jnp.sin(tau), 0.5 * speed * jnp.cos(tau))
-        x, z = y[0] - p[0], y[1] - p[1]
-        c, s = jnp.cos(self.turn * tau), jnp.sin(self.turn * tau)
-        e, f = c * x + s * z, -s * x + c * z
-        cubic = e * e + f * f
-        de = (self.a + self.s - cubic) * e - self.b * f
-        df = (self.a - self.s - cubic) * f + self.b * e
-        spin = self.turn * speed
-        return (c * de - s * df - spin * z + drift[0], s * de + c * df + spin * x + drift[1])
-
-
-def planted(a, s=0.0, b=0.0, turn=0.5):
-    return jc.ForcedSystem(Planted(**numbers(a=a, s=s, b=b, turn=turn)), dimension=2)
-
-
-@pytest.mark.parametrize("speed", [0.8, 2.5])
-@pytest.mark.wide
-@pytest.mark.parametrize("at, inside", [(-0.2, -0.26), (0.2, 0.15)])
-def test_period_doubling_of_a_planted_driven_orbit(speed, at, inside):
-    """Multipliers -exp((a + s) T) and -exp((a - s) T): exact, with rate T and the orbit known."""
-    system, period = planted(inside, s=0.2), 2 * np.pi / speed
-    orbit = jc.periodic_orbit(system, speed, guess=(0.9, 0.1), method=METHOD)
-    exact = -np.exp([(inside + 0.2) * period, (inside - 0.2) * period])
-    np.testing.assert_allclose(orbit.multipliers, exact, rtol=1e-8)
-    point = jc.bifurcation(system, "period-doubling", orbit, "a", method=METHOD)
-    assert point.status == "converged"
-    assert abs(point.value - at) < 1e-8
-    np.testing.assert_allclose(point.state, [1.0, 0.0], atol=1e-8)
-    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
-    np.testing.assert_allclose(abs(point.direction), [1.0, 0.0] if at < 0 else [0.0, 1.0], atol=1e-6)
-    assert abs(point.angle - np.pi) < 1e-8
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("turn", [0.0, 0.5, 1.0])
-def test_torus_bifurcation_of_a_planted_driven_orbit(turn):
-    """(-1)^(2 turn) exp((a +- i b) T)."""
-    system, period = planted(-0.06, b=0.3, turn=turn), 2 * np.pi / 1.1
-    orbit = jc.periodic_orbit(system, 1.1, guess=(0.9, 0.1), method=METHOD)
-    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", method=METHOD)
-    assert point.status == "converged"
-    assert abs(point.value) < 1e-8
-    critical = np.exp(1j * np.pi * 2 * turn + 0.3j * period)
-    assert abs(point.angle - abs(np.angle(critical))) < 1e-8
-    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)

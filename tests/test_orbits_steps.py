@@ -125,14 +125,6 @@ def test_steps_that_are_asked_for_are_kept():
 
 
 @pytest.mark.wide
-def test_an_orbit_is_found_again_by_its_own_method():
-    orbit = jc.periodic_orbit(stop(), 0.6)
-    again = jc.periodic_orbit(stop(), 0.6, guess=orbit, method=orbit.method)
-    assert again.converged and again.steps == orbit.steps
-    np.testing.assert_allclose(again.state, orbit.state, rtol=1e-9)
-
-
-@pytest.mark.wide
 def test_choice_is_made_inside_jit_and_in_each_lane():
     free, touching = 2.5, 1.1
     plain = [jc.periodic_orbit(stop(), w) for w in (free, touching)]
