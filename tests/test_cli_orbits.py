@@ -436,16 +436,12 @@ REFUSALS = [
     ("bifurcations 1a --first 0", "--first must be a speed above 0 rpm, but 0 was given"),
     ("bifurcations 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
     ("bifurcations 1a --solver euler", "--solver must be one of rodas3, rodas4"),
-    ("gradient nowhere.toml", "nowhere.toml' must be a readable TOML file"),
     ("map 1a --y gap", "--y must be one of bore, "),
-    ("map 1a --x gap", "--x must be one of speed, bore, "),
     ("map 1a --x guidance_gap", "must be two different parameters, but both are guidance_gap"),
     ("map 1a --rows 1", "--rows must be 0 or at least 2, but 1 was given"),
     ("map 1a --revolutions 0", "--revolutions must be at least 1, but 0 was given"),
     ("map 1a --starts 4", "--starts must be at most 3, but 4 was given"),
     ("map 1a --lower 0.4kg", '--lower has the unit "kg"'),
-    ("map 1a --lower wide", '--lower is "wide", which is not a number with a unit'),
-    ("map 1a --upper 1", "--upper must be a value of guidance_gap from 1e-05 to 0.005 m, but 1 m was given"),
     ("map 1a --lower 0.5mm", "must have guidance_gap = 0.00045 m between them, but the range is 0.0005 to"),
 ]
 

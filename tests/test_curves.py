@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import wide_but
+from laws import double_well, hardening, numbers
 from scipy.interpolate import CubicSpline
 
 import jaxcage as jc
@@ -20,37 +21,16 @@ METHOD = jc.method("rk4", steps=256)
 FINE = jc.method("rk4", steps=1024)
 
 
-def numbers(**values):
-    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
-
-
-class Duffing(eqx.Module):
-    """x'' + d x' - k x + b x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
-
-    d: jax.Array
-    k: jax.Array
-    b: jax.Array
-    g: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-self.d * u + self.k * x - self.b * x**3 + self.g * jnp.cos(tau),)
-
-
-def duffing(d=0.1, k=-1.0, g=0.3, b=1.0):
-    return jc.ForcedOscillator(Duffing(**numbers(d=d, k=k, b=b, g=g)), coordinates=1)
-
-
 @pytest.fixture(scope="module")
 def fold():
-    orbit = jc.periodic_orbit(duffing(), 1.7, guess=(0.6, 2.4), revolutions=200, method=METHOD)
-    return jc.bifurcation(duffing(), "fold", orbit, method=METHOD)
+    orbit = jc.periodic_orbit(hardening(), 1.7, guess=(0.6, 2.4), revolutions=200, method=METHOD)
+    return jc.bifurcation(hardening(), "fold", orbit, method=METHOD)
 
 
 @pytest.mark.wide
 def test_folds_of_the_hardening_duffing_pass_a_cusp(fold):
     """Its force is 0.0513635 by DOP853, with the second derivative of the strobe map by variational equations."""
-    curve = jc.curve(duffing(), fold, "speed", "g", lower=0.01, upper=0.6, x_lower=0.5, x_upper=3.0, method=METHOD)
+    curve = jc.curve(hardening(), fold, "speed", "g", lower=0.01, upper=0.6, x_lower=0.5, x_upper=3.0, method=METHOD)
     assert curve.ended == ("range", "range") and np.all(curve.genuine) and curve.kind == "fold"
     assert 0.0513635 < np.min(curve.y_value) < 0.0534 and str(curve).endswith("points, ends: range, range")
     # Both sides of the curve, from the cusp on.
@@ -69,21 +49,9 @@ def test_folds_of_the_hardening_duffing_pass_a_cusp(fold):
 
 
 @pytest.mark.wide
-def test_fold_curve_is_made_of_folds(fold):
-    """Each is found again on its own, without the curve."""
-    curve = jc.curve(duffing(), fold, "speed", "g", lower=0.2, upper=0.4, x_lower=1.0, x_upper=3.0, method=METHOD)
-    point_of = eqx.filter_jit(
-        jax.vmap(lambda g, w, y: jc.bifurcation(duffing(g=g), "fold", ((y[0], y[1]), w), method=METHOD).value)
-    )
-    found = point_of(*(jnp.asarray(c[1:-1]) for c in (curve.y_value, curve.x_value, curve.state)))
-    np.testing.assert_allclose(found, curve.x_value[1:-1], rtol=0, atol=1e-9)
-    assert found.size > 10 and np.ptp(found) > 0.1
-
-
-@pytest.mark.wide
 def test_period_doubling_curve_has_an_exact_scaling():
     """x -> x / sqrt(b): the force of any edge times sqrt(b) is one number. At b = 1 it is DOP853's."""
-    system = duffing(d=0.3, k=1.0, g=0.262)
+    system = double_well(0.262)
     orbit = jc.periodic_orbit(system, 1.2, guess=(1.0, 0.0), revolutions=300, method=FINE)
     point = jc.bifurcation(system, "period-doubling", orbit, "g", method=FINE)
     curve = jc.curve(system, point, "g", "b", lower=0.25, upper=4.0, x_lower=0.05, x_upper=1.0, method=FINE)
@@ -178,15 +146,15 @@ def test_bad_arguments(fold):
     with pytest.raises(
         ValueError, match="`point` must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point"
     ):
-        jc.curve(duffing(), pitchfork, "speed", "g", **limits)
+        jc.curve(hardening(), pitchfork, "speed", "g", **limits)
     for wrong in (dict(lower=0.4, upper=0.2), dict(x_lower=3.0, x_upper=3.0)):
         with pytest.raises(ValueError, match="`x_lower` and `x_upper` must be in ascending order"):
-            jc.curve(duffing(), fold, "speed", "g", **(limits | wrong))
-    with pytest.raises(ValueError, match="`parameter` must be one of speed, d, k, b, g, but 'stiffness'"):
-        jc.curve(duffing(), fold, "speed", "stiffness", **limits)
+            jc.curve(hardening(), fold, "speed", "g", **(limits | wrong))
+    with pytest.raises(ValueError, match="`parameter` must be one of speed, m, d, k, b, g, but 'stiffness'"):
+        jc.curve(hardening(), fold, "speed", "stiffness", **limits)
     with pytest.raises(ValueError, match="`point` must be a fold of the system, but Newton's method finds none there"):
-        jc.curve(duffing(d=2.0), fold, "speed", "g", **limits)
+        jc.curve(hardening(d=2.0), fold, "speed", "g", **limits)
     with pytest.raises(ValueError, match="must have the system's g between them, 0.02, but are 0.2 and 0.4"):
-        jc.curve(duffing(g=0.02), fold, "speed", "g", **limits)
+        jc.curve(hardening(0.02), fold, "speed", "g", **limits)
     with pytest.raises(ValueError, match="`point` must begin from 1 to 1.2"):
-        jc.curve(duffing(), fold, "speed", "g", **(limits | dict(x_upper=1.2)))
+        jc.curve(hardening(), fold, "speed", "g", **(limits | dict(x_upper=1.2)))

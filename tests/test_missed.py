@@ -64,7 +64,7 @@ DIPS = {
     "twice in the first step": ([0.1185, 0.1414, 0.5309, 0.8128], [0.378, 0.210, 0.117], {(0, 1)}),
     "twice in a long last step": ([0.30397864, 0.09297943, 0.42741154, 0.69109067], [425.0, 242.2, 134.7], {(0, 1)}),
 }
-"""Products of mu + 1 along branches of 2a and 1a, where the period doubles and comes back within a step, and lengths."""
+"""Products of mu + 1 along branches of 2a and 1a, where the period doubles and comes back, and lengths of the steps."""
 
 
 @pytest.mark.parametrize("name", DIPS)

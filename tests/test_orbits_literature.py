@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from laws import double_well, hardening, numbers
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -29,28 +30,6 @@ METHOD = jc.method("rk4", steps=1024)
 FINE = jc.method("rk4", steps=2048)
 
 
-def numbers(**values):
-    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
-
-
-class Duffing(eqx.Module):
-    """m x'' + d x' - k x + b x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
-
-    m: jax.Array
-    d: jax.Array
-    k: jax.Array
-    b: jax.Array
-    g: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return ((-self.d * u + self.k * x - self.b * x**3 + self.g * jnp.cos(tau)) / self.m,)
-
-
-def duffing(d=0.3, k=1.0, g=0.26):
-    return jc.ForcedOscillator(Duffing(**numbers(m=1, d=d, k=k, b=1, g=g)), coordinates=1)
-
-
 def agrees(ours, number: Number) -> bool:
     return bool(abs(ours - number.value) <= number.tolerance)
 
@@ -64,7 +43,7 @@ def test_orbits_in_other_units_are_the_same():
 
     small = jc.ForcedOscillator(law, coordinates=1, scale=1e-3)
     for well in (1.0, -1.0):
-        whole = jc.periodic_orbit(duffing(), 1.2, guess=(well, 0.0), revolutions=400, method=METHOD)
+        whole = jc.periodic_orbit(double_well(), 1.2, guess=(well, 0.0), revolutions=400, method=METHOD)
         assert float(whole.state[0]) * well > 0
         found = jc.periodic_orbit(small, 1.2, guess=1.001e-3 * whole.state, method=METHOD)
         np.testing.assert_allclose(1e3 * found.state, whole.state, rtol=1e-9)
@@ -74,7 +53,7 @@ def test_orbits_in_other_units_are_the_same():
 @pytest.mark.parametrize("periods", DUFFING_DOUBLINGS)
 def test_period_doubling_cascade_of_the_double_well_duffing(periods):
     inside, expected = DUFFING_DOUBLINGS[periods]
-    system = duffing(g=inside)
+    system = double_well(inside)
     orbit = jc.periodic_orbit(system, 1.2, periods, guess=(1.0, 0.0), revolutions=400, method=METHOD)
     assert bool(orbit.stable) and -1 < orbit.multipliers[0].real < -0.3
     # Damping is all that shrinks areas, whatever the orbit.
@@ -90,7 +69,7 @@ def test_period_doubling_cascade_of_the_double_well_duffing(periods):
 @pytest.mark.wide
 def test_gradient_of_the_first_period_doubling():
     """DOP853 and differences; scaling x shows that the force at any edge goes with b^(-1/2)."""
-    system = duffing(g=0.262)
+    system = double_well(0.262)
     orbit = jc.periodic_orbit(system, 1.2, 1, guess=(1.0, 0.0), revolutions=400, method=METHOD)
 
     def edge(system):
@@ -115,7 +94,7 @@ FOLDS = {"up": (1.7, (0.6, 2.4)), "down": (1.4, (-0.3, 0.05))}
 @pytest.mark.parametrize("name", FOLDS)
 def test_folds_of_the_hardening_duffing(name):
     speed, start = FOLDS[name]
-    system = duffing(d=0.1, k=-1.0, g=0.3)
+    system = hardening()
     orbit = jc.periodic_orbit(system, speed, 1, guess=start, revolutions=400, method=METHOD)
     assert bool(orbit.stable)
     point = jc.bifurcation(system, "fold", orbit, method=METHOD)
