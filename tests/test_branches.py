@@ -112,9 +112,7 @@ def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found(doubling
 
 def test_doubled_branch_has_twice_the_period(doubling):
     system = double_well()
-    doubled = jc.orbits.doubled_branch(
-        system, doubling, "g", lower=0.1, upper=0.35, until_doubling=True, method=FINE, speed=1.2
-    )
+    doubled = jc.orbits.doubled_branch(system, doubling, "g", lower=0.1, upper=0.35, until_doubling=True, method=FINE)
     assert doubled.periods == 2 and doubled.ended[0] == "doubling"
     np.testing.assert_allclose(np.prod(doubled.multipliers, axis=1), np.exp(-0.3 * 4 * np.pi / 1.2), rtol=1e-6)
     away = []

@@ -43,6 +43,10 @@ GROWTH = 1.8
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
+TURN, BEND, SWING = 0.9, 0.3, 0.5
+"""Of a step: smallest cosine of the angle between its tangents; largest correction, over its length: more, and Newton's
+method may have gone to another curve; largest change of the equations' derivative, over its size and one: more, and
+folds may have been passed over."""
 MOVED = 0.1
 """What half the steps change in a point, over the step's length: more, and what is followed may be their error."""
 ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
@@ -212,12 +216,6 @@ class Steps:
     longest: float = 0.5
     shortest: float = 1e-7
     most: int = 400
-    turn: float = 0.9
-    """Smallest cosine of the angle between neighbouring tangents."""
-    bend: float = 0.3
-    """Largest correction, over the step's length: more, and Newton's method may have gone to another curve."""
-    swing: float = 0.5
-    """Largest change of the equations' derivative, over its size and one: more, and folds may have been passed over."""
 
     def __post_init__(self):
         if not 0 < self.shortest <= self.first <= self.longest:
@@ -251,13 +249,7 @@ def _closed(points: list[Corrected]) -> bool:
 
 
 def classified(
-    steps: Steps,
-    last: Corrected,
-    got: Corrected,
-    ahead: np.ndarray,
-    normal: np.ndarray,
-    length: np.ndarray,
-    apart: np.ndarray,
+    last: Corrected, got: Corrected, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Steps classified by the points that they begin and end with.
 
@@ -265,22 +257,22 @@ def classified(
     tangent as in the point: a point that is elsewhere than its tangent says is not of this curve. The determinant of
     the equations with the tangent keeps its sign along a curve, at folds too, but where another curve is crossed.
 
-    **Arguments:** what is allowed; last points and new ones; predictions and their unit tangents; lengths of the steps
-    and of those before, infinite where there was none.
+    **Arguments:** last points and new ones; predictions and their unit tangents; lengths of the steps and of those
+    before, infinite where there was none.
 
     **Returns:** distance of each point from its prediction; angle between the tangents, over the largest allowed;
     whether the point is on the curve, or on one that crosses it; and whether the determinant has the same sign.
     """
-    turned = np.arccos(np.clip(np.sum(got.tangent * last.tangent, axis=1), -1.0, 1.0)) / np.arccos(steps.turn)
+    turned = np.arccos(np.clip(np.sum(got.tangent * last.tangent, axis=1), -1.0, 1.0)) / np.arccos(TURN)
     way, slope = got.u - ahead, got.tangent - normal
     missed = np.linalg.norm(way, axis=1)
     largest = lambda m: np.max(np.abs(m), axis=(1, 2))
-    smooth = largest(got.jacobian - last.jacobian) < steps.swing * (1 + largest(last.jacobian))
+    smooth = largest(got.jacobian - last.jacobian) < SWING * (1 + largest(last.jacobian))
     across = slope - np.sum(slope * normal, axis=1, keepdims=True) * normal
     share = 1 / (2 / length + 2 / (length + apart))
     off = np.linalg.norm(way - share[:, None] * across, axis=1)
     belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length), OF_MISSED * missed)
-    sure = got.converged & (turned < 1) & (missed < steps.bend * length) & smooth & belongs
+    sure = got.converged & (turned < 1) & (missed < BEND * length) & smooth & belongs
 
     def orientation(points: Corrected) -> np.ndarray:
         whole = np.concatenate([points.jacobian, points.tangent[:, None]], axis=1)
@@ -353,7 +345,7 @@ def follow(
             far = np.flatnonzero(unknown)
             closer = correct(curves.take(index[far]), got.u[far], normal[far], count[index[far]], measured=True)
             got = put(got, far, closer)
-        missed, turned, sure, same = classified(steps, last, got, ahead, normal, length[index], apart)
+        missed, turned, sure, same = classified(last, got, ahead, normal, length[index], apart)
         same |= update is not None  # new equations have an orientation of their own
         good = sure & (same | crosses[index])
         finer, coarser = np.zeros((2, lanes), dtype=bool)

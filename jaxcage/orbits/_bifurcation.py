@@ -22,7 +22,7 @@ from ._implicit import AbstractEquations, Found, as_root, settled
 from ._located import brackets
 from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, settle, sorted_multipliers
 from ._point import FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
-from ._problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, with_value
+from ._problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem
 from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix, to_critical
 from ._steps import (
     BY_OTHERS,
@@ -129,7 +129,7 @@ def bifurcation(
     def point(method: AbstractMethod, counts: Counts, state: Any, speed: Any, at: Any, spin: bool) -> Any:
         """What `_find_point` finds from there."""
         known, state, speed, at = frozen((given, state, jnp.asarray(speed, dtype=float), jnp.asarray(at)))
-        there = Given(*with_value(known.system, speed, parameter, at))
+        there = Given(known.system, speed).changed(parameter, at)
         unit = jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at))
         problem = make_problem(there, (parameter,), unit[None], periods, method)
         return _find_point(problem, counts, cast(Kind, kind), known, there, state, at, spin)
@@ -160,8 +160,9 @@ def bifurcation(
     if is_traced((found, given, start)) or not reach or int(found.outcome) not in (NO_SUCH_POINT, OTHER_KIND):
         return found
     if spin:
-        here, turning = with_value(system, first, parameter, at)
-        start = periodic_orbit(here, turning, int(periods), guess=start, revolutions=SPUN, method=method).state
+        here = Given(system, first).changed(parameter, at)
+        orbit = periodic_orbit(here.system, here.speed, int(periods), guess=start, revolutions=SPUN, method=method)
+        start = orbit.state
     away = float(reach) * (abs(float(at)) or 1.0)
     follower = make_follower(given, parameter, float(at) - away, float(at) + away, method, int(periods))
     there, looked = _along_branch(follower, (np.asarray(start), float(at)), kind)
@@ -256,7 +257,7 @@ def _place(equations: PointEquations, u: Array, given: Given, converged: Array) 
     """The parameter's value, speed and state; NaN, and their derivatives too, where there is no such point."""
     problem = equations.problem
     keep = lambda x: x * jnp.where(converged, 1.0, jnp.nan)
-    speed = jnp.asarray(problem.at(u, given)[1], dtype=float)
+    speed = jnp.asarray(problem.at(u, given).speed, dtype=float)
     return {"value": keep(problem.values(u)[0]), "speed": keep(speed), "state": keep(problem.state(u))}
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
-from .._types import Scalar
 from ..analysis import Edge
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
@@ -71,7 +71,6 @@ def doubled_branch(
     *,
     lower: float,
     upper: float,
-    speed: Scalar | None = None,
     steps: Steps = Steps(first=0.01, shortest=1e-7),
     amplitude: float = 0.02,
     until_doubling: bool = False,
@@ -82,7 +81,7 @@ def doubled_branch(
     **Arguments:**
 
     - `point`: a period doubling, of an orbit of any number of revolutions.
-    - `lower`, `upper`, `speed`, `steps`: as for `branch`.
+    - `lower`, `upper`, `steps`: as for `branch`.
     - `amplitude`: how far from the doubling it is entered, in units of the system's scale along the critical direction.
     - `until_doubling`: end with the branch's own first period doubling.
 
@@ -94,7 +93,7 @@ def doubled_branch(
         raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
     require_found(point, point.value)
     at, periods = float(point.value), int(point.periods)
-    given = Given(system, jnp.asarray(point.speed if speed is None else speed, dtype=float))
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
     follower = make_follower(given, parameter, lower, upper, method).around(at, 2 * periods)
     curves, half = follower.curves(1), follower.around(at, periods)
     scale = np.asarray(follower.problem.scale)
@@ -105,7 +104,9 @@ def doubled_branch(
     while amplitude > SMALLEST_AMPLITUDE:
         start = settle_on(curves, u + amplitude * across, across, int(point.steps))
         near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        if near and _doubling(follower, start)[0] > 0 and _half_way(half, start, across) > amplitude:
+        once = correct(half.curves(1), start.u, across, start.steps, ONCE)  # where it is half of its revolutions later
+        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # nothing if it is the orbit that doubles
+        if near and _doubling(follower, start)[0] > 0 and away > amplitude:
             break
         amplitude /= 4
     else:
@@ -114,13 +115,6 @@ def doubled_branch(
     (trace,) = follow(curves, start, steps=steps, inside=follower.inside, stop=stop)
     (found,) = describe(follower, [(trace.points, ("doubling", trace.ended))])
     return found
-
-
-def _half_way(half: Follower, start: Corrected, across: np.ndarray) -> float:
-    """How far an orbit is from where it began after half of its revolutions, in units of the system's scale: twice the
-    amplitude if it doubled, nothing if it is the orbit that doubles, there or later."""
-    once = correct(half.curves(1), start.u, across, start.steps, ONCE)
-    return float(np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0]))
 
 
 def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
@@ -135,34 +129,21 @@ def cascade(
     lower: float,
     upper: float,
     levels: int = 4,
-    speed: Scalar | None = None,
     method: AbstractMethod | None = None,
 ) -> Cascade:
-    """Follow a period-doubling cascade from its first point.
-
-    **Arguments:** the first period doubling, of a period-1 orbit; parameter and its range [SI]; number of doublings.
-    """
+    """Follow a period-doubling cascade from its first point, the doubling of a period-1 orbit, over a range of the
+    parameter [SI] and so many doublings."""
     require_x64()
     require_range(parameter, lower, upper)
     require_found(point, point.value)
     if levels < 1:
         raise ArgumentError("levels", said=f"must be at least 1, but {levels} was given.")
-    fixed = None if parameter == SPEED else (point.speed if speed is None else speed)
     points = [point]
+    how: dict[str, Any] = {"lower": lower, "upper": upper, "until_doubling": True, "method": method}
     amplitude, ended = 0.02, ""
     while len(points) < levels:
         try:
-            doubled = doubled_branch(
-                system,
-                points[-1],
-                parameter,
-                lower=lower,
-                upper=upper,
-                speed=fixed,
-                amplitude=amplitude,
-                until_doubling=True,
-                method=method,
-            )
+            doubled = doubled_branch(system, points[-1], parameter, amplitude=amplitude, **how)
         except ValueError as error:
             ended = str(error)
             break

@@ -80,9 +80,8 @@ def curve(
     """
     require_x64()
     if point.kind not in ("period-doubling", "Neimark-Sacker", "fold"):
-        raise ArgumentError(
-            "point", said=f"must be a period-doubling, Neimark-Sacker or fold, but it is a {point.kind}."
-        )
+        said = f"must be a period-doubling, Neimark-Sacker or fold, but it is a {point.kind}."
+        raise ArgumentError("point", said=said)
     require_found(point, point.value)
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
@@ -106,9 +105,8 @@ def curve(
     y_kept = np.eye(1, u.size, u.size - 1)
     start = settle_on(curves, u[None], y_kept, count // 2)
     if not bool(start.converged[0]):
-        raise ArgumentError(
-            "point", said=f"must be a {point.kind} of the system, but Newton's method finds none there."
-        )
+        said = f"must be a {point.kind} of the system, but Newton's method finds none there."
+        raise ArgumentError("point", said=said)
     both = np.zeros(2, dtype=int)
     up, down = follow(
         curves.take(both),

@@ -15,7 +15,7 @@ from .._types import Scalar
 from ..integrate import AbstractMethod
 from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._orbit import OrbitEquations
-from ._problem import SPEED, Given, OrbitProblem, Parameter, make_problem, with_value
+from ._problem import SPEED, Given, OrbitProblem, Parameter, make_problem
 from ._steps import Counts, counted, stiff
 
 
@@ -43,8 +43,7 @@ class Follower(eqx.Module):
 
     def around(self, at: Scalar, periods: Any = None) -> "Follower":
         """The same in the system's scale at a value of the parameter, with other periods if they are given."""
-        there = Given(*with_value(self.given.system, self.given.speed, self.parameter, jnp.asarray(at, dtype=float)))
-        mine = self.problem
+        there, mine = self.given.changed(self.parameter, jnp.asarray(at, dtype=float)), self.problem
         periods = mine.periods if periods is None else periods
         problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
         return dataclasses.replace(self, problem=problem)
@@ -89,9 +88,8 @@ def require_within(name: str, at: float, lower: float, upper: float) -> None:
     """**Raises:** `ArgumentError` for an orbit outside the range in which it is to be followed."""
     slack = AT_THE_END * max(abs(lower), abs(upper))
     if at < lower - slack or at > upper + slack:
-        raise ArgumentError(
-            name, said=f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
-        )
+        said = f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
+        raise ArgumentError(name, said=said)
 
 
 def make_follower(

@@ -121,13 +121,8 @@ def solve(
     size = lambda step: jnp.max(jnp.abs(step))
     tiny = lambda step, u: size(step / (tolerance + tolerance * jnp.abs(u))) <= 1.0
 
-    def ended(tried: Array, newton: Newton) -> tuple[Array, Array]:
-        """Whether the method has ended after `tried`, and whether at a root."""
-        lost = (newton.factor < smallest) | ~jnp.all(jnp.isfinite(tried))
-        return newton.done | lost, newton.done & ~lost
-
     def turn(carry: tuple) -> tuple:
-        i, _, u, newton, _ = carry
+        i, u, newton, _, _ = carry
         r, jacobian, aux = linearised(u)
         first = jnp.isinf(newton.step[0])
         known = jnp.where(first, jnp.eye(u.size), newton.jacobian)
@@ -142,15 +137,17 @@ def solve(
         length = size(new.step)
         share = jnp.minimum(new.factor, 1.0 / jnp.where(length > 0, length, 1.0))
         onward = new.point + share * new.step
-        return i + 1, u, jnp.where(new.done, u, onward) if at_root else onward, new, aux
+        lost = (new.factor < smallest) | ~jnp.all(jnp.isfinite(u))
+        return i + 1, jnp.where(new.done, u, onward) if at_root else onward, new, lost, aux
 
     unknown = lambda *shape: jnp.full(shape, jnp.inf)
     n, like = guess.size, eqx.filter_eval_shape(linearised, guess)[2]
     begin = Newton(guess, unknown(n, n), unknown(n), unknown(n), jnp.ones(()), jnp.asarray(skip))
-    start = jnp.zeros((), int), guess, guess, begin, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
-    on = lambda carry: (carry[0] < max_steps) & ~ended(carry[1], carry[3])[0]
-    i, tried, u, newton, aux = jax.lax.while_loop(on, turn, start)
-    return u, Found(ended(tried, newton)[1], i, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))
+    aux = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
+    start = jnp.zeros((), int), guess, begin, ~jnp.all(jnp.isfinite(guess)), aux
+    on = lambda carry: (carry[0] < max_steps) & ~carry[2].done & ~carry[3]
+    i, u, newton, lost, aux = jax.lax.while_loop(on, turn, start)
+    return u, Found(newton.done & ~lost, i, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))
 
 
 def settled(

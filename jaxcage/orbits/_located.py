@@ -47,8 +47,7 @@ MOST_TURNS = 40
 LOCATED = 1e-9
 """As closely as places are refined, in the unknowns' units."""
 BRACKETED = 1e-5
-"""At a branch point the curve's equations are singular, and no point is found where the function vanishes: it is then
-bracketed this closely, and interpolated."""
+"""A branch point, at which the curve's equations are singular, is bracketed this closely, and interpolated."""
 
 
 class Seen(NamedTuple):
@@ -63,13 +62,11 @@ class Seen(NamedTuple):
 
 
 def account(follower: Follower, rows: Sequence[Corrected]) -> list[tuple[Corrected, list[Seen]]]:
-    """The orbits of branches, and their bifurcations in order.
+    """The orbits of branches, and their bifurcations in order; between any two there is an orbit.
 
-    Where the count of unstable multipliers changes from one orbit to another by what was seen between them does not
-    explain, as when two real multipliers pass -1 within a step, the step is halved. Where it changes by what was
-    located there does not explain, its orbits are solved for again and it is looked at once more. What is left is in
-    the list, of the kind `unexplained`: there the branch cannot be trusted to be one. Between any two bifurcations
-    there is an orbit, that tells whether those between them are stable.
+    Where the count of unstable multipliers changes otherwise than by what was seen, as when two real multipliers pass
+    -1 within a step, the step is halved. Where it changes otherwise than by what was located, its orbits are solved for
+    again and it is looked at once more. What is left is of the kind `unexplained`: the branch may not be one there.
     """
     rows = [_halved(follower, _at_the_root(follower, row)) for row in rows]
     seen = _located(follower, rows)
@@ -239,12 +236,9 @@ def brackets(follower: Follower, points: Corrected) -> list[tuple[int, str]]:
 
 
 def locate(follower: Follower, wanted: Sequence[tuple[Corrected, int, str]]) -> list[tuple[Corrected, float] | None]:
-    """Where the test functions of (points, index, kind) vanish, and the distance [SI] to the place by half the
-    steps; None where that could not be found.
-
-    A branch point, where the curve's equations are singular, may be found by some steps and not by others: its error is
-    from those that find it.
-    """
+    """Where the test functions of (points, index, kind) vanish, and the distance [SI] to the place by half the steps;
+    None where that could not be found. A branch point, where the curve's equations are singular, may be found by some
+    steps and not by others: its error is from those that find it."""
     if not wanted:
         return []
     curves = follower.curves(len(wanted))
@@ -310,12 +304,8 @@ def locate(follower: Follower, wanted: Sequence[tuple[Corrected, int, str]]) -> 
 def _zeros(
     follower: Follower, curves: Curves, ends: Sequence[Corrected], kinds: Sequence[str], steps: np.ndarray, within: Any
 ) -> list[Corrected | None]:
-    """Where the test functions vanish between two orbits each, these solved for again by so many steps.
-
-    Places are refined until they move by less than `within`, in the unknowns' units; one for all or each.
-
-    **Returns:** an orbit per pair, None where the function does not change sign between them, or the curve was lost.
-    """
+    """Where the test functions vanish between two orbits each, these solved for again by so many steps: refined until
+    it moves by less than `within`; None where the function does not change sign, or the curve was lost."""
     both = jax.tree.map(lambda *x: np.concatenate(x), *ends)
     lane = np.repeat(np.arange(len(ends)), 2)
     other = np.flatnonzero(both.steps != steps[lane])

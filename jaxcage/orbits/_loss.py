@@ -94,9 +94,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     """Zones in which the synchronous orbit is lost, from the stable stretches that were found.
 
     **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
-    500 rpm and at most 5 % of the highest speed.
-
-    **Returns:** `LossZones`. Without any stretch there is no zone: nothing is known of the orbit.
+    500 rpm and at most 5 % of the highest speed. Without any stretch there is no zone: nothing is known of the orbit.
     """
     close_below_rpm = closing_width(found.sweep.rpm) if close_below_rpm is None else close_below_rpm
     if not found.stretches:

@@ -32,8 +32,7 @@ AT_REST = 1e-3
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
-"""Parts of a revolution over which the divergence is integrated: of a method without steps, and of steps that are a
-multiple of so many."""
+"""Parts of a revolution over which the divergence is integrated, without steps, and of steps that are a multiple."""
 
 
 class OrbitEquations(AbstractEquations):
@@ -158,12 +157,6 @@ def _sorted_multipliers_jvp(primals: Any, tangents: Any) -> Any:
     return mu, jnp.diagonal(jnp.linalg.solve(v, m_dot.astype(v.dtype) @ v))
 
 
-def _resolved(m: Float[Array, "dim dim"]) -> Float[Array, ""]:
-    """log|det| of a matrix like `m` whose smallest singular value is at the level of rounding."""
-    size = jnp.linalg.svd(m, compute_uv=False)
-    return jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
-
-
 def divergence_integral(
     strobe: StrobeMap, state: Float[Array, " dim"], periods: Int[Array, ""] | int
 ) -> Float[Array, ""]:
@@ -222,7 +215,9 @@ def _find(
     monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
     state, multipliers = _place(equations, u, monodromy)
     expected = divergence_integral(equations.problem.prepare(u, given), state, problem.periods)
-    floor = _resolved(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0))
+    size = jnp.linalg.svd(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0), compute_uv=False)
+    # log|det| of a matrix like this one whose smallest singular value is at the level of rounding
+    floor = jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
     orbit = Orbit(
         state=state,
         speed=given.speed,

@@ -65,15 +65,6 @@ def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> 
     return jnp.asarray(speed if parameter == SPEED else pick(system, parameter)(system), dtype=float)
 
 
-def with_value(
-    system: AbstractForcedSystem, speed: Any, parameter: Parameter, new: Any
-) -> tuple[AbstractForcedSystem, Any]:
-    """System and speed with `parameter` set to `new`."""
-    if parameter == SPEED:
-        return system, new
-    return eqx.tree_at(pick(system, parameter), system, new), speed
-
-
 def depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
     """For each array that f(x) returns, whether it depends on x."""
     traced = jax.make_jaxpr(f)(x).jaxpr
@@ -100,6 +91,12 @@ class Given(eqx.Module):
 
     system: AbstractForcedSystem
     speed: Scalar
+
+    def changed(self, parameter: Parameter, new: Any) -> "Given":
+        """The same with `parameter` set to `new`."""
+        if parameter == SPEED:
+            return Given(self.system, new)
+        return Given(eqx.tree_at(pick(self.system, parameter), self.system, new), self.speed)
 
 
 Prepared: TypeAlias = tuple[StrobeMap, list[Any]]
@@ -130,17 +127,17 @@ class OrbitProblem(eqx.Module):
         """State at phase 0, in SI units."""
         return u[: self.dimension] * self.scale
 
-    def at(self, u: Float[Array, " n"], given: Given) -> tuple[AbstractForcedSystem, Scalar]:
-        """System and speed [rad/s] at the unknowns u."""
-        system, speed = given.system, given.speed
+    def at(self, u: Float[Array, " n"], given: Given) -> Given:
+        """System and speed at the unknowns u."""
         values = self.values(u)
         for i, parameter in enumerate(self.parameters):
-            system, speed = with_value(system, speed, parameter, values[i])
-        return system, speed
+            given = given.changed(parameter, values[i])
+        return given
 
     def prepare(self, u: Float[Array, " n"], given: Given) -> StrobeMap:
         """The strobe map at the unknowns u: all that depends on speed and design."""
-        return strobe_map(*self.at(u, given), self.method)
+        there = self.at(u, given)
+        return strobe_map(there.system, there.speed, self.method)
 
     def drift(self, u: Float[Array, " n"], given: Given, i: int) -> list[Any]:
         """How the field's numbers change with the i-th unknown; None for those that do not depend on it."""

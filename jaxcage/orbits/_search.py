@@ -42,8 +42,7 @@ ON_BRANCH = 0.03
 SPREAD = 0.6
 """Random starts are spread over this share of the system's scale in every direction."""
 SAME = 1e-4
-"""Orbits are the same within this distance, in units of the system's scale: an orbit that hardly attracts moves by a
-hundred times the error of its map."""
+"""Orbits are the same within this: one that hardly attracts moves by a hundred times the error of its map."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Of the state, at a speed [rad/s]."""
@@ -287,8 +286,7 @@ class _Settled(NamedTuple):
 
 
 def _met(settled: Sweep) -> list[list[int]]:
-    """Speed and start of the simulations that ran to their end, whatever their label: where an orbit hardly attracts
-    they are still on the way to it, and where it attracts few of them Newton's method may come upon it."""
+    """Speed and start of the simulations that ran to their end, though some may be still on the way to an orbit."""
     return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
 
 

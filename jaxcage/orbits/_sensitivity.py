@@ -207,13 +207,11 @@ def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
-    """Speed [rad/s] of the edge near `point`; NaN if Newton's method does not find it, or elsewhere by half the
-    steps."""
+    """Speed [rad/s] of the edge near `point`; NaN where it is not found, or elsewhere by half the steps."""
     require_x64()
     if point.kind == "branch-point":
-        raise ArgumentError(
-            "point", said="must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
-        )
+        said = "must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
+        raise ArgumentError("point", said=said)
     edge = _located(system, point, method)
     return edge.speed if edge.status == "converged" else float("nan")
 
@@ -240,13 +238,14 @@ def sensitivity(
     speed = edge.speed
     slope = _pulled_back(edge.problem, Given(system, jnp.asarray(point.speed, dtype=float)), edge.u, edge.weight)
     change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
+    units, bases = parameter_dimensions(system), {"mass": 0.0, "length": 0.0, "time": 1.0}
     return Sensitivity(
         name=name,
         kind=point.kind,
         value_rpm=speed / PER_RPM,
         derivative={n: s / PER_RPM for n, s in slope.items()},
         elasticity=change,
-        homogeneity=_homogeneity(system, change),
+        homogeneity={b: rate + sum(units[n][b] * e for n, e in change.items()) for b, rate in bases.items()},
         transversality=edge.rate,
         status="tangential" if abs(edge.rate * speed) < TANGENTIAL else "converged",
         state=np.asarray(edge.problem.state(edge.u)),
@@ -263,13 +262,6 @@ def _nowhere(
     row = dict.fromkeys(parameter_paths(system), nan)
     broken: dict[str, float] = dict.fromkeys(("mass", "length", "time"), nan)
     return Sensitivity(name, kind, nan, row, row, broken, nan, status, error_rpm=error_rpm)
-
-
-def _homogeneity(system: AbstractForcedSystem, elasticity: Mapping[str, float]) -> dict[str, float]:
-    """Residuals of the three identities, relative to the value."""
-    dimensions = parameter_dimensions(system)
-    total = {b: sum(dimensions[n][b] * e for n, e in elasticity.items()) for b in ("mass", "length", "time")}
-    return total | {"time": total["time"] + 1.0}
 
 
 def sensitivities(
@@ -358,9 +350,7 @@ def leading_multiplier(
     """Size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; speed [rad/s]; guess; revolutions after
-    which the orbit closes; integration method.
-
-    **Returns:** `LeadingMultiplier`. Where two multipliers are equal in size, of one of them.
+    which the orbit closes; integration method. Where two multipliers are equal in size, one of them is taken.
     """
     require_x64()
     chosen, counts = counted(method)
