@@ -153,13 +153,7 @@ DUFFING_SLOPES = {
 FEIGENBAUM = 4.669201609
 # x'' + .1 x' + x + x^3 = .3 cos wt: w at the folds where the large orbit ends, and the small one.
 DUFFING_FOLDS = {"up": Number(1.77971952, 2e-8, DOP853), "down": Number(1.3242362, 1e-7, DOP853)}
-# Limit cycle of van der Pol's equation. mu: period, logarithm of the second multiplier.
-VAN_DER_POL = {
-    1.0: (Number(6.6632868593, 1e-9, DOP853), Number(-7.05893281, 1e-8, DOP853)),
-    0.1: (Number(6.2871112723, 1e-9, DOP853), Number(-0.6291039210, 1e-8, DOP853)),
-}
 VAN_DER_POL_LET_GO = Number(1.0175566306, 1e-9, DOP853)
-LURE = Number(0.63031334, 2e-5, COLLOCATION), Number(0.6303020062, 1e-9, DOP853)
 
 
 # Film. Frame of the tables: x along the load (here -y) and y a quarter turn on in the direction of rotation, so that
@@ -621,12 +615,6 @@ def van_der_pol() -> Iterator[Row]:
     def law(c: Any, tau: Any, y: Any, speed: Any) -> Any:
         return (y[1], c["mu"] * (1 - y[0] ** 2) * y[1] - y[0] + c["g"] * jnp.cos(tau))
 
-    for mu, (period, logarithm) in VAN_DER_POL.items():
-        system, fine = _system(law, 2, mu=mu, g=0.0), jc.method("rodas4", steps=2048)
-        orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=20, period="free", method=fine)
-        yield beside(f"van der Pol, mu {mu:g}: period", period, orbit.period)
-        ours = jnp.log(orbit.multipliers[1].real)
-        yield beside(f"van der Pol, mu {mu:g}: logarithm of the multiplier", logarithm, ours)
     driven = _system(law, 2, mu=0.3, g=1.2)
     held = jc.periodic_orbit(driven, 1.3, guess=(-1.3, -0.4), method=FINE)
     what = "van der Pol, mu 0.3, g cos 1.3t: g where it is let go (Neimark-Sacker)"
@@ -641,15 +629,6 @@ def mathieu() -> Iterator[Row]:
         kind, theirs = "period-doubling" if order == 1 else "branch-point", float(of(order, 1))
         ours = _point(system, kind, ((0.0, 0.0), theirs + 0.03), "a", speed=2.0)
         yield row(f"Mathieu's equation: {name}", theirs, ours, 1e-8, MATHIEU)
-
-
-def lure() -> Iterator[Row]:
-    system = _system(lambda c, tau, y, speed: (y[1], y[2], -c["a"] * y[2] - y[1] - y[0] + y[0] ** 2), 3, a=0.65)
-    start, speed = (-0.373, 0.0, 0.577), 2 * math.pi / 6.36
-    orbit = jc.periodic_orbit(system, speed, guess=start, period="free", method=FINE)
-    ours = _point(system, "period-doubling", orbit, "a", period="free")
-    for number in LURE:
-        yield beside("Lur'e x''' + a x'' + x' + x = x^2: a where the period doubles", number, ours)
 
 
 # The cage.
@@ -738,7 +717,7 @@ TOPICS: dict[str, tuple[Rows, ...]] = {
     "statics": (load_factors, nu2310),
     "contact": (contact,),
     "exponents": (driven_exponents, flows),
-    "bifurcations": (doublings, pendulum_doublings, folds, van_der_pol, mathieu, lure),
+    "bifurcations": (doublings, pendulum_doublings, folds, van_der_pol, mathieu),
     "cage": (unbalance, divergence, whirl, half_a_revolution),
 }
 

@@ -36,7 +36,6 @@ START = jc.models.BearingState(jnp.zeros((5, 13)), jnp.zeros(9), jnp.zeros(2))
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
-    "branches": lambda m: jc.orbits.branches([OSCILLATOR], [DOUBLING], lower=1.0, upper=2.0),
     "cage_forces": lambda m: jc.analysis.cage_forces(m, TRAJECTORY),
     "cage_moments": lambda m: jc.analysis.cage_moments(m, TRAJECTORY),
     "cage_mass": lambda m: jc.bearing.cage_mass(m.bearing, 5e-4),

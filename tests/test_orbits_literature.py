@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from laws import numbers
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -14,10 +15,6 @@ import jaxcage as jc
 
 
 METHOD = jc.method("rk4", steps=1024)
-
-
-def numbers(**values):
-    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
 
 
 @pytest.mark.wide
@@ -36,28 +33,6 @@ def test_orbits_in_other_units_are_the_same():
         found = jc.periodic_orbit(duffing(1e-3), 1.2, guess=1.001e-3 * whole.state, method=METHOD)
         np.testing.assert_allclose(1e3 * found.state, whole.state, rtol=1e-9)
         np.testing.assert_allclose(found.multipliers, whole.multipliers, rtol=1e-8)
-
-
-class Bautin(eqx.Module):
-    """Cycles of radius r with r^4 - r^2 = mu, the faster the larger, in states of other units."""
-
-    mu: jax.Array
-
-    def __call__(self, tau, y, speed):
-        u, v = y[0] / 3.0, y[1] / 0.2
-        square = u * u + v * v
-        growth = self.mu + square - square * square
-        rate = 0.5 + square
-        return 3.0 * (growth * u - rate * v), 0.2 * (growth * v + rate * u)
-
-
-def test_fold_of_cycles_of_the_bautin_normal_form():
-    """At mu = -1/4 and r^2 = 1/2 (Kuznetsov, Elements of Applied Bifurcation Theory, 8.3), whatever the scale."""
-    system = jc.ForcedSystem(Bautin(jnp.asarray(0.0)), 2, scale=(3.0, 0.2))
-    near = (2.13, 0.0), -0.249
-    point = jc.bifurcation(system, "fold", near, "mu", speed=1.0, period="free", reach=0, method=METHOD)
-    assert point.status == "converged" and abs(point.value + 0.25) < 1e-9 and abs(point.speed - 1) < 1e-9
-    assert abs((point.state[0] / 3.0) ** 2 + (point.state[1] / 0.2) ** 2 - 0.5) < 1e-6
 
 
 class Mathieu(eqx.Module):
@@ -87,8 +62,7 @@ def mathieu_trace(a, q=1.0):
     return end[0] + end[3]
 
 
-@pytest.mark.parametrize("a", [-1.0, 0.7, 2.5, 5.0])
-@pytest.mark.parametrize("z", [0.1, 0.6])
+@pytest.mark.parametrize("a, z", [(-1.0, 0.1), (0.7, 0.6), (5.0, 0.1)])
 def test_multipliers_of_damped_mathieu(a, z):
     """x = exp(-z t) y makes it the undamped equation for y at a - z^2: exact."""
     zero = dict(guess=(0.0, 0.0), method=METHOD)
@@ -102,7 +76,6 @@ def test_multipliers_of_damped_mathieu(a, z):
 # Kind, damping, bracket of a, sign of the multiplier.
 DAMPED = [
     ("period-doubling", 0.1, (-0.2, 0.0), -1),
-    ("period-doubling", 0.1, (1.7, 1.9), -1),
     ("period-doubling", 0.2, (1.5, 1.8), -1),
     ("branch-point", 0.1, (-0.6, -0.3), 1),
 ]
@@ -126,61 +99,3 @@ def test_edges_of_damped_mathieu(kind, z, bracket, sign):
     rate = shrink * slope * sign / (2 * sign - shrink * mathieu_trace(at))
     np.testing.assert_allclose(abs(point.transversality), abs(rate), rtol=1e-6)
     assert point.status == "converged" and bool(point.trusted)
-
-
-class Circle(eqx.Module):
-    """A Stuart-Landau oscillator with a planted pair: x, y on a circle of radius sqrt(r), which drives u, v."""
-
-    r: jax.Array
-    w: jax.Array
-    a: jax.Array
-    b: jax.Array
-    c: jax.Array
-
-    def __call__(self, tau, state, speed):
-        x, y, u, v = state
-        growth = self.r - x * x - y * y
-        return (
-            growth * x - self.w * y,
-            growth * y + self.w * x,
-            self.a * u - self.b * v + self.c * x,
-            self.b * u + self.a * v,
-        )
-
-
-def circle(r=0.3, w=1.3, a=-0.1, b=0.37):
-    return jc.ForcedSystem(Circle(**numbers(r=r, w=w, a=a, b=b, c=0.4)), dimension=4)
-
-
-def cycle_of(system, r):
-    guess = (0.9 * r**0.5, 0.1, 0.1, 0.1)
-    spin = 20 if system.rates.a < 0 else 0  # the drive of an unstable pair would only blow it up
-    return jc.periodic_orbit(system, 1.25, guess=guess, revolutions=spin, period="free", method=METHOD)
-
-
-@pytest.mark.parametrize("r, a, b", [(0.3, -0.1, 0.37), (0.05, 0.2, 1.9), (1.0, -0.7, 0.05)])
-def test_multipliers_of_a_planted_limit_cycle(r, a, b):
-    """1, exp(-2 r T) and exp((a +- i b) T): exact."""
-    orbit = cycle_of(circle(r=r, a=a, b=b), r)
-    period = 2 * np.pi / 1.3
-    assert abs(orbit.period - period) < 1e-8
-    assert abs(jnp.hypot(*orbit.state[:2]) - r**0.5) < 1e-8
-    exact = [1, np.exp(-2 * r * period), np.exp((a + 1j * b) * period), np.exp((a - 1j * b) * period)]
-    for mu in exact:
-        assert np.min(np.abs(np.asarray(orbit.multipliers) - mu)) < 1e-8 * max(1, abs(mu))
-    assert bool(orbit.stable) == (a < 0)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("b", [0.37, 1.9])
-def test_torus_bifurcation_of_a_planted_limit_cycle(b):
-    """The pair leaves the unit circle at a = 0 with angle b T and rate T: exact. The drive is not resonant."""
-    system = circle(b=b, a=-0.05)
-    orbit = cycle_of(system, 0.3)
-    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", period="free", method=METHOD)
-    period = 2 * np.pi / 1.3
-    assert point.status == "converged"
-    assert abs(point.value) < 1e-8
-    assert abs(point.angle - abs(np.angle(np.exp(1j * b * period)))) < 1e-8
-    assert abs(point.transversality - period) < 1e-6
-    assert abs(point.speed - 1.3) < 1e-8

@@ -34,7 +34,6 @@ def point_document(point: Point, branch: int | None) -> dict[str, Any]:
         **chosen(point, "kind speed_rpm error_rpm steps"),
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
-        "criticality": point.criticality or None,
         "edge": point.edge,
         "branch": branch,
         "state": point.state,
@@ -140,7 +139,7 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
         (
             speed(float(p.speed_rpm), 3),
             error_cell(p.error_rpm),
-            f"{p.criticality} {p.kind}".strip(),
+            p.kind,
             multiplier_cell(p),
             number(angle_deg(p), 2),
             str(branch_of(found, p)),
