@@ -95,7 +95,6 @@ SPROTT = "J. C. Sprott, Common Chaotic Systems (2004), sprott.physics.wisc.edu/c
 ENSEMBLE = "2048 runs of 500 periods in NumPy, Runge-Kutta on the variational equation (`tests/literature.py`)"
 DOP853 = "SciPy's DOP853 at 1e-12 with Newton's method on the variational equations"
 SHOOTING = f"{DOP853} (`tests/literature.py`)"
-COLLOCATION = "BifurcationKit's manual, Lur'e problem, and MatCont: by collocation, off their meshes"
 FEIGENBAUM_1978 = "M. J. Feigenbaum (1978): distances of period doublings shrink by 4.669..."
 SCALING = "exact: under x -> s x the force at any edge goes with b^(-1/2)"
 MATHIEU = "characteristic values at q = 1: DLMF chapter 28, computed by SciPy's `mathieu_a` and `mathieu_b`"

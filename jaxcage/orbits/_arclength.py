@@ -101,7 +101,7 @@ def _correct(
     return jax.lax.scan(turn, (at, normal), jnp.array([False, True]))[1]
 
 
-_correct_lanes = compiled(eqx.filter_vmap(_correct, in_axes=(eqx.if_array(0), None, 0, 0, 0, None, None)), "correct")
+_correct_lanes = compiled(eqx.filter_vmap(_correct, in_axes=(eqx.if_array(0), None, 0, 0, 0, None, None)))
 
 
 def take(tree: Any, lanes: Any) -> Any:
