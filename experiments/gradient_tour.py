@@ -11,7 +11,7 @@
 # # A tour of gradients
 # 1. An edge of a zone is a bifurcation of the synchronous orbit: it has equations, and so an exact gradient.
 # 2. The largest Floquet multiplier has one too, on either side of the edge.
-# 3. A chaotic trajectory has none that is worth having: its derivative explodes. An ensemble has.
+# 3. A chaotic trajectory has none that is worth having: its derivative explodes.
 
 # %%
 import jaxcage as jc  # before jax: it keeps XLA from talking of kept programs
@@ -69,10 +69,3 @@ for n in (10, 40, 80)[: small(3, 2)]:
         return jnp.mean(jax.lax.scan(advance, start, None, n)[1])
 
     print(f"{n} revolutions: {float(jax.jit(jax.jacfwd(mean_square))(0.45e-3)):+.3e}")
-
-# %%
-width = jc.design.chaotic_width(4000, 20000, small(48, 8), cloud=small(24, 4), discard=small(150, 10))
-space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3)})
-(got,) = width.measure(space, space.place[None])
-print(f"chaotic speeds below 20000 rpm: {got.value:.0f} +- {got.error:.0f} rpm")
-print(f"over the whole range of the gap, 0.3 mm, they change by {got.slope[0]:+.0f} +- {got.slope_error[0]:.0f} rpm")

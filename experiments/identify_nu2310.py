@@ -2,59 +2,114 @@
 
 A search in stages, each dearer than the one before and begun where that one ended, from the paper's start: chaos seen
 in 200 revolutions, chaos that lasts 600, and chaos that lasts 3000 on a finer grid. `--from 1` goes straight to the
-second one. Candidates are scored by `jaxcage.design.screen`: about the mean relative error of the edges,
-with a price for every band too many. The first begins with quasi-random designs and with the package's set.
+second one. Every design is swept over speed in all cases at once, and its largest exponents are held against the
+published zones. The score is about the mean relative error of the edges, with a price for every band too many. No edge
+is needed for that, so that the search works far from the answer, where zones are missing or too many. A stage begins
+with quasi-random designs and goes on with an evolution strategy (CMA-ES, of the extra `bench`).
 
 Every design goes to a ledger, a CSV file, from which another run goes on: it skips stages that were done, and begins
 others at the best design that the ledger holds. `--read clearance_reading=radial` searches by another reading of the
 paper, with `cubic_ratio` in place of the cubic stiffness for `support.cubic=dimensionless`. `--check` shows what the
 ledger's best set, or that of `--begin FILE.json`, does at 100 rpm from three starts; with four times the steps by
-`--steps 4`, to another horizon by `--horizon 6000`. `--trade-off` runs nothing and shows
-how well the cases go together: what the ledger's designs reach in some of them, and in those left out.
+`--steps 4`, to another horizon by `--horizon 6000`. `--quick` takes few designs and speeds.
 """
 
 import argparse
 import csv
 import dataclasses
-import itertools
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+import cma
 import numpy as np
+from scipy.stats import qmc
 
 import jaxcage as jc
-from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.analysis import CHAOS_THRESHOLD
+from jaxcage.bearing import PUBLISHED_CASES, PublishedCase
 from jaxcage.integrate import controlled, finer
-from jaxcage.reproduction import LASTING, compare_edges, wide_zones
+from jaxcage.report import LASTING, compare_edges, wide_zones
 
 
 jc.enable_x64()
 
+SOFT = 0.04
+"""Half width over which calm turns into chaos, so that the score tells better from worse."""
+TOGETHER = 64
+"""Designs swept in one batch."""
+BLOCKS, KEEP = 5, 16
+"""Blocks of revolutions, which tell a chaotic lane from one of which nothing is known; strobe states, which tell where
+chaos has closed on an orbit of up to 8 revolutions."""
+EDGES = 3
+"""Published ones of each case."""
+NEEDLESS = 0.01
+"""What a needless change between calm and chaos costs, as a relative error of the edges."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknown:
+    """A constant to be found, the same in all cases."""
+
+    name: str
+    lower: float
+    """Smallest value [SI]."""
+    upper: float
+    linear: bool = False
+    """Whether equal steps add, instead of multiply."""
+    parameter: str = ""
+    """What takes its value, if that has another name."""
+
+    @property
+    def target(self) -> str:
+        """The parameter that takes its value."""
+        return self.parameter or self.name
+
+    @property
+    def span(self) -> float:
+        """Distance of the bounds, or of their logarithms."""
+        return self.upper - self.lower if self.linear else float(np.log(self.upper / self.lower))
+
+    def value(self, place: float) -> float:
+        """Value [SI] at a place between the bounds: 0 is the lower one, 1 the upper."""
+        along = place * self.span
+        return float(self.lower + along if self.linear else self.lower * np.exp(along))
+
+    def place(self, value: float) -> float:
+        """Where `value` [SI] lies between the bounds, or the nearest bound."""
+        along = value - self.lower if self.linear else np.log(value / self.lower)
+        return float(np.clip(along / self.span, 0.0, 1.0))
+
+
 UNKNOWNS = (
-    jc.design.Unknown("cage_mass", 0.20, 0.36),  # [kg] from the cage's shape
-    jc.design.Unknown("stiffness_x", 5e3, 4e5),  # [N/m] of the support
-    jc.design.Unknown("stiffness_y", 5e3, 4e5),
-    jc.design.Unknown("cubic_stiffness", 1e10, 1e15),  # [N/m^3]; see RELATIVE
-    jc.design.Unknown("damping", 0.3, 60.0),  # [N s/m]
-    jc.design.Unknown("cross_stiffness", -1e4, 1e4, "linear"),  # [N/m]
-    jc.design.Unknown("land_width", 0.5e-3, 6.5e-3),  # [m]
-    jc.design.Unknown("amplitude", 10.0, 500.0),  # [N] at 1000 rad/s
-    jc.design.Unknown("exponent", 1.0, 2.0, "linear"),
-    jc.design.Unknown("contact_stiffness", 1e7, 1e11, sets=("stiffness",)),  # [N/m^(10/9)]
-    jc.design.Unknown("restitution", 0.3, 1.0, "linear"),
+    Unknown("cage_mass", 0.20, 0.36),  # [kg] from the cage's shape
+    Unknown("stiffness_x", 5e3, 4e5),  # [N/m] of the support
+    Unknown("stiffness_y", 5e3, 4e5),
+    Unknown("cubic_stiffness", 1e10, 1e15),  # [N/m^3]; see RELATIVE
+    Unknown("damping", 0.3, 60.0),  # [N s/m]
+    Unknown("cross_stiffness", -1e4, 1e4, linear=True),  # [N/m]
+    Unknown("land_width", 0.5e-3, 6.5e-3),  # [m]
+    Unknown("amplitude", 10.0, 500.0),  # [N] at 1000 rad/s
+    Unknown("exponent", 1.0, 2.0, linear=True),
+    Unknown("contact_stiffness", 1e7, 1e11, parameter="stiffness"),  # [N/m^(10/9)]
+    Unknown("restitution", 0.3, 1.0, linear=True),
 )
-RELATIVE = jc.design.Unknown("cubic_ratio", 1e-2, 1e3)
+RELATIVE = Unknown("cubic_ratio", 1e-2, 1e3)
 """alpha in K_3 = alpha K_s / c^2, in place of the cubic stiffness, by the reading support.cubic=dimensionless."""
 
 POPULATION = 4 + int(3 * np.log(len(UNKNOWNS)))
 """Designs of a generation of the evolution strategy."""
 
 
+def with_values(model: jc.CageModel, unknowns: Sequence[Unknown], values: dict[str, float]) -> jc.CageModel:
+    """A case with these constants."""
+    return jc.replace(model, **{u.target: values[u.name] for u in unknowns})
+
+
 @dataclasses.dataclass(frozen=True)
 class Stage:
-    """How long and how finely candidates are looked at, and how many."""
+    """How long and how finely designs are looked at, and how many."""
 
     name: str
     horizon: int
@@ -62,7 +117,7 @@ class Stage:
     speeds: int
     starts: int
     designs: int
-    """Quasi-random ones."""
+    """Quasi-random ones, a power of 2."""
     generations: int
     spread: float
     """First step of the evolution strategy, as a part of the bounds."""
@@ -79,7 +134,7 @@ QUICK = tuple(dataclasses.replace(s, speeds=8, designs=2, generations=1, horizon
 class Ledger:
     """The designs tried, in a file."""
 
-    def __init__(self, path: Path, unknowns: tuple[jc.design.Unknown, ...]):
+    def __init__(self, path: Path, unknowns: tuple[Unknown, ...]):
         self.path, self.unknowns = path, unknowns
         self.head = ("stage", "score", *PUBLISHED_CASES, *(u.name for u in unknowns))
         self.rows: list[dict[str, str]] = []
@@ -87,10 +142,10 @@ class Ledger:
             with path.open() as file:
                 self.rows = list(csv.DictReader(file))
 
-    def add(self, stage: str, candidate: jc.design.Candidate) -> None:
+    def add(self, stage: str, score: float, by_case: dict[str, float], values: dict[str, float]) -> None:
         """One more design."""
-        cases = [f"{candidate.by_case[c]:.4f}" if c in candidate.by_case else "" for c in PUBLISHED_CASES]
-        row = [stage, f"{candidate.score:.4f}", *cases, *(f"{candidate.values[u.name]:.6g}" for u in self.unknowns)]
+        cases = [f"{by_case[c]:.4f}" if c in by_case else "" for c in PUBLISHED_CASES]
+        row = [stage, f"{score:.4f}", *cases, *(f"{values[u.name]:.6g}" for u in self.unknowns)]
         self.rows.append(dict(zip(self.head, row, strict=True)))
         new = not self.path.exists()
         with self.path.open("a") as file:
@@ -107,81 +162,103 @@ class Ledger:
                 return {u.name: float(rows[0][u.name]) for u in self.unknowns}
         known = jc.parameters(jc.case("1a", "identified"))
         known["cubic_ratio"] = known["cubic_stiffness"] * known["guidance_gap"] ** 2 / known["stiffness_x"]
-        return {u.name: float(known[u.targets[0]]) for u in self.unknowns}
+        return {u.name: float(known[u.target]) for u in self.unknowns}
 
 
-def edges(cases: list[str]) -> list[jc.design.MeasuredEdge]:
-    """The published ones, with the 2 % to which a diagram can be read."""
-    made = []
-    for name in cases:
-        case = PUBLISHED_CASES[name]
-        read = {"zone 1 onset": case.zone_1_onset_rpm, "zone 1 exit": case.zone_1_exit_rpm}
-        read |= {"zone 2 onset": case.zone_2_onset_rpm}
-        made += [jc.design.MeasuredEdge(name, edge, rpm, 0.02 * rpm, "chaotic") for edge, rpm in read.items()]
-    return made
+class OutOfTime(Exception):
+    """The search has taken its minutes."""
+
+
+class Search:
+    """One stage: designs swept in all cases at once, their scores in the ledger."""
+
+    def __init__(self, stage: Stage, models: dict[str, jc.CageModel], ledger: Ledger, until: float):
+        self.stage, self.models, self.ledger, self.until = stage, models, ledger, until
+        self.speeds = np.geomspace(4000, 27500, stage.speeds) * np.pi / 30
+        self.starts = [tuple(float(c) for c in y) for y in jc.case("1a").starts(1000.0)[: stage.starts]]
+        self.began, self.tried, self.best = time.perf_counter(), 0, np.inf
+
+    def run(self, begin: dict[str, float], seed: int) -> None:
+        """Quasi-random designs and `begin`, then generations from the best of them."""
+        unknowns = self.ledger.unknowns
+        first = qmc.Sobol(len(unknowns), rng=seed).random_base2(int(np.log2(self.stage.designs)))
+        first = np.vstack([[u.place(begin[u.name]) for u in unknowns], first])
+        start = first[int(np.argmin(self.scores(first)))]
+        options = {"bounds": [0.0, 1.0], "maxiter": self.stage.generations, "seed": seed + 1, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(start, self.stage.spread, options)
+        while not strategy.stop():
+            places = strategy.ask()
+            strategy.tell(places, self.scores(np.array(places)).tolist())
+
+    def scores(self, places: np.ndarray) -> np.ndarray:
+        """How far designs are from what was published: the mean over the cases plus half the worst."""
+        parts = np.array_split(places, -(-len(places) // TOGETHER))
+        return np.concatenate([self._scores_together(part) for part in parts])
+
+    def _scores_together(self, places: np.ndarray) -> np.ndarray:
+        unknowns, cases = self.ledger.unknowns, len(self.models)
+        values = [{u.name: u.value(p) for u, p in zip(unknowns, place, strict=True)} for place in places]
+        swept = jc.sweep_designs(
+            [with_values(model, unknowns, chosen) for chosen in values for model in self.models.values()],
+            self.speeds,
+            starts=self.starts,
+            discard=100,
+            revolutions=100,
+            confirm=False,
+            horizon=self.stage.horizon,
+            exponents=1,
+            blocks=BLOCKS,
+            keep=KEEP,
+        )
+        scores = []
+        for i, chosen in enumerate(values):
+            own = zip(self.models, swept[i * cases : (i + 1) * cases], strict=True)
+            by_case = {name: self._wrong(PUBLISHED_CASES[name], found) for name, found in own}
+            off = list(by_case.values())
+            scores.append(float(np.mean(off) + 0.5 * np.max(off)))
+            self._tell(scores[-1], by_case, chosen)
+        return np.array(scores)
+
+    def _wrong(self, case: PublishedCase, found: jc.Sweep) -> float:
+        """Mean relative error of the edges of a case, were each wrong speed due to one that has moved; each needless
+        change between calm and chaos costs `NEEDLESS` besides. Chaos counts by how much of the way to the horizon it
+        lasts, and a lane that failed is wrong whatever it should do.
+        """
+        rpm = found.rpm
+        should = (rpm >= case.zone_1_onset_rpm) & (rpm <= case.zone_1_exit_rpm) | (rpm >= case.zone_2_onset_rpm)
+        lasted = 1.0 if found.escape is None else np.minimum(found.escape, found.horizon) / found.horizon
+        level = np.clip((found.exponents[..., 0] - CHAOS_THRESHOLD) / (2 * SOFT) + 0.5, 0, 1)
+        chaos = (lasted * level).max(axis=1)
+        chaos = np.where(np.isfinite(chaos), chaos, 1.0 - should)
+        needless = np.sum(np.abs(np.diff(chaos))) - np.sum(np.abs(np.diff(should.astype(float))))
+        misplaced = np.gradient(np.log(rpm)) @ np.abs(should - chaos)
+        return float(misplaced / EDGES + NEEDLESS * max(needless, 0.0))
+
+    def _tell(self, score: float, by_case: dict[str, float], values: dict[str, float]) -> None:
+        self.tried += 1
+        self.ledger.add(self.stage.name, score, by_case, values)
+        if score < self.best:
+            self.best = score
+            numbers = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+            seconds = time.perf_counter() - self.began
+            said = f"{seconds:.0f} s, {self.tried} tried: score {score:.4f}: {numbers}"
+            print(f"{self.stage.name}: {said}", flush=True)
+        if time.perf_counter() > self.until:
+            raise OutOfTime
 
 
 def check(models: dict[str, jc.CageModel], ledger: Ledger, values: dict[str, float], steps: int, horizon: int) -> None:
     """Edges of lasting chaos and its wide zones with these values, at 100 rpm, from three starts."""
-    chosen = {target: values[u.name] for u in ledger.unknowns for target in u.targets}
-    made = [jc.replace(model, **chosen) for model in models.values()]
     method = finer(controlled(), steps.bit_length() - 1) if steps > 1 else None
     errors = []
-    for name, model in zip(models, made, strict=True):
+    for name, case in models.items():
+        model = with_values(case, ledger.unknowns, values)
         found = jc.zones(jc.sweep(model, jc.rpm(2500, 27500, 251), method=method, horizon=horizon)).zones
         rows = compare_edges(PUBLISHED_CASES[name], found, LASTING)
         errors += [30.0 if r.error_percent is None else abs(r.error_percent) for r in rows]
         said = [f"{r.edge} " + ("none" if r.ours_rpm is None else f"{r.error_percent:+.1f} %") for r in rows]
         print(f"{name}: {', '.join(said)}; {len(wide_zones(found))} wide zones", flush=True)
     print(f"{np.sum(np.array(errors) <= 10)} of {len(errors)} within 10 %, median error {np.median(errors):.1f} %")
-
-
-def trade_off(ledger: Ledger) -> None:
-    """How far off the ledger's designs are in each case and in all choices of cases: means of the score's parts."""
-    reached = [rows for stage in STAGES if (rows := ledger.of(stage.name))]
-    cases = [c for c in PUBLISHED_CASES if reached[-1][0][c]]
-    off = np.array([[float(row[c]) for c in cases] for row in reached[-1]])
-    mean = lambda some: off[:, list(some)].mean(axis=1)
-    print(f"{len(off)} designs of the stage '{reached[-1][0]['stage']}'\n")
-    print("case  the best for it alone  the best for all the others: in these  in it")
-    for i, case in enumerate(cases):
-        others = mean(set(range(len(cases))) - {i})
-        best = np.argmin(others)
-        print(f"{case:4s}{off[:, i].min():23.3f}{others[best]:39.3f}{off[best, i]:7.3f}")
-    print(f"\n{'cases':5s}  {'that go together best':>22s}  mean  {'that go together worst':>22s}  mean")
-    for n in range(2, len(cases) + 1):
-        best = sorted((mean(some).min(), some) for some in itertools.combinations(range(len(cases)), n))
-        ends = [f"{', '.join(cases[i] for i in some):>22s} {value:.3f}" for value, some in (best[0], best[-1])]
-        print(f"{n:5d}  {'  '.join(ends)}")
-
-
-def search(
-    stage: Stage, models: dict[str, jc.CageModel], ledger: Ledger, begin: dict[str, float], until: float, seed: int
-) -> bool:
-    """One stage, and whether it came to its end before the time was up."""
-    grid = np.geomspace(4000, 27500, stage.speeds) * np.pi / 30
-    starts = [tuple(float(c) for c in y) for y in jc.case("1a").starts(1000.0)[: stage.starts]]
-    began, best = time.perf_counter(), np.inf
-
-    class OutOfTime(Exception):
-        pass
-
-    def tried(count: int, candidate: jc.design.Candidate) -> None:
-        nonlocal best
-        ledger.add(stage.name, candidate)
-        if candidate.score < best:
-            best = candidate.score
-            print(f"{stage.name}: {time.perf_counter() - began:.0f} s, {count} tried: {candidate}", flush=True)
-        if time.perf_counter() > until:
-            raise OutOfTime
-
-    options: dict[str, Any] = dict(designs=stage.designs, generations=stage.generations, spread=stage.spread)
-    options |= dict(discard=100, revolutions=100, horizon=stage.horizon, seed=seed, starts=starts, report=tried)
-    try:
-        jc.design.screen(models, ledger.unknowns, edges(list(models)), grid, begin=begin, **options)
-    except OutOfTime:
-        return False
-    return True
 
 
 def main() -> None:
@@ -195,7 +272,6 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--begin", type=Path, help="JSON file of values, instead of the ledger's best")
     parser.add_argument("--check", action="store_true", help="no search: the edges with the values to begin with")
-    parser.add_argument("--trade-off", action="store_true", help="no search: how well the cases go together")
     parser.add_argument(
         "--steps", type=int, default=1, choices=(1, 2, 4, 8), help="of a check: so many times the steps"
     )
@@ -208,8 +284,6 @@ def main() -> None:
     relative = read.get("support.cubic") == "dimensionless"
     unknowns = tuple(RELATIVE if relative and u.name == "cubic_stiffness" else u for u in UNKNOWNS)
     ledger = Ledger(given.ledger, unknowns)
-    if given.trade_off:
-        return trade_off(ledger)
     begin = json.loads(given.begin.read_text()) if given.begin else None
     if given.check:
         return check(models, ledger, begin or ledger.best(), given.steps, given.horizon)
@@ -218,7 +292,9 @@ def main() -> None:
         if len(ledger.of(stage.name)) > stage.designs + stage.generations * POPULATION:
             continue  # done by a run before
         first, begin = begin or ledger.best(), None
-        if not search(stage, models, ledger, first, until, given.seed + len(ledger.of(stage.name))):
+        try:
+            Search(stage, models, ledger, until).run(first, given.seed + len(ledger.of(stage.name)))
+        except OutOfTime:
             print(f"time is up in the stage '{stage.name}'; another run goes on from there")
             return
     print(f"best: {ledger.best()}")

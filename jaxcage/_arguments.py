@@ -1,7 +1,7 @@
-"""Arguments of public functions compared with their declarations before anything is done: one mechanism for all.
+"""Arguments of public functions compared with their annotations before anything is done: one mechanism for all.
 
-What an argument may be is read off its annotation: whole numbers, numbers, real arrays, names of a choice, models. How
-large a count may be is said once, by its name. What is traced passes: it has no value yet.
+What an argument may be is read off its annotation: whole numbers, numbers, real arrays, names of a choice, models. What
+is traced passes: it has no value yet. Bounds of numbers are asked for by the functions themselves.
 """
 
 import functools
@@ -22,26 +22,6 @@ from ._errors import ArgumentError
 
 MOST = 10_000_000
 """Of anything that is counted: more ends in no memory, or in no lifetime."""
-LEAST: dict[str, int] = {
-    **dict.fromkeys(["blocks", "keep", "count", "steps", "lanes", "period", "rows", "columns", "starts", "workers"], 1),
-    **dict.fromkeys(["coordinates", "dimension", "n_rollers", "periods", "profiles", "stations", "substeps"], 1),
-    **dict.fromkeys(["discard", "horizon", "exponents", "strobe", "samples", "seed", "persist"], 0),
-}
-"""Of counts by their names; others have a least value of their own, which their function knows."""
-CHECKED: dict[str, Callable[..., Any]] = {}
-"""Functions that compare their arguments, by their names."""
-SPEEDS = frozenset({"speed", "first", "last"})
-"""Names of single speeds, which are above 0 and finite."""
-POSITIVE = frozenset(
-    "cage_diameter guidance_gap inner_radius outer_radius palmgren_constant pitch_diameter pitch_radius pocket_radius "
-    "raceway_diameter radius rib_diameter roller_diameter slenderness temperature temperature_1 temperature_2 "
-    "viscosity viscosity_1 viscosity_2 width".split()
-)
-"""Names of other numbers that are above 0 and finite in every formula."""
-MAY_BE_NAN = frozenset({"starts", "tau"})
-"""A lane that starts nowhere fails alone; a law that is asked with no phase shows whether it wants one."""
-FASTEST = 1e9
-"""Of speeds [rad/s]: beyond, nothing that is computed means anything."""
 _REAL = "biuf"
 _ARRAYS = (jax.Array, np.ndarray, np.generic)
 
@@ -49,13 +29,13 @@ _ARRAYS = (jax.Array, np.ndarray, np.generic)
 def check_layer(layer: dict[str, Any], names: str) -> None:
     """Have these functions of a layer compare their arguments; called at the end of its `__init__`."""
     for name in names.split():
-        f = CHECKED[name] = layer[name]
+        f = layer[name]
         layer[name] = checked(f)
         setattr(sys.modules[f.__module__], f.__name__, layer[name])  # where pickle looks for it
 
 
 def checked(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`f`, which compares its arguments with their declarations first."""
+    """`f`, which compares its arguments with their annotations first."""
 
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
@@ -66,9 +46,9 @@ def checked(f: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
-    """Compare arguments with the declarations of `f`; some of them may be missing.
+    """Compare arguments with the annotations of `f`; some of them may be missing.
 
-    **Raises:** `ArgumentError` for the first that is not what is declared.
+    **Raises:** `ArgumentError` for the first that is not what its annotation says.
     """
     signature = _signature(f)
     try:
@@ -81,11 +61,25 @@ def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
             continue
         if parameter.annotation is inspect.Parameter.empty:  # `self`
             continue
-        if said := wrong(name, parameter.annotation, value):
+        if said := wrong(parameter.annotation, value):
             raise ArgumentError(name, said=f"must be {said}, but {shown(value)} was given.")
 
 
 _signature = functools.lru_cache(maxsize=1024)(inspect.signature)
+
+
+def require_at_least(least: int, **numbers: Any) -> None:
+    """**Raises:** `ArgumentError` for a number below `least`, by its name; what is traced passes."""
+    for name, value in numbers.items():
+        if not isinstance(value, Tracer) and not value >= least:
+            raise ArgumentError(name, said=f"must be at least {least}, but {shown(value)} was given.")
+
+
+def require_above_zero(**numbers: Any) -> None:
+    """**Raises:** `ArgumentError` for numbers that are not positive and finite, by name; what is traced passes."""
+    for name, value in numbers.items():
+        if not isinstance(value, Tracer) and not np.all((np.asarray(value) > 0) & np.isfinite(value)):
+            raise ArgumentError(name, said=f"must be positive and finite, but {shown(value)} was given.")
 
 
 def options(annotation: Any) -> tuple[Any, ...]:
@@ -97,8 +91,8 @@ def options(annotation: Any) -> tuple[Any, ...]:
     return (annotation,)
 
 
-def wrong(name: str, annotation: Any, value: Any) -> str:
-    """What an argument must be, empty if it is that or if its declaration does not say."""
+def wrong(annotation: Any, value: Any, in_row: bool = False) -> str:
+    """What an argument must be, or a thing of a row, empty if it is that or if its annotation does not say."""
     members = options(annotation)
     if _is_traced(value) or (value is None and types.NoneType in members):
         return ""
@@ -113,10 +107,11 @@ def wrong(name: str, annotation: Any, value: Any) -> str:
             return ""
         others = [m for m in members if m is not int and not is_array_type(m)]
         rows = others if not isinstance(value, _ARRAYS) else []  # an array is no row of things
-        fits = _is_count(name, value) or any(not _wrong_one(name, m, value) for m in rows)
-        return "" if fits else _count_words(name, value)
+        fits = _is_count(value) or any(not _wrong_one(m, value) for m in rows)
+        return "" if fits else f"a whole number of at most {MOST}" if type(value) is int else "a whole number"
     if float in members:
-        return _wrong_number(name, members, bool([m for m in arrays if not _is_scalar(m)]), value)
+        missing = isinstance(value, float) and math.isnan(value)  # as a quantity or a part of a state may be
+        return "a number" if missing and not arrays and not in_row else _wrong_number(members, arrays, value)
     if all(typing.get_origin(m) is typing.Literal for m in members):
         known = [option for m in members for option in typing.get_args(m)]
         return "" if isinstance(value, str) and value in known else f"one of {', '.join(map(str, known))}"
@@ -125,15 +120,15 @@ def wrong(name: str, annotation: Any, value: Any) -> str:
     if all(is_plain_class(m) for m in members):
         names = " or ".join(m.__name__ for m in members)
         return "" if isinstance(value, members) else f"of kind {names}"
-    said = [_wrong_one(name, member, value) for member in members]
+    said = [_wrong_one(member, value) for member in members]
     return " or ".join(said) if all(said) else ""
 
 
-def _wrong_one(name: str, kind: Any, value: Any) -> str:
+def _wrong_one(kind: Any, value: Any) -> str:
     """The same for a member of a union: a class, a function, a mapping or a row of something."""
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
     if origin is None:
-        return wrong(name, kind, value) if is_plain_class(kind) or is_array_type(kind) else ""
+        return wrong(kind, value) if is_plain_class(kind) or is_array_type(kind) else ""
     if origin is Callable:
         return "" if callable(value) else "something that can be called"
     if not inspect.isclass(origin) or not issubclass(origin, Mapping | Sequence):
@@ -141,7 +136,7 @@ def _wrong_one(name: str, kind: Any, value: Any) -> str:
     if issubclass(origin, Mapping):
         if not isinstance(value, Mapping):
             return "a mapping"
-        said = [wrong("", inside[1], each) for each in value.values()]
+        said = [wrong(inside[1], each) for each in value.values()]
         return f"a mapping to what is {next(filter(None, said))}" if any(said) else ""
     if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray | jax.Array):
         return "a row of things"
@@ -151,8 +146,7 @@ def _wrong_one(name: str, kind: Any, value: Any) -> str:
     each = inside[:1] * len(value) if issubclass(origin, tuple) is False or inside[-1] is ... else inside
     if len(each) != len(value):
         return f"a row of {len(each)}"
-    inner = name if name in MAY_BE_NAN else ""
-    said = [wrong(inner, kind, x) for kind, x in zip(each, value, strict=True)]
+    said = [wrong(kind, x, in_row=True) for kind, x in zip(each, value, strict=True)]
     return f"a row of things, each {next(filter(None, said))}" if any(said) else ""
 
 
@@ -172,10 +166,6 @@ def is_plain_class(kind: Any) -> bool:
     return simple and kind is not typing.Any and not getattr(kind, "_is_protocol", False)
 
 
-def _is_scalar(kind: Any) -> bool:
-    return getattr(kind, "dim_str", None) == ""
-
-
 def _is_real(value: Any, with_imaginary: bool) -> bool:
     """Whether an array holds numbers and nothing else."""
     if isinstance(value, np.ma.MaskedArray):
@@ -187,44 +177,30 @@ def _is_real(value: Any, with_imaginary: bool) -> bool:
     return kind in _REAL or (with_imaginary and kind == "c") or (kind == "V" and isinstance(value, jax.Array))
 
 
-def _is_count(name: str, value: Any) -> bool:
+def _is_count(value: Any) -> bool:
     if isinstance(value, bool | np.bool_):
         return False
     if isinstance(value, _ARRAYS) and np.ndim(value) == 0 and value.dtype.kind in "iu":
         value = int(value)
-    return isinstance(value, int) and LEAST.get(name, -MOST) <= value <= MOST
+    return isinstance(value, int) and abs(value) <= MOST
 
 
-def _count_words(name: str, value: Any) -> str:
-    least = LEAST.get(name)
-    if least is not None and type(value) is int and value < least:
-        return f"at least {least}"
-    return "a whole number" if least is None else f"a whole number from {least} to {MOST}"
-
-
-def _wrong_number(name: str, members: tuple[Any, ...], or_array: bool, value: Any) -> str:
+def _wrong_number(members: tuple[Any, ...], arrays: Sequence[Any], value: Any) -> str:
     single = isinstance(value, int | float | np.number) or (isinstance(value, _ARRAYS) and np.ndim(value) == 0)
     if not single:
+        or_array = any(m.dim_str != "" for m in arrays)
         if or_array and _is_real(value, False):
             return ""
         others = tuple(m for m in members if is_plain_class(m) and m not in (int, float))
         rows = [m for m in members if typing.get_origin(m) is not None]
-        if isinstance(value, others) or any(not _wrong_one(name, m, value) for m in rows):
+        if isinstance(value, others) or any(not _wrong_one(m, value) for m in rows):
             return ""
         return "a number or an array of numbers" if or_array else "a number or a row of them" if rows else "a number"
     if isinstance(value, bool | np.bool_):
         return "a number"
     if type(value) is int and not -(2**63) <= value < 2**63:
         return "a number, of 64 bits if it is whole"
-    try:
-        number = float(value)
-    except (OverflowError, TypeError):
-        return "a number"
-    if name in SPEEDS and not 0 < number <= FASTEST:
-        return f"positive and finite, at most {FASTEST:g} rad/s"
-    if name in POSITIVE and not 0 < number < math.inf:
-        return "positive and finite"
-    return "a number" if math.isnan(number) and name not in MAY_BE_NAN else ""
+    return ""
 
 
 def shown(value: Any) -> str:

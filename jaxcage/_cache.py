@@ -13,12 +13,8 @@ import platformdirs
 from ._errors import ArgumentError
 
 
-traced: pathlib.Path | None = None
-"""Where lowered programs are kept too; None before `keep_compiled_programs` was called."""
-
-
 def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> pathlib.Path | None:
-    """Keep what is traced and compiled in a folder and use it again, in this process and later ones.
+    """Keep what is compiled in a folder and use it again, in this process and later ones.
 
     The `jaxcage` command calls this by default; a script or notebook may. It changes JAX's configuration of the whole
     process. Programs are made for the processor they were compiled on: each kind of processor has its own sub-folder.
@@ -50,8 +46,6 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
         return None
     jax.config.update("jax_compilation_cache_dir", str(place))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
-    global traced
-    traced = place / "traced"
     return place
 
 

@@ -64,8 +64,6 @@ _QUANTITIES = (
     Quantity("outcome", "", "1", "how the integration of each lane ended"),
     Quantity("label", "", "1", "what each lane does"),
     Quantity("chaotic_share", "", "1", "share of the finished starts that are chaotic while observed"),
-    Quantity("order", r"$f/f_c$", "1", "frequency over cage rotation"),
-    Quantity("amplitude", r"$|Y_C|$", "m", "amplitude", "µm", 1e6),
     Quantity("force", r"$F$", "N", "force"),
     Quantity("contact_force", r"$Q_{cw}$", "N", "roller-bar contact force"),
     Quantity("bar_force", r"$K_c \delta_c$", "N", "bar force"),

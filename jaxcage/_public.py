@@ -24,7 +24,7 @@ from .analysis import (
     zones as zones,
 )
 from .bearing import Bearing as Bearing, Lubricant as Lubricant
-from .design import DesignSpace as DesignSpace, fit_edges as fit_edges, optimise as optimise
+from .design import DesignSpace as DesignSpace, optimise as optimise
 from .integrate import (
     BearingRun as BearingRun,
     Trajectory as Trajectory,

@@ -103,12 +103,12 @@ def program_of(f: Callable[..., Any], form: Form, options: dict[str, Any]) -> Ca
     return run
 
 
-def jitted(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`equinox.filter_jit`, of which old programs are dropped."""
+def jitted(f: Callable[..., Any], options: dict[str, Any] | None = None) -> Callable[..., Any]:
+    """`equinox.filter_jit`, of which old programs are dropped; with options for XLA."""
 
     @functools.wraps(f)
     def run(*args: Any, **kwargs: Any) -> Any:
         form, arrays = split((args, kwargs))
-        return programs.get((run, form, shapes(arrays)), lambda: program_of(f, form, {}))(arrays)
+        return programs.get((run, form, shapes(arrays)), lambda: program_of(f, form, options or {}))(arrays)
 
     return run

@@ -44,11 +44,7 @@ def check_types_again():
 
 @pytest.fixture(autouse=True, scope="module")
 def forget_compiled_programs():
-    """Files share what they compile, until there is too much of it; what is traced is kept within a file at most, since
-    constants may be changed in another one."""
-    from jaxcage import _cache
-
+    """Files share what they compile, until there is too much of it."""
     yield
-    _cache.traced = None
     if not MAPS.exists() or MAPS.read_bytes().count(b"\n") > MOST_MAPS:
         jax.clear_caches()

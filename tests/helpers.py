@@ -2,15 +2,17 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import pint
 import pytest
 
 import jaxcage as jc
+from jaxcage.forces import parameter
 
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
@@ -84,6 +86,29 @@ def unforced(model: jc.CageModel) -> jc.CageModel:
     return jc.replace(model, **{n: jnp.zeros(()) for n in chosen})
 
 
+class DoubleWell(eqx.Module):
+    """m x'' + d x' - k x + b x^3 = g cos(w t), whose small orbit ends in a fold and in a period doubling."""
+
+    mass: float = parameter("kg", 0.0, 1e3, "m")
+    damping: float = parameter("N s/m", 0.0, 1e3, "d")
+    stiffness: float = parameter("N/m", 0.0, 1e3, "k")
+    cubic: float = parameter("N/m^3", 0.0, 1e3, "b")
+    forcing: float = parameter("N", 0.0, 1e3, "g")
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        push = self.forcing * jnp.cos(tau)
+        return ((push - self.damping * u + self.stiffness * x - self.cubic * x**3) / self.mass,)
+
+
+WELL = {"mass": 1.0, "damping": 0.3, "stiffness": 1.0, "cubic": 1.0}
+
+
+def double_well() -> jc.ForcedOscillator:
+    """The oscillator with `WELL` and a forcing of 0.262 N."""
+    return jc.ForcedOscillator(DoubleWell(**WELL, forcing=0.262), coordinates=1)
+
+
 def wide_but(values: Iterable[Any], *quick: Any) -> list[Any]:
     """`values` as parameters of a test, all but `quick` marked `wide`: further examples of what `quick` shows."""
     return _marked(values, quick, pytest.mark.wide)
@@ -99,3 +124,13 @@ def _marked(values: Iterable[Any], quick: tuple[Any, ...], mark: pytest.MarkDeco
     assert all(q in values for q in quick), f"{quick} must be of {values}"
     marked = [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=mark) for v in values]
     return [v if v in quick else m for v, m in zip(values, marked, strict=True)]
+
+
+def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], dataclasses.Field]]:
+    """Every parameter, choice and count of a module with its path of attribute names."""
+    for field in dataclasses.fields(module):
+        value, here = getattr(module, field.name), (*path, field.name)
+        if isinstance(value, eqx.Module):
+            yield from declared(value, here)
+        elif {"parameter", "choice", "count"} & set(field.metadata):
+            yield here, field

@@ -108,7 +108,6 @@ def findings(name: str = "1a", quick: bool = False) -> Findings:
         y_value=gaps,
         state=np.zeros((9, 4)),
         genuine=np.ones(9, dtype=bool),
-        special=(),
         ended=("range", "range"),
         multipliers=np.zeros((9, 4), dtype=complex),
     )

@@ -12,13 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import slow_but, wide_but
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
+from laws import double_well, hardening, numbers
+from literature import DUFFING_DOUBLINGS, DUFFING_FOLDS
 
 import jaxcage as jc
-from jaxcage.orbits import critical_vectors, criticality, normal_form_coefficient, normal_form_places
-from jaxcage.validation import DUFFING_DOUBLINGS, DUFFING_FOLDS, VAN_DER_POL
 
 
 METHOD = jc.method("rodas4", steps=256)
@@ -27,32 +24,8 @@ DOUBLING = DUFFING_DOUBLINGS[1][1].value
 """Force at which the period doubles first."""
 
 
-def numbers(**values):
-    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
-
-
 def kinds(branch):
     return [p.kind for p in branch.special]
-
-
-class Duffing(eqx.Module):
-    """x'' + d x' - k x + x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
-
-    d: jax.Array
-    k: jax.Array
-    g: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-self.d * u + self.k * x - x**3 + self.g * jnp.cos(tau),)
-
-
-def hardening(g=0.3):
-    return jc.ForcedOscillator(Duffing(**numbers(d=0.1, k=-1, g=g)), coordinates=1)
-
-
-def double_well(g=0.26):
-    return jc.ForcedOscillator(Duffing(**numbers(d=0.3, k=1, g=g)), coordinates=1)
 
 
 def image(system, speed, state, method=METHOD):
@@ -91,11 +64,6 @@ def test_branch_passes_the_folds_of_the_hardening_duffing(over_speed):
     assert over_speed.value[0] <= 0.5 and over_speed.value[-1] >= 2.5
 
 
-def test_predictions_by_a_cubic_spare_orbits(over_speed):
-    """Without its cubic term, by a parabola through the last two points, twice as many orbits are needed."""
-    assert over_speed.value.size < 130
-
-
 def test_stability_changes_at_the_folds_and_nowhere_else(over_speed):
     first, second = (p.index for p in over_speed.special)
     stable = np.ones(over_speed.value.size, dtype=bool)
@@ -118,41 +86,6 @@ def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
     map_of = eqx.filter_jit(jax.vmap(lambda w, y: jnp.stack(jc.strobe_map(hardening(), w, METHOD)((y[0], y[1])).y)))
     images = map_of(jnp.asarray(over_speed.speed), jnp.asarray(over_speed.state))
     np.testing.assert_allclose(images, over_speed.state, atol=1e-9)
-    # No step has gone over to another branch: all points are on one whose neighbours are near.
-    start = over_speed.state[1], over_speed.value[1]
-    fine = jc.branch(hardening(), start, lower=0.5, upper=2.5, steps=jc.orbits.Steps(longest=0.1), method=METHOD)
-    curve, points = (np.c_[b.value / 0.1, b.state] for b in (fine, over_speed))
-    length = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    assert np.max(length) < 0.15
-    along = np.r_[0.0, np.cumsum(length)]
-    dense = CubicSpline(along, curve)(np.linspace(0.0, along[-1], 20000))
-    away = np.linalg.norm(points[:, None] - dense[None], axis=2).min(axis=1)
-    assert np.max(away[1:-1]) < 1e-3  # the first and the last are beyond the range
-
-
-@pytest.mark.wide
-def test_branch_in_the_force_passes_folds_of_its_own():
-    """At the speed of a fold over speed, the fold over force is at the force used there."""
-    speed = DUFFING_FOLDS["up"].value
-    orbit = jc.periodic_orbit(hardening(0.2), speed, guess=(0.0, 0.0), revolutions=200, method=METHOD)
-    branch = jc.branch(hardening(0.2), orbit, "g", lower=0.05, upper=1.5, method=METHOD)
-    assert kinds(branch) == ["fold", "fold"] and branch.parameter == "g"
-    np.testing.assert_array_equal(branch.speed, speed)
-    assert branch.special[0].value > branch.special[1].value
-    assert abs(branch.special[1].value - 0.3) < 1e-7
-    assert not np.any(branch.stable[branch.special[0].index + 1 : branch.special[1].index + 1])
-    assert branch.stable[0] and branch.stable[-1]
-    np.testing.assert_allclose(np.prod(branch.multipliers, axis=1), np.exp(-0.2 * np.pi / speed), rtol=1e-6)
-
-
-@pytest.mark.wide
-def test_parameter_as_a_function(over_speed):
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    named = jc.branch(hardening(), orbit, "g", lower=0.2, upper=0.4, method=METHOD)
-    picked = jc.branch(hardening(), orbit, lambda s: s.acceleration.g, lower=0.2, upper=0.4, method=METHOD)
-    np.testing.assert_array_equal(named.value, picked.value)
-    np.testing.assert_array_equal(named.state, picked.state)
-    assert picked.parameter == "parameter" and np.ptp(named.value) > 0.2
 
 
 @pytest.mark.wide
@@ -162,7 +95,6 @@ def test_period_doublings_over_the_force(over_force):
     assert abs(first.value - DOUBLING) < 1e-7
     assert first.edge and first.speed == 1.2 and abs(first.critical + 1) < 1e-8
     assert over_force.stable[first.index] != over_force.stable[first.index + 1]
-    assert first.criticality == "supercritical"  # as the cascade that follows shows
 
 
 @pytest.fixture(scope="module")
@@ -180,9 +112,7 @@ def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found(doubling
 
 def test_doubled_branch_has_twice_the_period(doubling):
     system = double_well()
-    doubled = jc.orbits.doubled_branch(
-        system, doubling, "g", lower=0.1, upper=0.35, until_doubling=True, method=FINE, speed=1.2
-    )
+    doubled = jc.orbits.doubled_branch(system, doubling, "g", lower=0.1, upper=0.35, until_doubling=True, method=FINE)
     assert doubled.periods == 2 and doubled.ended[0] == "doubling"
     np.testing.assert_allclose(np.prod(doubled.multipliers, axis=1), np.exp(-0.3 * 4 * np.pi / 1.2), rtol=1e-6)
     away = []
@@ -215,28 +145,6 @@ def test_cascade_that_does_not_go_on_is_shorter(doubling):
     assert found.error == np.inf and abs(found.limit - 0.2924) < 2e-4
 
 
-class Parabola(eqx.Module):
-    """x' = p - x^2."""
-
-    p: jax.Array
-
-    def __call__(self, tau, y, speed):
-        return (self.p - y[0] ** 2,)
-
-
-@pytest.mark.wide
-def test_system_of_one_state():
-    """Orbits x = +-sqrt(p) with the multiplier exp(-2 x T), and a fold at p = 0: exact."""
-    system = jc.ForcedSystem(Parabola(**numbers(p=0.25)), dimension=1)
-    branch = jc.branch(system, ((0.5,), 0.25), "p", lower=-0.5, upper=0.5, speed=2.0, method=METHOD)
-    (fold,) = branch.special
-    assert fold.kind == "fold" and fold.edge and abs(fold.value) < 1e-9
-    np.testing.assert_allclose(branch.value, branch.state[:, 0] ** 2, atol=1e-9)
-    assert np.array_equal(branch.stable, branch.state[:, 0] > 0)
-    # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
-    np.testing.assert_allclose(branch.multipliers[:, 0], np.exp(-2 * branch.state[:, 0] * np.pi), rtol=2e-3)
-
-
 class Bend(eqx.Module):
     """x' = p + a x - x^3."""
 
@@ -249,7 +157,7 @@ class Bend(eqx.Module):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("start", [-1.3, -1.2, -1.1, -1.0, -0.9])
+@pytest.mark.parametrize("start", [-1.3, -1.1, -0.9])
 def test_two_folds_within_a_step(start):
     """At x = +-sqrt(a/3), 0.04 apart where steps are 0.5: as many multipliers outside on either side, and two folds."""
     a = 0.001
@@ -260,50 +168,6 @@ def test_two_folds_within_a_step(start):
     place = np.sqrt(a / 3)
     np.testing.assert_allclose([p.value for p in branch.special], [2 * place**3, -2 * place**3], rtol=0, atol=1e-8)
     assert np.array_equal(branch.stable, np.abs(branch.state[:, 0]) > place)
-
-
-class Mathieu(eqx.Module):
-    """x'' + 2 z x' + (a - 2 cos 2t) x + x^3 = 0 with tau = 2 t."""
-
-    a: jax.Array
-    z: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-2 * self.z * u - (self.a - 2 * jnp.cos(tau)) * x - x**3,)
-
-
-def mathieu_trace(a):
-    """Trace of the monodromy matrix of the undamped linear equation over pi."""
-
-    def rates(t, y):
-        stiffness = a - 2 * np.cos(2 * t)
-        return [y[1], -stiffness * y[0], y[3], -stiffness * y[2]]
-
-    end = solve_ivp(rates, (0, np.pi), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
-    return end[0] + end[3]
-
-
-@pytest.mark.wide
-def test_branch_point_and_period_doublings_of_the_rest_state():
-    """x = exp(-z t) y turns it into the undamped equation at a - z^2, whose trace is then +-2 cosh(z pi) (SciPy)."""
-    z = 0.1
-    system = jc.ForcedOscillator(Mathieu(**numbers(a=0.5, z=z)), coordinates=1)
-    branch = jc.branch(system, ((0.0, 0.0), 0.5), "a", lower=-0.8, upper=2.5, speed=2.0, method=FINE)
-    ordered = sorted(branch.special, key=lambda p: p.value)
-    assert [p.kind for p in ordered] == ["branch-point", "period-doubling", "period-doubling"]
-    brackets = [(-0.6, -0.3, 1), (-0.2, 0.0, -1), (1.7, 1.9, -1)]
-    edge = lambda a, sign: mathieu_trace(a - z * z) - 2 * sign * np.cosh(z * np.pi)
-    exact = [brentq(edge, low, high, args=(sign,), xtol=1e-12) for low, high, sign in brackets]
-    np.testing.assert_allclose([p.value for p in ordered], exact, rtol=0, atol=1e-8)
-    for point, (_, _, sign) in zip(ordered, brackets, strict=True):
-        assert abs(point.critical - sign) < 1e-7 and point.edge
-    # The cube stiffens: doubled orbits are at lower a, where the rest state is stable at the first doubling only.
-    assert [p.criticality for p in ordered] == ["", "subcritical", "supercritical"]
-    inside = (branch.value > exact[0]) & (branch.value < exact[1])
-    assert np.array_equal(branch.stable, inside | (branch.value > exact[2]))
-    np.testing.assert_allclose(branch.state, 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.prod(branch.multipliers, axis=1), np.exp(-2 * z * np.pi), rtol=1e-6)
 
 
 class Ring(eqx.Module):
@@ -417,9 +281,7 @@ def test_torus_of_a_planted_orbit():
 # What happens inside the unit circle, or outside, without anything crossing it.
 QUIET = {
     "real pair and complex pair change order": dict(a=(-0.3, -0.3), c=(1.0, -1.0), s=(0.0, 0.05), b=(0.4, 0.0)),
-    "four real ones cross each other": dict(a=(-0.4, -0.4), c=(1.0, -1.0), s=(0.1, 0.15), b=(0.0, 0.0)),
     "neutral saddle": dict(a=(0.0, -0.3), c=(1.0, 0.0), s=(0.3, 0.1), b=(0.0, 0.0)),
-    "neutral saddle, negative": dict(a=(-0.3, 0.0), c=(0.0, 1.0), s=(0.1, 0.3), b=(0.0, 0.0)),
     "neutral saddle of two blocks": dict(a=(-0.3, 0.2), c=(1.0, 0.5), s=(0.05, 0.05), b=(0.0, 0.0)),
 }
 
@@ -448,10 +310,6 @@ def test_crossings_within_one_step_are_in_order(first):
     assert np.sum((branch.value > 0.02) & (branch.value < 0.0201)) == 1
     np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0201], rtol=0, atol=1e-8)
     assert branch.special[0].kind == first and sorted(kinds(branch)) == ["branch-point", "period-doubling"]
-    # Along the critical direction e' = -e^3 and the map is -e / sqrt(1 + 2 T e^2), to third order -e + T e^3.
-    doubling = next(p for p in branch.special if p.kind == "period-doubling")
-    np.testing.assert_allclose(doubling.coefficient, 2 * np.pi / 1.1, rtol=1e-6)
-    assert doubling.criticality == "supercritical" and doubling.coefficient_error < 1e-6
     assert [p.edge for p in branch.special] == [True, False]
 
 
@@ -479,13 +337,6 @@ def test_two_crossings_of_one_kind_within_a_step(kind, block):
     assert kinds(branch) == [kind, kind]
     np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
     assert np.diff(branch.value)[branch.special[0].index] < 0.003 < 0.007 < np.max(np.diff(branch.value))  # halved
-    finer = dict(steps=jc.orbits.Steps(first=0.05, longest=0.2), method=jc.method("rodas4", steps=512))
-    again = planted_branch(how=finer, **block)
-    assert kinds(again) == kinds(branch) and again.value.size > 1.5 * branch.value.size
-    np.testing.assert_allclose([p.value for p in again.special], places, rtol=0, atol=1e-8)
-    if kind == "Neimark-Sacker":  # in the second block |z|' = -|z|^3; along q = (1, -i) / sqrt(2), w' = -2 |w|^2 w
-        np.testing.assert_allclose(branch.special[1].coefficient, -4 * np.pi / 1.1, rtol=1e-6)
-        assert branch.special[1].criticality == "supercritical"
     assert np.array_equal(branch.stable, branch.value < places[0])
 
 
@@ -500,110 +351,14 @@ def test_crossing_that_is_not_found_is_said_to_be_unexplained():
     assert np.array_equal(branch.stable[away], branch.value[away] < 0.02)
 
 
-def test_normal_forms_of_maps():
-    """Henon's map at its first doubling by the formula with its own second derivative; the delayed logistic map at
-    r = 2, whose amplitude r_k+1 = r_k (1 - r_k^2) for |q| = 1: exact, and as 400 000 iterations show to 2e-3."""
-    b, a = 0.3, 0.3675
-    x = (b - 1 + np.sqrt((1 - b) ** 2 + 4 * a)) / (2 * a)
-    henon = lambda at: jnp.array([[-2 * a * (x + at[0]), 1.0], [b, 0.0]])
-    logistic = lambda at: jnp.array([[2 * (0.5 - at[1]), -2 * (0.5 + at[0])], [1.0, 0.0]])
-    q, p = np.array([1, -b]) / np.hypot(1, b), np.array([1.0, -1.0])
-    second = lambda u, v: np.array([-2 * a * u[0] * v[0], 0.0])
-    p = p / (p @ q)
-    matrix = np.array(henon(np.zeros(2)))
-    exact = p @ second(q, np.linalg.solve(np.eye(2) - matrix, second(q, q))) / 2
-    for kind, slope, value in (("period-doubling", henon, exact), ("Neimark-Sacker", logistic, -1.0)):
-        critical = critical_vectors(kind, slope(np.zeros(2)))
-        found = normal_form_coefficient(critical, jax.vmap(slope)(normal_form_places(critical)))
-        np.testing.assert_allclose(found.value, value, rtol=1e-10)
-        assert found.error < 1e-10 and criticality(kind, *found) == "supercritical"
-        assert criticality(kind, -found.value, found.error) == "subcritical"
-        assert criticality(kind, found.value, 2.0) == "unknown" and criticality("fold", *found) == ""
-
-
-class VanDerPol(eqx.Module):
-    mu: jax.Array
-
-    def __call__(self, tau, y, speed):
-        x, u = y
-        return (u, self.mu * (1 - x * x) * u - x)
-
-
-@pytest.mark.wide
-def test_branch_of_a_self_excited_system_over_its_damping():
-    """Periods of van der Pol's limit cycle at mu = 0.1 and 1, and its multiplier, by DOP853."""
-    system = jc.ForcedSystem(VanDerPol(**numbers(mu=0.3)), dimension=2)
-    orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=30, period="free", method=FINE)
-    branch = jc.branch(system, orbit, "mu", lower=0.05, upper=1.2, period="free", method=FINE)
-    assert branch.ended == ("range", "range") and branch.special == () and np.all(branch.stable)
-    up = np.argsort(branch.value)
-    at = lambda y: CubicSpline(branch.value[up], y[up])
-    periods = [VAN_DER_POL[mu][0].value for mu in (0.1, 1.0)]
-    np.testing.assert_allclose(2 * np.pi / at(branch.speed)([0.1, 1.0]), periods, rtol=0, atol=1e-6)
-    trivial, other = np.sort(branch.multipliers.real, axis=1).T[::-1]
-    # Multipliers are those of Newton's last iterate but one, at a distance of up to 1e-5.
-    np.testing.assert_allclose(trivial, 1.0, atol=1e-5)
-    np.testing.assert_allclose(at(np.log(other))([0.1, 1.0]), [np.log(0.5330692592), -7.05893281], atol=5e-5)
-
-
-class Circling(eqx.Module):
-    """A limit cycle |z| = 1 of period 2 pi, and two directions across it that turn with it, once or half as fast:
-    along these e' = (p - 0.02) e + s e^3 - t f and f' = (p - 0.02 - d) f + s f^3 + t e."""
-
-    p: jax.Array
-    d: jax.Array
-    s: jax.Array
-    t: jax.Array
-
-    def __call__(self, tau, y, speed):
-        x, z, u, v = y
-        angle = jnp.arctan2(z, x) / 2
-        half, side = jnp.cos(angle), jnp.sin(angle)
-        e, f = half * u + side * v, -side * u + half * v
-        square = e * e + f * f
-        de = (self.p - 0.02) * e + self.s * square * e - self.t * f
-        df = (self.p - 0.02 - self.d) * f + self.s * square * f + self.t * e
-        size = 1 - x * x - z * z
-        cycle = size * x - z, size * z + x
-        return *cycle, half * de - side * df - v / 2, side * de + half * df + u / 2
-
-
-CIRCLING = {
-    "supercritical period-doubling": dict(d=0.2, s=-1.0, t=0.0),
-    "subcritical period-doubling": dict(d=0.2, s=1.0, t=0.0),
-    "supercritical Neimark-Sacker": dict(d=0.0, s=-1.0, t=0.3),
-    "subcritical Neimark-Sacker": dict(d=0.0, s=1.0, t=0.3),
-}
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("name", CIRCLING)
-def test_criticality_on_a_self_excited_orbit(name):
-    """Of e' = sign e^3 over T = 2 pi, of which half a turn of the frame makes -e - sign T e^3; and with
-    q = (1, -i) / sqrt(2) of w' = 2 sign |w|^2 w."""
-    (how, kind), values = name.split(), CIRCLING[name]
-    system = jc.ForcedSystem(Circling(**numbers(p=0.0, **values)), dimension=4)
-    how_to = dict(period="free", method=METHOD)
-    branch = jc.branch(system, ((1.0, 0.0, 0.0, 0.0), 0.0), "p", lower=-0.1, upper=0.1, speed=1.0, **how_to)
-    exact = 2 * np.pi * values["s"] * (-1.0 if kind == "period-doubling" else 2.0)
-    (found,) = branch.special
-    alone = jc.bifurcation(system, kind, (found.state, 0.018), "p", speed=0.99, **how_to)
-    for point in (found, alone):
-        assert point.kind == kind and abs(point.value - 0.02) < 1e-9 and point.criticality == how
-        np.testing.assert_allclose(point.coefficient, exact, rtol=1e-6)
-        assert point.coefficient_error < 1e-5
-
-
 @pytest.mark.parametrize(
     "settings, sentence",
     [
-        (dict(lower=2.0, upper=1.0), "`upper` must be above `lower`, but they are 1 and 2"),
         (dict(lower=1.0, upper=1.0), "`upper` must be above `lower`, but they are 1 and 1"),
         (dict(lower=0.0, upper=1.0), "`lower` must be positive where the speed is followed, but 0 was given"),
         (dict(lower=0.5, upper=np.inf), "`lower` and `upper` must be finite, but are 0.5 and inf"),
-        (dict(parameter="g", lower=-np.inf, upper=1.0), "`lower` and `upper` must be finite, but are -inf and 1"),
         (dict(lower=1.0, upper=2.0), "`orbit` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"),
-        (dict(parameter="m", lower=0.0, upper=1.0), "`parameter` must be one of speed, d, k, g, but 'm' was given"),
+        (dict(parameter="a", lower=0.0, upper=1.0), "`parameter` must be one of speed, m, d, k, b, g, but 'a' was"),
     ],
 )
 def test_bad_arguments(settings, sentence):
@@ -617,14 +372,6 @@ def test_an_orbit_at_the_end_of_the_range_is_followed():
     steps = jc.orbits.Steps(most=2)
     branch = jc.branch(hardening(), ((0.5, 0.0), beyond), lower=0.8, upper=1.5, steps=steps, method=METHOD)
     assert branch.value.max() > 0.8 and branch.ended == ("range", "steps")
-
-
-def test_many_branches_and_cascades_ask_for_a_range_too():
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    with pytest.raises(ValueError, match="`orbits` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"):
-        jc.orbits.branches([hardening()], [orbit], lower=1.0, upper=2.0, method=METHOD)
-    with pytest.raises(ValueError, match="`lower` must be positive"):
-        jc.orbits.branches([hardening()], [orbit], lower=-1.0, upper=2.0, method=METHOD)
 
 
 def test_parameter_without_a_speed():
@@ -649,16 +396,3 @@ def test_lengths_of_steps_must_be_in_order(steps):
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
         jc.orbits.Steps(**steps)
     assert dataclasses.replace(jc.orbits.Steps(), first=0.1).first == 0.1
-
-
-@pytest.mark.slow
-def test_shorter_steps_change_no_bifurcation(over_speed):
-    orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), method=METHOD)
-    steps = jc.orbits.Steps(first=0.01, longest=0.04, most=2000)
-    fine = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=steps, method=METHOD)
-    assert fine.value.size > 2 * over_speed.value.size
-    np.testing.assert_allclose(
-        [p.value for p in fine.special], [p.value for p in over_speed.special], rtol=0, atol=1e-9
-    )
-    few = jc.branch(hardening(), orbit, lower=0.5, upper=2.5, steps=jc.orbits.Steps(most=5), method=METHOD)
-    assert few.ended == ("steps", "steps") and few.value.size == 11

@@ -1,6 +1,5 @@
 """Programs kept on disk: damaged, foreign or out of reach they cost a compilation and one sentence, no more."""
 
-import json
 import os
 import stat
 import subprocess
@@ -9,21 +8,17 @@ import warnings
 from pathlib import Path
 
 import jax
-import numpy as np
 import pytest
 
-from jaxcage import _cache, keep_compiled_programs
+from jaxcage import keep_compiled_programs
 from jaxcage.cli import main
 from jaxcage.cli._console import tell_of_kept_programs
-from jaxcage.integrate import _traced
-from jaxcage.integrate._traced import Kept
 
 
 @pytest.fixture(autouse=True)
 def own_settings(monkeypatch: pytest.MonkeyPatch):
     """Settings of the process are put back."""
     monkeypatch.delenv("JAXCAGE_CACHE", raising=False)
-    monkeypatch.setattr(_cache, "traced", None)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     names = ("jax_compilation_cache_dir", "jax_persistent_cache_min_compile_time_secs")
     before = {name: getattr(jax.config, name) for name in names}
@@ -111,36 +106,3 @@ def test_a_damaged_entry_is_compiled_anew(tmp_path: Path):
         for path in entries:
             path.unlink()
         run()
-
-
-def double(x: jax.Array) -> dict[str, jax.Array]:
-    return {"twice": 2 * x}
-
-
-@pytest.mark.parametrize(
-    "form, program",
-    [(b'{"twice": 0}', b"no program"), (b'["os._exit", 0]', None), (b'{"twice": 7}', None), (b"[]", None)],
-)
-def test_what_a_stranger_left_is_traced_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form, program):
-    """Bytes with the right digest that are no program, and forms of no result; nothing that they name is run."""
-    monkeypatch.setattr(_cache, "traced", tmp_path)
-    x = np.arange(3.0)
-    Kept(double, "double", {})(x)
-    (path,) = tmp_path.iterdir()
-    whole = path.read_bytes()
-    true = whole.split(b"\n", 2)[2]
-    body = form + b"\n" + (true if program is None else program)
-    path.write_bytes(_traced._digest(body) + b"\n" + body)
-    found = Kept(double, "double", {})(x)
-    assert np.array_equal(found["twice"], 2 * x)
-    assert path.read_bytes() != body and json.loads(path.read_bytes().split(b"\n")[1]) == {"twice": 0}
-
-
-def test_a_pipe_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(_cache, "traced", tmp_path)
-    Kept(double, "double", {})(np.arange(3.0))
-    (path,) = tmp_path.iterdir()
-    path.unlink()
-    os.mkfifo(path)
-    found = Kept(double, "double", {})(np.arange(3.0))
-    assert np.array_equal(found["twice"], [0, 2, 4])

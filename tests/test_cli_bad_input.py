@@ -1,5 +1,6 @@
 """Every bad input is refused with one sentence on standard error and exit status 2."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from jaxcage.cli import main
+from jaxcage.io import ConfigError, load_model, read_bytes
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -26,7 +28,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 WHOLE = "Interrupted: files of earlier runs are as they were, and the same command starts over.\n"
 COMMANDS = (
     "init, simulate, sweep, zones, bifurcations, gradient, compare, runup, map, study, design, "
-    "sensitivity, unknowns, identify, poincare, statics, impact, reproduce, validate, report"
+    "sensitivity, unknowns, identify, poincare, statics, impact, reproduce, report"
 )
 
 
@@ -62,7 +64,6 @@ COMMANDS = (
         ("simulate 1a --speed 8500 --revolutions 0", "--revolutions must be at least 1, but 0"),
         ("simulate 1a --speed 8500 --discard -1", "--discard must be at least 0, but -1"),
         ("reproduce --constants best", "--constants"),
-        ("validate --topics film,oil", "--topics must be made of film, statics, contact, exponents,"),
         ("impact 1a --speed -1", "--speed must be a speed above 0 rpm, but -1 was given"),
         ("impact 1a --speed 8500 --duration 0", "--duration must lie between 0 and 1000 ms, but 0"),
         ("impact 1a --speed 8500 --duration nan", "--duration must lie between 0 and 1000 ms"),
@@ -190,3 +191,21 @@ def test_errors_of_our_own_are_not_taken_for_bad_input(monkeypatch: pytest.Monke
     monkeypatch.setattr(_bearing, "statics", broken)
     with pytest.raises(ValueError, match="a mistake in the library"):
         main(["statics", "1a"])
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "large"])
+def test_only_files_of_a_sensible_size_are_read(capsys: pytest.CaptureFixture[str], tmp_path: Path, kind: str):
+    path = tmp_path / "design.toml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with open(path, "wb") as file:
+            file.truncate(10**12)  # holds nothing, and is a terabyte long
+    why = "it has 1000000000000 bytes, more than the 10000000 that are read" if kind == "large" else "no regular file"
+    with pytest.raises(ConfigError, match=f"must be a readable TOML file, but: .*{why}"):
+        load_model(path)
+    assert why in refused(capsys, "statics", str(path), "--out", str(tmp_path))
+    with pytest.raises(OSError):
+        read_bytes(path)

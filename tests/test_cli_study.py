@@ -194,38 +194,22 @@ def test_a_line_a_minute_where_there_is_no_terminal(
 
 
 @pytest.mark.wide
-def test_adaptive_map(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """The figure is there from the coarse picture on, curves come on top; the data hold what was computed."""
+def test_map_of_labels(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Curves come on top; the data hold all points."""
     line = np.full(5, jc.rpm(7000))
     height, rest = np.linspace(4e-4, 5e-4, 5), (np.zeros((5, 4)), np.zeros((5, 4), complex), np.ones(5, bool), ())
     edge = Curve("fold", "speed", "guidance_gap", line, height, *rest, ("range", "range"), "zone 1 onset")
     monkeypatch.setattr(_label_map, "_curves", lambda *_: ([edge], {"zone 2 onset": "a branch point"}))
-    stages: list[bool] = []
-    write = _label_map._write
-    monkeypatch.setattr(
-        _label_map,
-        "_write",
-        lambda job, *given: (write(job, *given), stages.append(job.path("_speed_guidance_gap_labels.png").exists()))[0],
-    )
-    small = [*MAP, "--adaptive", "--first", "3000", "--last", "9000", "--out", str(tmp_path)]
+    small = [*MAP, "--first", "3000", "--last", "9000", "--out", str(tmp_path)]
     got = document(capsys, *small)
-    assert len(stages) >= 2 and all(stages)
     assert got["points"] == [9, 7] and got["x_range"] == pytest.approx([3000, 9000])
     assert got["curves"] == ["zone 1 onset"] and got["refused"] == {"zone 2 onset": "a branch point"}
-    assert 0 < got["computed"] <= 63 and sum(got["kinds"].values()) == got["computed"]
+    assert sum(got["kinds"].values()) == 63
     assert Path(got["figure"]).read_bytes().startswith(b"\x89PNG\r\n")
     data = xr.open_zarr(got["data"], consolidated=False, chunks=None)
     assert data["label"].dims == ("speed", "guidance_gap", "start")
-    assert int(np.sum(data["label"] >= 0)) == got["computed"]
+    assert data["label"].size == 63 and int(np.min(data["label"])) >= 0
     np.testing.assert_allclose(data["speed"], jc.rpm(3000, 9000, 9), rtol=1e-14)
-
-
-def test_a_map_of_fewer_points_than_its_coarse_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    small = ["--points", "3x3", "--most", "8", "--adaptive", "--no-curves", "--revolutions", "20"]
-    assert main(["map", "1a", *small, "--out", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    assert "chaotic       0      -\n" in out and "Not complete: with more than --most 8 points" in out
-    assert "Data:" not in out
 
 
 @pytest.mark.parametrize(
@@ -234,12 +218,11 @@ def test_a_map_of_fewer_points_than_its_coarse_picture(capsys: pytest.CaptureFix
         ("--points 300", "--points must be ACROSSxUPWARDS, each from 2 to 10000, e.g. 300x300, but '300' was given"),
         ("--points 1x300", "but '1x300' was given"),
         ("--points 9x7 --revolutions 37", "--revolutions must be a multiple of 10"),
-        ("--points 9x7 --most 1", "--most must be at least 4"),
         ("--points 9x7 --speed 9000", "--speed goes with an --x that is not the speed"),
         ("--points 9x7 --x eccentricity", "--speed must be given for a map over eccentricity"),
         ("--points 9x7 --x eccentricity --speed -1", "--speed must be a speed above 0 rpm, but -1"),
         ("--points 9x7 --starts 4", "--starts must be at most 3, but 4"),
-        ("--adaptive", "--adaptive, --refine, --no-curves, --persist, --most and --speed go with --points"),
+        ("--no-curves", "--no-curves, --persist and --speed go with --points"),
     ],
 )
 def test_impossible_maps_get_one_sentence(

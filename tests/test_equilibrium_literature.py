@@ -19,7 +19,6 @@ from jaxcage import replace
 from jaxcage.analysis import (
     LARGEST_WHIRLING,
     attitude_angle,
-    dimensional,
     eccentricity_ratio,
     equilibrium,
     film_coefficients,
@@ -32,20 +31,6 @@ from jaxcage.analysis import (
 from jaxcage.forces import ElasticRib, RibFilm, film_scale
 from jaxcage.integrate import simulate
 from jaxcage.models import case
-from jaxcage.validation import SHORT_BEARING
-
-
-# eps, N, angle [deg], Kxx, Kxy, Kyx, Kyy, Cxx, Cxy = Cyx, Cyy, omega sqrt(c/g), whirl ratio
-TABLE = """
-0.1 0.080383 82.708 2.5308 9.7577 -10.3811 1.3284 19.7905 -2.5325 20.4872 2.7413 0.5029
-0.2 0.172547 75.431 2.4849 4.5203  -5.7631 1.4978  9.5869 -2.4916 10.9798 2.6814 0.5106
-0.3 0.292375 68.178 2.4126 2.6246  -4.4825 1.7949  6.0612 -2.4270  8.1530 2.6058 0.5194
-0.4 0.466837 60.940 2.3189 1.5715  -4.0478 2.2493  4.2164 -2.3430  7.0221 2.5446 0.5238
-0.5 0.750381 53.680 2.2099 0.8577  -3.9766 2.9233  3.0539 -2.2450  6.6148 2.5417 0.5146
-0.6 1.27263  46.321 2.0917 0.3071  -4.1377 3.9512  2.2389 -2.1380  6.6507 2.7010 0.4740
-0.7 2.41405  38.704 1.9695 -0.1734 -4.5347 5.6594  1.6240 -2.0267  7.0987 3.6278 0.3446
-"""
-ROWS = [tuple(float(v) for v in line.split()) for line in TABLE.strip().splitlines()]
 
 
 def friswell(eps):
@@ -79,61 +64,11 @@ def test_autodiff_coefficients_are_friswells_closed_forms(eps, film):
     assert float(ours.attitude_angle) == pytest.approx(float(attitude_angle(eps)), rel=1e-12)
 
 
-@pytest.mark.parametrize("row", ROWS, ids=[str(row[0]) for row in ROWS])
-def test_table_of_the_short_bearing(row):
-    eps, number, angle, kxx, kxy, kyx, kyy, cxx, cxy, cyy, speed, ratio = row
-    c = film_coefficients(eps)
-    assert float(load_number(eps)) == pytest.approx(number, rel=6e-6)
-    assert np.degrees(attitude_angle(eps)) == pytest.approx(angle, abs=6e-4)
-    np.testing.assert_allclose(c.stiffness, [[kxx, kxy], [kyx, kyy]], atol=6e-5)
-    np.testing.assert_allclose(c.damping, [[cxx, cxy], [cxy, cyy]], atol=6e-5)
-    assert float(threshold(eps).speed) == pytest.approx(speed, abs=6e-5)
-    assert float(threshold(eps).whirl_ratio) == pytest.approx(ratio, abs=6e-5)
-
-
-def test_sommerfeld_number_of_the_table():
-    """S (L/D)^2 = mu n_s D L (R/c)^2 (L/D)^2/W = 1/(4 pi N), n_s in revolutions per second."""
-    printed = [0.98998, 0.46119, 0.27218, 0.17046, 0.10605, 0.06253, 0.03296]
-    ours = [1 / (4 * np.pi * float(load_number(row[0]))) for row in ROWS]
-    np.testing.assert_allclose(ours, printed, atol=6e-6)
-
-
-def test_printed_digits_of_ocvirks_solution():
-    """Independent program: eps = 0.5 gives N = 0.750381081812 and 53.68020060 deg."""
-    assert float(load_number(0.5)) == pytest.approx(0.750381081812, abs=6e-13)
-    assert np.degrees(attitude_angle(0.5)) == pytest.approx(53.68020060, abs=6e-9)
-
-
-@pytest.mark.parametrize(
-    "load, speed_rpm, viscosity, eps, angle, thickness_um",
-    [
-        (1000.0, 3000.0, 0.02, 0.6757879254, 40.58502207, 32.421207),
-        (500.0, 3000.0, 0.02, 0.5596683869, 49.30861855, 44.033161),
-        (1000.0, 6000.0, 0.02, 0.5596683869, 49.30861855, 44.033161),
-        (1000.0, 3000.0, 0.04, 0.5596683869, 49.30861855, 44.033161),
-    ],
-)
-def test_bearing_of_50_mm_radius(load, speed_rpm, viscosity, eps, angle, thickness_um):
-    """R 50, L 25 mm, c 100 um: digits printed by an independent program."""
-    scale = film_scale(viscosity, 0.05, 0.025, 1e-4)
-    ours = eccentricity_ratio(load / (scale * speed_rpm * np.pi / 30))
-    assert float(ours) == pytest.approx(eps, abs=6e-11)
-    assert np.degrees(attitude_angle(ours)) == pytest.approx(angle, abs=6e-9)
-    assert 100 * (1 - float(ours)) == pytest.approx(thickness_um, abs=6e-7)
-
-
-def test_ross_doctest():
-    """ROSS `CylindricalBearing`: W 525 N, L 30, D 100, c 0.1 mm, 0.1 Pa s, 1500 rpm; N/m, rounded.
-
-    Its attitude angle has a misplaced bracket and is not compared.
-    """
-    speed = 1500 * np.pi / 30
-    eps = eccentricity_ratio(525 / (film_scale(0.1, 0.05, 0.03, 1e-4) * speed))
-    assert float(eps) == pytest.approx(0.266298, abs=6e-7)
-    stiffness, damping = dimensional(film_coefficients(eps), load=525.0, clearance=1e-4, speed=speed)
-    for ours, printed in zip(np.asarray(stiffness).ravel(), SHORT_BEARING.values(), strict=True):
-        assert ours == pytest.approx(printed.value, abs=printed.tolerance)
-    np.testing.assert_allclose(damping, friswell(float(eps))[1] * 525 / (1e-4 * speed), rtol=1e-10)
+def test_bearing_of_50_mm_radius():
+    """R 50, L 25 mm, c 100 um, 1000 N, 3000 rpm, 20 mPa s: digits printed by an independent program."""
+    eps = eccentricity_ratio(1000.0 / (film_scale(0.02, 0.05, 0.025, 1e-4) * 3000.0 * np.pi / 30))
+    assert float(eps) == pytest.approx(0.6757879254, abs=6e-11)
+    assert np.degrees(attitude_angle(eps)) == pytest.approx(40.58502207, abs=6e-9)
 
 
 @pytest.mark.parametrize("eps", [1e-8, 1e-3, 0.2, 0.5, 0.9, 0.999])
@@ -146,15 +81,6 @@ def test_eccentricity_ratio_inverts_the_load_number(eps):
 def test_load_number_must_be_positive():
     with pytest.raises(Exception, match="`load_number` must be positive"):
         eccentricity_ratio(0.0)
-
-
-def test_threshold_of_a_vanishing_load():
-    """omega sqrt(c/g) = sqrt(24/pi), whirl at half speed, K_xx = 8/pi, K_yy = 4/pi as eps -> 0."""
-    small = threshold(1e-6)
-    assert float(small.speed) == pytest.approx(np.sqrt(24 / np.pi), rel=1e-10)
-    assert float(small.whirl_ratio) == pytest.approx(0.5, rel=1e-10)
-    c = film_coefficients(1e-6)
-    np.testing.assert_allclose(np.diag(c.stiffness), [8 / np.pi, 4 / np.pi], rtol=1e-8)
 
 
 @pytest.mark.wide
@@ -257,13 +183,6 @@ def test_simulated_whirl_decays_and_grows_as_the_eigenvalues_say(factor, film):
     ratio = orbit_measures(model, run).whirl_ratio
     assert 0.500 < ratio < 0.524
     assert ratio == pytest.approx(float(at.whirl_frequency) / speed, rel=5e-3)
-
-
-@pytest.mark.parametrize("gap_mm, highest", [(0.225, 5511), (0.30, 4773), (0.45, 3897), (0.60, 3375)])
-def test_whirl_speed_of_a_light_cage_in_rpm(gap_mm, highest):
-    """sqrt(24/pi) sqrt(g/c): independent of the viscosity, falling as gap^(-1/2)."""
-    model = beyond_range(cage_in_film(guidance_gap=gap_mm * 1e-3), cage_mass=1e-6)
-    assert float(film_whirl_speed(model)) * 30 / np.pi == pytest.approx(highest, abs=0.6)
 
 
 @pytest.mark.slow

@@ -26,12 +26,11 @@ import zarr
 from report_example import findings, swept
 
 import jaxcage as jc
-from jaxcage.cli import _page, _sweep, _validate, main
+from jaxcage.cli import _page, _sweep, main
 from jaxcage.cli._job import save_figure
 from jaxcage.io import load_sweep, open_sweep, replacing, save_model, save_sweep, write_columns, write_template
 from jaxcage.plotting import new_figure
 from jaxcage.studies import Plan, Store, Study, open_study, run_study
-from jaxcage.validation import Comparison
 
 
 ROOT = Path(jc.__file__).parent
@@ -128,7 +127,6 @@ COMMANDS = {
     "statics": ["statics", "1a"],
     "sweep": ["sweep", "1a"],
     "report": ["report", "1a"],
-    "validate": ["validate", "--topics", "film"],
 }
 
 
@@ -138,7 +136,6 @@ def nothing_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_sweep, "sweep", lambda *_, **__: swept(count=26))
     monkeypatch.setattr(_page.report, "examine", lambda *_, **__: findings("1a", quick=True))
     monkeypatch.setattr(_page.report, "page", lambda *_, **__: "<p>an hour of work</p>\n" * 100)
-    monkeypatch.setitem(_validate.TOPICS, "film", lambda: [Comparison("a force", "by hand", 1.0, 1.0, 1e-9)] * 40)
 
 
 def failed(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
@@ -200,7 +197,7 @@ def test_a_study_on_a_full_disk_goes_on(tmp_path: Path):
     """Out of room at once, or after two of its chunks: called again, it ends with the files of an unbroken study."""
     plan = Plan({"speed": np.linspace(1.1, 1.9, 12)}, {}, 0, 0, 2, 6)
     system = jc.ForcedOscillator(_duffing, coordinates=1)
-    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0)
+    study = Study(system, plan, jc.method("rk4", steps=32), 10, 10, 5, 1, 0, "duffing", "1")
     run_study(study, tmp_path / "whole.zarr")
     store = tmp_path / "study.zarr"
     with (
@@ -330,11 +327,9 @@ def test_ctrl_c_says_one_sentence(driven: Any, name: str):
     assert status == 130 and line.startswith("Interrupted") and line.endswith(".")
     if name == "study":
         assert line == "Interrupted: what is stored stays, and the same command goes on from there."
-    if name == "map of labels":
-        assert line == "Interrupted: the picture and data of the last stage stay."
     if name == "design":
         assert line == "Interrupted: the same command goes on where the search stopped."
-    if name in ("sweep", "map", "report", "a figure"):
+    if name in ("sweep", "map", "map of labels", "report", "a figure"):
         assert line == "Interrupted: files of earlier runs are as they were, and the same command starts over."
 
 
@@ -410,14 +405,6 @@ def test_a_store_cannot_run_code(
     assert mark.exists()  # whoever reads it without such care has run it
 
 
-def test_a_kept_search_cannot_run_code(tmp_path: Path):
-    kept, mark = tmp_path / "search.npz", tmp_path / "mark"
-    np.savez(kept, what=np.array([_Touch(mark)], dtype=object), allow_pickle=True)
-    with pytest.raises(ValueError, match="must be a file of this search, but is none"):
-        jc.optimise(jc.case("1a"), {"guidance_gap": (3e-4, 6e-4)}, jc.design.cost(), keep=kept)
-    assert not mark.exists()
-
-
 SOURCES = {str(p.relative_to(ROOT)): p for p in sorted(ROOT.rglob("*.py"))}
 
 
@@ -471,7 +458,7 @@ def test_every_file_is_put_in_place_whole():
         }
         found |= {(name, _called(n)) for n in ast.walk(tree) if _writes(n) and id(n) not in sheltered}
     assert found == {
-        ("studies/_empty.py", "to_zarr"),  # the empty store, made aside
+        ("studies/_store.py", "to_zarr"),  # the empty store, made aside
         ("io/_files.py", "open"),  # aside, in place by `os.replace`
         ("design/_kept.py", "open"),  # a kept search, moved into place
         ("design/_kept.py", "savez"),
@@ -479,9 +466,6 @@ def test_every_file_is_put_in_place_whole():
         ("design/_optimise.py", "save"),
         ("io/_template.py", "open"),  # a new file only
         ("report/_figures.py", "savefig"),  # into memory
-        ("io/_tables.py", "open"),  # both aside: `write_tables` puts them in place
-        ("io/_tables.py", "save"),
-        ("plotting/_bearing.py", "save"),  # an animation, aside by `Job.written`
     }
 
 

@@ -36,7 +36,6 @@ START = jc.models.BearingState(jnp.zeros((5, 13)), jnp.zeros(9), jnp.zeros(2))
 ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bifurcation": lambda m: jc.bifurcation(OSCILLATOR, "fold", (1.0, STATE)),
     "branch": lambda m: jc.branch(OSCILLATOR, STATE, lower=1.0, upper=2.0),
-    "branches": lambda m: jc.orbits.branches([OSCILLATOR], [DOUBLING], lower=1.0, upper=2.0),
     "cage_forces": lambda m: jc.analysis.cage_forces(m, TRAJECTORY),
     "cage_moments": lambda m: jc.analysis.cage_moments(m, TRAJECTORY),
     "cage_mass": lambda m: jc.bearing.cage_mass(m.bearing, 5e-4),
@@ -48,19 +47,17 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "equilibrium": lambda m: jc.equilibrium(m, 900.0),
     "film_coefficients": lambda m: jc.analysis.film_coefficients(0.5),
     "film_whirl_speed": lambda m: jc.analysis.film_whirl_speed(m),
-    "fit_edges": lambda m: jc.fit_edges({"1a": m}, [], [], [], start={}),
     "label_map": lambda m: jc.label_map(m, {"speed": SPEEDS}, {"guidance_gap": np.array([4e-4, 5e-4])}),
     "leading_multiplier": lambda m: jc.orbits.leading_multiplier(OSCILLATOR, 1.0, STATE),
     "load_distribution": lambda m: jc.bearing.load_distribution(m.bearing, 1000.0, 900.0),
     "monodromy": lambda m: jc.sweeps.monodromy(OSCILLATOR, SPEEDS, np.zeros((2, 2))),
     "optimise": lambda m: jc.optimise(m, WITHIN, jc.design.cost()),
     "orbit_measures": lambda m: jc.orbit_measures(m, TRAJECTORY),
-    "pareto_front": lambda m: jc.design.pareto_front(m, WITHIN, jc.design.cost(), jc.design.cost(), [1.0]),
     "periodic_orbit": lambda m: jc.periodic_orbit(OSCILLATOR, 1.0),
     "ramp": lambda m: jc.ramp(OSCILLATOR, 1.0, 1.1, revolutions=2),
     "run_up_down": lambda m: jc.run_up_down(OSCILLATOR, SPEEDS),
     "run_up_down_designs": lambda m: jc.sweeps.run_up_down_designs([OSCILLATOR], SPEEDS),
-    "screen": lambda m: jc.design.screen({"1a": m}, [], [], SPEEDS),
+    "surrogate_search": lambda m: jc.design.surrogate_search(m, WITHIN, jc.design.cost()),
     "sensitivities": lambda m: jc.orbits.sensitivities(m, {"an edge": FOLD}, jc.method()),
     "sensitivity": lambda m: jc.sensitivity(m, FOLD),
     "simulate": lambda m: jc.simulate(OSCILLATOR, 1.0, revolutions=1),
@@ -69,7 +66,7 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
         "outer_rib", guidance_gap=1.0, pocket_clearance=1.0, radial_clearance=1.0, elastic_approach=1.0
     ),
     "strobe_map": lambda m: jc.strobe_map(OSCILLATOR, 1.0),
-    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere"),
+    "study": lambda m: jc.study(OSCILLATOR, {"speed": SPEEDS}, store="nowhere", name="duffing", version="1"),
     "sweep": lambda m: raw_sweep(OSCILLATOR, SPEEDS),
     "sweep_designs": lambda m: raw_sweeps([OSCILLATOR], SPEEDS),
     "synchronous_orbits": lambda m: jc.synchronous_orbits(OSCILLATOR, 1.0, 1.1, count=2),
@@ -78,7 +75,6 @@ ENTRIES: dict[str, Callable[[Any], Any]] = {
     "bearing_over_time": lambda m: jc.bearing_over_time(WHOLE, 1000.0, np.arange(2.0), start=START),
     "sweep_bearing": lambda m: jc.sweep_bearing(WHOLE, 1000.0),
     "sweep_bearings": lambda m: jc.sweep_bearings([WHOLE], 1000.0),
-    "waterfall": lambda m: jc.analysis.waterfall(OSCILLATOR, SPEEDS),
 }
 """Every public function that computes in JAX, or makes a model to compute with."""
 

@@ -4,12 +4,12 @@ import functools
 
 import diffrax as dfx
 import equinox as eqx
-import independent
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import even
+from reference import confirmed, field as second_field
 from scipy.integrate import solve_ivp
 
 from jaxcage import replace
@@ -206,7 +206,8 @@ def test_adaptive_steps_through_diffeqsolve(solver, kind):
 
 CAGE, SPEED = case("1a", "preliminary"), 15000 * np.pi / 30
 START = CAGE.starts(SPEED)[0]
-UNIT = independent.scale(SPEED)
+FIELD = second_field(CAGE, SPEED)
+UNIT = FIELD.scale
 
 # What a revolution's error is at these steps, in units of the clearance.
 NAMED = {
@@ -225,7 +226,7 @@ NAMED = {
 def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
     steps, tolerance = NAMED[name]
     end = one_revolution(CAGE, SPEED, method(name, steps=steps), START)
-    expected = independent.strobe([float(c) for c in START], SPEED)
+    expected = confirmed(FIELD, [float(c) for c in START]).strobe[-1]
     np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=tolerance)
 
 
@@ -234,7 +235,7 @@ def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
 def test_named_solvers_agree_with_adaptive_steps(name):
     tolerance = 1e-7
     end = one_revolution(CAGE, SPEED, method(name, tolerance=tolerance), START)
-    expected = independent.strobe([float(c) for c in START], SPEED)
+    expected = confirmed(FIELD, [float(c) for c in START]).strobe[-1]
     np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=100 * tolerance)
 
 

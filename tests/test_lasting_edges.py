@@ -82,27 +82,16 @@ ELASTICITY = np.array([-0.3, 0.5])
 
 
 class Planted:
-    """In place of the sweeps: three lanes of each design, which leave chaos at a known rate; with a power at one that
-    is 0 at the edge and one escape in a horizon 100 rpm beyond it."""
+    """In place of the sweeps: three lanes of each design, which leave chaos at a known rate."""
 
-    def __init__(
-        self,
-        seed: int,
-        rate_at_edge: float = 1.0,
-        steep: float = STEEP,
-        curvature: float = 0.0,
-        power: float | None = None,
-    ):
+    def __init__(self, seed: int, rate_at_edge: float = 1.0, steep: float = STEEP, curvature: float = 0.0):
         self.rng, self.rate, self.steep, self.curvature = np.random.default_rng(seed), rate_at_edge, steep, curvature
-        self.power = power
 
     def __call__(self, model: Any, names: Any, values: np.ndarray, rpm: np.ndarray, horizon: int, *_: Any) -> Any:
         base = np.array([float(jc.parameters(model)[n]) for n in names])
         away = rpm - EDGE * np.prod((values / base) ** ELASTICITY, axis=1)
         beyond = self.steep * away
         rate = self.rate * np.exp(beyond + self.curvature * beyond**2) / horizon
-        if self.power is not None:
-            rate = np.maximum(away / 100.0, 1e-6) ** self.power / horizon
         block = analysis.LIFE_BLOCK
         times = block * np.ceil(self.rng.exponential(1 / rate[:, None], (rpm.size, 3)) / block) + 100
         return np.where(times <= horizon, times, np.inf), horizon
@@ -110,15 +99,10 @@ class Planted:
 
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch):
-    def plant(seed: int, **law: float | None) -> None:
+    def plant(seed: int, **law: float) -> None:
         monkeypatch.setattr("jaxcage.design._lasting._escapes", Planted(seed, **law))
 
     return plant
-
-
-@pytest.fixture
-def few_draws(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("jaxcage.design._lasting.DRAWS", 6)
 
 
 @pytest.mark.parametrize("curvature, errors, most", [(0.0, 2, 34), (0.15, 3, 38)])
@@ -155,12 +139,9 @@ def test_chaos_that_nobody_leaves_is_refused(planted):
         lasting_edge(CASE, EDGE, 150.0, names=NAMES)
 
 
-def test_a_parameter_that_is_zero_or_unknown_is_refused():
+def test_what_cannot_be_is_refused():
     with pytest.raises(ValueError, match="`names` must hold parameters of the design that are not 0, but has 'gap'"):
         lasting_edge(CASE, 12000.0, 100.0, names=("gap",))
-
-
-def test_a_window_and_a_horizon_that_are_none_are_refused():
     with pytest.raises(ValueError, match="`within_rpm` must be positive, but 0.0"):
         lasting_edge(CASE, 12000.0, 0.0)
     with pytest.raises(ValueError, match="`horizon` must be above 400 revolutions, but 300"):
@@ -202,118 +183,35 @@ def test_an_open_zone_has_no_width_and_the_gradient_of_its_one_edge(planted):
         width.change("gap")
 
 
-def test_change_of_a_width_is_that_of_the_planted_edges(planted):
-    """An onset at half the speed of the exit, with the same elasticities, each from lanes of its own."""
-    z = []
-    for seed in range(12):
-        planted(seed)
-        ends = {end: lasting_edge(CASE, EDGE, 100.0, designs=32, seed=seed) for end in ("onset", "exit")}
-        width = zone_width(ends | {"onset": halved(ends["onset"])})
-        of = [width.change(name) for name in NAMES] + [width.change(*NAMES)]
-        true = [EDGE / 2 * e for e in (*ELASTICITY, 0.2)]
-        z.append([(value - t) / error for (value, error), t in zip(of, true, strict=True)])
-    assert np.mean(np.abs(z) < 2) > 0.85 and np.all(np.sqrt(np.mean(np.square(z), axis=0)) < 1.6)
-
-
-@pytest.mark.wide
 def test_gradient_command_of_lasting_zones(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted, few_draws
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted
 ):
+    """A zone with both edges, and one without an onset."""
     planted(5)
-    zone = Zone("chaotic", Edge(EDGE, 100.0, "chaotic"), Edge(EDGE, 100.0, "chaotic"), 1.0)
+    edge = Edge(EDGE, 100.0, "chaotic")
+    both = Zone("chaotic", edge, edge, 1.0), Zone("chaotic", None, edge, 1.0)
     swept = types.SimpleNamespace(outcome=np.zeros((1, 3), int), horizon=3000)
     monkeypatch.setattr("jaxcage.cli._lasting.sweep", lambda *_, **__: swept)
-    monkeypatch.setattr("jaxcage.cli._lasting.zones", lambda _: types.SimpleNamespace(zones=(zone,)))
+    monkeypatch.setattr("jaxcage.cli._lasting.zones", lambda _: types.SimpleNamespace(zones=both))
     asked = ["gradient", "1a", "--lasting", "--designs", "32", "--out", str(tmp_path)]
     assert main([*asked, "--json"]) == 0
     got = json.loads(capsys.readouterr().out)
-    assert [e["name"] for e in got["edges"]] == ["zone 1 onset", "zone 1 exit"]
+    assert [e["name"] for e in got["edges"]] == ["zone 1 onset", "zone 1 exit", "zone 2 exit"]
     for edge in got["edges"]:
         for name, true in zip((*NAMES, "gap at fixed rho"), (*ELASTICITY, 0.2), strict=True):
             found = edge["elasticity"][name]
             assert abs(found["value"] - true) < 4 * found["error"] < 0.6
-    assert abs(got["widths"][0]["width_rpm"]) < 4 * got["widths"][0]["standard_error_rpm"]
+    closed, opened = got["widths"]
+    assert abs(closed["width_rpm"]) < 4 * closed["standard_error_rpm"]
+    assert opened["open"] and opened["status"] == "open: no onset within the range" and opened["width_rpm"] is None
+    last = got["edges"][-1]
+    by = opened["rpm_by_1_percent"]["eccentricity"]["value"]
+    assert by == pytest.approx(0.01 * last["speed_rpm"] * last["elasticity"]["eccentricity"]["value"])
     assert main(asked) == 0
     out = capsys.readouterr().out
-    assert (
-        "mean life of chaos passes 3000 revolutions" in out
-        and "95 % interval [rpm]" in out
-        and "what 1 % more of a parameter adds" in out
-    )
-    assert main([*asked, "--zone", "2"]) == 2
-    assert "--zone must be at most 1" in capsys.readouterr().err
+    assert "mean life of chaos passes 3000 revolutions" in out and "what 1 % more of a parameter adds" in out
+    assert "open: no onset within the range" in out
+    assert main([*asked, "--zone", "3"]) == 2
+    assert "--zone must be at most 2" in capsys.readouterr().err
     assert main([*asked, "--by", "gap"]) == 2
     assert main(["gradient", "1a", "--zone", "1"]) == 2
-
-
-@pytest.mark.wide
-def test_a_planted_crisis_and_its_elasticities_lie_within_their_errors(planted, few_draws):
-    held, z = 0, []
-    for seed in range(4):
-        planted(seed, power=1.5)
-        found = lasting_edge(CASE, 12150.0, 150.0, designs=32, seed=seed).crisis()
-        assert found.status == "converged" and found.fit.beyond == "above"
-        held += found.interval_rpm[0] <= EDGE <= found.interval_rpm[1]
-        off = np.array([*(found.elasticity - ELASTICITY), found.sum_of(*NAMES)[0] - 0.2])
-        z.append(off / [*found.elasticity_error, found.sum_of(*NAMES)[1]])
-        assert np.all(found.elasticity_error < 0.2)
-        np.testing.assert_allclose(found.slope * found.values / found.speed_rpm, found.elasticity)
-    assert held >= 3 and np.mean(np.abs(z) < 2) > 0.9
-
-
-def test_a_life_that_grows_as_an_exponential_is_no_crisis(planted, few_draws):
-    """It diverges nowhere: whatever power is fitted, the crisis is not to be used, and says why.
-
-    Of 16 such draws (32 and 64 designs) one was taken for a crisis.
-    """
-    planted(0)
-    found = lasting_edge(CASE, 12100.0, 150.0, designs=32)
-    assert found.status == "converged"
-    assert found.crisis().status.startswith(("no power law", "not told"))
-
-
-@pytest.mark.wide
-def test_a_crisis_that_the_power_law_does_not_fit_is_not_used(planted, few_draws):
-    """Lanes that leave chaos ever later with the distance."""
-    planted(1, power=-1.5)
-    found = lasting_edge(CASE, 12150.0, 150.0, designs=16, rounds=2)
-    backwards = dataclasses.replace(found, steepness=-found.steepness)
-    assert backwards.crisis().status.startswith("no power law")
-
-
-def test_the_command_prints_crises_and_an_open_zone(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planted, few_draws
-):
-    zone = Zone("chaotic", None, Edge(EDGE + 100, 100.0, "chaotic"), 1.0)
-    swept = types.SimpleNamespace(outcome=np.zeros((1, 3), int), horizon=3000)
-    monkeypatch.setattr("jaxcage.cli._lasting.sweep", lambda *_, **__: swept)
-    monkeypatch.setattr("jaxcage.cli._lasting.zones", lambda _: types.SimpleNamespace(zones=(zone,)))
-    asked = ["gradient", "1a", "--lasting", "--designs", "32", "--out", str(tmp_path)]
-    planted(1, power=1.5)
-    assert main([*asked, "--json"]) == 0
-    got = json.loads(capsys.readouterr().out)
-    crisis = got["edges"][0]["crisis"]
-    assert crisis["status"] == "converged" and crisis["beyond"] == "above"
-    low, high = crisis["interval_rpm"]
-    assert low < crisis["speed_rpm"] < high and high - low < 300 and low < EDGE < high
-    for name, true in zip((*NAMES, "gap at fixed rho"), (*ELASTICITY, 0.2), strict=True):
-        found = crisis["elasticity"][name]
-        assert abs(found["value"] - true) < 3 * found["error"] < 0.5
-    for widths, edge in (("widths", got["edges"][0]), ("widths_to_crises", crisis)):
-        (width,) = got[widths]
-        assert width["open"] and width["status"] == "open: no onset within the range" and width["width_rpm"] is None
-        by = width["rpm_by_1_percent"]["eccentricity"]["value"]
-        assert by == pytest.approx(0.01 * edge["speed_rpm"] * edge["elasticity"]["eccentricity"]["value"])
-    planted(1, power=1.5)
-    assert main(asked) == 0
-    out = capsys.readouterr().out
-    assert f"{crisis['speed_rpm']:.0f}" in out and "Widths of 1a between crises" in out
-    assert "open: no onset within the range" in out
-    planted(0, steep=0.03)  # an exponential law
-    assert main([*asked, "--json"]) == 0
-    refused = json.loads(capsys.readouterr().out)
-    said = refused["edges"][0]["crisis"]
-    assert said["speed_rpm"] is None and said["elasticity"] is None
-    assert said["status"].startswith(("no power law", "not told"))
-    assert refused["widths_to_crises"][0]["rpm_by_1_percent"] is None
-    assert said["status"] in refused["widths_to_crises"][0]["status"]

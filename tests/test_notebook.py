@@ -79,7 +79,6 @@ def test_an_orbit_shows_its_multipliers():
         periods=jnp.array(1),
         steps=jnp.array(512),
         error=jnp.array(1e-8),
-        self_excited=False,
         solver=jc.method(),
     )
     assert "0.5+0.1j" in orbit._repr_html_() and "8594.4 rpm" in orbit._repr_html_()

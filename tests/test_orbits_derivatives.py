@@ -108,22 +108,6 @@ def test_hessian_of_state_and_multipliers(name):
 HESSIAN = jax.jit(jax.jacfwd(jax.jacrev(orbit_numbers)))
 
 
-@pytest.mark.wide
-def test_batches_equal_loops():
-    theta, guess = DOUBLE_WELL
-    thetas = jnp.asarray(theta + 0.01 * np.outer(np.arange(-2.0, 3.0), [0, 1, 1, 1, -1, -1, 1]))
-    values = jax.vmap(VALUE, in_axes=(0, None))(thetas, guess)
-    np.testing.assert_allclose(values, [VALUE(t, guess) for t in thetas], rtol=0, atol=1e-12)
-    assert np.ptp(values[:, 0]) > 1e-3
-    slopes = jax.vmap(FORWARD, in_axes=(0, None))(thetas, guess)
-    np.testing.assert_allclose(slopes, [FORWARD(t, guess) for t in thetas], rtol=1e-10, atol=1e-11)
-
-
-def test_jit_changes_nothing():
-    theta, guess = DOUBLE_WELL
-    np.testing.assert_allclose(VALUE(jnp.asarray(theta), guess), orbit_numbers(theta, guess), rtol=0, atol=1e-13)
-
-
 @pytest.mark.parametrize("periods", [1, 2, 3])
 @pytest.mark.parametrize("name", ["double well", "hardening"])
 def test_determinant_of_the_monodromy_matrix(name, periods):

@@ -1,9 +1,4 @@
-"""Periodic orbits and bifurcation points of systems whose answers are published, exact, or found without JAX.
-
-Laws are modules as a user would write them. Numbers, their sources and tolerances are those of the validation page;
-"DOP853" is SciPy's at a tolerance of 1e-12 with Newton's method on the variational equations, sharing nothing with this
-library.
-"""
+"""Periodic orbits and bifurcation points of systems whose answers are exact; `literature` has the published ones."""
 
 from typing import Any
 
@@ -12,191 +7,32 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from laws import numbers
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.special import mathieu_a, mathieu_b
 
 import jaxcage as jc
-from jaxcage.validation import (
-    DUFFING_DOUBLINGS,
-    DUFFING_FOLDS,
-    DUFFING_SLOPES,
-    LURE,
-    VAN_DER_POL,
-    VAN_DER_POL_LET_GO,
-    Number,
-)
 
 
 METHOD = jc.method("rk4", steps=1024)
-FINE = jc.method("rk4", steps=2048)
-
-
-def numbers(**values):
-    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
-
-
-class Duffing(eqx.Module):
-    """m x'' + d x' - k x + b x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
-
-    m: jax.Array
-    d: jax.Array
-    k: jax.Array
-    b: jax.Array
-    g: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return ((-self.d * u + self.k * x - self.b * x**3 + self.g * jnp.cos(tau)) / self.m,)
-
-
-def duffing(d=0.3, k=1.0, g=0.26):
-    return jc.ForcedOscillator(Duffing(**numbers(m=1, d=d, k=k, b=1, g=g)), coordinates=1)
-
-
-def agrees(ours, number: Number) -> bool:
-    return bool(abs(ours - number.value) <= number.tolerance)
 
 
 @pytest.mark.wide
 def test_orbits_in_other_units_are_the_same():
     """Both wells of an oscillator, and in thousandths: Newton's method starts at its guess, not between the two."""
 
-    def law(tau, q, v, speed):
-        return (-0.3 * v[0] + q[0] - 1e6 * q[0] ** 3 + 0.26e-3 * jnp.cos(tau),)
+    def duffing(unit):
+        def law(tau, q, v, speed):
+            return (-0.3 * v[0] + q[0] - q[0] ** 3 / unit**2 + 0.26 * unit * jnp.cos(tau),)
 
-    small = jc.ForcedOscillator(law, coordinates=1, scale=1e-3)
+        return jc.ForcedOscillator(law, coordinates=1, scale=unit)
+
     for well in (1.0, -1.0):
-        whole = jc.periodic_orbit(duffing(), 1.2, guess=(well, 0.0), revolutions=400, method=METHOD)
+        whole = jc.periodic_orbit(duffing(1.0), 1.2, guess=(well, 0.0), revolutions=400, method=METHOD)
         assert float(whole.state[0]) * well > 0
-        found = jc.periodic_orbit(small, 1.2, guess=1.001e-3 * whole.state, method=METHOD)
+        found = jc.periodic_orbit(duffing(1e-3), 1.2, guess=1.001e-3 * whole.state, method=METHOD)
         np.testing.assert_allclose(1e3 * found.state, whole.state, rtol=1e-9)
         np.testing.assert_allclose(found.multipliers, whole.multipliers, rtol=1e-8)
-
-
-@pytest.mark.parametrize("periods", DUFFING_DOUBLINGS)
-def test_period_doubling_cascade_of_the_double_well_duffing(periods):
-    inside, expected = DUFFING_DOUBLINGS[periods]
-    system = duffing(g=inside)
-    orbit = jc.periodic_orbit(system, 1.2, periods, guess=(1.0, 0.0), revolutions=400, method=METHOD)
-    assert bool(orbit.stable) and -1 < orbit.multipliers[0].real < -0.3
-    # Damping is all that shrinks areas, whatever the orbit.
-    assert abs(jnp.linalg.slogdet(orbit.monodromy)[1] + 0.3 * 2 * jnp.pi * periods / 1.2) < 1e-8
-    point = jc.bifurcation(system, "period-doubling", orbit, "g", speed=1.2, periods=periods, method=METHOD)
-    assert point.status == "converged"
-    assert agrees(point.value, expected)
-    assert abs(point.multipliers[0] + 1) < 1e-8
-    assert point.transversality > 0
-    assert int(point.periods) == periods
-
-
-@pytest.mark.wide
-def test_gradient_of_the_first_period_doubling():
-    """DOP853 and differences; scaling x shows that the force at any edge goes with b^(-1/2)."""
-    system = duffing(g=0.262)
-    orbit = jc.periodic_orbit(system, 1.2, 1, guess=(1.0, 0.0), revolutions=400, method=METHOD)
-
-    def edge(system):
-        point = jc.bifurcation(system, "period-doubling", orbit, "g", speed=1.2, method=METHOD)
-        return point.value, point
-
-    gradient, point = eqx.filter_grad(edge, has_aux=True)(system)
-    law = gradient.acceleration
-    # The third: both stiffnesses multiplied by one number.
-    found = {"m": law.m, "d": law.d, "k": law.k + law.b}
-    assert all(agrees(found[name], slope) for name, slope in DUFFING_SLOPES.items())
-    assert abs(law.b + point.value / 2) < 1e-10
-    # The equation multiplied by a number.
-    assert abs(law.m + 0.3 * law.d + law.k + law.b - point.value) < 1e-10
-    assert law.g == 0.0  # the parameter that is solved for
-
-
-# State on the branch: speed from which it is followed, simulated from this start.
-FOLDS = {"up": (1.7, (0.6, 2.4)), "down": (1.4, (-0.3, 0.05))}
-
-
-@pytest.mark.parametrize("name", FOLDS)
-def test_folds_of_the_hardening_duffing(name):
-    speed, start = FOLDS[name]
-    system = duffing(d=0.1, k=-1.0, g=0.3)
-    orbit = jc.periodic_orbit(system, speed, 1, guess=start, revolutions=400, method=METHOD)
-    assert bool(orbit.stable)
-    point = jc.bifurcation(system, "fold", orbit, method=METHOD)
-    assert point.status == "converged"
-    assert agrees(point.value, DUFFING_FOLDS[name]) and point.value == point.speed
-    assert abs(point.multipliers[0] - 1) < 1e-6
-    assert float(point.angle) < 1e-6
-    # The other multiplier follows from the damping.
-    assert abs(point.multipliers[1].real - jnp.exp(-0.1 * 2 * jnp.pi / point.speed)) < 1e-6
-    assert abs(jnp.linalg.norm(point.direction) - 1) < 1e-12
-
-
-class VanDerPol(eqx.Module):
-    mu: jax.Array
-
-    def __call__(self, tau, y, speed):
-        x, u = y
-        return (u, self.mu * (1 - x * x) * u - x)
-
-
-class Bautin(eqx.Module):
-    """Cycles of radius r with r^4 - r^2 = mu, the faster the larger, in states of other units."""
-
-    mu: jax.Array
-
-    def __call__(self, tau, y, speed):
-        u, v = y[0] / 3.0, y[1] / 0.2
-        square = u * u + v * v
-        growth = self.mu + square - square * square
-        rate = 0.5 + square
-        return 3.0 * (growth * u - rate * v), 0.2 * (growth * v + rate * u)
-
-
-def test_fold_of_cycles_of_the_bautin_normal_form():
-    """At mu = -1/4 and r^2 = 1/2 (Kuznetsov, Elements of Applied Bifurcation Theory, 8.3), whatever the scale."""
-    system = jc.ForcedSystem(Bautin(jnp.asarray(0.0)), 2, scale=(3.0, 0.2))
-    near = (2.13, 0.0), -0.249
-    point = jc.bifurcation(system, "fold", near, "mu", speed=1.0, period="free", reach=0, method=METHOD)
-    assert point.status == "converged" and abs(point.value + 0.25) < 1e-9 and abs(point.speed - 1) < 1e-9
-    assert abs((point.state[0] / 3.0) ** 2 + (point.state[1] / 0.2) ** 2 - 0.5) < 1e-6
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("mu", VAN_DER_POL)
-def test_limit_cycle_of_van_der_pol(mu):
-    period, log_multiplier = VAN_DER_POL[mu]
-    system = jc.ForcedSystem(VanDerPol(**numbers(mu=mu)), dimension=2)
-    orbit = jc.periodic_orbit(system, 0.97, guess=(1.8, 0.4), revolutions=20, period="free", method=FINE)
-    assert orbit.status == "converged" and bool(orbit.stable)
-    assert agrees(orbit.period, period)
-    np.testing.assert_allclose(orbit.multipliers[0], 1.0, atol=1e-9)
-    assert agrees(jnp.log(orbit.multipliers[1].real), log_multiplier)
-    assert abs(orbit.liouville) < 1e-8
-
-
-class Entrained(eqx.Module):
-    """x'' - 0.3 (1 - x^2) x' + x = g cos(w t)."""
-
-    g: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (0.3 * (1 - x * x) * u - x + self.g * jnp.cos(tau),)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("force", [0.8, 1.2], ids=["unstable side", "stable side"])
-def test_torus_bifurcation_of_the_driven_van_der_pol(force):
-    """Where a drive of 1.3 rad/s lets go of the oscillator (DOP853)."""
-    system = jc.ForcedOscillator(Entrained(**numbers(g=force)), coordinates=1)
-    orbit = jc.periodic_orbit(system, 1.3, guess=(-1.3, -0.4), method=METHOD)
-    assert bool(orbit.stable) == (force > 1)
-    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "g", method=METHOD)
-    assert point.status == "converged"
-    assert agrees(point.value, VAN_DER_POL_LET_GO)
-    np.testing.assert_allclose(jnp.abs(point.multipliers), 1.0, atol=1e-9)
-    assert abs(point.angle - np.angle(0.16011959 + 0.98709762j)) < 1e-8
-    assert point.transversality < 0  # a stronger drive holds it
 
 
 class Mathieu(eqx.Module):
@@ -226,29 +62,7 @@ def mathieu_trace(a, q=1.0):
     return end[0] + end[3]
 
 
-CHARACTERISTIC = {
-    "b1": ("period-doubling", mathieu_b(1, 1)),
-    "a1": ("period-doubling", mathieu_a(1, 1)),
-    "a0": ("branch-point", mathieu_a(0, 1)),
-    "b2": ("branch-point", mathieu_b(2, 1)),
-    "a2": ("branch-point", mathieu_a(2, 1)),
-}
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("name", CHARACTERISTIC)
-def test_characteristic_values_of_mathieu(name):
-    """DLMF chapter 28: both multipliers are 1 or -1 with a Jordan block, and cross at an infinite rate."""
-    kind, exact = CHARACTERISTIC[name]
-    point = jc.bifurcation(mathieu(), kind, ((0.0, 0.0), exact + 0.03), "a", speed=2.0, method=METHOD)
-    assert bool(point.converged)
-    assert abs(point.value - exact) < 1e-8
-    np.testing.assert_allclose(point.state, 0.0, atol=1e-9)
-    np.testing.assert_allclose(point.multipliers, -1.0 if kind == "period-doubling" else 1.0, atol=1e-4)
-
-
-@pytest.mark.parametrize("a", [-1.0, 0.7, 2.5, 5.0])
-@pytest.mark.parametrize("z", [0.1, 0.6])
+@pytest.mark.parametrize("a, z", [(-1.0, 0.1), (0.7, 0.6), (5.0, 0.1)])
 def test_multipliers_of_damped_mathieu(a, z):
     """x = exp(-z t) y makes it the undamped equation for y at a - z^2: exact."""
     zero = dict(guess=(0.0, 0.0), method=METHOD)
@@ -262,7 +76,6 @@ def test_multipliers_of_damped_mathieu(a, z):
 # Kind, damping, bracket of a, sign of the multiplier.
 DAMPED = [
     ("period-doubling", 0.1, (-0.2, 0.0), -1),
-    ("period-doubling", 0.1, (1.7, 1.9), -1),
     ("period-doubling", 0.2, (1.5, 1.8), -1),
     ("branch-point", 0.1, (-0.6, -0.3), 1),
 ]
@@ -286,140 +99,3 @@ def test_edges_of_damped_mathieu(kind, z, bracket, sign):
     rate = shrink * slope * sign / (2 * sign - shrink * mathieu_trace(at))
     np.testing.assert_allclose(abs(point.transversality), abs(rate), rtol=1e-6)
     assert point.status == "converged" and bool(point.trusted)
-
-
-class Circle(eqx.Module):
-    """A Stuart-Landau oscillator with a planted pair: x, y on a circle of radius sqrt(r), which drives u, v."""
-
-    r: jax.Array
-    w: jax.Array
-    a: jax.Array
-    b: jax.Array
-    c: jax.Array
-
-    def __call__(self, tau, state, speed):
-        x, y, u, v = state
-        growth = self.r - x * x - y * y
-        return (
-            growth * x - self.w * y,
-            growth * y + self.w * x,
-            self.a * u - self.b * v + self.c * x,
-            self.b * u + self.a * v,
-        )
-
-
-def circle(r=0.3, w=1.3, a=-0.1, b=0.37):
-    return jc.ForcedSystem(Circle(**numbers(r=r, w=w, a=a, b=b, c=0.4)), dimension=4)
-
-
-def cycle_of(system, r):
-    guess = (0.9 * r**0.5, 0.1, 0.1, 0.1)
-    spin = 20 if system.rates.a < 0 else 0  # the drive of an unstable pair would only blow it up
-    return jc.periodic_orbit(system, 1.25, guess=guess, revolutions=spin, period="free", method=METHOD)
-
-
-@pytest.mark.parametrize("r, a, b", [(0.3, -0.1, 0.37), (0.05, 0.2, 1.9), (1.0, -0.7, 0.05)])
-def test_multipliers_of_a_planted_limit_cycle(r, a, b):
-    """1, exp(-2 r T) and exp((a +- i b) T): exact."""
-    orbit = cycle_of(circle(r=r, a=a, b=b), r)
-    period = 2 * np.pi / 1.3
-    assert abs(orbit.period - period) < 1e-8
-    assert abs(jnp.hypot(*orbit.state[:2]) - r**0.5) < 1e-8
-    exact = [1, np.exp(-2 * r * period), np.exp((a + 1j * b) * period), np.exp((a - 1j * b) * period)]
-    for mu in exact:
-        assert np.min(np.abs(np.asarray(orbit.multipliers) - mu)) < 1e-8 * max(1, abs(mu))
-    assert bool(orbit.stable) == (a < 0)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("b", [0.37, 1.9])
-def test_torus_bifurcation_of_a_planted_limit_cycle(b):
-    """The pair leaves the unit circle at a = 0 with angle b T and rate T: exact. The drive is not resonant."""
-    system = circle(b=b, a=-0.05)
-    orbit = cycle_of(system, 0.3)
-    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", period="free", method=METHOD)
-    period = 2 * np.pi / 1.3
-    assert point.status == "converged"
-    assert abs(point.value) < 1e-8
-    assert abs(point.angle - abs(np.angle(np.exp(1j * b * period)))) < 1e-8
-    assert abs(point.transversality - period) < 1e-6
-    assert abs(point.speed - 1.3) < 1e-8
-
-
-class Planted(eqx.Module):
-    """A driven orbit p(tau) around which the state turns by half a turn a period, with rates a + s and a - s."""
-
-    a: jax.Array
-    s: jax.Array
-    b: jax.Array
-    turn: jax.Array
-
-    def __call__(self, tau, y, speed):
-        p = (jnp.cos(tau), 0.5 * jnp.sin(tau))
-        drift = (-speed * jnp.sin(tau), 0.5 * speed * jnp.cos(tau))
-        x, z = y[0] - p[0], y[1] - p[1]
-        c, s = jnp.cos(self.turn * tau), jnp.sin(self.turn * tau)
-        e, f = c * x + s * z, -s * x + c * z
-        cubic = e * e + f * f
-        de = (self.a + self.s - cubic) * e - self.b * f
-        df = (self.a - self.s - cubic) * f + self.b * e
-        spin = self.turn * speed
-        return (c * de - s * df - spin * z + drift[0], s * de + c * df + spin * x + drift[1])
-
-
-def planted(a, s=0.0, b=0.0, turn=0.5):
-    return jc.ForcedSystem(Planted(**numbers(a=a, s=s, b=b, turn=turn)), dimension=2)
-
-
-@pytest.mark.parametrize("speed", [0.8, 2.5])
-@pytest.mark.wide
-@pytest.mark.parametrize("at, inside", [(-0.2, -0.26), (0.2, 0.15)])
-def test_period_doubling_of_a_planted_driven_orbit(speed, at, inside):
-    """Multipliers -exp((a + s) T) and -exp((a - s) T): exact, with rate T and the orbit known."""
-    system, period = planted(inside, s=0.2), 2 * np.pi / speed
-    orbit = jc.periodic_orbit(system, speed, guess=(0.9, 0.1), method=METHOD)
-    exact = -np.exp([(inside + 0.2) * period, (inside - 0.2) * period])
-    np.testing.assert_allclose(orbit.multipliers, exact, rtol=1e-8)
-    point = jc.bifurcation(system, "period-doubling", orbit, "a", method=METHOD)
-    assert point.status == "converged"
-    assert abs(point.value - at) < 1e-8
-    np.testing.assert_allclose(point.state, [1.0, 0.0], atol=1e-8)
-    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
-    np.testing.assert_allclose(abs(point.direction), [1.0, 0.0] if at < 0 else [0.0, 1.0], atol=1e-6)
-    assert abs(point.angle - np.pi) < 1e-8
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("turn", [0.0, 0.5, 1.0])
-def test_torus_bifurcation_of_a_planted_driven_orbit(turn):
-    """(-1)^(2 turn) exp((a +- i b) T)."""
-    system, period = planted(-0.06, b=0.3, turn=turn), 2 * np.pi / 1.1
-    orbit = jc.periodic_orbit(system, 1.1, guess=(0.9, 0.1), method=METHOD)
-    point = jc.bifurcation(system, "Neimark-Sacker", orbit, "a", method=METHOD)
-    assert point.status == "converged"
-    assert abs(point.value) < 1e-8
-    critical = np.exp(1j * np.pi * 2 * turn + 0.3j * period)
-    assert abs(point.angle - abs(np.angle(critical))) < 1e-8
-    np.testing.assert_allclose(point.transversality, period, rtol=1e-6)
-
-
-class Lure(eqx.Module):
-    a: jax.Array
-
-    def __call__(self, tau, y, speed):
-        x, u, f = y
-        return (u, f, -self.a * f - u - x + x * x)
-
-
-@pytest.mark.wide
-def test_period_doubling_of_the_lure_system():
-    """x''' + a x'' + x' + x = x^2, by DOP853, and by MatCont and BifurcationKit off their meshes."""
-    system = jc.ForcedSystem(Lure(**numbers(a=0.65)), dimension=3)
-    guess = (-0.373, 0.0, 0.577)  # a maximum of x'' by simulation, at a period of 6.360
-    orbit = jc.periodic_orbit(system, 2 * np.pi / 6.36, guess=guess, period="free", method=METHOD)
-    assert bool(orbit.stable)
-    point = jc.bifurcation(system, "period-doubling", orbit, "a", period="free", method=METHOD)
-    assert point.status == "converged"
-    assert all(agrees(point.value, theirs) for theirs in LURE)
-    # The divergence is -a everywhere.
-    assert abs(jnp.prod(point.multipliers).real - jnp.exp(-point.value * 2 * jnp.pi / point.speed)) < 1e-8

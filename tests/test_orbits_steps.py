@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 import reference
 from helpers import even
+from laws import double_well
+from literature import DUFFING_DOUBLINGS
 from reference import bifurcation as shooting
 
 import jaxcage as jc
 from jaxcage.integrate import FixedSteps, strobe_map
 from jaxcage.io import load_model, write_template
 from jaxcage.orbits import Point, SynchronousOrbits, edge_speed, sensitivity
-from jaxcage.validation import DUFFING_DOUBLINGS
 
 
 RPM = np.pi / 30
@@ -46,18 +47,6 @@ class Stop(eqx.Module):
 def stop(f=0.3):
     numbers = {"f": f, "width": 2e-3, "k": 1.0, "d": 0.1}
     return jc.ForcedOscillator(Stop(**{n: jnp.asarray(x) for n, x in numbers.items()}), coordinates=1)
-
-
-class Duffing(eqx.Module):
-    g: jax.Array
-
-    def __call__(self, tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-0.3 * u + x - x**3 + self.g * jnp.cos(tau),)
-
-
-def duffing(g=0.26):
-    return jc.ForcedOscillator(Duffing(jnp.asarray(g)), coordinates=1)
 
 
 def image(model, orbit, steps):
@@ -125,14 +114,6 @@ def test_steps_that_are_asked_for_are_kept():
 
 
 @pytest.mark.wide
-def test_an_orbit_is_found_again_by_its_own_method():
-    orbit = jc.periodic_orbit(stop(), 0.6)
-    again = jc.periodic_orbit(stop(), 0.6, guess=orbit, method=orbit.method)
-    assert again.converged and again.steps == orbit.steps
-    np.testing.assert_allclose(again.state, orbit.state, rtol=1e-9)
-
-
-@pytest.mark.wide
 def test_choice_is_made_inside_jit_and_in_each_lane():
     free, touching = 2.5, 1.1
     plain = [jc.periodic_orbit(stop(), w) for w in (free, touching)]
@@ -150,8 +131,8 @@ def test_choice_is_made_inside_jit_and_in_each_lane():
 @pytest.mark.wide
 def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to_it():
     inside, exact = DUFFING_DOUBLINGS[1]
-    orbit = jc.periodic_orbit(duffing(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
-    find = lambda speed, **k: jc.bifurcation(duffing(inside), "period-doubling", orbit, "g", speed=speed, **k)
+    orbit = jc.periodic_orbit(double_well(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
+    find = lambda speed, **k: jc.bifurcation(double_well(inside), "period-doubling", orbit, "g", speed=speed, **k)
     point = find(1.2)
     assert point.status == "converged"
     assert 0 < point.error < 1e-7 * point.value
@@ -163,9 +144,9 @@ def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to
 
 def test_bifurcation_that_half_the_steps_move_is_not_converged():
     inside, _ = DUFFING_DOUBLINGS[1]
-    orbit = jc.periodic_orbit(duffing(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
+    orbit = jc.periodic_orbit(double_well(inside), 1.2, guess=(1.0, 0.0), revolutions=200)
     coarse = jc.method("rk4", steps=24)
-    find = lambda w: jc.bifurcation(duffing(inside), "period-doubling", orbit, "g", speed=w, method=coarse)
+    find = lambda w: jc.bifurcation(double_well(inside), "period-doubling", orbit, "g", speed=w, method=coarse)
     point = find(1.2)
     assert point.status == "not converged" and not point.converged
     assert np.isnan(point.value) and point.error > 2e-4 * inside

@@ -272,13 +272,15 @@ def test_no_file_holds_a_force_of_ones_own(tmp_path: Path):
 
 @pytest.mark.wide
 def test_a_study_of_a_force_of_ones_own_knows_its_law_and_numbers(tmp_path: Path):
-    """Another number or another text of the law is another study; nothing pretends to be a configuration."""
-    brief = {"discard": 1, "revolutions": 2, "blocks": 1, "method": METHOD, "starts": 1}
+    """Another number or version of the law is another study; nothing pretends to be a configuration."""
+    brief = {"discard": 1, "revolutions": 2, "blocks": 1, "method": METHOD, "starts": 1, "name": "drag", "version": "1"}
     run = lambda model: jc.study(model, {"speed": np.array([SPEED])}, store=tmp_path / "own", **brief)
     assert "configuration" not in run(OWN).attrs
     name = "extra.ViscousDrag.coefficient"
     with pytest.raises(ValueError, match="holds another study, which differs in extra.ViscousDrag"):
         run(jc.replace(OWN, **{name: 2.0}))
+    with pytest.raises(ValueError, match="which differs in version"):
+        jc.study(OWN, {"speed": np.array([SPEED])}, store=tmp_path / "own", **brief | {"version": "2"})
     varied = {"speed": np.array([SPEED]), name: np.array([1.0, 2.0])}
     found = jc.study(OWN, varied, store=tmp_path / "varied", **brief)
     assert found[name].attrs["units"] == "N s/m" and np.ptp(found["peak"].values) > 0

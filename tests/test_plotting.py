@@ -5,7 +5,6 @@ import subprocess
 import sys
 
 import jax.numpy as jnp
-import matplotlib.colors as colours
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -31,7 +30,6 @@ from jaxcage.plotting import (
     strobe_section,
     sweep_figure,
     time_history,
-    waterfall_map,
     zoomed_diagram,
 )
 
@@ -239,22 +237,6 @@ def test_load_bars():
     loaded = [bar.get_x() + bar.get_width() / 2 for bar in bars if bar.get_height() > 0]
     assert max(loaded) == pytest.approx(-min(loaded))
     assert max(loaded) < np.degrees(float(shared.half_angle))
-
-
-def test_waterfall():
-    rpm, orders = np.linspace(8000, 9000, 5), np.linspace(0, 3, 13)
-    amplitude = np.full((5, 13), 1e-9)
-    amplitude[:, 4] = 1e-4
-    amplitude[2] = np.nan
-    ax = waterfall_map(rpm, orders, amplitude)
-    (mesh,) = ax.collections
-    values = np.ma.masked_invalid(np.ma.asarray(mesh.get_array()).reshape(13, 5))
-    np.testing.assert_allclose(values[4].compressed(), 100.0)  # micrometres
-    assert np.all(np.ma.getmaskarray(values)[:, 2])
-    norm = mesh.norm
-    assert isinstance(norm, colours.LogNorm)
-    assert (norm.vmin, norm.vmax) == pytest.approx((1e-2, 100.0))
-    assert ax.get_ylabel() == "Frequency over cage rotation $f/f_c$"
 
 
 def test_axes_that_are_given_are_used():

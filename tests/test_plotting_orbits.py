@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from test_io_dataset import sweep_of
 
-from jaxcage.orbits import Branch, CodimensionTwo, Curve, Point, Sensitivity
+from jaxcage.orbits import Branch, Curve, Point, Sensitivity
 from jaxcage.plotting import (
     BLUE,
     GREY,
@@ -296,19 +296,17 @@ def test_values_of_many_bars_do_not_overlap():
     )
 
 
-def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, special=(), x: str = "speed", y: str = "guidance_gap"):
+def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, x: str = "speed", y: str = "guidance_gap"):
     mu = np.full((rpm.size, 4), 0.5 + 0j)
-    points = tuple(CodimensionTwo(k, r * PER_RPM, g, mu[0]) for k, r, g in special)
     genuine = np.ones(rpm.size, bool)
-    return Curve(kind, x, y, rpm * PER_RPM, gap, 0 * mu.real, mu, genuine, points, ("range", "range"), kind)
+    return Curve(kind, x, y, rpm * PER_RPM, gap, 0 * mu.real, mu, genuine, ("range", "range"), kind)
 
 
 def two_curves() -> list[Curve]:
     """A period-doubling and a torus curve that meet at 10000 rpm and 0.5 mm."""
     gap = np.linspace(4e-4, 6e-4, 21)
-    meet = ("1:2 resonance", 10000.0, 5e-4)
-    doubling = curve_of("period-doubling", 10000 + (gap - 5e-4) * 5e6, gap, [meet, ("cusp", 9750.0, 4.5e-4)])
-    torus = curve_of("Neimark-Sacker", 10000 + np.linspace(0, 900, 10), 5e-4 - np.linspace(0, 0.8e-4, 10), [meet])
+    doubling = curve_of("period-doubling", 10000 + (gap - 5e-4) * 5e6, gap)
+    torus = curve_of("Neimark-Sacker", 10000 + np.linspace(0, 900, 10), 5e-4 - np.linspace(0, 0.8e-4, 10))
     return [doubling, torus]
 
 
@@ -337,20 +335,6 @@ def test_neutral_saddles_are_dotted_and_named_once():
     assert next(line for line in ax.get_lines() if line.get_label() == "neutral saddles").get_linestyle() == ":"
     names = [text.get_text() for text in ax.get_legend().get_texts()]
     assert sorted(names) == ["Neimark-Sacker", "neutral saddles", "period-doubling"]
-
-
-def test_points_of_codimension_two_are_named_once_where_nothing_is_hidden():
-    ax = stability_map(two_curves(), y_unit="mm", y_factor=1e3)
-    np.testing.assert_allclose(data(ax, "_codimension two"), [[10000, 0.5], [9750, 0.45]])
-    assert [text.get_text() for text in ax.texts] == ["1:2 resonance", "cusp"]
-    boxes = extents(ax)
-    assert overlaps(boxes) == 0
-    for kind in ("period-doubling", "Neimark-Sacker"):
-        points = finite(data(ax, kind))
-        fine = np.stack(
-            [np.interp(np.linspace(0, 1, 999), np.linspace(0, 1, len(points)), c) for c in points.T], axis=1
-        )
-        assert all(box.count_contains(ax.transData.transform(fine)) == 0 for box in boxes)
 
 
 def test_exponents_beneath_the_curves_are_white_at_zero():

@@ -8,8 +8,7 @@ import re
 import jax
 import numpy as np
 import pytest
-
-from jaxcage.validation import DUFFING_DOUBLINGS, EXPONENTS
+from literature import DUFFING_DOUBLINGS, EXPONENTS
 
 
 ROOT = pathlib.Path(__file__).parent.parent

@@ -33,7 +33,6 @@ def few(monkeypatch: pytest.MonkeyPatch) -> _recent.Recent:
     """A process that keeps four programs."""
     kept = Recent(4)
     monkeypatch.setattr(_recent, "programs", kept)
-    monkeypatch.setattr("jaxcage.integrate._traced.programs", kept)
     return kept
 
 
@@ -134,7 +133,7 @@ def test_memory_stays_as_it_is_over_laws_of_ones_own(few: _recent.Recent):
 @pytest.mark.wide
 def test_runs_of_one_size_of_chunks_share_their_programs(monkeypatch: pytest.MonkeyPatch):
     """Some lanes again, in chunks with room for all of them: nothing is compiled anew, and they do the same."""
-    monkeypatch.setattr("jaxcage.integrate._traced.programs", programs := Recent(16))
+    monkeypatch.setattr(_recent, "programs", programs := Recent(16))
     hardening = jc.ForcedOscillator(
         lambda tau, q, v, speed: (-0.1 * v[0] - q[0] - q[0] ** 3 + 0.3 * jnp.cos(tau),), coordinates=1
     )

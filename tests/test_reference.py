@@ -13,6 +13,7 @@ from reference._land import pressurised_half
 from scipy.integrate import quad
 
 import jaxcage as jc
+from jaxcage.analysis import start_tangents
 from jaxcage.forces import pulse_spectrum
 
 
@@ -183,6 +184,19 @@ def test_growth_is_that_of_neighbouring_trajectories():
     assert found == pytest.approx(expected, abs=1e-5)
 
 
+@pytest.mark.wide
+@pytest.mark.parametrize("rpm", [10250.0, 24500.0])
+def test_growth_in_chaos(rpm):
+    """Revolution by revolution, from a state of the attractor: nothing depends on how long one looks."""
+    model, speed = jc.case("1a"), jc.rpm(rpm)
+    settled = jc.sweep(model, speed, discard=150, revolutions=100, horizon=0)
+    at = settled.last[0, list(settled.label[0]).index("chaotic")]
+    brief = dict(discard=0, revolutions=6, blocks=6, confirm=False, horizon=0)
+    ours = jc.sweep(model, speed, starts=at[None, None], method=jc.method("rk4", steps=8192), **brief)
+    theirs = reference.growth(reference.field(model, speed), at, 6, direction=start_tangents(4, 1)[0])
+    np.testing.assert_allclose(ours.block_growth[0, 0, :, 0], theirs, rtol=0, atol=1e-4)
+
+
 def test_random_models_are_legal_and_the_same_again():
     for wide in (False, True):
         for seed in range(8):
@@ -191,8 +205,3 @@ def test_random_models_are_legal_and_the_same_again():
             for name, value in jc.parameters(model).items():
                 assert info[name].lower <= float(value) <= info[name].upper, name
             assert reference.numbers_of(model) == reference.numbers_of(reference.random_model(seed, wide))
-
-
-def test_the_finite_film_is_not_of_the_reference():
-    with pytest.raises(ValueError, match="finite length"):
-        reference.field(jc.replace(jc.case("1a"), **{"film.model": "finite_length"}), 1000.0)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hostile import declared
+from helpers import declared
 from report_example import findings, orbits, swept
 
 import jaxcage as jc

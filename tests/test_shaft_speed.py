@@ -17,7 +17,7 @@ from jaxcage.cli._vary import read_vary
 from jaxcage.io import ConfigError, model_from, read_bearing, write_template
 from jaxcage.plotting import add_shaft_axes, new_figure
 from jaxcage.plotting._orbit_diagram import label_speed
-from jaxcage.report import Table, read_operating, with_shaft
+from jaxcage.report import Speeds, Table, read_operating, with_shaft
 
 
 RATIO = (1 - 16 / 81) / 2
@@ -85,11 +85,14 @@ def test_operating_ranges_and_studies_take_either():
 
 
 def test_a_table_shows_the_shaft_beside_the_cage():
-    table = Table("Zones", ("zone", "onset", "share"), [("1", "8000 ± 50", "5%"), ("2", "past range", "-")], ("onset",))
+    onset = Speeds("{:.0f} ± {:.0f}", 8000.2, 50.0)
+    table = Table("Zones", ("zone", "onset", "share"), [("1", onset, "5%"), ("2", "past range", "-")], ("onset",))
     both = with_shaft(table, 0.4)
     assert both.columns == ("zone", "onset", "onset, shaft", "share")
     assert both.rows == [("1", "8000 ± 50", "20000 ± 125", "5%"), ("2", "past range", "past range", "-")]
-    exact = with_shaft(Table("", ("speed [rpm]",), [("12355.50 ± 2e-05",)], ("speed [rpm]",)), 0.5)
+    exact = with_shaft(
+        Table("", ("speed [rpm]",), [(Speeds("{:.2f} ± {:.1g}", 12355.5, 2e-5),)], ("speed [rpm]",)), 0.5
+    )
     assert exact.columns[1] == "speed, shaft [rpm]" and exact.rows == [("12355.50 ± 2e-05", "24711.00 ± 4e-05")]
 
 

@@ -1,12 +1,10 @@
 """Spectra by orders against signals whose lines are known."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxcage.integrate as ji
-from jaxcage.analysis import OrderSpectrum, dominant_orders, order_spectrum, waterfall, whirl_spectrum
-from jaxcage.models import ForcedOscillator
+from jaxcage.analysis import OrderSpectrum, dominant_orders, order_spectrum, whirl_spectrum
 
 
 def trajectory(signals, revolutions=20, samples=64, extra=0, speed=500.0):
@@ -78,40 +76,6 @@ def test_whirl_spectrum_tells_forward_from_backward():
     assert max(spectrum.at(-0.5), spectrum.at(1)) < 1e-15
     first, second = dominant_orders(spectrum)
     assert first.order == pytest.approx(0.5) and second.order == pytest.approx(-1)
-
-
-def resonator(tau, q, v, speed):
-    """Unit mass on a spring of 100 N/m, damped, driven by 3 N at order 1 and 1 N at order 2."""
-    del speed
-    return (-100 * q[0] - 4 * v[0] + 3 * jnp.sin(tau) + jnp.cos(2 * tau),)
-
-
-def test_waterfall_of_a_resonator_is_its_frequency_response():
-    speeds = np.array([3.0, 5.0, 12.0])
-    result = waterfall(ForcedOscillator(resonator, coordinates=1), speeds, revolutions=16, discard=40)
-    assert result.amplitude.shape == (3, 8 * 16 + 1)
-    np.testing.assert_allclose(result.rpm, speeds * 30 / np.pi)
-    for i, speed in enumerate(speeds):
-        for order, force in ((1, 3.0), (2, 1.0)):
-            w = order * speed
-            expected = force / np.hypot(100 - w**2, 4 * w)
-            assert result.spectrum(i).at(order) == pytest.approx(expected, rel=1e-6)
-    assert result.outcome == ("successful",) * 3
-    assert "1.000x" in str(result)
-
-
-def runaway(tau, q, v, speed):
-    """Falls off to infinity above 4 rad/s."""
-    del tau, v
-    return (jnp.where(speed > 4, 1e3 * q[0] ** 3, -q[0]),)
-
-
-@pytest.mark.wide
-def test_waterfall_leaves_failed_speeds_nan():
-    result = waterfall(ForcedOscillator(runaway, coordinates=1), np.array([3.0, 5.0]), revolutions=4, discard=4)
-    assert result.outcome[0] == "successful" != result.outcome[1]
-    assert np.all(np.isfinite(result.amplitude[0])) and np.all(np.isnan(result.amplitude[1]))
-    assert result.outcome[1] in str(result) and "1 failed" in str(result)
 
 
 def test_bad_arguments_are_named():

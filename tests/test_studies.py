@@ -41,7 +41,7 @@ class Duffing(eqx.Module):
 OSCILLATOR = jc.ForcedOscillator(Duffing(jnp.array(0.1), jnp.array(1.0)), coordinates=1)
 SPEEDS, CUBICS = np.linspace(1.1, 1.9, 9), np.array([0.5, 1.0, 1.5, -4.0])
 LENGTH: dict[str, Any] = {"discard": 40, "revolutions": 40, "blocks": 4, "method": jc.method("rodas4", steps=32)}
-OPTIONS: dict[str, Any] = {**LENGTH, "starts": 2, "lanes": 12}
+OPTIONS: dict[str, Any] = {**LENGTH, "starts": 2, "lanes": 12, "name": "duffing", "version": "1"}
 VARY: dict[str, Any] = {"cubic": CUBICS, "speed": SPEEDS, "damping": jc.studies.Tolerance(0.1, 0.02)}
 
 
@@ -129,7 +129,7 @@ def test_shards_fill_one_store(whole: Path, tmp_path: Path):
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize("written", [0, 1, 3, 7])
+@pytest.mark.parametrize("written", [0, 1, 3, 6])
 def test_a_chunk_half_written_is_written_again(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
 ):
@@ -141,7 +141,7 @@ def test_a_chunk_half_written_is_written_again(
         if left[0] >= 0:
             return put(self, chunk, results)
         for name in sorted(results, key=lambda name: name == "outcome")[:written]:
-            self._arrays[name][self.study.plan.region(chunk)] = results[name]
+            self._chunks.arrays[name][self.study.plan.region(chunk)] = results[name]
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Store, "write", write)
@@ -220,7 +220,7 @@ def test_a_cluster_without_workers_is_not_waited_for(monkeypatch: pytest.MonkeyP
         ({"revolutions": 20}, "differs in revolutions: choose"),
         ({"seed": 4}, "differs in cloud.damping, seed: choose"),
         ({"starts": 1}, "differs in starts: choose"),
-        ({"method": jc.method("rodas4", steps=48)}, "differs in method: choose"),
+        ({"method": jc.method("rodas4", steps=48)}, "differs in method, method_numbers.steps: choose"),
     ],
 )
 def test_another_study_is_not_mixed_in(whole: Path, change: dict, words: str):
@@ -352,7 +352,7 @@ def test_designs_of_a_cage_by_name():
 def test_a_store_is_made_once_by_whoever_comes_first(tmp_path: Path):
     """Two shards that begin together: the second finds the store in place, and nothing is left beside it."""
     plan = Plan({"speed": SPEEDS}, {}, 0, 0, 2, 12)
-    study = Study(OSCILLATOR, plan, LENGTH["method"], 40, 40, 4, 1, 0)
+    study = Study(OSCILLATOR, plan, LENGTH["method"], 40, 40, 4, 1, 0, "duffing", "1")
     first, second = (Store(tmp_path / "study.zarr", study) for _ in range(2))
     assert first.pending() == second.pending() == list(range(plan.chunks))
     assert [p.name for p in tmp_path.iterdir()] == ["study.zarr"]

@@ -6,10 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import raw_sweep
+from literature import DUFFING_FOLDS
 
 import jaxcage as jc
 from jaxcage.models import FirstOrderField
-from jaxcage.validation import DUFFING_FOLDS
 
 
 def duffing(tau, q, v, speed):
@@ -176,7 +176,7 @@ def test_simulation_and_sweep_agree():
         ({"speeds": np.array([1.0, np.nan])}, "positive and finite"),
         ({"speeds": np.array([2.0, 1.0])}, "ascending"),
         ({"discard": -1}, "`discard` must be at least 0, but -1"),
-        ({"revolutions": 0}, "at least 0 and 1"),
+        ({"revolutions": 0}, "`revolutions` must be at least 1"),
         ({"exponents": 3}, "at most 2"),
         ({"blocks": 7}, "divide"),
         ({"starts": []}, "states of 2 numbers"),

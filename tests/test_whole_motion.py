@@ -401,6 +401,5 @@ def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
     assert "--solver" in capsys.readouterr().err
     assert main(["simulate", "nu2310", "--speed", "200000"]) == 2
     assert "at most 300 m/s at its land" in capsys.readouterr().err
-    for option in (["--load", "300 N"], ["--animate"]):
-        assert main(["simulate", "1a", "--speed", "8500", *option]) == 2
-        assert f"Option {option[0]} goes with a whole bearing" in capsys.readouterr().err
+    assert main(["simulate", "1a", "--speed", "8500", "--load", "300 N"]) == 2
+    assert "Option --load goes with a whole bearing" in capsys.readouterr().err

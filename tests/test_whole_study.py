@@ -53,7 +53,7 @@ def test_every_lane_is_in_its_place(told_apart: list[int], order: tuple[str, ...
     for most in (4, 3, 100):
         store = tmp_path / f"{most}"
         found = jc.study(BEARING, {name: values[name] for name in order}, store=store, lanes=most, **LENGTH)
-        assert found["cage_slip"].dims == (*order, "start") and check_study(store).whole
+        assert found["cage_slip"].dims == (*order, "start") and not check_study(store).damaged
         expected = (
             found["load"]
             + float(BEARING.cage_mass)

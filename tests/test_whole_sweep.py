@@ -295,12 +295,8 @@ def test_the_bearing_is_drawn_to_scale(swept, run):
 
 
 def test_what_cannot_be_swept():
-    for changed, said in (
-        ({"ring.ring_motion": "quasi_static"}, "dynamic"),
-        ({"film.model": "finite_length"}, "short"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            jc.sweep_bearing(bearing(**changed), SPEED)
+    with pytest.raises(ValueError, match="dynamic"):
+        jc.sweep_bearing(bearing(**{"ring.ring_motion": "quasi_static"}), SPEED)
     model = bearing()
     for options in ({"starts": 4}, {"blocks": 3}, {"exponents": 2}, {"discard": -1}):
         with pytest.raises(ValueError, match=next(iter(options))):

@@ -10,8 +10,7 @@
 | `_escapes`      | when lanes left chaos for good                                                       |
 | `_transients`   | an attractor or a chaotic transient: mean life with its error, coexisting ends       |
 | `_hazard`       | the rate of escapes as it depends on speed and design                                |
-| `_crisis`       | where a crisis ends an attractor: the mean life extrapolated to its divergence       |
-| `_spectra`      | amplitude spectra by order of speed, waterfall                                       |
+| `_spectra`      | amplitude spectra by order of speed                                                  |
 | `_equilibrium`  | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
 | `_bearing_history` | forces and slips of every roller of it, around its circumference; its spectra     |
 | `_bearing_measures` | slips, forces, losses, state of the whole bearing                                |
@@ -48,7 +47,6 @@ from ._bearing_sweep import (
     summed_up as summed_up,
 )
 from ._bearing_zones import BearingZone as BearingZone, bearing_zones as bearing_zones
-from ._crisis import Crisis as Crisis, crisis as crisis
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,
@@ -106,11 +104,9 @@ from ._observe import (
 from ._spectra import (
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,
-    Waterfall as Waterfall,
     dominant_orders as dominant_orders,
     order_spectrum as order_spectrum,
     spectrum_of as spectrum_of,
-    waterfall as waterfall,
     whirl_spectrum as whirl_spectrum,
 )
 from ._sweep import LIFE_BLOCK as LIFE_BLOCK, Confirmation as Confirmation, Sweep as Sweep
@@ -125,12 +121,10 @@ from ._transients import (
 )
 from ._zero_one import mean_square_displacement as mean_square_displacement, zero_one as zero_one
 from ._zones import (
-    CLOSE_BELOW_RPM as CLOSE_BELOW_RPM,
     Edge as Edge,
     MeanLife as MeanLife,
     Zone as Zone,
     Zones as Zones,
-    close_windows as close_windows,
     closing_width as closing_width,
     lives_in_words as lives_in_words,
     zones as zones,
@@ -140,5 +134,5 @@ from ._zones import (
 check_layer(
     globals(),
     "around bearing_history bearing_measures cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
-    "orbit_measures order_spectrum stability_chart survival waterfall zero_one zones",
+    "orbit_measures order_spectrum stability_chart survival zero_one zones",
 )

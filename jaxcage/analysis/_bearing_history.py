@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_above_zero
 from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import BearingRun
@@ -73,6 +74,7 @@ def _at_samples(model: BearingModel, speed: Scalar, states: BearingState) -> tup
 
 def bearing_history(model: BearingModel, run: BearingRun, speed: float) -> BearingHistory:
     """Forces, loads and slips of every roller at the samples of a run at the shaft speed `speed` [rad/s]."""
+    require_above_zero(speed=speed)
     clock = np.stack([run.angle, run.time], axis=1)
     states = BearingState(jnp.asarray(run.rollers), jnp.asarray(run.bodies), jnp.asarray(clock))
     found = tuple(map(np.asarray, _at_samples(model, jnp.asarray(float(speed)), states)))

@@ -28,8 +28,8 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._parameters import replace
 from .._types import Scalar
-from ..forces import AbstractForcing, ShortFilm, SynchronousImpact, film_scale, short_film_force
-from ..models import CageModel, SecondOrderField
+from ..forces import AbstractForcing, FilmModel, SynchronousImpact, film_scale, short_film_force
+from ..models import CageModel, SecondOrderField, require_speeds
 
 
 LARGEST_WHIRLING = 0.7560303864710124
@@ -87,7 +87,7 @@ class FilmCoefficients(NamedTuple):
     """-dF_i/dv_j in units of W/(c omega)."""
 
 
-def film_coefficients(eccentricity_ratio: Scalar, film: ShortFilm = "fixed_half") -> FilmCoefficients:
+def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half") -> FilmCoefficients:
     """Static equilibrium and dimensionless dynamic coefficients, by differentiating the film force.
 
     The half film and the film of positive pressure agree in all of them: at rest the pressurised
@@ -160,7 +160,7 @@ class StabilityChart:
 
 
 @eqx.filter_jit
-def _chart(eps: Float[Array, " points"], film: ShortFilm) -> tuple[FilmCoefficients, WhirlThreshold]:
+def _chart(eps: Float[Array, " points"], film: FilmModel) -> tuple[FilmCoefficients, WhirlThreshold]:
     coefficients = jax.vmap(lambda e: film_coefficients(e, film))(eps)
     return coefficients, jax.vmap(whirl_threshold)(coefficients.stiffness, coefficients.damping)
 
@@ -168,7 +168,7 @@ def _chart(eps: Float[Array, " points"], film: ShortFilm) -> tuple[FilmCoefficie
 def stability_chart(
     eccentricity_ratios: Float[np.ndarray, " points"] | None = None,
     *,
-    film: ShortFilm = "fixed_half",
+    film: FilmModel = "fixed_half",
 ) -> StabilityChart:
     """The chart of threshold speed against load number.
 
@@ -192,9 +192,8 @@ def film_whirl_speed(model: CageModel) -> Array:
     """Speed [rad/s] above which the cage would whirl, in its film under its weight alone.
 
     Support, contact, supply pressure, forcing and forces of one's own are left out: it is the oil-whirl
-    line to lay over a diagram of the full model, for a film of finite length that of its short film. On it
-    omega = threshold(eps) sqrt(g/c), with the load number of the weight at that speed: one equation
-    for eps. Differentiable with respect to every parameter.
+    line to lay over a diagram of the full model. On it omega = threshold(eps) sqrt(g/c), with the load number of the
+    weight at that speed: one equation for eps. Differentiable with respect to every parameter.
 
     **Returns:** the speed, infinite beyond 50 000 sqrt(g/c): a weak film that the weight squeezes.
 
@@ -210,7 +209,7 @@ def film_whirl_speed(model: CageModel) -> Array:
     wanted = model.cage_mass * model.gravity / (scale * unit)
 
     def at(u: Array) -> tuple[Array, Array]:
-        coefficients = film_coefficients(LARGEST_WHIRLING * jax.nn.sigmoid(u), film.arc)
+        coefficients = film_coefficients(LARGEST_WHIRLING * jax.nn.sigmoid(u), film.model)
         speed, _ = whirl_threshold(coefficients.stiffness, coefficients.damping)
         return coefficients.load_number, speed
 
@@ -318,5 +317,6 @@ def equilibrium(model: CageModel, speed: Scalar, *, start: Float[Array, " coordi
     that depends on the phase alone, an `AbstractForcing`, is left out like the unbalance).
     """
     require_x64()
+    require_speeds(model, speed)
     first = None if start is None else jnp.asarray(start) / model.clearance
     return _equilibrium(model, jnp.asarray(speed, dtype=float), first)

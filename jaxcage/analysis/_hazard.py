@@ -65,7 +65,7 @@ def hazard(
     guess[0] = np.log(np.sum(escaped) / np.sum(survived + escaped) / block)
     from scipy.optimize import minimize  # takes half a second to load
 
-    lanes = lambda beta: costs_of_lanes(design @ beta, survived, escaped, block)
+    lanes = lambda beta: _costs_of_lanes(design @ beta, survived, escaped, block)
     curvature = lambda beta: design.T @ (lanes(beta)[2][:, None] * design)
     best = minimize(
         lambda beta: np.sum(lanes(beta)[0]),
@@ -76,17 +76,11 @@ def hazard(
         tol=1e-8,
     ).x
     inverse, each = np.linalg.pinv(curvature(best)), lanes(best)[1][:, None] * design
-    fits = probability_of_fit(design @ best, survived, escaped, block, along=design[:, 1], fitted=2)
-    return Hazard(
-        best,
-        inverse @ (each.T @ each) @ inverse,
-        int(np.sum(escaped)),
-        late.size,
-        fits,
-    )
+    fits = _probability_of_fit(design @ best, survived, escaped, block, along=design[:, 1])
+    return Hazard(best, inverse @ (each.T @ each) @ inverse, int(np.sum(escaped)), late.size, fits)
 
 
-def costs_of_lanes(
+def _costs_of_lanes(
     log_rate: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minus the logarithm of what each lane did, so many blocks survived and then an escape or the end, with its first
@@ -98,17 +92,11 @@ def costs_of_lanes(
     return cost, rate * survived - escaped * left, rate * survived + escaped * left * (left + rate - 1)
 
 
-def probability_of_fit(
-    log_rate: np.ndarray,
-    survived: np.ndarray,
-    escaped: np.ndarray,
-    block: float | int,
-    *,
-    along: np.ndarray,
-    fitted: int,
+def _probability_of_fit(
+    log_rate: np.ndarray, survived: np.ndarray, escaped: np.ndarray, block: float | int, along: np.ndarray
 ) -> float:
     """That escapes seen are at least as unlike those expected, in parts of the lanes along some number, with about as
-    many escapes expected in each, after so many numbers were fitted."""
+    many escapes expected in each."""
     expected = -np.expm1(-block * np.exp(log_rate)) * (survived + escaped)
     order = np.argsort(along)
     part = np.minimum((np.cumsum(expected[order]) / np.sum(expected) * BINS).astype(int), BINS - 1)
@@ -116,4 +104,4 @@ def probability_of_fit(
     misfit = np.sum((of(escaped.astype(float)) - of(expected)) ** 2 / np.maximum(of(expected), 1e-9))
     from scipy.stats import chi2  # takes half a second to load
 
-    return float(chi2.sf(misfit, max(BINS - fitted, 1)))
+    return float(chi2.sf(misfit, BINS - 2))

@@ -4,17 +4,13 @@ A trajectory is sampled evenly in phase, so its spectrum is over orders even whe
 """
 
 import dataclasses
-import math
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from .._errors import ArgumentError
-from .._notebook import notebook_html
-from .._types import State
-from ..integrate import AbstractMethod, Trajectory, simulate
-from ..models import AbstractForcedSystem
+from ..integrate import Trajectory
 
 
 Window = Literal["hann", "flattop", "boxcar"]
@@ -159,87 +155,3 @@ def dominant_orders(spectrum: OrderSpectrum, count: int = 5, *, floor: float | i
         place = order[k] + sign * shift * spectrum.resolution
         lines.append(Peak(float(place), float(a[k] * factor)))
     return tuple(sorted(lines, key=lambda line: -line.amplitude)[:count])
-
-
-@dataclasses.dataclass(frozen=True)
-class Waterfall:
-    """Spectra over speed. A speed at which the simulation failed is NaN."""
-
-    speed: Float[np.ndarray, " speeds"]
-    """Speed [rad/s]."""
-    order: Float[np.ndarray, " orders"]
-    """Order, a multiple of the cage speed."""
-    amplitude: Float[np.ndarray, "speeds orders"]
-    """Amplitude in the unit of the component."""
-    outcome: tuple[str, ...]
-    """How each simulation ended: `successful`, or why not."""
-    window: Window
-
-    @property
-    def rpm(self) -> Float[np.ndarray, " speeds"]:
-        """Speed in revolutions per minute."""
-        return self.speed * 30 / np.pi
-
-    def spectrum(self, i: int) -> OrderSpectrum:
-        """The spectrum at the `i`-th speed."""
-        return OrderSpectrum(self.order, self.amplitude[i], self.window)
-
-    def __str__(self) -> str:
-        failed = sum(outcome != "successful" for outcome in self.outcome)
-        lines = [
-            f"Waterfall of {len(self.speed)} speeds, {self.rpm.min():.0f} to "
-            f"{self.rpm.max():.0f} rpm, orders to {self.order[-1]:g}, {failed} failed"
-        ]
-        for i, rpm in enumerate(self.rpm):
-            peaks = dominant_orders(self.spectrum(i), 3) if self.outcome[i] == "successful" else ()
-            text = "  ".join(f"{p.order:7.3f}x {p.amplitude:9.3e}" for p in peaks)
-            lines.append(f"  {rpm:8.0f} rpm  {text or self.outcome[i]}")
-        return "\n".join(lines)
-
-    _repr_html_ = notebook_html
-
-
-def waterfall(
-    system: AbstractForcedSystem,
-    speeds: Float[np.ndarray, " speeds"],
-    *,
-    component: int = 0,
-    revolutions: int = 64,
-    discard: int = 100,
-    samples: int = 64,
-    highest_order: float | int = 8,
-    window: Window = "hann",
-    start: State | None = None,
-    method: AbstractMethod | None = None,
-) -> Waterfall:
-    """Spectra of one component at each of `speeds`, one simulation each.
-
-    **Arguments:**
-
-    - `system`: what to simulate.
-    - `speeds`: cage speeds [rad/s].
-    - `component`: index into the state.
-    - `revolutions`: in the spectrum; one over it is the resolution in orders.
-    - `discard`: revolutions before it.
-    - `samples`: per revolution; lines beyond half of it fold back.
-    - `highest_order`: orders kept.
-    - `window`: as in `order_spectrum`.
-    - `start`, `method`: as in `simulate`.
-    """
-    size = math.floor(min(highest_order, samples / 2) * revolutions + 1e-9) + 1
-    rows, outcomes = [], []
-    for speed in np.asarray(speeds, dtype=float):
-        run = simulate(
-            system,
-            float(speed),
-            revolutions=revolutions,
-            samples=samples,
-            discard=discard,
-            start=start,
-            method=method,
-        )
-        outcomes.append(run.outcome)
-        fine = run.outcome == "successful"
-        rows.append(order_spectrum(run, component, window=window).amplitude[:size] if fine else np.full(size, np.nan))
-    order = np.arange(size) / revolutions
-    return Waterfall(np.asarray(speeds, dtype=float), order, np.stack(rows), tuple(outcomes), window)

@@ -17,6 +17,7 @@ have died out.
 import numpy as np
 from jaxtyping import Float
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 
 
@@ -86,11 +87,11 @@ def zero_one(
 
     **Raises:** `ValueError` for a series or a number of frequencies that is too short.
     """
+    require_at_least(0, seed=seed)
     n = np.atleast_1d(series).shape[-1]
     if n < SHORTEST:
         raise ArgumentError("series", said=f"must have at least {SHORTEST} values, but it has {n}.")
-    if frequencies < 1:
-        raise ArgumentError("frequencies", said=f"must be at least 1, but {frequencies} was given.")
+    require_at_least(1, frequencies=frequencies)
     finite = np.all(np.isfinite(series), axis=-1)
     safe = np.where(finite[..., None], series, 0.0)
     size = np.max(np.abs(safe), axis=-1) if scale is None else np.full(finite.shape, float(scale))

@@ -38,7 +38,7 @@ class Edge:
     kind: str
     """`chaotic`, `transient` or `synchronous-loss`."""
     mechanism: str = "unknown"
-    """`period-doubling`, `Neimark-Sacker`, `fold`, `crisis` or `unknown`."""
+    """`period-doubling`, `Neimark-Sacker`, `fold` or `unknown`."""
     basis: str = "statistical"
     """`statistical`: seen in a sweep; `located`: a bifurcation, solved for; `cascade`: the limit of a period-doubling
     cascade, extrapolated from its first points."""

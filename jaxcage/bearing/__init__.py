@@ -21,10 +21,8 @@ from ._cage_mass import (
     clipped_pocket_area as clipped_pocket_area,
 )
 from ._cases import (
-    FIGURE_AXES as FIGURE_AXES,
     PUBLISHED_CASES as PUBLISHED_CASES,
     PUBLISHED_SPEED_RANGE_RPM as PUBLISHED_SPEED_RANGE_RPM,
-    FigureAxis as FigureAxis,
     PublishedCase as PublishedCase,
     published_case as published_case,
 )

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._arguments import require_above_zero
 from .._checks import require_x64
 from .._parameters import parameter
 from .._types import Scalar
@@ -48,6 +49,9 @@ def clipped_pocket_area(
 
     **Returns:** area [m^2].
     """
+    require_above_zero(
+        pocket_radius=pocket_radius, pitch_radius=pitch_radius, inner_radius=inner_radius, outer_radius=outer_radius
+    )
     whole = _overlap(outer_radius, pocket_radius, pitch_radius)
     return whole - _overlap(inner_radius, pocket_radius, pitch_radius)
 
@@ -64,6 +68,7 @@ def cage_mass(bearing: Bearing, guidance_gap: Scalar, cage: CageGeometry | None 
     **Returns:** mass [kg].
     """
     require_x64()
+    require_above_zero(guidance_gap=guidance_gap)
     cage = CageGeometry() if cage is None else cage
     inner, outer = cage.inner_diameter / 2, guiding_radius(bearing.rib_diameter, guidance_gap)
     pocket = (bearing.roller_diameter + bearing.pocket_clearance) / 2

@@ -1,4 +1,4 @@
-"""What the paper publishes: cases (Table 2), their zones (section 4), axis limits of its figures.
+"""What the paper publishes: cases (Table 2) and their zones (section 4).
 
 Source: L. Chen, X. Xia, H. Zheng, M. Qiu, "Chaotic Dynamics of Cage Behavior in a High-Speed
 Cylindrical Roller Bearing", Shock and Vibration 2016, article 9120505,
@@ -63,35 +63,3 @@ def published_case(name: str) -> PublishedCase:
     if name not in PUBLISHED_CASES:
         raise ArgumentError("name", said=f"must be one of {', '.join(PUBLISHED_CASES)}, but {name!r} was given.")
     return PUBLISHED_CASES[name]
-
-
-@dataclasses.dataclass(frozen=True)
-class FigureAxis:
-    """Limits of one axis of a published figure: the motion stays within, they are not its peaks."""
-
-    figure: str
-    quantity: str
-    unit: str
-    lower: float
-    upper: float
-
-
-FIGURE_AXES: tuple[FigureAxis, ...] = (
-    FigureAxis("5", "time", "s", 0.0, 6e-4),
-    FigureAxis("5", "cage-roller contact force", "N", -40.0, 120.0),
-    FigureAxis("7", "speed", "rpm", *PUBLISHED_SPEED_RANGE_RPM),
-    FigureAxis("7", "vertical displacement", "mm", -0.3, 0.3),
-    FigureAxis("8a", "speed", "rpm", 7000.0, 22000.0),
-    FigureAxis("8a", "vertical displacement", "mm", -0.08, 0.02),
-    FigureAxis("8b", "speed", "rpm", 7500.0, 14000.0),
-    FigureAxis("8b", "vertical displacement", "mm", -0.03, 0.06),
-    FigureAxis("8c", "speed", "rpm", 7500.0, 14000.0),
-    FigureAxis("8c", "vertical displacement", "mm", -0.04, 0.05),
-    FigureAxis("9", "vertical displacement", "mm", -0.3, 0.2),
-    FigureAxis("9", "vertical velocity", "mm/s", -400.0, 400.0),
-    FigureAxis("9c", "vertical displacement", "mm", -0.2, 0.1),
-    FigureAxis("9c", "vertical velocity", "mm/s", -300.0, 300.0),
-)
-"""The caption of fig. 7 says X_C where its axis says vertical. Fig. 9 is at 8500 rpm, revolutions 4
-to 4000, with the transients of the paper's start; the axes of panel c (smaller eccentricity) are
-narrower than those of the others. Panel a lies outside zone 1 of case 1a."""

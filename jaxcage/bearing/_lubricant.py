@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._arguments import require_above_zero
 from .._errors import ArgumentError
 from .._parameters import ROUNDING, parameter
 from .._types import Scalar
@@ -45,6 +46,8 @@ def walther_viscosity(
 
     **Returns:** kinematic viscosity [m^2/s].
     """
+    require_above_zero(temperature=temperature, temperature_1=temperature_1, temperature_2=temperature_2)
+    require_above_zero(viscosity_1=viscosity_1, viscosity_2=viscosity_2)
     nu_0 = jnp.asarray(reference, dtype=float)
     w1 = jnp.log(jnp.log(viscosity_1 / nu_0 + WALTHER_CONSTANT))
     w2 = jnp.log(jnp.log(viscosity_2 / nu_0 + WALTHER_CONSTANT))
@@ -121,6 +124,7 @@ def vg(grade: Scalar, temperature: Scalar = CELSIUS_40) -> Lubricant:
 
     **Arguments:** grade [mm^2/s at 40 C], operating temperature [K].
     """
+    require_above_zero(temperature=temperature)
     known = require_positive("grade", grade)
     given: Any = np.asarray(known) if is_concrete(known) else known  # no programs for what NumPy can do
     return Lubricant(

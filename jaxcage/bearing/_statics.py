@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from .._arguments import require_above_zero, require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._types import Scalar
@@ -47,6 +48,7 @@ class LoadDistribution(eqx.Module):
 
 def roller_angles(n_rollers: int, first_angle: Scalar = -jnp.pi / 2) -> Float[Array, " rollers"]:
     """Angles of equally spaced rollers from +x, counter-clockwise, the first at `first_angle` [rad]."""
+    require_at_least(1, n_rollers=n_rollers)
     return jnp.asarray(first_angle) + 2 * jnp.pi / n_rollers * jnp.arange(n_rollers, dtype=float)
 
 
@@ -80,6 +82,7 @@ def static_cage_displacement(
     **Raises:** `ValueError` for another kind of guidance.
     """
     require_x64()
+    require_above_zero(guidance_gap=guidance_gap)
     shift = elastic_approach + radial_clearance / 2
     if guidance == "outer_rib":
         return jnp.asarray(guidance_gap / 2)

@@ -18,7 +18,7 @@
 | `_lasting`  | `gradient --lasting`                                                        |
 | `_map`, `_label_map` | `map`, `map --points`                                              |
 | `_design`   | `design`, `sensitivity`                                                     |
-| `_study`, `_page`, `_reproduce`, `_validate` | `study`, `report`, `reproduce`, `validate` |
+| `_study`, `_page`, `_reproduce` | `study`, `report`, `reproduce`                    |
 
 A command is its options, a function that computes with a `Job` and returns a `Report`, and a line in
 `_options.COMMANDS`. One that takes a whole bearing too has a function for that, and a line in `WHOLE_COMMANDS`. Tables

@@ -12,7 +12,6 @@ from .. import report
 from .._parameters import parameters
 from ..analysis import Sweep, zones
 from ..design import (
-    MEASURES,
     UNCONFIRMED,
     AbstractObjective,
     ChaosMeasure,
@@ -21,23 +20,20 @@ from ..design import (
     Optimised,
     Robust,
     Scatter,
-    TradeOff,
     chaotic_width,
     cost,
     global_sensitivity,
     judged,
     land_loads,
     negligible_load,
-    optimise,
     surrogate_search,
     tolerance_budget,
-    trade_off,
     unchanged,
 )
 from ..integrate import DEFAULT_ERROR, controlled
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
-from ..plotting import design_figure, elasticity_bars, trade_off_diagram
+from ..plotting import design_figure, elasticity_bars
 from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job
@@ -79,14 +75,13 @@ def design(job: Job[DesignOptions]) -> Report:
     vary = read_bounds(options.vary or _usual(job.model), job.model)
     balance = None if options.worse_balance else no_worse_balance(job.model, vary)
     scatter = read_scatter(options.scatter, list(vary))
-    width = chaotic_width(options.first, options.last, options.speeds, **job.given("cloud spread seed"))
+    width = chaotic_width(options.first, options.last, options.speeds)
     kept = kept_search(job)
     with job.computing(advice="the same command goes on where the search stopped") as say:
         seen = _searched(job, vary, _objective(job, width, vary, scatter), kept, say)
         say("finer look", 0, 1)
         found, itself = judged(seen, _objective(job, _finer(options), vary, scatter))
         searched = job.seconds
-        front = _front(job, width, vary, found, say) if options.front else None
         differ = [job.model] if found.best.objective >= itself else [job.model, found.best.model]
         say("fresh sweeps", 0, 1)
         swept = [_check(model, options) for model in differ]
@@ -101,8 +96,6 @@ def design(job: Job[DesignOptions]) -> Report:
             with concurrent.futures.ThreadPoolExecutor() as pool:  # a search keeps one core busy
                 loss = _twice(list(pool.map(search, differ)))
     job.figure(design_figure(found, checked["before"], checked["after"]))
-    if front is not None:
-        job.draw(lambda ax: trade_off_diagram(front, ax), (9.0, 6.0), f"{job.name}: trade-offs", "front", "_front")
     kept.unlink(missing_ok=True)
     chaotic = {name: zones(swept) for name, swept in checked.items()}
     document = {
@@ -120,13 +113,11 @@ def design(job: Job[DesignOptions]) -> Report:
         "chaotic_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in chaotic.items()},
         "synchronous_loss_zones": {name: [_ends(z) for z in z_.zones] for name, z_ in loss.items()},
         "search_seconds": round(searched, 1),
-        "trade_offs": None if front is None else report.trade_off_document(front),
     }
     tables = [
         report.parameters_table(job.name, job.model, found, document),
         report.optima_table(found),
         *report.before_and_after_tables(document),
-        *([] if front is None else [report.trade_off_table(job.name, front)]),
     ]
     return Report(document, tables, [*_notes(document, found), *([balance] if balance else [])])
 
@@ -145,13 +136,16 @@ def _searched(
 ) -> Optimised[CageModel]:
     """What the search that was asked for saw as its best."""
     options = job.options
-    shared: dict[str, Any] = job.given("starts scouts seed") | {"keep": kept}
     steps = vars(options)["steps"]
-    tell = lambda step, _: say("search", step, steps)
-    if options.search == "gradient":
-        return optimise(job.model, vary, objective, steps=steps, report=tell, **shared)
-    size = {"batches": steps, "batch": vars(options)["cloud"]}
-    return surrogate_search(job.model, vary, objective, report=tell, **size, **shared)
+    return surrogate_search(
+        job.model,
+        vary,
+        objective,
+        batches=steps,
+        keep=kept,
+        report=lambda step, _: say("search", step, steps),
+        **job.given("starts scouts batch seed"),
+    )
 
 
 def _finer(options: DesignOptions) -> ChaosMeasure:
@@ -159,7 +153,7 @@ def _finer(options: DesignOptions) -> ChaosMeasure:
     steps."""
     between = (options.last - options.first) / (8 * options.speeds)
     range_ = options.first + between, options.last - between, FINER * options.speeds
-    return chaotic_width(*range_, starts=STARTS, seed=options.seed, method=controlled(DEFAULT_ERROR / 4))
+    return chaotic_width(*range_, starts=STARTS, method=controlled(DEFAULT_ERROR / 4))
 
 
 def _objective(
@@ -173,22 +167,6 @@ def _objective(
     if scatter:
         objective = Robust(objective, scatter, **job.given("worst seed"))
     return objective + options.cost * cost() if options.cost else objective
-
-
-def _front(
-    job: Job[DesignOptions], width: ChaosMeasure, vary: dict[str, tuple[float, float]], found: Optimised, say: Say
-) -> TradeOff:
-    """Designs all over the bounds by what each term of the objective measures, with the design and its optimum."""
-    say("front", 0, 1)
-    terms = {"chaotic speeds [rpm]": width} | {
-        f"{what} [{unit}]": LandMeasure(width, what) for what, unit in MEASURES.items()
-    }
-    space = found.space
-    best = np.array([u.place(found.best.values[u.name]) for u in space.unknowns])
-    beside = np.stack([np.clip(space.place, 0.0, 1.0), best])
-    return trade_off(
-        job.model, vary, terms | {"cost": cost()}, designs=job.options.front, seed=job.options.seed, beside=beside
-    )
 
 
 def _loads(model: CageModel, swept: Sweep) -> dict[str, float]:
@@ -230,8 +208,8 @@ def _chaotic_rpm(found: Sweep) -> float:
 
 def _swept(found: Optimised, options: DesignOptions, draws: int) -> int:
     """Designs whose speeds were swept in the search."""
-    clouds = vars(options)["cloud"] * sum(len(o.history) for o in found.optima)
-    return (clouds + (options.scouts if options.starts > 1 else 0)) * draws
+    batches = vars(options)["batch"] * sum(len(o.history) for o in found.optima)
+    return (batches + (options.scouts if options.starts > 1 else 0)) * draws
 
 
 def _ends(zone: Any) -> dict[str, Any]:

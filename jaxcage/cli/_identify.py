@@ -10,13 +10,8 @@ from .._parameters import parameter_info
 from ..io import Range, Unknown, read_bytes, read_measurements, with_ranges
 from ..studies import Narrowed, identify
 from ._job import Job
-from ._limits import Demand
 from ._options import IdentifyOptions
 from ._show import Report
-
-
-LENGTH = 232
-"""Revolutions of a draw at a measured speed: 100 left out, 100 observed, 32 sampled."""
 
 
 def identify_from(job: Job[IdentifyOptions]) -> Report:
@@ -27,8 +22,6 @@ def identify_from(job: Job[IdentifyOptions]) -> Report:
             f'Case {job.name} must be a TOML file with ranges, such as stiffness = "1e4 .. 1e6 N/m", but has none.'
         )
     measured = read_measurements(options.measured, job.speeds, job.ratio)
-    lanes = options.draws * len({m.cage_rpm for m in measured})
-    job.require(Demand(lanes, LENGTH * options.stages, 16e3 * lanes))
     with job.computing("draws") as say:
         found = identify(
             job.model,

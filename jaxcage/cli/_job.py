@@ -19,7 +19,6 @@ from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
 from ..integrate import AbstractMethod, FixedSteps, controlled, method
 from ..io import (
     BearingFile,
-    ShownUnits,
     Unknown,
     Whose,
     cage_rpm,
@@ -32,10 +31,9 @@ from ..io import (
 )
 from ..models import FASTEST, BearingModel, CageModel, case, fastest_speed, whole_bearing
 from ..models.whole import WHOLE_BEARINGS
-from ..plotting import Style, add_shaft_axes, in_units, new_figure, restyle
+from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
 from ._console import Say, progress, say
-from ._limits import Demand, check_demand, demand_of, options_of_size
 from ._options import WHOLE_COMMANDS, AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag
 
@@ -53,8 +51,6 @@ class Job(Generic[Given]):
         """Name of the case, or of the TOML file without its ending and with `_` for what no figure can show."""
         self.files: dict[str, str | None] = {}
         """What was written, by the key under which it is listed; None for what was asked for and could not be made."""
-        self.measured = False
-        """Whether it has been looked at what the command will take."""
         self.asked: AbstractMethod | None = None
         """Integration method, if any option says how to integrate."""
         if isinstance(options, IntegrationOptions):
@@ -82,20 +78,6 @@ class Job(Generic[Given]):
         if self.file is not None:
             return self.file.speeds
         return "cage" if self.whole is None else "shaft"
-
-    @functools.cached_property
-    def units(self) -> ShownUnits:
-        """Units of tables, figures and files: as the options say, or the file.
-
-        **Raises:** `InputError`.
-        """
-        given = getattr(self.options, "units", None)
-        if given is None:
-            return ShownUnits() if self.file is None else self.file.units
-        try:
-            return ShownUnits.read(given)
-        except ValueError as error:
-            raise InputError(f"Option --units {error}.") from error
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -136,10 +118,8 @@ class Job(Generic[Given]):
 
     @functools.cached_property
     def folder(self) -> Path:
-        """The folder to write to, tried out, after it has been looked at whether there is room for the computation."""
+        """The folder to write to, tried out."""
         assert isinstance(self.options, CommonOptions)
-        if not self.measured:  # by a command that knows better
-            self.require(demand_of(self.options, getattr(self, "model", None)))
         return check_writable(self.options.out)
 
     @contextlib.contextmanager
@@ -152,15 +132,6 @@ class Job(Generic[Given]):
         with progress(at, unit, advice) as bar:
             yield bar
 
-    def require(self, demand: Demand) -> None:
-        """Refuse what there is no room for, and say what takes long, once.
-
-        **Raises:** `InputError`.
-        """
-        assert isinstance(self.options, CommonOptions)
-        check_demand(demand, Path(self.options.out), options_of_size(self.options))
-        self.measured = True
-
     @property
     def seconds(self) -> float:
         """Since the command began."""
@@ -169,7 +140,7 @@ class Job(Generic[Given]):
     def saved(self, figure: Figure, path: Path) -> Path:
         """Write a figure in the style that is asked for."""
         assert isinstance(self.options, CommonOptions)
-        return save_figure(in_units(figure, self.units), path, self.options.style)
+        return save_figure(figure, path, self.options.style)
 
     def given(self, names: str) -> dict[str, Any]:
         """Options that go to the library under their own names, but for those that are left out: it knows what then."""
@@ -201,7 +172,7 @@ class Job(Generic[Given]):
 
     def columns(self, columns: Mapping[str, np.ndarray], key: str = "data", detail: str = "") -> None:
         """Write a table of numbers, and list it under `key`."""
-        self.listed(key, write_columns(self.path(f"{detail}.csv"), self.units.in_columns(columns)))
+        self.listed(key, write_columns(self.path(f"{detail}.csv"), columns))
 
     def text(self, text: str, path: Path, key: str) -> None:
         """Write a page, and list it under `key`."""

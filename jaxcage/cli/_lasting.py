@@ -43,23 +43,16 @@ def lasting_gradient(job: Job[GradientOptions]) -> Report:
         edges |= {f"zone {i} {end}": edge for end, edge in found.items()}
     if not edges:
         raise NoResult(" ".join(notes) or "All zones are open at both ends: there is no edge to differentiate.")
-    with job.computing("crises"):
-        crises = {name: edge.crisis(options.seed) for name, edge in edges.items()}
-    at_horizon, to_crises = report.widths_of(edges), report.widths_of(crises)
     between = f"Widths of {job.name} between mean lives of {swept.horizon} revolutions"
     tables = [
         report.lasting_table(job.name, edges, swept.horizon),
-        report.width_table(between, at_horizon, options.by),
-        report.crisis_table(job.name, crises),
-        report.width_table(f"Widths of {job.name} between crises", to_crises, options.by),
+        report.width_table(between, report.widths_of(edges), options.by),
     ]
-    notes += [
+    notes.append(
         "Errors are standard errors, from the scatter of lanes. An edge is where the mean life of chaos passes the "
-        "horizon; it is not that of a synchronous orbit, which `jaxcage gradient` solves for exactly.",
-        "A crisis is extrapolated from the same lanes and does not depend on the horizon. That a power law fits them "
-        "(p) does not prove it: an exponential law fits over a short range of speeds too.",
-    ]
-    return Report(report.lasting_document(edges, crises), tables, notes)
+        "horizon; it is not that of a synchronous orbit, which `jaxcage gradient` solves for exactly."
+    )
+    return Report(report.lasting_document(edges), tables, notes)
 
 
 def _chosen(found: tuple[Zone, ...], number: int, horizon: int) -> list[tuple[int, Zone]]:

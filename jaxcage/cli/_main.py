@@ -95,6 +95,10 @@ def _carry_out(options: AnyOptions) -> None:
         report = _complete(job, report)
     except ArgumentError as error:
         raise _of_options(error, options) from error
+    except jax.errors.JaxRuntimeError as error:
+        if "RESOURCE_EXHAUSTED" in str(error):
+            raise MemoryError from error
+        raise
     _print(report, options.json)
     if report.failure:
         raise NoResult(report.failure)
@@ -115,18 +119,13 @@ def _of_options(error: ArgumentError, options: AnyOptions) -> Exception:
 
 def _complete(job: "Job[Any]", report: "Report") -> "Report":
     """What every command says: the case, how long it took, what was written, and shaft speeds in its tables."""
-    from ..report import in_units, with_shaft
+    from ..report import with_shaft
 
     case = {"case": job.name} if job.name else {}
     read, named = _readings(job, report.document)
     time = {"seconds": round(job.seconds, 2)} if job.options.timed else {}
     said = [f"Time: {seconds:.1f} s" for seconds in time.values()]
     tables = [with_shaft(table, job.ratio) if job.name and job.whole is None else table for table in report.tables]
-    tables = [in_units(table, job.units) for table in tables]
-    if (wanted := getattr(job.options, "table", None)) is not None and tables:
-        from ..io import write_tables
-
-        job.listed("table", write_tables(job.folder / wanted, [(t.title, [t.columns, *t.rows]) for t in tables]))
     files = [
         f"{key.replace('_', ' ').capitalize()}: {visible(path)}" for key, path in job.files.items() if path is not None
     ]

@@ -104,7 +104,6 @@ def _document(curves: Sequence[Curve], exponents: Exponents | None, x: Axis, y: 
             **chosen(c, "name kind genuine"),
             "x": x.told(c.x_value),
             "y": c.y_value,
-            "special": [{"kind": p.kind, "x": x.told(p.x_value), "y": p.y_value} for p in c.special],
             "ended": list(c.ended),
         }
         for c in curves
@@ -114,15 +113,11 @@ def _document(curves: Sequence[Curve], exponents: Exponents | None, x: Axis, y: 
 
 
 def _tables(name: str, curves: Sequence[Curve], x: Axis, y: Axis) -> list[Table]:
-    """What the curves cover, and the points of codimension two on them."""
+    """What the curves cover, and why they end."""
     span = lambda axis, values: (axis.cell(np.min(values)), axis.cell(np.max(values)))
     rows = [
         (c.name, c.kind, *span(x, c.x_value), *span(y, c.y_value), str(c.x_value.size), " / ".join(c.ended))
         for c in curves
     ]
-    points = [(c.name, p.kind, x.cell(p.x_value), y.cell(p.y_value)) for c in curves for p in c.special]
     columns = ("edge", "kind", f"{x.head} from", "to", f"{y.head} from", "to", "points", "ends")
-    return [
-        Table(f"Edges of {name} over {x.name} and {y.name}", columns, rows),
-        Table("Points of codimension two", ("edge", "kind", x.head, y.head), points or [("none", *3 * ("-",))]),
-    ]
+    return [Table(f"Edges of {name} over {x.name} and {y.name}", columns, rows)]

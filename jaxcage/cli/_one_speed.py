@@ -21,9 +21,8 @@ from ._show import Report
 def simulate_at(job: Job[SimulateOptions]) -> Report:
     """`jaxcage simulate`: time history, orbit and each force at one speed."""
     options, model = job.options, job.model
-    for name, given in (("--load", options.load is not None), ("--animate", options.animate)):
-        if given:
-            raise InputError(f"Option {name} goes with a whole bearing, but {job.name} is a cage.")
+    if options.load is not None:
+        raise InputError(f"Option --load goes with a whole bearing, but {job.name} is a cage.")
     with job.computing():
         samples = samples_per_revolution(job.method, 128)
         length = job.given("revolutions discard")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 import tyro
 
 from .._errors import InputError
-from ._readers import is_table, is_within, number, text, two, whole
+from ._readers import is_within, number, text, two, whole
 
 
 SIDE = range(2, 10_001)
@@ -73,11 +73,6 @@ class CommonOptions(AnyOptions):
     """Style of the figures: for white pages, dark screens, or black-and-white paper."""
     no_cache: bool = False
     """Compile everything anew instead of using programs kept from earlier runs."""
-    units: OptionalText = None
-    """Units of tables, figures and files, each for its kind of quantity, e.g. "um, mm/s" or "inch, lbf". If left out
-    what the TOML file says, else mm and the like. JSON, and data sets that are stored, stay in SI."""
-    table: Annotated[str | None, text("name a .csv or .xlsx file within --out", is_table)] = None
-    """Write the tables that are printed to this file within the output folder too: .csv, or .xlsx with a sheet each."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,7 +127,7 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Sweep over speed from three starts: orbit diagram, exponents, chaotic zones; slips, forces, losses of a whole
     bearing, whose speeds are the shaft's."""
 
-    of_cage: ClassVar[str] = "solver steps waterfall horizon confirm draws seed nominal"
+    of_cage: ClassVar[str] = "solver steps horizon confirm draws seed nominal"
     of_whole: ClassVar[str] = "load"
 
     count: Annotated[int | None, whole(1)] = None
@@ -151,8 +146,6 @@ class SweepOptions(_Length, _Range, IntegrationOptions):
     """Revolutions to which chaos is followed, to tell how long it lasts; 0 turns this off."""
     exponents: FromOne = 1
     """Number of Lyapunov exponents."""
-    waterfall: FromZero = 0
-    """Speeds of a waterfall of spectra of the vertical motion; none by default."""
     load: Load = None
     """Of a whole bearing: shaft load [N], or with a unit; its own if left out."""
 
@@ -248,7 +241,7 @@ class MapOptions(SearchOptions):
         "columns": (50, 13),
         "revolutions": (100, 20),
     }
-    of_cage: ClassVar[str] = "solver steps count x persist points adaptive refine most speed no_curves"
+    of_cage: ClassVar[str] = "solver steps count x persist points speed no_curves"
 
     x: str = "speed"
     """Parameter across: speed, or any parameter of the model, each curve then at its own edge's speed."""
@@ -270,13 +263,7 @@ class MapOptions(SearchOptions):
     persist: FromZero = 0
     """With --points: revolutions that chaos must outlast to count; what has died out by then was a transient."""
     points: Annotated[tuple[int, int] | None, two("x", _SIDES, lambda a, b: a in SIDE and b in SIDE)] = None
-    """Instead of rows and columns: a grid of labels, e.g. 300x300, from a coarse picture to the full grid."""
-    adaptive: bool = False
-    """With --points: only points near a change of label are computed."""
-    refine: Literal["chaos", "label"] = "chaos"
-    """With --adaptive: follow where chaos begins and ends, or where any label changes."""
-    most: Annotated[int | None, whole(4)] = None
-    """With --points: points computed at most."""
+    """Instead of rows and columns: a grid of labels, e.g. 300x300."""
     speed: OptionalSpeed = None
     """With --points and another --x than the speed: the speed of all points [rpm]."""
     no_curves: bool = False
@@ -286,18 +273,13 @@ class MapOptions(SearchOptions):
         super().check()
         given = lambda *names: any(self._given(name) for name in names)
         if self.points is None:
-            if given("adaptive", "refine", "no_curves", "persist", "most", "speed"):
-                raise InputError(
-                    "Options --adaptive, --refine, --no-curves, --persist, --most and --speed go with --points, "
-                    "e.g. --points 300x300."
-                )
+            if given("no_curves", "persist", "speed"):
+                raise InputError("Options --no-curves, --persist and --speed go with --points, e.g. --points 300x300.")
             if self.rows == 1:
                 raise InputError("Option --rows must be 0 or at least 2, but 1 was given.")
             return
         if given("rows", "columns"):
             raise InputError("Options --rows and --columns do not go with --points, which says how many there are.")
-        if given("refine") and not self.adaptive:
-            raise InputError("Option --refine goes with --adaptive.")
         if (self.revolutions or 0) % 10:
             raise InputError(f"Option --revolutions must be a multiple of 10, but {self.revolutions} was given.")
         discard = self.usual["discard"][0] if self.discard is None else self.discard
@@ -382,7 +364,7 @@ class VaryOptions(_Range):
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DesignOptions(VaryOptions):
     """Change the design so that fewer speeds are chaotic, checked by a fresh sweep. Of a whole bearing (nu2310), make
-    wear, forces, impulses, friction power, slip and unbalance small at one speed, by gradient."""
+    wear, forces, impulses, friction power, slip and unbalance small at one speed."""
 
     usual: ClassVar[Mapping[str, tuple[Any, Any]]] = {
         "wear": (1000.0, 1.0),
@@ -392,14 +374,13 @@ class DesignOptions(VaryOptions):
         "slip": (None, 1.0),
         "balance": (None, 1.0),
         "steps": (10, 12),
-        "cloud": (12, 16),
+        "batch": (12, 16),
         "ensemble": (None, 4),
         "discard": (None, 10),
         "revolutions": (None, 20),
     }
-    of_cage: ClassVar[str] = "first last speeds quick cost front scatter worst search"
+    of_cage: ClassVar[str] = "first last speeds quick cost scatter worst"
     of_whole: ClassVar[str] = "speed load impulse slip balance ensemble discard revolutions"
-    called: ClassVar[Mapping[str, str]] = {"designs": "cloud"}
 
     cost: Annotated[float, number("be at least 0", lambda x: x >= 0)] = 1000.0
     """What one unit of manufacturing cost is worth, in rpm of chaotic speeds; the paper's case 1a costs 2 units."""
@@ -418,9 +399,6 @@ class DesignOptions(VaryOptions):
     """Of a whole bearing: what the slip of its cage counts; 1 if left out."""
     balance: Price = None
     """Of a whole bearing: what the balance grade G of its cage counts; 1 if left out."""
-    front: FromZero = 0
-    """Designs spread over the bounds, of which those are listed that no other beats in chaotic speeds, wear load, peak
-    force and cost at once; 0 lists none."""
     worse_balance: bool = False
     """Let the cage be balanced worse than it is; otherwise its eccentricity may only become smaller."""
     scatter: Annotated[Texts, tyro.conf.arg(metavar="NAME=LAW")] = ()
@@ -428,20 +406,15 @@ class DesignOptions(VaryOptions):
     The mean over it is then minimised."""
     worst: Share = 1.0
     """With --scatter: mean over this share of the manufactured cages, the worst ones."""
-    search: Literal["surrogate", "gradient"] = "surrogate"
-    """How to search: by a surrogate, a Gaussian process that chooses --cloud designs at every step from what was found
-    before; or down the gradient, which is that of a cloud of designs."""
     starts: FromOne = 1
     """Searches: one from the design itself, others from the best of the scouts."""
     scouts: FromZero = 0
     """Designs spread over the bounds that are looked at beforehand; without any, further searches start anywhere."""
     steps: Annotated[int | None, whole(1)] = None
-    """Steps of each search at most; 10 if left out, 12 of a whole bearing."""
-    cloud: Annotated[int | None, whole(4)] = None
-    """Designs of a step: chosen together, or around the one whose gradient is taken; 12 if left out, 16 of a whole
+    """Steps of each search; 10 if left out, 12 of a whole bearing."""
+    batch: Annotated[int | None, whole(2)] = None
+    """Designs of a step, chosen together by a Gaussian process of what was found before; 12 if left out, 16 of a whole
     bearing."""
-    spread: Share = 0.1
-    """Their scatter, as a part of the distance between the bounds: structure that is finer is smoothed away."""
     ensemble: Annotated[int | None, whole(1)] = None
     """Of a whole bearing: drawn starts of each design; 4 if left out."""
     discard: Annotated[int | None, whole(0)] = None
@@ -519,8 +492,6 @@ class SimulateOptions(_AtSpeed, IntegrationOptions):
     """Revolutions left out at the beginning."""
     load: Load = None
     """Shaft load [N] of a whole bearing, or with a unit, e.g. "4.45 kN"; its own if left out."""
-    animate: bool = False
-    """Of a whole bearing: an animation of one revolution of the cage as well, a GIF."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -547,20 +518,12 @@ class ImpactOptions(_AtSpeed):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReproduceOptions(CommonOptions):
-    """The paper beside this model: edges, figures 5, 7, 8 and 9, conclusions, readings."""
+    """The paper beside this model: edges, conclusions, and the orbit diagrams of figures 7 and 8."""
 
     constants: Literal["identified", "preliminary"] = "identified"
     """Set of constants that the paper does not print."""
     quick: bool = False
     """A coarse grid, short runs and no exact edges: for trying."""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class ValidateOptions(CommonOptions):
-    """Numbers of this package beside printed ones, closed forms and other programs, as VALIDATION.md."""
-
-    topics: str = ""
-    """Topics, e.g. "film, statics"; all of them if left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -688,7 +651,6 @@ COMMANDS: Mapping[str, tuple[type[AnyOptions], str]] = {
     "statics": (StaticsOptions, "_bearing.statics"),
     "impact": (ImpactOptions, "_bearing.impact"),
     "reproduce": (ReproduceOptions, "_reproduce.reproduce"),
-    "validate": (ValidateOptions, "_validate.validate"),
     "report": (ReportOptions, "_page.report_on"),
 }
 """Command -> its options, and the function of this package that carries it out for a cage."""

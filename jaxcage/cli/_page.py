@@ -37,9 +37,7 @@ def report_on(job: Job[ReportOptions]) -> Report:
         )
         drawn = drawn_chances(job, options.draws, say) if job.unknowns and options.draws else None
     table, left = (None, ()) if job.file is None else (job.file.table, job.file.left)
-    html = report.page(
-        findings, operating, table=table, command=command_line(options), chances=drawn, left=left, units=job.units
-    )
+    html = report.page(findings, operating, table=table, command=command_line(options), chances=drawn, left=left)
     job.text(html, job.path(".html"), "report")
     assessed = report.assess(findings, operating)
     failed, size = int(findings.sweep.failed.sum()), len(html.encode())

@@ -125,8 +125,3 @@ def is_within(path: str) -> bool:
     parts = Path(path).parts
     short = all(len(os.fsencode(part)) <= LONGEST for part in parts)
     return bool(parts) and short and not Path(path).is_absolute() and ".." not in parts
-
-
-def is_table(path: str) -> bool:
-    """Whether a path within a folder ends as a table does."""
-    return is_within(path) and Path(path).suffix.lower() in (".csv", ".xlsx")

@@ -5,9 +5,8 @@ from typing import Any
 
 from ..plotting import ramp_figure
 from ..report import Table, number
-from ..sweeps import Ramped, RampUpDown, ramp_revolutions, ramp_up_down, rpm
+from ..sweeps import Ramped, RampUpDown, ramp_up_down, rpm
 from ._job import Job
-from ._limits import ALONE, NUMBER, Demand
 from ._options import RunUpOptions
 from ._show import Report
 
@@ -18,11 +17,9 @@ ROWS = 20
 
 def runup(job: Job[RunUpOptions]) -> Report:
     """Carry out `jaxcage runup` of a cage."""
-    options, settle = job.options, job.options.discard or 0
+    options = job.options
     rate = rpm(options.rate * (job.ratio if job.speeds == "shaft" else 1.0))
     first, last = rpm(options.first), rpm(options.last)
-    revolutions = ramp_revolutions(first, last, (last - first) / rate) + settle
-    job.require(Demand(1, 2 * revolutions, 10 * NUMBER * job.model.dimension * 32 * revolutions, rate=ALONE))
     with job.computing():
         found = ramp_up_down(
             job.model,
@@ -30,7 +27,7 @@ def runup(job: Job[RunUpOptions]) -> Report:
             last,
             rate,
             windows=options.windows or 2,
-            settle=settle,
+            settle=options.discard or 0,
             method=job.asked,
         )
     slow, fast = found.rate_rpm_per_s

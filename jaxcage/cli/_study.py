@@ -1,13 +1,12 @@
 """`jaxcage study`: a sweep over any grid or sample of parameters, stored as it goes."""
 
 import time
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._errors import InputError
+from .._errors import InputError, NoResult
 from ..analysis import CAGE_STATES
 from ..integrate import OUTCOMES
 from ..models import BearingModel, CageModel
@@ -18,7 +17,6 @@ from ..studies import (
     WHOLE_TOLERANCE,
     AbstractStudy,
     BearingStudy,
-    DamagedStore,
     Plan,
     Spread,
     Study,
@@ -29,11 +27,9 @@ from ..studies import (
 )
 from ._console import say, warn_of_short
 from ._job import Job, blocks_of
-from ._limits import Demand, demand_of_study
 from ._options import StudyOptions
 from ._show import Report
 from ._vary import read_vary
-from ._whole import SWEEPING
 
 
 if TYPE_CHECKING:
@@ -44,6 +40,7 @@ MOST_LANES = 100_000_000
 MEASURES = ("cage_slip", "pocket_force_max_N", "land_force_max_N", "friction_power_W", "eccentricity_mean", "exponent")
 """Of a whole bearing, what is told of all lanes together."""
 ADVICE = "what is stored stays, and the same command goes on from there"
+AGAIN = "the same command without --check and --shard computes again what is damaged and leaves the rest"
 
 
 def study(job: Job[StudyOptions], whole: BearingModel | None = None) -> Report:
@@ -55,20 +52,23 @@ def study(job: Job[StudyOptions], whole: BearingModel | None = None) -> Report:
     if whole is not None:
         given = WHOLE_TOLERANCE if options.tolerance is None else options.tolerance
         work = BearingStudy(whole, _plan(job, whole, len(CAGE_STARTS)), **length, tolerance=given)
-        job.require(_demand(work))
     else:
         plan = _plan(job, job.model, len(job.model.starts(1.0)))
         work = Study(job.model, plan, job.method, **length, strobe=options.strobe)
-        job.require(demand_of_study(work))
     path = job.folder / _name(job)
-    before, began = _lanes_stored(path), time.perf_counter()
+    began, done = time.perf_counter(), [0]
     with job.computing(unit="lanes", advice=ADVICE) as bar:
+
+        def progress(so_far: int, total: int) -> None:
+            done.append(so_far)
+            bar("", so_far, total)
+
         try:
-            run_study(work, path, **job.given("shard executor scheduler workers"), progress=partial(bar, ""))
+            run_study(work, path, **job.given("shard executor scheduler workers"), progress=progress)
         except ImportError as error:  # of an extra
             raise InputError(str(error)) from error
-    seconds = time.perf_counter() - began
-    document = _document(work, path, before, seconds)
+    computed = done[-1] - done[1]  # the first number is of those that were stored before
+    document = _document(work, path, computed, time.perf_counter() - began)
     warn_of_short(document.get("too_short", 0))
     if document["stored"] < work.plan.size:
         say(f"Warning: {work.plan.size - document['stored']} lanes are left for the other shards.")
@@ -79,18 +79,10 @@ def study(job: Job[StudyOptions], whole: BearingModel | None = None) -> Report:
     rate = document["lanes_per_second"]
     notes = [
         f"Failed lanes: {', '.join(f'{n} {what}' for what, n in document['failed'].items()) or 'none'}",
-        f"Computed: {document['stored'] - before} lanes" + (f", {rate:.3g} a second" if rate else ""),
+        f"Computed: {computed} lanes" + (f", {rate:.3g} a second" if rate else ""),
         f"Open it: jaxcage.open_study({str(path)!r})",
     ]
     return Report(document, [table], notes)
-
-
-def _demand(work: BearingStudy) -> Demand:
-    """What a study of whole bearings takes, about."""
-    lanes, revolutions = work.plan.size, work.discard + work.revolutions
-    stored = 8.0 * len(work.variables) * lanes
-    memory = min(work.plan.lanes, lanes) * (2e4 + 600.0 * revolutions) + stored
-    return Demand(lanes, revolutions, memory, stored, SWEEPING)
 
 
 def _name(job: Job[StudyOptions]) -> str:
@@ -105,9 +97,8 @@ def _verify(job: Job[StudyOptions]) -> Report:
     except FileNotFoundError as error:
         raise InputError(str(error)) from error
     damaged = {str(chunk): what for chunk, what in state.damaged.items()}
-    counts = {"chunks": state.chunks, "finished": state.finished, "damaged": damaged, "metadata": state.metadata}
-    again = "the same command without --check computes it again and leaves the rest"
-    failure = "" if state.whole else f"The store '{path}' is damaged: {again}."
+    counts = {"chunks": state.chunks, "finished": state.finished, "damaged": damaged}
+    failure = f"The store '{path}' is damaged: {AGAIN}." if damaged else ""
     return Report({"store": str(path), **counts}, notes=str(state).splitlines(), failure=failure)
 
 
@@ -125,19 +116,14 @@ def _plan(job: Job[StudyOptions], model: CageModel | BearingModel, own: int) -> 
     return plan
 
 
-def _lanes_stored(path: Path) -> int:
+def _document(work: AbstractStudy, path: Path, computed: int, seconds: float) -> dict[str, Any]:
     try:
         with open_study(path) as dataset:
-            return int(np.sum(dataset["outcome"].values >= 0))
-    except (FileNotFoundError, KeyError, DamagedStore):
-        return 0  # nothing yet, or nothing of ours: that is said later
-
-
-def _document(work: AbstractStudy, path: Path, before: int, seconds: float) -> dict[str, Any]:
-    with open_study(path) as dataset:
-        outcome = dataset["outcome"].values
-        done = outcome >= 0
-        about = _of_bearings(dataset, done) if isinstance(work, BearingStudy) else _of_cages(dataset, done, work)
+            outcome = dataset["outcome"].values
+            done = outcome >= 0
+            about = _of_bearings(dataset, done) if isinstance(work, BearingStudy) else _of_cages(dataset, done, work)
+    except ValueError as error:  # a chunk that another shard has written
+        raise NoResult(f"The store '{path}' is damaged: {AGAIN}.") from error
     stored = int(np.sum(done))
     if stored:
         require_some(outcome[done])
@@ -145,11 +131,11 @@ def _document(work: AbstractStudy, path: Path, before: int, seconds: float) -> d
         "axes": work.plan.axes,
         "lanes": work.plan.size,
         "stored": stored,
-        "stored_before": before,
+        "stored_before": stored - computed,
         "chunks": work.plan.chunks,
         **about,
         "failed": _named(outcome[outcome > 0], OUTCOMES),
-        "lanes_per_second": round((stored - before) / seconds, 3) if stored > before else None,
+        "lanes_per_second": round(computed / seconds, 3) if computed else None,
     }
 
 

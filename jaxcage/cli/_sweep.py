@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from .. import report
-from ..analysis import Sweep, Zones, waterfall, zones
+from ..analysis import Sweep, Zones, zones
 from ..integrate import OUTCOMES
 from ..io import save_sweep
 from ..orbits import explain, loss_zones, synchronous_orbits
-from ..plotting import sweep_figure, waterfall_map, zoomed_diagram
+from ..plotting import sweep_figure, zoomed_diagram
 from ..sweeps import rpm, sweep
 from ._chances import chances
 from ._console import say, warn_of_short
-from ._job import Job, blocks_of, samples_per_revolution
+from ._job import Job, blocks_of
 from ._options import SweepOptions, ZonesOptions
 from ._show import Report
 
@@ -50,7 +50,6 @@ def sweep_over_speed(job: Job[SweepOptions]) -> Report:
     edges = zones(found)
     job.figure(sweep_figure(found, edges, job.published, _title(job, found)))
     _zoom(job, found, edges)
-    _waterfall(job, found)
     beyond, short = int(np.sum(found.peak > 1)), int(np.sum(found.too_short))
     if beyond:
         say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
@@ -110,17 +109,6 @@ def _zoom(job: Job[SweepOptions], found: Sweep, edges: Zones) -> None:
         low, high = zone.onset.speed_rpm - 0.2 * zone.width_rpm, zone.exit.speed_rpm + 0.2 * zone.width_rpm
         title = f"{_title(job, found)}, widest zone"
         job.draw(lambda ax: zoomed_diagram(found, low, high, ax=ax), (9.0, 5.0), title, "zoom", "_zoom")
-
-
-def _waterfall(job: Job[SweepOptions], found: Sweep) -> None:
-    """Spectra of the vertical motion over speed, if asked for."""
-    if job.options.waterfall:
-        speeds = np.linspace(found.speed[0], found.speed[-1], job.options.waterfall)
-        samples = samples_per_revolution(job.method)
-        s = waterfall(job.model, speeds, component=1, samples=samples, method=job.method)
-        title = f"{_title(job, found)}: spectra of the vertical motion"
-        draw = lambda ax: waterfall_map(s.rpm, s.order, s.amplitude, ax)
-        job.draw(draw, (9.0, 5.0), title, "waterfall", "_waterfall")
 
 
 def zones_over_speed(job: Job[ZonesOptions]) -> Report:

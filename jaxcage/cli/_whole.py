@@ -25,11 +25,10 @@ from ..analysis import (
 from ..integrate import BearingRun, simulate_bearing
 from ..io import SpeedOf, Whose
 from ..models import FASTEST, BearingModel
-from ..plotting import bearing_animation, bearing_figure
+from ..plotting import bearing_figure
 from ..report import Table, chosen, number
 from ..sweeps import rpm
 from ._job import Job
-from ._limits import Demand
 from ._one_speed import measures_table
 from ._options import DesignOptions, GradientOptions, SensitivityOptions, SimulateOptions
 from ._readers import flag
@@ -40,10 +39,6 @@ SAMPLES = 128
 """Of a revolution of the cage: some twenty in the contact of a roller with its pocket."""
 TOLERANCE = 1e-5
 """Of a step, in units of the state's scale."""
-RATE = 0.5
-"""Revolutions a second, about."""
-SWEEPING = 30.0
-"""Revolutions of lanes that a core makes in a second in a sweep, about, exponents with them."""
 
 
 class AtShaftSpeed(NamedTuple):
@@ -78,16 +73,11 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     if options.solver is not None or options.steps is not None:
         raise InputError("Options --solver and --steps do not go with a whole bearing: its steps are controlled.")
     at = at_shaft_speed(job, model)
-    numbers = (5 * model.bearing.n_rollers + 40) * SAMPLES * (options.revolutions + options.discard)
-    job.require(Demand(1, options.revolutions + options.discard, 40.0 * numbers, 20.0 * numbers, RATE))
     with job.computing():
         found = examined(job.name, at, options.revolutions, options.discard, options.tolerance)
     run, history = found.run, found.history
     job.figure(found.figure, detail=at.ending)
     job.columns(_columns(history), detail=at.ending)
-    if options.animate:
-        with job.written("animation", job.path(f"{at.ending}.gif")) as path:
-            bearing_animation(at.model, run, history, path)
     places = dict(vars(found.circumference))
     document = {
         **at.document,

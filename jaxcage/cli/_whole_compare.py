@@ -12,10 +12,9 @@ from ..models import BearingModel
 from ..plotting import bearings_beside
 from ..sweeps import sweep_bearing
 from ._job import Job, blocks_of, whole_subject
-from ._limits import Demand
 from ._options import CompareOptions
 from ._show import Report
-from ._whole import SWEEPING, require_land_speed, shaft_speeds
+from ._whole import require_land_speed, shaft_speeds
 from ._whole_sweep import zones_table
 
 
@@ -40,8 +39,6 @@ def bearings_compared(job: Job[CompareOptions], model: BearingModel) -> Report:
     names = [job.name, second if second != job.name else f"{second}_second"]
     speeds = shaft_speeds(job, model, options.count or 2)
     require_land_speed(other, float(speeds[-1]) * 30 / np.pi, "--last")
-    lanes, length = 2 * speeds.size * STARTS, options.discard + options.revolutions
-    job.require(Demand(lanes, length, 2e4 * lanes + 600.0 * lanes * length, rate=SWEEPING))
     with job.computing() as say:
         found = [
             sweep_bearing(

@@ -9,10 +9,9 @@ from ..design import DIRECTIONS, STATISTICS, bearing_gradient
 from ..models import BearingModel
 from ..plotting import statistic_bars
 from ._job import Job
-from ._limits import Demand
 from ._options import GradientOptions
 from ._show import Report
-from ._whole import SWEEPING, at_shaft_speed
+from ._whole import at_shaft_speed
 
 
 def bearing_gradients(job: Job[GradientOptions], model: BearingModel) -> Report:
@@ -20,8 +19,6 @@ def bearing_gradients(job: Job[GradientOptions], model: BearingModel) -> Report:
     options = job.options
     at = at_shaft_speed(job, model)
     given = job.given("designs spread starts discard revolutions seed tolerance")
-    lanes, length = options.designs * given["starts"], given["discard"] + given["revolutions"]
-    job.require(Demand(lanes, length, 2e4 * lanes, rate=SWEEPING * (1 if options.chaos else 2)))
     with job.computing("designs") as say:
         found = bearing_gradient(
             at.model,

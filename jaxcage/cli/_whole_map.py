@@ -13,10 +13,9 @@ from ..plotting import bearing_map_figure
 from ..report import Axis, Table, parameter_axis
 from ..sweeps import sweep_bearings
 from ._job import Job
-from ._limits import Demand
 from ._options import MapOptions
 from ._show import Report
-from ._whole import SWEEPING, shaft_speeds
+from ._whole import shaft_speeds
 
 
 LOAD, LIGHTEST = "load", 0.05
@@ -32,8 +31,6 @@ def bearing_map(job: Job[MapOptions], model: BearingModel) -> Report:
     spaced = np.geomspace if axis.name == LOAD and axis.lower > 0 else np.linspace
     values = spaced(axis.lower, axis.upper, options.rows or 2)
     given = job.given("starts discard revolutions tolerance")
-    lanes = speeds.size * values.size * given["starts"]
-    job.require(Demand(lanes, given["discard"] + given["revolutions"], 2e4 * lanes, rate=SWEEPING))
     try:
         models = [replace(model, **{axis.name: float(value)}) for value in values]
     except ValueError as error:

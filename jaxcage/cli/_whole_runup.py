@@ -2,18 +2,15 @@
 
 import dataclasses
 
-import numpy as np
-
 from .._errors import NoResult
 from ..models import BearingModel
 from ..plotting import bearing_ramp_figure
 from ..report import Table, number
 from ..sweeps import BearingUpDown, bearing_up_down, rpm
 from ._job import Job
-from ._limits import Demand
 from ._options import RunUpOptions
 from ._show import Report
-from ._whole import SWEEPING, loaded, shaft_speeds
+from ._whole import loaded, shaft_speeds
 
 
 STARTS = 3
@@ -25,9 +22,6 @@ def bearing_runup(job: Job[RunUpOptions], model: BearingModel) -> Report:
     model = loaded(model, options.load)
     speeds = shaft_speeds(job, model, 2)
     rate = float(rpm(options.rate))
-    turning = float(model.rolling_cage_speed(float(np.mean(speeds)))) / (2 * np.pi)
-    revolutions = int(2 * turning * (speeds[-1] - speeds[0]) / rate) + (options.discard or 0)
-    job.require(Demand(8, revolutions, 1e6, rate=2 * SWEEPING))
     with job.computing():
         found = bearing_up_down(
             model,

@@ -21,11 +21,10 @@ from ..design import (
 from ..models import BearingModel
 from ..plotting import statistic_bars
 from ._job import Job
-from ._limits import Demand
 from ._options import SensitivityOptions
 from ._show import Report
 from ._vary import read_cage_bounds
-from ._whole import SWEEPING, at_shaft_speed
+from ._whole import at_shaft_speed
 
 
 AROUND, STARTS = 64, 2
@@ -42,10 +41,7 @@ def bearing_shares(job: Job[SensitivityOptions], whole: BearingModel) -> Report:
     if of not in BEARING_MEASURES:
         raise InputError(f"Option --of must be one of {', '.join(BEARING_MEASURES)}, but '{of}' was given.")
     vary = read_cage_bounds(options.vary, model)
-    length, relative = filled["discard"] + filled["revolutions"], options.tolerance / 100
-    lanes = filled["samples"] * (len(vary) + 2) * filled["ensemble"]
-    more = 0 if options.quick else AROUND * STARTS
-    job.require(Demand(lanes + more, length, 2e4 * (lanes + more), rate=2 * SWEEPING))
+    relative = options.tolerance / 100
     found: BearingGradient | None = None
     with job.computing() as say:
         runs = BearingRuns(

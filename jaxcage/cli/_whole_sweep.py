@@ -15,10 +15,9 @@ from ..plotting import bearing_sweep_figure
 from ..report import Table, chosen
 from ..sweeps import sweep_bearing
 from ._job import Job, blocks_of
-from ._limits import Demand
 from ._options import SweepOptions
 from ._show import Report
-from ._whole import SWEEPING, loaded, shaft_speeds
+from ._whole import loaded, shaft_speeds
 
 
 SPEEDS, STARTS = 13, 3
@@ -65,8 +64,6 @@ def swept(job: Job[Any], model: BearingModel, speeds: np.ndarray) -> BearingSwee
     **Raises:** `NoResult` if every lane fails.
     """
     options = job.options
-    lanes, revolutions = speeds.size * STARTS, options.discard + options.revolutions
-    job.require(Demand(lanes, revolutions, 2e4 * lanes + 600.0 * lanes * revolutions, 2e4 * lanes, SWEEPING))
     with job.computing("sweep") as say:
         found = sweep_bearing(
             model,

@@ -1,8 +1,7 @@
 """Designs of the whole bearing: wear, forces, friction, slip and balance, beside what they are now.
 
-Its motion is chaotic, so a design is measured by means over drawn initial states, the same ones for every design, and
-its slope is that of scattered pairs of designs, as in `bearing_gradient`. Load, speed, oil and traction stay what they
-are: only the cage is changed.
+Its motion is chaotic, so a design is measured by means over drawn initial states, the same ones for every design. Load,
+speed, oil and traction stay what they are: only the cage is changed.
 """
 
 import dataclasses
@@ -19,8 +18,8 @@ from ..analysis import STATISTIC_UNITS, BearingSweep
 from ..models import BearingModel
 from ..models.whole import drawn_places
 from ..sweeps import Progress, sweep_bearings
-from ._bearing_gradient import STATISTICS, gradient_of_pairs, moves
-from ._objective import AbstractObjective, DesignSpace, Measured
+from ._bearing_gradient import STATISTICS
+from ._objective import AbstractObjective, DesignSpace
 
 
 CAGE_PARAMETERS = (
@@ -34,7 +33,7 @@ CAGE_PARAMETERS = (
     "inner_land_diameter",
 )
 """What of a whole bearing a design of its cage may change."""
-BALANCE = "balance_grade_mm_per_s"
+BALANCE, OBJECTIVE = "balance_grade_mm_per_s", "objective"
 TERMS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "wear": (("pocket_wear_mm3_per_h", "land_wear_mm3_per_h"),),
     "force": (("pocket_force_peak_N",), ("land_force_peak_N",)),
@@ -61,11 +60,6 @@ class BearingRuns:
     discard: int = 10
     revolutions: int = 20
     """Of the cage observed, an even number; peaks are the largest in half of them."""
-    designs: int = 16
-    """Around each design, in pairs that mirror each other."""
-    spread: float = 0.1
-    """Half width of the box they come from, as a part of the distance between the bounds. Near a bound the box is moved
-    inwards, and value and slope are those of its plane."""
     tolerance: float = 1e-4
     seed: int = 0
     progress: Progress | None = None
@@ -77,18 +71,6 @@ class BearingRuns:
         if self.revolutions < 2 or self.revolutions % 2:
             raise ArgumentError(
                 "revolutions", said=f"must be an even number above 0, but {self.revolutions} was given."
-            )
-        if self.designs < 6 or self.designs % 2:
-            raise ArgumentError("designs", said=f"must be an even number from 6 on, but {self.designs} was given.")
-        if not 0 < self.spread <= 0.5:
-            raise ArgumentError("spread", said=f"must be above 0 and at most 0.5, but {self.spread:g} was given.")
-
-    def require_designs(self, parameters: int) -> None:
-        """**Raises:** `ValueError` for fewer designs than so many slopes with errors take."""
-        if self.designs < 2 * (parameters + 2):
-            raise ArgumentError(
-                "designs",
-                said=f"must be at least {2 * (parameters + 2)} for {parameters} parameters, but is {self.designs}.",
             )
 
     def run(self, models: Sequence[BearingModel]) -> list[BearingSweep]:
@@ -105,16 +87,10 @@ class BearingRuns:
             progress=self.progress,
         )
 
-    def fresh(self, *, starts: int = 8, longer: int = 2) -> "BearingRuns":
-        """Runs for a check: other starts, a tenth of the tolerance, `longer` times as many revolutions left out."""
-        return dataclasses.replace(
-            self,
-            starts=starts,
-            discard=longer * self.discard,
-            tolerance=self.tolerance / 10,
-            seed=self.seed + 1,
-            progress=None,
-        )
+    def fresh(self, starts: int = 8) -> "BearingRuns":
+        """Runs for a check: other starts, a tenth of the tolerance, twice as many revolutions left out."""
+        finer = {"discard": 2 * self.discard, "tolerance": self.tolerance / 10}
+        return dataclasses.replace(self, starts=starts, seed=self.seed + 1, progress=None, **finer)
 
 
 def balance_grade(model: BearingModel, speeds: Float[np.ndarray, " speeds"] | float) -> float:
@@ -129,20 +105,11 @@ def _halves(found: BearingSweep, name: str) -> Float[np.ndarray, "starts 2"]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BearingObjective(AbstractObjective):
-    """A weighted sum of statistics of the whole bearing, with slopes and standard errors from scattered designs."""
+    """A weighted sum of statistics of the whole bearing."""
 
     runs: BearingRuns
     weights: Mapping[str, float]
     """Per unit of each statistic."""
-
-    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
-        n, pairs = len(space.unknowns), self.runs.designs // 2
-        self.runs.require_designs(n)
-        moved = self.runs.spread * moves(pairs, n, self.runs.seed)
-        centres = np.clip(places, self.runs.spread, 1 - self.runs.spread)
-        around = centres[:, None, None] + np.stack([moved, -moved])
-        found = self.halves(space, around.reshape(-1, n)).reshape(len(places), 2, pairs, 2)
-        return [_fitted(space.names, moved, *each) for each in zip(found, places - centres, strict=True)]
 
     def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
         return self.halves(space, np.asarray(places)).mean(axis=-1)
@@ -156,20 +123,6 @@ class BearingObjective(AbstractObjective):
             parts = [w * _halves(found, name).mean(axis=0) for name, w in self.weights.items() if name != BALANCE]
             rows.append(exact + np.sum(parts, axis=0) if parts else np.full(2, exact))
         return np.array(rows)
-
-
-def _fitted(
-    names: tuple[str, ...], moved: np.ndarray, found: Float[np.ndarray, "2 pairs 2"], off: Float[np.ndarray, " n"]
-) -> Measured:
-    """Value and slope of a plane through designs, at a place that is `off` their middle."""
-    whole = np.all(np.isfinite(found), axis=(0, 2))
-    if whole.sum() < len(names) + 2:
-        nothing = np.full(len(names), np.nan)
-        return Measured(math.nan, math.nan, nothing, nothing, "too many designs near it failed")
-    fitted = gradient_of_pairs("objective", "1", names, moved[whole], found[:, whole])
-    slope = fitted.by_relative_change
-    error = math.sqrt(fitted.value_error**2 + off @ fitted.covariance @ off)
-    return Measured(fitted.value + float(slope @ off), error, slope, fitted.by_relative_change_error)
 
 
 def bearing_objective(
@@ -193,7 +146,6 @@ def bearing_objective(
         raise ArgumentError("prices", said=f"must name some of {', '.join(TERMS)}, but has '{wrong[0]}'.")
     if not all(price >= 0 for price in prices.values()) or not sum(prices.values()) > 0:
         raise ArgumentError("prices", said=f"must be at least 0 and not all 0, but are {dict(prices)}.")
-    runs.require_designs(len(vary))
     found = runs.run([model])[0]
     now = {name: float(np.nanmean(_halves(found, name))) for name in COMPARED}
     now[BALANCE] = balance_grade(model, runs.speeds)
@@ -242,25 +194,33 @@ class BeforeAfter:
         return abs(self.change) > 2 * self.change_error
 
 
-def before_and_after(before: BearingModel, after: BearingModel, runs: BearingRuns) -> tuple[list[BeforeAfter], int]:
+def before_and_after(
+    before: BearingModel, after: BearingModel, runs: BearingRuns, weights: Mapping[str, float] | None = None
+) -> tuple[list[BeforeAfter], int]:
     """Every statistic of two designs, from the same starts.
 
-    **Arguments:** designs; how to run them, best `BearingRuns.fresh` of those that the search had.
+    **Arguments:** designs; how to run them, best `BearingRuns.fresh` of those that the search had; the weights of the
+    `BearingObjective`, if there is one.
 
-    **Returns:** a row for each of `COMPARED` and the balance grade; the number of lanes that failed, which are left out
-    with those that began alike.
+    **Returns:** a row for each of `COMPARED`, the balance grade and the objective; the number of lanes that failed,
+    which are left out with those that began alike.
     """
     old, new = runs.run([before, after])
     whole = ~(old.failed | new.failed).any(axis=0)
     mean = lambda x: float(x.mean()) if x.size else math.nan
     error = lambda x: float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan
-    rows = []
-    for name in COMPARED:
-        a, b = (_halves(each, name)[whole].mean(axis=-1) for each in (old, new))
-        unit = STATISTIC_UNITS[name]
-        rows.append(BeforeAfter(name, unit, mean(a), error(a), mean(b), error(b), mean(b - a), error(b - a)))
+
+    def row(name: str, unit: str, a: np.ndarray, b: np.ndarray) -> BeforeAfter:
+        return BeforeAfter(name, unit, mean(a), error(a), mean(b), error(b), mean(b - a), error(b - a))
+
+    found = {name: [_halves(each, name)[whole].mean(axis=-1) for each in (old, new)] for name in COMPARED}
+    rows = [row(name, STATISTIC_UNITS[name], *pair) for name, pair in found.items()]
     then, now = (balance_grade(model, runs.speeds) for model in (before, after))
     rows.append(BeforeAfter(BALANCE, "mm/s", then, 0.0, now, 0.0, now - then, 0.0))
+    if weights is not None:
+        found[BALANCE] = [np.full(int(whole.sum()), grade) for grade in (then, now)]
+        total = lambda i: np.sum([w * found[name][i] for name, w in weights.items()], axis=0)
+        rows.append(row(OBJECTIVE, "1", total(0), total(1)))
     return rows, int(old.failed.sum() + new.failed.sum())
 
 

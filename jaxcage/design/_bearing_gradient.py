@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from .._arguments import require_above_zero, require_at_least
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
@@ -174,9 +175,11 @@ def bearing_gradient(
     **Raises:** `ValueError` for parameters that are unknown or 0, a box of designs that leaves a parameter's range,
     counts that are impossible, too few designs for the directions; if too many of them fail.
     """
+    require_above_zero(speed=speed)
+    require_at_least(0, seed=seed, discard=discard)
     values = _values(model, directions)
     _require(directions, statistics, designs, spread, revolutions)
-    moved = spread * moves(designs // 2, len(directions), seed)
+    moved = spread * _moves(designs // 2, len(directions), seed)
     boxed = [_design(model, values, directions, row) for row in np.concatenate([moved, -moved])]
     found = sweep_bearings(
         boxed,
@@ -255,7 +258,7 @@ def _require(
         raise ArgumentError("revolutions", said=f"must be an even number above 0, but {revolutions} was given.")
 
 
-def moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
+def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
     """Places in the box, half way out or further: as many plus as minus in each column, in no order; of full rank."""
     rng, even = np.random.default_rng(seed), np.resize([1.0, -1.0], pairs)
     while True:

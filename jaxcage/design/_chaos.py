@@ -1,40 +1,35 @@
-"""How much of a speed range is chaotic, as a smooth statistic of an ensemble with a slope and error bars.
-
-A chaotic edge has no equation where a crisis or the breakdown of a torus makes it, and the derivative of a chaotic
-trajectory grows like e^(lambda n), whatever the statistics do. What has a slope is an average. Every speed counts with
-a smooth step of its largest exponent, every design is surrounded by a cloud of others, and the slope is that of a
-least-squares plane through the cloud. The same random numbers are used at every design, so that two designs differ by
-what they are and not by luck.
+"""How much of a speed range is chaotic, as a smooth statistic of lanes: every speed counts with a smooth step of its
+largest exponent. It has no slope: the derivative of a chaotic trajectory grows like e^(lambda n), whatever the
+statistics do.
 """
 
 import dataclasses
-import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import expit, ndtri
+from scipy.special import expit
 
 from .._errors import ArgumentError
-from .._sobol import sobol
 from ..analysis import CHAOS_THRESHOLD
 from ..integrate import AbstractMethod
 from ..sweeps import rpm, sweep_designs
-from ._objective import AbstractObjective, DesignSpace, Measured
+from ._objective import AbstractObjective, DesignSpace
 
 
 TOGETHER = 96
 """Designs swept in one batch."""
-RESAMPLED = 400
-"""Bootstrap samples behind a standard error."""
 
 
-class Ran(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Ran:
     """Designs after their revolutions."""
 
     exponent: Float[np.ndarray, "k speeds starts"]
     last: Float[np.ndarray, "k speeds starts dim"]
+    loads: dict[int, dict[str, np.ndarray]] = dataclasses.field(default_factory=dict)
+    """What their land feels over so many revolutions more, as far as it was asked for."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,32 +45,18 @@ class ChaosMeasure(AbstractObjective):
     revolutions: int = 100
     softness: float = 0.02
     """Half width of the step, in exponents per revolution."""
-    cloud: int = 12
-    """Designs around each, a multiple of 2: they come in opposite pairs."""
-    spread: float = 0.03
-    """Standard deviation of the cloud, as a part of the distance between the bounds."""
-    seed: int = 0
     method: AbstractMethod | None = None
     _last: list[Any] = dataclasses.field(default_factory=list, init=False, repr=False)
-    _read: dict[Any, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self):
-        if self.cloud < 4 or self.cloud % 2:
-            raise ArgumentError("cloud", said=f"must be an even number from 4 up, but {self.cloud} was given.")
-        if not self.spread > 0 or not self.softness > 0:
-            given = f"{self.spread} and {self.softness}"
-            raise ArgumentError("spread", "softness", said=f"must be positive, but {given} were given.")
+        if not self.softness > 0:
+            raise ArgumentError("softness", said=f"must be positive, but {self.softness} was given.")
 
-    @property
-    def resolution_rpm(self) -> float:
-        """Largest distance between two speeds."""
-        return float(np.max(np.diff(self.speeds))) * 30 / np.pi if self.speeds.size > 1 else float("inf")
-
-    def run(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> "Ran":
+    def run(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Ran:
         """The designs run over the speeds; what was run last is known, for other terms of a sum that ask for it."""
-        key = space.system, space.unknowns, np.asarray(places).tobytes()
-        if self._last and self._last[0][2] == key[2] and self._last[0][0] is key[0] and self._last[0][1] == key[1]:
-            return self._last[0][3]
+        key = np.asarray(places).tobytes()
+        if self._last and self._last[0] is space and self._last[1] == key:
+            return self._last[2]
         rows = []
         for part in np.array_split(places, -(-len(places) // TOGETHER)):
             models = [space.model(place) for place in part]
@@ -91,17 +72,8 @@ class ChaosMeasure(AbstractObjective):
                 method=self.method,
             )
         ran = Ran(np.array([s.exponents[..., 0] for s in rows]), np.array([s.last for s in rows]))
-        self._last[:] = [(*key, ran)]
+        self._last[:] = [space, key, ran]
         return ran
-
-    def read_off(
-        self, space: DesignSpace, places: Float[np.ndarray, "k n"], what: Any, read: Callable[["Ran"], Any]
-    ) -> Any:
-        """What `read` makes of a run; what was read last is known, for other terms of a sum that ask for `what`."""
-        ran = self.run(space, places)
-        if what not in self._read or self._read[what][0] is not ran:
-            self._read[what] = ran, read(ran)
-        return self._read[what][1]
 
     def chaos(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
         """How chaotic each design is at each speed. A lane that failed counts as chaotic: nothing says it is calm."""
@@ -111,53 +83,13 @@ class ChaosMeasure(AbstractObjective):
     def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
         return self.chaos(space, np.asarray(places)) @ self.weights
 
-    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
-        return self.through_cloud(space, places, self.values)
-
-    def through_cloud(
-        self,
-        space: DesignSpace,
-        places: Float[np.ndarray, "k n"],
-        values: Callable[[DesignSpace, Float[np.ndarray, "k n"]], Float[np.ndarray, " k"]],
-    ) -> list[Measured]:
-        """Value and slope of `values` at each place, from the cloud of designs around it."""
-        steps = self.spread * self._directions(len(space.unknowns))
-        around = np.clip(
-            np.asarray(places)[:, None, None] + steps[None, None] * np.array([[1.0], [-1.0]])[:, None], 0, 1
-        )
-        k, _, pairs, n = around.shape
-        found = values(space, around.reshape(-1, n)).reshape(k, 2, pairs)
-        rng = np.random.default_rng(self.seed)
-        drawn = np.concatenate([np.arange(pairs)[None], rng.integers(0, pairs, (RESAMPLED, pairs))])
-        return [self._plane(around[i], found[i], drawn) for i in range(k)]
-
-    def _directions(self, n: int) -> Float[np.ndarray, "pairs n"]:
-        """Evenly spread over a normal distribution, the same at every design."""
-        return ndtri(np.clip(sobol(n, self.cloud // 2, self.seed), 1e-3, 1 - 1e-3))
-
-    def _plane(self, around: np.ndarray, found: np.ndarray, drawn: np.ndarray) -> Measured:
-        """Value and slope from pairs of opposite designs, with errors by the bootstrap over pairs."""
-        apart, change, middle = around[0] - around[1], found[0] - found[1], found.mean(axis=0)
-        if not np.all(np.isfinite(found)):
-            nothing = np.full(around.shape[-1], np.nan)
-            return Measured(math.nan, math.nan, nothing, nothing, "every start of a design near it failed")
-        slopes = np.array([np.linalg.lstsq(apart[rows], change[rows], rcond=1e-6)[0] for rows in drawn])
-        pairs, n = apart.shape
-        small = np.sqrt(pairs / max(pairs - n, 1))  # the bootstrap of few pairs is too sure of itself
-        return Measured(
-            float(middle.mean()),
-            float(middle.std(ddof=1) / np.sqrt(pairs)),
-            slopes[0],
-            small * slopes[1:].std(axis=0, ddof=1),
-        )
-
 
 def chaotic_width(first_rpm: float, last_rpm: float, count: int = 48, **options: Any) -> ChaosMeasure:
     """Chaotic speeds between two [rpm], on a grid of `count` speeds: a smoothed width of the zones in that range.
 
     **Arguments:** range and speeds; the fields of `ChaosMeasure`.
 
-    **Returns:** an objective in rpm, at the resolution of the grid and of the cloud.
+    **Returns:** an objective in rpm, at the resolution of the grid.
     """
     speeds = rpm(first_rpm, last_rpm, count)
     return ChaosMeasure(speeds, np.full(count, (last_rpm - first_rpm) / count), **options)

@@ -49,7 +49,7 @@ class KeptSearch:
         """**Arguments:** where; the space that is searched, and for what; what else makes this search another one, as
         JSON has it."""
         design = {name: np.asarray(value).tolist() for name, value in parameters(space.system).items()}
-        bounds = {u.name: [u.lower, u.upper] for u in space.unknowns}
+        bounds = {name: list(pair) for name, pair in space.bounds.items()}
         self.path = Path(path)
         what = {"design": design, "bounds": bounds, "objective": made_of(objective), **search}
         self.what = json.dumps(what, sort_keys=True)

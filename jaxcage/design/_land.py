@@ -18,7 +18,7 @@ from ..analysis import Sweep
 from ..models import CageModel
 from ..sweeps import averages
 from ._chaos import ChaosMeasure
-from ._objective import AbstractObjective, DesignSpace, Measured
+from ._objective import AbstractObjective, DesignSpace
 
 
 MEASURES = {"wear load": "N m/s", "peak land force": "N", "film drag power": "W"}
@@ -46,7 +46,7 @@ class LandMeasure(AbstractObjective):
     `wear load` [N m/s]: mean contact force times the speed at which the cage's land slides on the rib's; `peak land
     force` [N]: its largest value over some revolutions; `film drag power` [W]: what shearing the film takes; `least
     film` [m]: the smallest distance of cage and rib, of the starts the least, 0 where they touch: it is to be made
-    large. Slopes come from the same cloud of designs, and the same simulations, as those of `chaos`.
+    large. They come from the same simulations as `chaos`.
     """
 
     chaos: ChaosMeasure
@@ -62,15 +62,14 @@ class LandMeasure(AbstractObjective):
     def at_speeds(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k speeds"]:
         """At each speed; NaN where every start of a design failed."""
         models: list[Any] = [space.model(place) for place in places]
-        read = lambda ran: _loads(models, self.chaos.speeds, ran.last, self.revolutions)
-        return self.chaos.read_off(space, places, ("land", self.revolutions), read)[self.what]
+        ran = self.chaos.run(space, places)
+        if self.revolutions not in ran.loads:
+            ran.loads[self.revolutions] = _loads(models, self.chaos.speeds, ran.last, self.revolutions)
+        return ran.loads[self.revolutions][self.what]
 
     def values(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, " k"]:
         weights = self.chaos.weights / np.sum(self.chaos.weights)
         return self.at_speeds(space, np.asarray(places)) @ weights
-
-    def measure(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> list[Measured]:
-        return self.chaos.through_cloud(space, places, self.values)
 
     def relative(self, space: DesignSpace, price: float) -> AbstractObjective:
         """`price` times this over what the design itself has; where that is next to nothing, over what its weight would

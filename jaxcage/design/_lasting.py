@@ -16,11 +16,10 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
-from ..analysis import LIFE_BLOCK, Hazard, Zone, crisis, hazard
+from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
 from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..sweeps import Progress, sweep_designs
-from ._crisis_edge import LIKELY, AbstractStatisticalEdge, CrisisEdge, crisis_edge
 
 
 NAMES = ("guidance_gap", "eccentricity")
@@ -33,16 +32,24 @@ REACH = 2.0
 """Lanes are spread over speeds with mean lives of e^-REACH to e^REACH horizons, as far as the last round tells."""
 DISCARD, OBSERVED = 100, 300
 """Revolutions left out, and those after which lanes that are calm are not followed."""
-DRAWS = 30
-"""Data sets drawn from the law of a crisis, for its errors."""
+LIKELY = 0.001
+"""Probability below which the law of escapes does not fit."""
 CERTAIN = 3.0
 """Standard errors of an edge that must fit into the window."""
 
 
 @dataclasses.dataclass(frozen=True)
-class LastingEdge(AbstractStatisticalEdge):
+class LastingEdge:
     """Where the mean life of chaos passes the horizon, and how that moves with parameters."""
 
+    speed_rpm: float
+    names: tuple[str, ...]
+    elasticity: Float[np.ndarray, " n"]
+    """Relative change of the edge by that of each parameter."""
+    covariance: Float[np.ndarray, "1+n 1+n"]
+    """Of the speed [rpm], then of the elasticities."""
+    values: Float[np.ndarray, " n"]
+    """Of the parameters [SI]."""
     horizon: int
     middle_rpm: float
     window_rpm: float
@@ -50,23 +57,6 @@ class LastingEdge(AbstractStatisticalEdge):
     steepness: float
     """Change of the logarithm of the escape rate with speed [1/rpm]."""
     fit: Hazard
-    lanes: tuple[np.ndarray, np.ndarray, np.ndarray] = dataclasses.field(repr=False)
-    """Speed of each lane [rpm], relative changes of its parameters, and after how many revolutions it was calm."""
-
-    def crisis(self, seed: int = 0) -> CrisisEdge:
-        """Where the mean life diverges, if a crisis does it: by a power law of the same lanes, without the horizon.
-
-        **Returns:** `CrisisEdge`; its `status` says where the numbers should not be used.
-
-        **Raises:** `ValueError` where fewer than ten lanes escaped.
-        """
-        rpm, change, times = self.lanes
-        beyond, side = ("above", 1) if self.steepness > 0 else ("below", -1)
-        options = {"block": LIFE_BLOCK, "t0": DISCARD, "beyond": beyond, "draws": DRAWS, "seed": seed}
-        fit = lambda some: crisis(times[some], self.horizon, rpm[some], change[some], **options)
-        away = side * (rpm * (1 - change @ self.elasticity) - self.speed_rpm)
-        escaped = (times > DISCARD) & (times <= self.horizon)
-        return crisis_edge(fit, away, escaped, self.names, self.values, float(np.ptp(rpm)) / 2)
 
     @property
     def status(self) -> str:
@@ -76,10 +66,37 @@ class LastingEdge(AbstractStatisticalEdge):
             return "no edge: the mean life does not pass the horizon among these speeds"
         return "converged" if self.fit.p_value >= LIKELY else "the rate of escapes is not log-linear here"
 
+    @property
+    def slope(self) -> Float[np.ndarray, " n"]:
+        """[rpm per unit of the parameter]."""
+        return self.elasticity * self.speed_rpm / self.values
+
+    @property
+    def standard_error_rpm(self) -> float:
+        """Of the speed."""
+        return math.sqrt(self.covariance[0, 0])
+
+    @property
+    def elasticity_error(self) -> Float[np.ndarray, " n"]:
+        """Standard error of each elasticity."""
+        return np.sqrt(np.diag(self.covariance)[1:])
+
+    def sum_of(self, *names: str) -> tuple[float, float]:
+        """Elasticity by several parameters that change together, such as gap and eccentricity at a fixed ratio, with
+        its standard error.
+
+        **Raises:** `ValueError` for a parameter that the edge was not asked about.
+        """
+        if unknown := [name for name in names if name not in self.names]:
+            raise ArgumentError("names", said=f"must be among {', '.join(self.names)}, but has '{unknown[0]}'.")
+        weight = np.array([0.0, *(float(n in names) for n in self.names)])
+        return float(weight[1:] @ self.elasticity), math.sqrt(weight @ self.covariance @ weight)
+
     def __str__(self) -> str:
         lanes = f"{self.fit.escapes} of {self.fit.lanes} chaotic lanes escaped by revolution {self.horizon}"
         head = f"{self.speed_rpm:.0f} +- {self.standard_error_rpm:.0f} rpm, elasticities ({lanes}; {self.status})"
-        return "\n".join([head, *self._rows()])
+        each = zip(self.names, self.elasticity, self.elasticity_error, strict=True)
+        return "\n".join([head, *(f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in each)])
 
     _repr_html_ = notebook_html
 
@@ -214,10 +231,7 @@ def _fitted(
     of_slope[:, order + 1 :] -= np.diag(window / steep / scale)
     jacobian = np.vstack([window * of_at, (of_slope - np.outer(slope / speed, window * of_at)) / speed])
     covariance = jacobian @ fit.covariance @ jacobian.T
-    return LastingEdge(
-        *(speed, tuple(names), slope / speed, covariance, base, horizon, edge, window, steep / window, fit),
-        lanes=(rpm, change, times),
-    )
+    return LastingEdge(speed, tuple(names), slope / speed, covariance, base, horizon, edge, window, steep / window, fit)
 
 
 def _root(bent: Hazard, horizon: int) -> float:

@@ -2,7 +2,7 @@
 
 A position between the bounds is a logistic function of an unbounded number, so that no step leaves the bounds. All
 searches take their steps together, and their objectives are computed in one batch. A step to where the objective has no
-value is undone by half. The search ends when the slope is small, or no larger than its own error.
+value is undone by half. The search ends when the slope is small.
 """
 
 import dataclasses
@@ -15,14 +15,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError, InputError
 from .._sobol import sobol
 from ._kept import KeptSearch
-from ._objective import AbstractObjective, DesignSpace, Measured
-from ._unknowns import Design
+from ._objective import AbstractObjective, Design, DesignSpace, Measured
 
 
 AT_BOUND = 0.01
@@ -31,29 +31,6 @@ INSIDE = 0.02
 """Starts are kept this far from the bounds, where a logistic function has no slope."""
 SAME = 0.05
 """Two optima within this part of the bounds' distance in every parameter are one."""
-PATIENCE = 3
-"""Steps in a row for which the slope must be within its error before a search ends there."""
-
-
-def walk(first: float = 0.15, last: float = 0.03, steps: int = 12) -> optax.GradientTransformation:
-    """Steps of given length down the slope, between the bounds themselves: for slopes with noise.
-
-    A parameter that does nothing has a small part of the slope and stays about where it is, where Adam would make its
-    noise as large as any slope; one at its bound leaves it as readily as another.
-
-    **Arguments:** lengths of the first and the last of so many steps, as parts of the distance between the bounds.
-    """
-    length = optax.cosine_decay_schedule(first, max(steps, 1), last / first)
-
-    def update(gradient: Array, count: Array, z: Array | None = None) -> tuple[Array, Array]:
-        assert z is not None
-        place = jax.nn.sigmoid(z)
-        slope = gradient / (place * (1 - place))
-        step = length(count) * slope / jnp.maximum(jnp.sqrt(jnp.sum(slope * slope)), 1e-300)
-        new = jnp.clip(place - step, AT_BOUND / 2, 1 - AT_BOUND / 2)
-        return jnp.log(new / (1 - new)) - z, count + 1
-
-    return optax.GradientTransformation(lambda z: jnp.zeros((), jnp.int32), update)  # pyright: ignore[reportArgumentType]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,9 +39,8 @@ class Step:
 
     place: tuple[float, ...]
     value: float
-    error: float
-    slope: tuple[float, ...]
-    slope_error: tuple[float, ...]
+    slope: tuple[float, ...] = ()
+    """Nothing for a search that takes no slopes."""
     status: str = "ok"
 
 
@@ -75,19 +51,16 @@ class Optimum(Generic[Design]):
     values: dict[str, float]
     """[SI]."""
     objective: float
-    error: float
-    """Standard error; NaN of a single value."""
     at_bound: tuple[str, ...]
     """Parameters that ended at a bound: there the bound chose, not the objective."""
     history: tuple[Step, ...]
     status: str
-    """`slope is small`, `slope within its error`, `step limit`, or why the objective has no value."""
+    """`slope is small`, `step limit`, `batch limit`, or why the objective has no value."""
     model: Design
     """The design itself, of the kind that the search began with."""
 
     def __str__(self) -> str:
-        error = f" +- {self.error:.2g}" if np.isfinite(self.error) else ""
-        rows = [f"Optimum after {len(self.history) - 1} steps ({self.status}): {self.objective:.6g}{error}"]
+        rows = [f"Optimum after {len(self.history) - 1} steps ({self.status}): {self.objective:.6g}"]
         rows += [f"  {n:<24} {v:.6g}{' at bound' if n in self.at_bound else ''}" for n, v in self.values.items()]
         return "\n".join(rows)
 
@@ -113,10 +86,9 @@ class Optimised(Generic[Design]):
     def distinct(self) -> tuple[tuple[Optimum[Design], int], ...]:
         """Optima that differ, with how many starts led to each."""
         found: list[tuple[Optimum[Design], int]] = []
-        place = lambda o: np.array([u.place(o.values[u.name]) for u in self.space.unknowns])
         for optimum in self.optima:
             for i, (other, count) in enumerate(found):
-                if np.max(np.abs(place(other) - place(optimum))) < SAME:
+                if np.max(np.abs(self.space.place_of(other.values) - self.space.place_of(optimum.values))) < SAME:
                     found[i] = (other, count + 1)
                     break
             else:
@@ -147,8 +119,8 @@ def optimise(
     **Arguments:**
 
     - `system`: the design; `vary`: bounds [SI] by parameter name.
-    - `objective`: a sum of objectives, such as `chaotic_width(4000, 27500) + 500 * cost()`.
-        - `optimiser`: an optax optimiser of the unbounded variables; by default Adam with a decreasing rate.
+    - `objective`: a sum of objectives with slopes, such as `zone_width(edges) + 500 * cost()`.
+    - `optimiser`: an optax optimiser of the unbounded variables; by default Adam with a decreasing rate.
     - `starts`: number of searches, the first from the design itself, the others from quasi-random points; or these
         points, as fractions of the way from the lower bounds to the upper ones.
     - `scouts`: number of quasi-random points evaluated beforehand, without slopes; searches start from the best.
@@ -160,10 +132,12 @@ def optimise(
 
     **Returns:** `Optimised`.
 
-    **Raises:** `ValueError` for unknown parameters, bounds that do not ascend, starts outside, or a kept file of
-    another search.
+    **Raises:** `ValueError` for unknown parameters, bounds that do not ascend, starts outside, an objective without a
+    slope, or a kept file of another search.
     """
     require_x64()
+    require_at_least(0, seed=seed)
+    require_at_least(1, steps=steps)
     space = DesignSpace.of(system, vary)
     chosen = optax.adam(optax.cosine_decay_schedule(0.5, max(steps, 1), 0.1)) if optimiser is None else optimiser
     first = first_places(space, objective, starts, scouts, seed)
@@ -178,13 +152,13 @@ def optimise(
     before = z.copy()
     while (step := max(map(len, history))) <= steps:
         places = 1 / (1 + np.exp(-z))
-        live = [i for i in range(len(z)) if _ended(history[i], tolerance) is None]
+        live = [i for i in range(len(z)) if not _settled(history[i], tolerance)]
         if not live:
             break
         measured = dict(zip(live, objective.measure(space, places[live]), strict=True))
         gradient = np.zeros_like(z)
         for i, m in measured.items():
-            history[i].append(_step(places[i], m))
+            history[i].append(Step(tuple(places[i].tolist()), m.value, tuple(m.slope.tolist()), m.status))
             if m.status == "ok":
                 gradient[i] = m.slope * places[i] * (1 - places[i])
         if report is not None:
@@ -200,7 +174,8 @@ def optimise(
         z = np.where(np.isin(np.arange(len(z)), live)[:, None], stepped, z)
         if kept is not None:
             _save(kept, z, state, history)
-    return Optimised.of(space, [optimum_of(space, h, _ended(h, tolerance) or "step limit") for h in history])
+    status = lambda h: "slope is small" if _settled(h, tolerance) else "step limit"
+    return Optimised.of(space, [optimum_of(space, h, status(h)) for h in history])
 
 
 def first_places(
@@ -208,11 +183,10 @@ def first_places(
 ) -> Float[np.ndarray, "starts n"]:
     """Where searches start."""
     if isinstance(starts, np.ndarray):
-        if starts.ndim != 2 or starts.shape[1] != len(space.unknowns) or not np.all((starts >= 0) & (starts <= 1)):
+        if starts.ndim != 2 or starts.shape[1] != len(space.names) or not np.all((starts >= 0) & (starts <= 1)):
             raise ArgumentError("starts", said="must hold places between 0 and 1, one column for each parameter.")
         return np.clip(starts, INSIDE, 1 - INSIDE)
-    if starts < 1:
-        raise ArgumentError("starts", said=f"must be at least 1, but {starts} was given.")
+    require_at_least(1, starts=starts)
     own = space.place
     if not np.all((own >= 0) & (own <= 1)):
         outside = ", ".join(n for n, p in zip(space.names, own, strict=True) if not 0 <= p <= 1)
@@ -227,26 +201,13 @@ def first_places(
     return np.clip(np.vstack([own, drawn]), INSIDE, 1 - INSIDE)
 
 
-def _step(place: np.ndarray, measured: Measured) -> Step:
-    row = lambda x: tuple(float(c) for c in x)
-    m = measured
-    return Step(row(place), m.value, m.error, row(m.slope), row(m.slope_error), m.status)
-
-
-def _ended(history: Sequence[Step], tolerance: float) -> str | None:
-    """Why a search is over, if it is."""
+def _settled(history: Sequence[Step], tolerance: float) -> bool:
+    """Whether the slope is small."""
     if not history or history[-1].status != "ok":
-        return None
-    pull = lambda s: np.array(s.slope) * np.array(s.place) * (1 - np.array(s.place))
-    doubt = lambda s: np.array(s.slope_error) * np.array(s.place) * (1 - np.array(s.place))
+        return False
+    place, slope = np.array(history[-1].place), np.array(history[-1].slope)
     size = max(abs(next((s.value for s in history if s.status == "ok"), 1.0)), 1e-300)
-    if np.max(np.abs(pull(history[-1]))) < tolerance * size:
-        return "slope is small"
-    last = history[-PATIENCE:]
-    fine = [s.status == "ok" and np.any(np.array(s.slope_error) > 0) for s in last]
-    if len(last) == PATIENCE and all(fine) and all(np.all(np.abs(pull(s)) <= doubt(s)) for s in last):
-        return "slope within its error"
-    return None
+    return bool(np.max(np.abs(slope * place * (1 - place))) < tolerance * size)
 
 
 def optimum_of(space: DesignSpace[Design], history: Sequence[Step], status: str) -> Optimum[Design]:
@@ -260,7 +221,7 @@ def ended_at(space: DesignSpace[Design], best: Step, history: Sequence[Step], st
     """The optimum at a step."""
     place = np.array(best.place)
     edge = [n for n, p in zip(space.names, place, strict=True) if min(p, 1 - p) < AT_BOUND]
-    return Optimum(space.values(place), best.value, best.error, tuple(edge), tuple(history), status, space.model(place))
+    return Optimum(space.values(place), best.value, tuple(edge), tuple(history), status, space.model(place))
 
 
 def _save(kept: KeptSearch, z: np.ndarray, state: Any, history: Sequence[Sequence[Step]]) -> None:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError, InputError
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
-from ._objective import AbstractObjective, DesignSpace, Measured
-from ._optimise import Optimised, optimise
-from ._trade_off import unbeaten
+from ._objective import AbstractObjective, DesignSpace
 
 
 NARROW = 0.3
@@ -91,6 +90,7 @@ def global_sensitivity(
 
     **Raises:** `ValueError` for samples that are no power of 2, or an objective that could not be had somewhere.
     """
+    require_at_least(0, seed=seed)
     space = DesignSpace.of(system, vary)
 
     def evaluate(x: np.ndarray) -> np.ndarray:
@@ -187,42 +187,3 @@ def tolerance_budget(edge: Sensitivity, deviation: Mapping[str, float]) -> Toler
             raise InputError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
     moved = {n: abs(edge.elasticity[n]) * d * edge.value_rpm for n, d in deviation.items()}
     return ToleranceBudget(edge.name, edge.value_rpm, moved)
-
-
-@dataclasses.dataclass(frozen=True)
-class ParetoPoint:
-    """A design that no other beats: none that was found is as good in both respects and better in one."""
-
-    weight: float
-    values: dict[str, float]
-    first: Measured
-    second: Measured
-
-
-def pareto_front(
-    system: AbstractForcedSystem,
-    vary: Mapping[str, tuple[float, float]],
-    first: AbstractObjective,
-    second: AbstractObjective,
-    weights: Sequence[float],
-    *,
-    report: Callable[[int, Optimised], None] | None = None,
-    **options: Any,
-) -> tuple[ParetoPoint, ...]:
-    """Trade-off of two objectives: optima of first + weight * second without those that another beats.
-
-    **Arguments:** as for `optimise`; weights of the second objective, one search from each optimum to the next.
-
-    **Returns:** points by the second objective; none where either could not be had.
-    """
-    points = []
-    for i, weight in enumerate(weights):
-        found = optimise(system, vary, first + weight * second, **options)
-        space, best = found.space, found.best
-        place = np.array([[u.place(best.values[u.name]) for u in space.unknowns]])
-        options["starts"] = place
-        points.append(ParetoPoint(weight, best.values, first.measure(space, place)[0], second.measure(space, place)[0]))
-        if report is not None:
-            report(i, found)
-    kept = unbeaten(np.array([(p.first.value, p.second.value) for p in points]).reshape(-1, 2))
-    return tuple(sorted((p for p, good in zip(points, kept, strict=True) if good), key=lambda p: p.second.value))

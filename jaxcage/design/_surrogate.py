@@ -3,9 +3,10 @@
 The process is that of the logarithm of the objective. Each design of a batch is the best of one sample drawn from it
 (Thompson sampling), among places in a region about the best design so far, which grows while designs become better and
 shrinks while they do not (D. Eriksson et al., Scalable Global Optimization via Local Bayesian Optimization, NeurIPS
-2019). At the same number of designs it found better ones than slopes and evolution did: `python -m benchmarks.pay`.
+2019).
 """
 
+import dataclasses
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -18,9 +19,8 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._sobol import sobol
 from ._kept import KeptSearch
-from ._objective import AbstractObjective, DesignSpace
-from ._optimise import Optimised, Step, first_places, optimum_of
-from ._unknowns import Design
+from ._objective import AbstractObjective, Design, DesignSpace
+from ._optimise import Optimised, Step, ended_at, first_places, optimum_of
 
 
 CANDIDATES = 512
@@ -34,6 +34,10 @@ BETTER = 1e-3
 LENGTH, NOISE = 0.7, 0.05
 """What the process is taken to be unless the designs say otherwise: its correlation length in each parameter, and the
 variance of its noise beside its own."""
+AMONG = 4
+"""The best designs of a search that a finer objective looks at."""
+UNCONFIRMED = "not confirmed"
+"""How a search ended whose best is no better than the design as it is."""
 BESIDE = 5e-3
 """Part of the first value that is added to all of them, so that the logarithm of a small one has no cliff."""
 
@@ -138,9 +142,8 @@ class SurrogateSearch:
         """What the designs are worth; NaN for one that has no value."""
         fine = np.isfinite(values)
         best = int(np.argmin(np.where(fine, values, np.inf)))
-        nothing = (np.nan,) * places.shape[1]
         value, status = (float(values[best]), "ok") if fine[best] else (np.nan, "no design has a value")
-        self.history.append(Step(tuple(places[best].tolist()), value, np.nan, nothing, nothing, status))
+        self.history.append(Step(tuple(places[best].tolist()), value, status=status))
         if len(self.places) >= len(self.first):
             before = np.min(_known(self.values))
             won = np.nanmin(_known(values)) < before - BETTER * abs(before)
@@ -173,7 +176,6 @@ def _fitted(places: np.ndarray, worth: np.ndarray) -> tuple[Any, float]:
     from scipy.optimize import minimize
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels  # takes a second to load
-    from threadpoolctl import threadpool_limits
 
     n = places.shape[1]
     lengths: Any = np.full(n, LENGTH)
@@ -188,7 +190,41 @@ def _fitted(places: np.ndarray, worth: np.ndarray) -> tuple[Any, float]:
         return found.x, found.fun
 
     process: Any = GaussianProcessRegressor(kernel, alpha=1e-10, optimizer=most_probable)  # pyright: ignore[reportArgumentType]
-    with threadpool_limits(1, "blas"), warnings.catch_warnings():  # its threads would wait for one another
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: the parameter does nothing
         process.fit(places, worth)
     return process, process.kernel_.k2.noise_level
+
+
+def judged(found: Optimised[Design], objective: AbstractObjective) -> tuple[Optimised[Design], float]:
+    """The same searches, with the best of each chosen anew by a finer objective.
+
+    What a search saw as its best is better than it is, since of many values with noise the least is chosen. The finer
+    objective looks at the best few of each search and at the design that the searches began with: where that one is the
+    best, it stays.
+
+    **Arguments:** what was found; an objective with more speeds, starts or revolutions.
+
+    **Returns:** the searches, the best first by the finer objective; and what that says of the design itself.
+    """
+    space = found.space
+    own = np.clip(space.place, 0.0, 1.0)
+    picked = [
+        sorted((s for s in o.history if s.status == "ok"), key=lambda s: s.value)[:AMONG] or [o.history[-1]]
+        for o in found.optima
+    ]
+    values = objective.values(space, np.array([own, *(s.place for steps in picked for s in steps)]))
+    itself = Step(tuple(own.tolist()), float(values[0]))
+    optima, others = [], iter(values[1:].tolist())
+    for o, steps in zip(found.optima, picked, strict=True):
+        finer = [dataclasses.replace(s, value=x) for s, x in zip(steps, others, strict=False)]
+        best = min([itself, *finer], key=lambda s: np.nan_to_num(s.value, nan=np.inf))
+        optima.append(ended_at(space, best, o.history, "nothing better found" if best is itself else o.status))
+    return Optimised.of(space, optima), itself.value
+
+
+def unchanged(found: Optimised[Design], value: float) -> Optimised[Design]:
+    """The same searches with the design as it is, and what it is worth, in front: what they found is no better."""
+    place = tuple(np.clip(found.space.place, 0.0, 1.0).tolist())
+    own = ended_at(found.space, Step(place, value), found.best.history, UNCONFIRMED)
+    return Optimised((own, *found.optima), found.space)

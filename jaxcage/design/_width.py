@@ -6,12 +6,12 @@ import math
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..orbits import Sensitivity
-from ._crisis_edge import AbstractStatisticalEdge
+from ._lasting import LastingEdge
 
 
 TOGETHER = ("guidance_gap", "eccentricity")
 """What is shown first, and what grows together at a fixed ratio."""
-SolvedEdge = AbstractStatisticalEdge | Sensitivity
+SolvedEdge = LastingEdge | Sensitivity
 """An edge that knows how it answers to parameters: by lanes, or exactly."""
 
 

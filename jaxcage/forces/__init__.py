@@ -6,9 +6,6 @@
 | `_land`            | where the cage is in its guide                                              |
 | `_land_film`       | the film of all lands as a force on the cage                                |
 | `_film`            | short-bearing oil film of the rib lands, three film models, (25)-(28)       |
-| `_finite_film`     | the film of a land of finite width, and how far the short film is from it   |
-| `_reynolds`        | pressure by the Reynolds equation (25), three cavitation conditions         |
-| `_axial`, `_ring`  | its discretisation across the land, its linear solves around the rib        |
 | `_contact`         | line contact of the lands, with restitution                                 |
 | `_support`         | springs, cubic stiffness, damping and cross-coupling, (16), (20)            |
 | `_rib`             | rigid or elastic rib                                                        |
@@ -24,7 +21,6 @@ Frame: x to the right, y up, rotation positive counter-clockwise; forces act on 
 
 from .._arguments import check_layer
 from .._parameters import choice as choice, count as count, parameter as parameter
-from ._axial import axial_profiles as axial_profiles
 from ._contact import (
     ContactForce as ContactForce,
     LandContact as LandContact,
@@ -34,7 +30,6 @@ from ._contact import (
 )
 from ._film import (
     FilmModel as FilmModel,
-    ShortFilm as ShortFilm,
     film_drive as film_drive,
     film_pressure as film_pressure,
     film_resistance as film_resistance,
@@ -45,7 +40,6 @@ from ._film import (
     short_film_force as short_film_force,
     supply_force as supply_force,
 )
-from ._finite_film import finite_film_force as finite_film_force, short_film_excess as short_film_excess
 from ._gravity import WeightForce as WeightForce, weight as weight
 from ._impact_forcing import (
     PulseTrain as PulseTrain,
@@ -75,14 +69,7 @@ from ._pocket_impact import (
     impact_history as impact_history,
     impact_time_scale as impact_time_scale,
 )
-from ._reynolds import (
-    Cavitation as Cavitation,
-    FilmPressure as FilmPressure,
-    film_pressure_field as film_pressure_field,
-    pressure_force as pressure_force,
-)
 from ._rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
-from ._ring import solve_ring as solve_ring
 from ._smooth import (
     inverse_root as inverse_root,
     power_10_9 as power_10_9,
@@ -112,10 +99,8 @@ from ._unbalance import (
 check_layer(
     globals(),
     "approach_speed contact_force contact_slopes cross_force cubic_stiffness effective_eccentricity "
-    "film_drive film_pressure film_pressure_field film_resistance film_scale finite_film_force "
-    "fixed_half_resistance full_resistance half_circle_resistance impact_history impact_time_scale inverse_root "
-    "power_10_9 pressure_force pulse_spectrum pulse_train pulse_train_force "
-    "restitution_damping rib_force root_9 short_film_excess short_film_force smooth_norm smooth_plus "
-    "smooth_plus_slope solve_ring spring_force supply_force support_slopes synchronous_amplitude "
-    "synchronous_force unbalance_force weight",
+    "film_drive film_pressure film_resistance film_scale fixed_half_resistance full_resistance half_circle_resistance "
+    "impact_history impact_time_scale inverse_root power_10_9 pulse_spectrum pulse_train pulse_train_force "
+    "restitution_damping rib_force root_9 short_film_force smooth_norm smooth_plus smooth_plus_slope spring_force "
+    "supply_force support_slopes synchronous_amplitude synchronous_force unbalance_force weight",
 )

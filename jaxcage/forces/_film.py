@@ -17,13 +17,13 @@ from typing import Literal, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._arguments import require_above_zero
 from .._types import Scalar
 from ._smooth import inverse_root, smooth_norm
 
 
 Vector = tuple[Scalar, Scalar]
-ShortFilm = Literal["fixed_half", "positive_pressure", "full"]
-FilmModel = Literal["fixed_half", "positive_pressure", "full", "finite_length"]
+FilmModel = Literal["fixed_half", "positive_pressure", "full"]
 
 
 class Resistance(NamedTuple):
@@ -41,6 +41,7 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
 
     **Arguments:** dynamic viscosity [Pa s], land radius [m], width of one land [m], radial clearance [m].
     """
+    require_above_zero(viscosity=viscosity, radius=radius, width=width)
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
 
 
@@ -54,7 +55,7 @@ class FixedArc(NamedTuple):
     skew: Scalar
 
 
-def fixed_arc(model: ShortFilm, square: Scalar) -> FixedArc:
+def fixed_arc(model: FilmModel, square: Scalar) -> FixedArc:
     """The parts of M for the fixed half circle or the whole one, at the square of the eccentricity ratio."""
     inverse = 1 / (1 - square)
     half = model == "fixed_half"
@@ -113,7 +114,7 @@ def film_drive(x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar) -> t
 
 
 def film_resistance(
-    model: ShortFilm,
+    model: FilmModel,
     x: Scalar,
     y: Scalar,
     direction: Vector,
@@ -136,7 +137,7 @@ def film_resistance(
 
 
 def supply_force(
-    model: ShortFilm, direction: Vector, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
+    model: FilmModel, direction: Vector, px: Scalar, py: Scalar, omega: Scalar, smoothing: Scalar
 ) -> tuple[Array, Array]:
     """Thrust -2 u of a uniform gauge pressure on the pressurised half circle centred on u, in units of R L p_0.
 
@@ -152,7 +153,7 @@ def supply_force(
 
 
 def short_film_force(
-    model: ShortFilm, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar, smoothing: Scalar = 1e-9
+    model: FilmModel, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, omega: Scalar, smoothing: Scalar = 1e-9
 ) -> tuple[Array, Array]:
     """Force of the film in units of S = mu R L^3 / c^2, times 1/s: -(1/2) M P.
 

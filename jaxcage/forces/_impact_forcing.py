@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._parameters import count, parameter
 from .._types import Scalar
 from ..bearing import load_distribution
@@ -98,6 +99,7 @@ def pulse_spectrum(
     pulse. Coefficients are good to 1e-10 of the largest (1e-9 where it bounces ten times). They are NaN where 20 000
     steps do not resolve a pulse: a bar that swings tens of thousands of radians, or waves as many, during one impact.
     """
+    require_at_least(1, n_rollers=n_rollers)
     law = impact.oscillator
     v0 = approach_speed(law.approach_ratio, omega, pocket_clearance)
     moves = v0 > 0
@@ -125,6 +127,7 @@ def pulse_train(
     The zone is centred on -y with half angle theta; rollers turn counter-clockwise, enter at -pi/2 - theta, where the
     direction of motion is (cos theta, -sin theta), and leave at -pi/2 + theta, where it is (cos theta, sin theta).
     """
+    require_at_least(1, n_rollers=n_rollers)
     cosine, sine = pulse_spectrum(impact, omega, n_rollers, roller_mass, pocket_clearance)
     k = jnp.arange(impact.harmonics + 1, dtype=float) * n_rollers
 
@@ -140,6 +143,7 @@ def pulse_train(
 
 def pulse_train_force(tau: Scalar, train: PulseTrain, n_rollers: int) -> tuple[Array, Array]:
     """Force of the pulse train at phase tau [N]."""
+    require_at_least(1, n_rollers=n_rollers)
     first, rise = cos_sin(n_rollers * tau)
     now, before = (1.0, 0.0), (first, -rise)  # cosine and sine of k Z tau, by the recurrence of Chebyshev
     x = y = jnp.zeros(())

@@ -5,15 +5,11 @@ would be infinite.
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
-from jaxtyping import Array
 
 from .._parameters import choice, count, parameter
 from .._types import Scalar
-from ._film import FilmModel, ShortFilm, film_drive, film_resistance, film_scale, fixed_arc, supply_force
-from ._finite_film import finite_film_force
-from ._land import Place
+from ._film import FilmModel, film_drive, film_resistance, film_scale, fixed_arc, supply_force
 from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows
 from ._smooth import inverse_root
 
@@ -33,15 +29,9 @@ class RibFilm(eqx.Module):
         "fixed_half",
         "positive_pressure",
         "full",
-        "finite_length",
-        text="film model: a short film, or the Reynolds equation with its axial term",
+        text="film model: the arc of the short film that carries pressure",
         default="fixed_half",
     )
-
-    @property
-    def arc(self) -> ShortFilm:
-        """The short film whose pressurised arc this film has: exactly, or as the land gets narrow."""
-        return "positive_pressure" if self.model == "finite_length" else self.model
 
     def at(self, cage: GuidedCage, speed: Scalar) -> "FilmForce":
         """The film of `cage` in its guide."""
@@ -50,7 +40,6 @@ class RibFilm(eqx.Module):
             scale=self.n_lands * film_scale(viscosity, radius, self.land_width, c),
             supply_scale=self.n_lands * radius * self.land_width * self.supply_pressure,
             drag=self.n_lands * (2 * jnp.pi) * viscosity * radius**3 * self.land_width / c,
-            slenderness=self.land_width / (2 * radius),
             model=self.model,
         )
 
@@ -64,8 +53,6 @@ class FilmForce(AbstractForce):
     """R L p_0 of all lands [N]."""
     drag: Scalar
     """2 pi mu R^3 L/c of all lands [N m s]: the torque per speed of a cage in the middle of its clearance."""
-    slenderness: Scalar
-    """Width over diameter of a land."""
     model: FilmModel = eqx.field(static=True)
 
     def force(self, motion: Motion) -> Force:
@@ -73,33 +60,21 @@ class FilmForce(AbstractForce):
         x, y, omega = place.x, place.y, motion.cage_speed + motion.land_speed
         px, py = film_drive(x, y, place.vx, place.vy, omega)
         kept = 1 - place.excess * place.per_eps
-        fx, fy = self._pressed(kept * x, kept * y, place, px, py, omega, blur)
-        arc = "positive_pressure" if self.model == "finite_length" else self.model
-        thrust = supply_force(arc, (place.nx, place.ny), px, py, omega, blur)
+        m = film_resistance(self.model, kept * x, kept * y, (place.nx, place.ny), px, py, omega, blur)
+        half = -self.scale / 2
+        fx, fy = jnp.asarray(half * (m.xx * px + m.xy * py)), jnp.asarray(half * (m.xy * px + m.yy * py))
+        thrust = supply_force(self.model, (place.nx, place.ny), px, py, omega, blur)
         eps = place.eps - place.excess
         torque = self.drag * inverse_root(1 - eps * eps) * (motion.cage_speed - motion.land_speed)
         return fx + self.supply_scale * thrust[0], fy + self.supply_scale * thrust[1], -torque
 
-    def _pressed(
-        self, x: Scalar, y: Scalar, place: Place, px: Scalar, py: Scalar, omega: Scalar, blur: Scalar
-    ) -> tuple[Array, Array]:
-        """Force of the pressure that motion builds up [N], at (x, y) over clearance, for the drive P."""
-        if self.model == "finite_length":
-            fx, fy = finite_film_force(x, y, px, py, omega, self.slenderness, blur)
-            return jnp.asarray(self.scale * fx), jnp.asarray(self.scale * fy)
-        m = film_resistance(self.model, x, y, (place.nx, place.ny), px, py, omega, blur)
-        half = -self.scale / 2
-        return jnp.asarray(half * (m.xx * px + m.xy * py)), jnp.asarray(half * (m.xy * px + m.yy * py))
-
     def slopes(self, motion: Motion) -> tuple[Rows, Rows] | None:
-        """Closed form for a fixed arc; one solve, differentiated along all four, where the pressure is solved for.
+        """Closed form for a fixed arc.
 
         A displacement u turns the line of centres n by dn = (u - n n.u)/eps and t = (-n_y, n_x), across it, by as much.
         """
         if self.model == "positive_pressure":
             return None
-        if self.model == "finite_length":
-            return self._solved_slopes(motion)
         place, per_c, omega = motion.place, motion.land.per_clearance, motion.cage_speed + motion.land_speed
         nx, ny, per_eps = place.nx, place.ny, place.per_eps
         px, py = film_drive(place.x, place.y, place.vx, place.vy, omega)
@@ -140,12 +115,3 @@ class FilmForce(AbstractForce):
             (xy, drag * (isotropic + b * ny * ny - skewed)),
         )
         return of_q, of_v
-
-    def _solved_slopes(self, motion: Motion) -> tuple[Rows, Rows]:
-        def held(state: Array) -> Array:
-            x, y, vx, vy = state
-            return jnp.stack(self.force(motion._replace(x=x, y=y, vx=vx, vy=vy))[:2])
-
-        state = jnp.stack([jnp.asarray(s) for s in (motion.x, motion.y, motion.vx, motion.vy)])
-        (a, b), (c, d) = jax.jacfwd(held)(state).reshape(2, 2, 2)
-        return ((a[0], a[1]), (c[0], c[1])), ((b[0], b[1]), (d[0], d[1]))

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._parameters import parameter
 from .._types import Scalar
 from ._smooth import power_10_9
@@ -112,6 +113,7 @@ def impact_history(
 
     **Returns:** `ImpactHistory`.
     """
+    require_at_least(1, samples=samples, substeps=substeps)
     y0 = (jnp.zeros_like(v0), jnp.zeros_like(v0), jnp.asarray(v0), jnp.zeros_like(v0))
     grid = jnp.linspace(0.0, 1.0, samples)
     solution = dfx.diffeqsolve(

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._arguments import require_above_zero
 from .._types import Scalar
 
 
@@ -16,12 +17,14 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
 
     **Returns:** a value >= 0 in that unit; it exceeds max(u, 0) by at most 0.16 `width`, at u = 0.
     """
+    require_above_zero(width=width)
     t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
     return jnp.where(u >= width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 
 
 def smooth_plus_slope(u: Scalar, width: Scalar) -> Array:
     """Derivative of `smooth_plus`: the quintic smoothstep from 0 to 1."""
+    require_above_zero(width=width)
     t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
     return t**3 * (t * (6 * t - 15) + 10)
 

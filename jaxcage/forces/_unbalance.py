@@ -5,6 +5,7 @@ from typing import Literal
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._arguments import require_above_zero
 from .._types import Scalar
 from ._motion import AbstractForcing, Force, Motion
 from ._phase import cos_sin
@@ -28,6 +29,7 @@ def effective_eccentricity(
     `as_printed` takes (20) literally: 2 M rho omega^2 with rho = e/C_r read as a number of `printed_unit` (one
     millimetre): 4.44 e at a gap of 0.45 mm, 3.33 e at 0.60 mm.
     """
+    require_above_zero(guidance_gap=guidance_gap)
     if reading == "physical":
         return jnp.asarray(eccentricity)
     return jnp.asarray(2 * eccentricity / guidance_gap * printed_unit)

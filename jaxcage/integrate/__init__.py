@@ -10,7 +10,6 @@
 | `_march`       | many steps of a scalar function as a primitive: lanes, tangents, one compiled loop |
 | `_program`     | a scalar function traced: its elementary operations                                |
 | `_kernel`      | a step of a method, or one of its stages, as such a function                       |
-| `_device`      | a march as one kernel on a GPU                                                     |
 | `_strobe`      | the strobe map that everything uses                                                |
 | `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |
 | `_simulate`    | time histories, speed ramps                                                        |

@@ -3,7 +3,7 @@
 A step is written for a single lane, on scalars. What surrounds it decides what becomes of it:
 - `jax.vmap` makes lanes of it, and numbers that are the same in every lane stay scalars;
 - `jax.jvp` and `jax.jacfwd` put tangent vectors into the step, to any order; several directions share its values;
-- on a CPU each step is one loop along the lanes, on a GPU the whole march is one kernel (`_device`).
+- on a CPU each step is one loop along the lanes; another backend runs the step's own operations (`is_elementary`).
 
 XLA's CPU backend cuts a step of an integrator into a hundred loops over the lanes and computes shared terms again in
 each of them. What is inside a reduction it leaves in one piece. A step is therefore a reduction over windows of one
@@ -35,7 +35,6 @@ from jaxtyping import Array, Int
 
 from .._recent import jitted
 from ._program import CONTROL_FLOW, Numbers, Sizes, Step, pieces, program_of, undisturbed
-from ._traced import Kept, name_of
 
 
 LARGEST = {False: 2800, True: 12000}
@@ -60,17 +59,13 @@ _ours = contextvars.ContextVar("ours", default=False)
 """Whether the program that is being made is compiled with `COMPILER_OPTIONS`."""
 
 
-def compiled(f: Callable[..., Any], name: str | None = None) -> Callable[..., Any]:
+def compiled(f: Callable[..., Any]) -> Callable[..., Any]:
     """`jitted` for programs that march: the largest kernels are for these alone.
-
-    A function of a module is known by its name, another one by the `name` that it is given: later processes find such
-    programs traced (`_traced`).
 
     Options are for programs that are called with numbers: within another compiled function it is the function itself,
     and where it is differentiated or mapped from outside it is compiled with XLA's own.
     """
-    kept = Kept(f, name or name_of(f), COMPILER_OPTIONS)
-    traced = jitted(f)
+    with_options, within_others = jitted(f, COMPILER_OPTIONS), jitted(f)
 
     @functools.wraps(f)
     @undisturbed
@@ -78,10 +73,10 @@ def compiled(f: Callable[..., Any], name: str | None = None) -> Callable[..., An
         if jex.core.unsafe_am_i_under_a_jit_DO_NOT_USE():  # pyright: ignore[reportPrivateImportUsage]
             return f(*args, **kwargs)
         if any(isinstance(x, Tracer) for x in jax.tree.leaves((args, kwargs))):
-            return traced(*args, **kwargs)
+            return within_others(*args, **kwargs)
         token = _ours.set(True)
         try:
-            return kept(*args, **kwargs)
+            return with_options(*args, **kwargs)
         finally:
             _ours.reset(token)
 
@@ -333,14 +328,14 @@ def _share(tangent: Tangent) -> bool:
 
 
 def is_elementary(step: Step, sizes: Sizes) -> bool:
-    """Whether `step` is made of elementary operations on scalars alone."""
+    """Whether `step` is made of elementary operations on scalars alone, and the backend is a CPU."""
     if isinstance(step, Tangent):
         return is_elementary(step.step, step.sizes)
     program = program_of(step, sizes)
     caught = any(isinstance(c, Tracer) for c in program.consts)
     scalar = lambda e: not any(v.aval.shape for v in (*e.invars, *e.outvars))
     plain = all(e.primitive.name not in CONTROL_FLOW and scalar(e) for e in program.jaxpr.eqns)
-    return not caught and plain and _in_order()
+    return not caught and plain and jax.default_backend() == "cpu" and _in_order()
 
 
 @functools.cache
@@ -418,13 +413,6 @@ def _piece(part: Any, consts: Sequence[Any], given: Sequence[Array], like: Array
         return [y.astype(float) for y in eval_jaxpr(part, consts, *x)]
 
     return lanewise(kernel, len(part.outvars), [given[i] for i in alike], [given[i] for i in own] or [like])
-
-
-def _kernel_on_gpu(count: Array, *numbers: Array, how: How) -> tuple[Array, ...]:
-    from ._device import march_on_device
-
-    program, moved = program_of(how.step, how.sizes), how.sizes.moved + how.sizes.watched
-    return march_on_device(program, moved, [i - 1 for i in program.needed if i > moved], count, numbers)
 
 
 # --- the primitive -------------------------------------------------------------------------------------------------
@@ -524,5 +512,4 @@ march_p.def_impl(lambda *args, how: _compiled(how)(*args))
 march_p.def_abstract_eval(_abstract)
 batching.primitive_batchers[march_p] = _batch
 ad.primitive_jvps[march_p] = _jvp
-mlir.register_lowering(march_p, mlir.lower_fun(_loops, multiple_results=True))
-mlir.register_lowering(march_p, mlir.lower_fun(_kernel_on_gpu, multiple_results=True), platform="gpu")
+mlir.register_lowering(march_p, mlir.lower_fun(_loops, multiple_results=True), platform="cpu")

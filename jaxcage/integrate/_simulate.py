@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -96,18 +97,15 @@ def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> S
     y0 = system.starts(jnp.asarray(speed))[0] if start is None else start
     if len(y0) != system.dimension:
         raise ArgumentError("start", said=f"must be a state of {system.dimension} numbers, but has {len(y0)}.")
+    if not np.all(np.isfinite(np.asarray(y0, dtype=float))):
+        raise ArgumentError("start", said=f"must be finite numbers, but {shown(y0)} was given.")
     return tuple(jnp.asarray(c, dtype=float) for c in y0)
 
 
 def require_counts(revolutions: int, samples: int, discard: int) -> None:
     """**Raises:** `ValueError` for what no history can have."""
-    if revolutions < 1 or samples < 1 or discard < 0:
-        raise ArgumentError(
-            "revolutions",
-            "samples",
-            "discard",
-            said=f"must be at least 1, 1 and 0, but are {revolutions}, {samples} and {discard}.",
-        )
+    require_at_least(1, revolutions=revolutions, samples=samples)
+    require_at_least(0, discard=discard)
 
 
 def _method(method: AbstractMethod | None, samples: int) -> ControlledSteps:
@@ -180,11 +178,8 @@ def ramp(
     require_x64()
     require_known("ramp", INSTEAD, system, first, last, start)
     low, high = float(first), float(last)
-    lowest = min(low, high)
-    if not (np.isfinite(lowest) and lowest > 0):
-        raise ArgumentError("speed", said=f"must be positive and finite, but {lowest} rad/s was given.")
+    require_speeds(system, (low, high))
     require_counts(revolutions, samples, discard)
-    require_speeds(system, max(low, high))
     chosen = _method(method, samples)
     rise = (high - low) / revolutions
     speeds = low + rise * np.maximum(np.arange(-discard, revolutions), 0)

@@ -11,7 +11,7 @@ from jaxtyping import Array, Int
 
 from .._checks import require_x64
 from .._types import Scalar, State
-from ..models import AbstractField, AbstractForcedSystem
+from ..models import AbstractField, AbstractForcedSystem, require_speeds
 from ._controlled import controlled
 from ._method import REVOLUTION, AbstractMethod, Stretch, result_at
 from ._results import RESULTS
@@ -45,6 +45,7 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
     **Arguments:** system; speed; integration method, by default `jaxcage.controlled()`.
     """
     require_x64()
+    require_speeds(system, speed)
     chosen = controlled() if method is None else method
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

@@ -3,13 +3,11 @@
 | module          | responsibility                                                            |
 |-----------------|---------------------------------------------------------------------------|
 | `_units`        | texts with a unit to SI numbers                                           |
-| `_shown_units`  | tables, figures and files in the units that are asked for                 |
 | `_schema`       | what a configuration may hold, from the fields of the modules             |
 | `_config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
-| `_write_config` | a model to nested mapping or TOML                                         |
+| `_write_config` | a model to nested mapping or TOML; a TOML file with other ranges          |
 | `_ranges`       | values that are known within a range only                                 |
 | `_measurements` | what was measured on a machine, from CSV                                  |
-| `_narrow`       | a TOML file with other ranges                                             |
 | `_tables`       | tables as CSV or Excel                                                    |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
@@ -49,16 +47,13 @@ from ._dataset import (
 )
 from ._files import (
     check_writable as check_writable,
-    put_bytes as put_bytes,
     read_bytes as read_bytes,
     replacing as replacing,
     sync as sync,
 )
 from ._measurements import Measurement as Measurement, read_measurements as read_measurements
-from ._narrow import range_text as range_text, with_ranges as with_ranges
 from ._ranges import Range as Range, is_range as is_range, read_range as read_range
 from ._schema import ConfigError as ConfigError
-from ._shown_units import UNIT as UNIT, ShownUnits as ShownUnits
 from ._speeds import (
     SpeedOf as SpeedOf,
     Whose as Whose,
@@ -66,11 +61,11 @@ from ._speeds import (
     shaft_rpm as shaft_rpm,
     split_owner as split_owner,
 )
-from ._tables import write_tables as write_tables
 from ._template import Subject as Subject, template as template, write_template as write_template
 from ._units import to_si as to_si
 from ._write_config import (
     configuration as configuration,
     save_model as save_model,
     toml_text as toml_text,
+    with_ranges as with_ranges,
 )

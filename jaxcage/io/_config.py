@@ -34,7 +34,6 @@ from ..models.whole import WHOLE_BEARINGS
 from ._files import read_bytes
 from ._ranges import Range
 from ._schema import KINDS, ConfigError, Known, read_value, submodules, values
-from ._shown_units import ShownUnits
 from ._speeds import WHOSE, Whose
 from ._template import Subject, left_as_written
 from ._units import printable, shown
@@ -75,8 +74,6 @@ class BearingFile(Generic[M]):
     """Values that are still those of the template that `jaxcage init` writes, by dotted name."""
     table: Mapping[str, Any]
     """As it was read."""
-    units: ShownUnits = ShownUnits()
-    """Units of tables and figures: key `units`."""
 
 
 def load_model(path: str | Path) -> CageModel:
@@ -118,7 +115,7 @@ def _read(path: str | Path, make: Callable[[Mapping[str, Any], list[Unknown]], M
         model = make(table, unknowns)
         subject = subject_of(table)
         left = left_as_written(table, subject)
-        return BearingFile(model, _whose(table, subject), tuple(unknowns), left, table, _units(table))
+        return BearingFile(model, _whose(table, subject), tuple(unknowns), left, table)
     except ConfigError as error:
         raise ConfigError(f"File '{path}': {error}") from error
 
@@ -185,8 +182,9 @@ def _made(
     unknowns: list[Unknown] | None,
 ) -> M:
     """A model of `kind`, from nothing or from one of `bases`."""
-    rest, start, _ = dict(table), None, (_whose(table), _units(table))
-    for key in ("speeds", "model", "units"):
+    _whose(table)
+    rest, start = dict(table), None
+    for key in ("speeds", "model"):
         rest.pop(key, None)
     if "base" in rest:
         name = rest.pop("base")
@@ -216,18 +214,6 @@ def _whose(table: Mapping[str, Any], subject: Subject = "cage") -> Whose:
     if given not in WHOSE:
         raise ConfigError(f"`speeds` must be one of {', '.join(WHOSE)}, but is {shown(given)}.")
     return given
-
-
-def _units(table: Mapping[str, Any]) -> ShownUnits:
-    given = table.get("units")
-    if given is None:
-        return ShownUnits()
-    if not isinstance(given, str):
-        raise ConfigError(f"`units` must be a text, but is {shown(given)}.")
-    try:
-        return ShownUnits.read(given)
-    except ValueError as error:
-        raise ConfigError(f"`units` {error}.") from error
 
 
 def _build(
@@ -316,7 +302,7 @@ def _refuse_unknown(table: dict, keys: list[str], tables: list[str], path: tuple
     extra = [key for (where, key) in _READY_MADE if (where,) == path]
     keys = [*keys, *(where[-1] for where in _SHORTHANDS if where[:-1] == path)]
     allowed = [
-        *([] if path else ["base", "model", "speeds", "units"]),
+        *([] if path else ["base", "model", "speeds"]),
         *extra,
         *keys,
         *(f"[{name}]" for name in tables),

@@ -31,31 +31,6 @@ def read_bytes(path: str | Path, largest: int = LARGEST) -> bytes:
         return file.read(largest)
 
 
-def put_bytes(path: Path, data: bytes) -> None:
-    """Write a file in one step that a loss of power does not undo: the bytes reach the disk before the name does.
-
-    What is written aside is named `*.partial`; if somebody tidies it away meanwhile, it is written again.
-    """
-    for attempt in range(3):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, aside = tempfile.mkstemp(prefix=".", suffix=".partial", dir=path.parent)
-        try:
-            with open(handle, "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            os.chmod(aside, 0o666 & ~_umask())
-            os.replace(aside, path)
-            break
-        except FileNotFoundError:
-            if attempt == 2:
-                raise
-        except BaseException:
-            Path(aside).unlink(missing_ok=True)
-            raise
-    sync_folder(path.parent)
-
-
 def sync_folder(path: Path) -> None:
     """Have the names in a folder reach the disk, where the system can do that."""
     with contextlib.suppress(OSError):
@@ -64,12 +39,6 @@ def sync_folder(path: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
-
-
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
 
 
 @contextlib.contextmanager

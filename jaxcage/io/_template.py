@@ -15,7 +15,7 @@ from ..models import case, whole_bearing
 
 Subject = Literal["cage", "bearing"]
 """What a file is about: the cage in its land, or the whole bearing."""
-CHOSEN = ("model", "speeds", "units", "clearance_reading", "unbalance", "kind")
+CHOSEN = ("model", "speeds", "clearance_reading", "unbalance", "kind")
 """What the templates hold that is no number of the NU2310."""
 
 

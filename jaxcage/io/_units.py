@@ -82,22 +82,6 @@ def _convert(number: float, given: str, unit: str) -> float:
     return found
 
 
-@functools.cache
-def known_unit(text: str) -> str | None:
-    """What a unit measures, such as `meter` or `kilogram * meter / second ** 2`, without a factor; None for no unit."""
-    if not text or _UNIT.fullmatch(text) is None or _TOWER.search(text):
-        return None
-    try:
-        return str(_registry().Quantity(1.0, text).to_base_units().units).replace("radian / second", "1/second")
-    except Exception:  # pint's parser leaks errors of many kinds
-        return None
-
-
-def times(unit: str, other: str) -> float:
-    """How many of `other` make one of `unit`."""
-    return float(_registry().Quantity(1.0, unit).to(other).magnitude)
-
-
 def _base_units(unit: Any) -> set[str]:
     """Names of the base units of a unit, those without a dimension, such as the radian, among them."""
     return set(_registry().Quantity(1.0, unit).to_root_units().units._units)

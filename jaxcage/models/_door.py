@@ -12,6 +12,8 @@ from ._cage import CageModel
 from ._system import AbstractForcedSystem
 
 
+MOST = 1e9
+"""Of speeds [rad/s]: beyond, nothing that is computed means anything."""
 FASTEST = 300.0
 """Surface speed of the cage at its land [m/s] beyond which no cage runs: rho v^2 alone is 765 MPa of hoop stress in
 brass, twice what it bears, and what is given in rpm for rad/s is 9.5 times as fast as meant."""
@@ -23,13 +25,20 @@ def fastest_speed(model: CageModel) -> float:
 
 
 def require_speeds(system: AbstractForcedSystem, speeds: Any, name: str = "speed") -> None:
-    """Stop at speeds that no cage has, which are those of somebody who gave revolutions per minute.
+    """Stop at speeds that nothing has, and at those that no cage has, which are those of somebody who gave revolutions
+    per minute.
 
     **Raises:** `ValueError`.
     """
-    if not isinstance(system, CageModel) or not is_concrete(*jax.tree.leaves((speeds, system.land_radius))):
+    if not is_concrete(*jax.tree.leaves(speeds)):
         return
-    highest, limit = float(np.max(np.asarray(speeds, dtype=float), initial=0.0)), fastest_speed(system)
+    given = np.asarray(speeds, dtype=float)
+    if np.any(bad := ~((given > 0) & (given <= MOST))):
+        said = f"must be positive and finite, at most {MOST:g} rad/s, but {given[bad].flat[0]:g} was given."
+        raise ArgumentError(name, said=said)
+    if not isinstance(system, CageModel) or not is_concrete(system.land_radius):
+        return
+    highest, limit = float(np.max(given, initial=0.0)), fastest_speed(system)
     if highest > limit:
         raise ArgumentError(
             name,

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._arguments import checked, shown
+from .._arguments import checked, require_at_least, shown
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ._field import AbstractField, FirstOrderField, SecondOrderField
@@ -176,6 +176,7 @@ class ForcedSystem(_UsersSystem):
 
         **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
+        require_at_least(1, dimension=dimension)
         self.rates, self._dimension = rates, dimension
         self._scale, self._starts = _kept_scale(scale, dimension), _kept_starts(starts, dimension)
         self._harmonics = _kept_harmonics(harmonics)
@@ -222,6 +223,7 @@ class ForcedOscillator(_UsersSystem):
 
         **Raises:** `ValueError` for settings that do not fit, and for a law that does not repeat after one revolution.
         """
+        require_at_least(1, coordinates=coordinates)
         self.acceleration, self.coordinates = acceleration, coordinates
         self._scale, self._starts = _kept_scale(scale, 2 * coordinates), _kept_starts(starts, 2 * coordinates)
         self._harmonics = _kept_harmonics(harmonics)

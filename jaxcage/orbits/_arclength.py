@@ -2,8 +2,9 @@
 
 A curve R(u) = 0 with one unknown more than equations is followed by predicting along the cubic through its last two
 points and their tangents, and correcting by Newton's method on the plane across it, through folds and whatever the
-stability. Every curve (lane) has its own step length; the corrections of all lanes run in chunks of one compiled
-program on all cores.
+stability. A point of the same curve has the tangent that belongs to its place, and the orientation of the curve; a
+point of another curve beside it has neither, and a step to it is refused. Every curve (lane) has its own step length;
+the corrections of all lanes run in chunks of one compiled program on all cores.
 """
 
 import concurrent.futures
@@ -20,15 +21,13 @@ from jaxtyping import Array, Float
 from .._errors import ArgumentError
 from ..integrate import compiled
 from ..sweeps import cores
-from ._astray import ASIDE, CROSSED, classified, to_crossing
-from ._implicit import TOLERANCE, AbstractEquations, AbstractMapEquations, across, solve
+from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, SETTLED, Counts, by_steps
 
 
 LANES, FEW = (8, 32), 40
-"""Lanes per call: two programs for any number of curves, and work for every core; the second where there are more than
-a few lanes, so that one branch needs the first alone. Up to eight lanes cost what one does: they share the processor's
-instructions."""
+"""Lanes per call: two programs for any number of curves; the second where there are more than a few lanes, so that one
+branch needs the first alone. Up to eight lanes cost what one does: they share the processor's instructions."""
 FOLLOWING, OF_A_STEP = 1e-6, 1e-5
 """Newton's last step while following, in the unknowns' units, and over the step's length where that is less: points are
 then good to about its square."""
@@ -44,24 +43,18 @@ GROWTH = 1.8
 LOOSE, COARSER = 10.0, 100.0
 """While following errors may be larger than allowed, by this factor; where they are smaller than that by the second,
 half as many steps do."""
-UPRIGHT = 0.8
-"""A self-excited orbit that meets the plane on which it begins at a smaller cosine begins on another one: it may become
-tangent to any plane."""
+TURN, BEND, SWING = 0.9, 0.3, 0.5
+"""Of a step: smallest cosine of the angle between its tangents; largest correction, over its length: more, and Newton's
+method may have gone to another curve; largest change of the equations' derivative, over its size and one: more, and
+folds may have been passed over."""
 MOVED = 0.1
 """What half the steps change in a point, over the step's length: more, and what is followed may be their error."""
-
-
-class OnPlane(AbstractEquations):
-    """Equations of a curve, on the plane through `at` across `normal`."""
-
-    curve: AbstractMapEquations
-    at: Float[Array, " n"]
-    normal: Float[Array, " n"]
-
-    def linearised(self, u: Array, given: Any) -> tuple[Array, Array, Any]:
-        r, jacobian, aux = self.curve.linearised(u, given)
-        off = jnp.dot(self.normal, u - self.at)
-        return jnp.append(r, off), jnp.concatenate([jacobian, self.normal[None]]), aux
+ASTRAY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
+"""How far a point may be from where its tangent says that it is, in the unknowns' units and over the step's length, or
+over its distance from the prediction."""
+CROSSED, ASIDE = 1e-4, 0.01
+"""A step across which the orientation changes is halved down to this length. Where it changes all the same the curve
+crosses another, and the step is taken in one from so far off: near the crossing tangents are lost to rounding."""
 
 
 class Corrected(NamedTuple):
@@ -76,31 +69,27 @@ class Corrected(NamedTuple):
     steps: Any
     """Steps per revolution."""
     error: Any
-    """Distance to what half the steps give, and the same over what is allowed (see `AbstractMapEquations.apart`)."""
+    """Distance to what half the steps give, and the same over what is allowed (see `AbstractEquations.apart`)."""
     over: Any
     moved: Any
     """The same in the unknowns' units."""
 
 
 def _correct(
-    curve: AbstractMapEquations,
-    given: Any,
-    at: Array,
-    normal: Array,
-    tolerance: Array,
-    steps: Array,
-    halved: Array,
-    kept: Array,
+    curve: AbstractEquations, given: Any, at: Array, normal: Array, tolerance: Array, steps: Array, halved: Array
 ) -> Corrected:
     """The point and, if `halved`, what one step of Newton's method makes of it with half the steps: two in a row."""
-    curve = across(curve, at, given, kept)
 
     def turn(plane: tuple[Array, Array], half: Array) -> tuple[tuple[Array, Array], Corrected]:
         at, normal = plane
         by = jnp.where(half, (steps + 1) // 2, steps)
         last, skip = jnp.where(half, ONCE, tolerance), half & ~halved
-        across, near = OnPlane(by_steps(curve, by), at, normal), tolerance > TOLERANCE
-        u, found = solve(across, given, at, CORRECTIONS, last, skip=skip, near=near)
+
+        def on_plane(u: Array) -> tuple[Array, Array, Any]:
+            r, jacobian, aux = by_steps(curve, by).linearised(u, given)
+            return jnp.append(r, jnp.dot(normal, u - at)), jnp.concatenate([jacobian, normal[None]]), aux
+
+        u, found = solve(on_plane, at, CORRECTIONS, last, skip=skip, near=tolerance > TOLERANCE)
         jacobian = found.newton.jacobian[:-1]
         whole = jnp.concatenate([jacobian, normal[None]])
         tangent = jnp.linalg.solve(whole, jnp.zeros(u.size).at[-1].set(1.0))
@@ -112,10 +101,7 @@ def _correct(
     return jax.lax.scan(turn, (at, normal), jnp.array([False, True]))[1]
 
 
-_axes = eqx.if_array(0)
-_lanes = (0, 0, 0, None, None, None)
-_correct_shared = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, None, *_lanes)), "correct shared")
-_correct_own = compiled(eqx.filter_vmap(_correct, in_axes=(_axes, _axes, *_lanes)), "correct own")
+_correct_lanes = compiled(eqx.filter_vmap(_correct, in_axes=(eqx.if_array(0), None, 0, 0, 0, None, None)))
 
 
 def take(tree: Any, lanes: Any) -> Any:
@@ -147,17 +133,14 @@ def stack(tree: Any, lanes: int) -> Any:
 class Curves(NamedTuple):
     """Many curves of one kind, and the numbers of steps that may be tried."""
 
-    equations: AbstractMapEquations
+    equations: AbstractEquations
     """Their arrays with the lanes first."""
     given: Any
     counts: Counts
-    own_given: bool = False
-    """Whether the lanes come first in what is given too; else it is the same for all."""
 
     def take(self, lanes: Any) -> "Curves":
         """Some of them."""
-        mine = take(self.given, lanes) if self.own_given else self.given
-        return self._replace(equations=take(self.equations, lanes), given=mine)
+        return self._replace(equations=take(self.equations, lanes))
 
     @property
     def chooses(self) -> bool:
@@ -172,15 +155,12 @@ def correct(
     steps: np.ndarray,
     tolerance: Any = TOLERANCE,
     measured: bool = False,
-    kept: bool = False,
 ) -> Corrected:
     """Points of many curves on planes across them.
 
     **Arguments:** curves; points of the planes and their normals; steps per revolution; Newton's last step, of all or
-    each; whether errors are wanted too, by one step of Newton's method with half the steps; whether self-excited orbits
-    begin where the equations say, and not on the plane through `at`.
+    each; whether errors are wanted too, by one step of Newton's method with half the steps.
     """
-    run = _correct_own if curves.own_given else _correct_shared
     measured = measured and int(curves.counts.last) > 1
     tolerance = np.broadcast_to(np.asarray(tolerance, dtype=float), len(at))
     chunks = []
@@ -191,8 +171,8 @@ def correct(
 
     def part(k: np.ndarray) -> Corrected:
         some = curves.take(k)
-        numbers = (np.asarray(x) for x in (at[k], normal[k], tolerance[k], steps[k[0]], measured, kept))
-        return jax.tree.map(np.asarray, run(some.equations, some.given, *numbers))
+        numbers = (np.asarray(x) for x in (at[k], normal[k], tolerance[k], steps[k[0]], measured))
+        return jax.tree.map(np.asarray, _correct_lanes(some.equations, some.given, *numbers))
 
     if len(chunks) == 1:
         parts = [part(chunks[0])]
@@ -212,13 +192,10 @@ def correct(
     return points._replace(error=error, over=over, moved=far)
 
 
-def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: Any) -> Corrected:
-    """Points of many curves on planes across them, by as many steps as each needs.
-
-    **Arguments:** as for `correct`; the numbers of steps to begin with.
-    """
+def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: int = 0) -> Corrected:
+    """Points of many curves on planes across them, by as many steps as each needs, which are at least `steps`."""
     first = int(curves.counts.first if curves.chooses else curves.counts.last)
-    count = np.maximum(np.broadcast_to(steps, at.shape[0]), first)
+    count = np.full(at.shape[0], max(steps, first))
     found = correct(curves, at, normal, count, measured=True)
     while curves.chooses:
         given_up = ~found.converged & (found.steps >= GIVEN_UP)
@@ -239,22 +216,11 @@ class Steps:
     longest: float = 0.5
     shortest: float = 1e-7
     most: int = 400
-    turn: float = 0.9
-    """Smallest cosine of the angle between neighbouring tangents."""
-    bend: float = 0.3
-    """Largest correction, over the step's length: more, and Newton's method may have gone to another curve."""
-    swing: float = 0.5
-    """Largest change of the equations' derivative, over its size and one: more, and folds may have been passed over."""
 
     def __post_init__(self):
         if not 0 < self.shortest <= self.first <= self.longest:
-            raise ArgumentError(
-                "steps",
-                said=(
-                    "must have 0 < shortest <= first <= longest, but has "
-                    f"{self.shortest:g}, {self.first:g} and {self.longest:g}."
-                ),
-            )
+            given = f"{self.shortest:g}, {self.first:g} and {self.longest:g}"
+            raise ArgumentError("steps", said=f"must have 0 < shortest <= first <= longest, but has {given}.")
 
 
 class Trace(NamedTuple):
@@ -263,9 +229,8 @@ class Trace(NamedTuple):
     points: Corrected
     ended: str
     """`range`: it left the range; `closed`: it came back to where it began; `steps`: the number of steps was reached;
-    `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step; `equilibrium`:
-    a self-excited orbit shrank to one, at a Hopf bifurcation; `inaccurate`: by the finest steps allowed the next point
-    is not known any more, as towards a homoclinic orbit."""
+    `stopped`: it was stopped by the caller; `stuck`: no further point was found with the shortest step; `inaccurate`:
+    by the finest steps allowed the next point is not known any more."""
 
 
 def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
@@ -283,20 +248,38 @@ def _closed(points: list[Corrected]) -> bool:
     return len(points) >= 8 and bool(same) and passes(before.u, last.u, first.u[None])
 
 
-def through(curves: AbstractMapEquations, points: Corrected, lanes: np.ndarray) -> AbstractMapEquations:
-    """The curves, the orbits of these lanes now on planes through these points across the flow."""
-    n = curves.problem.dimension
-    flow = -points.jacobian[:, :n, n]  # the speed's column: what a longer way would add
-    new = points.u[:, :n], flow / np.linalg.norm(flow, axis=1, keepdims=True)
-    plane = lambda e: (e.frame.phase_point, e.frame.phase_direction)
-    return eqx.tree_at(plane, curves, put(plane(curves), lanes, new))
+def classified(
+    last: Corrected, got: Corrected, ahead: np.ndarray, normal: np.ndarray, length: np.ndarray, apart: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Steps classified by the points that they begin and end with.
 
+    What a prediction over `length` from two points `apart` leaves out, a s^2 (s + apart)^2, is nearly as far in the
+    tangent as in the point: a point that is elsewhere than its tangent says is not of this curve. The determinant of
+    the equations with the tangent keeps its sign along a curve, at folds too, but where another curve is crossed.
 
-def upright(curves: AbstractMapEquations, points: Corrected) -> Float[np.ndarray, " lanes"]:
-    """Cosine of the angle between the flow at each point and the normal of the plane on which its orbit begins."""
-    n = curves.problem.dimension
-    flow = -points.jacobian[:, :n, n]
-    return np.sum(flow * curves.frame.phase_direction, axis=1) / np.linalg.norm(flow, axis=1)
+    **Arguments:** last points and new ones; predictions and their unit tangents; lengths of the steps and of those
+    before, infinite where there was none.
+
+    **Returns:** distance of each point from its prediction; angle between the tangents, over the largest allowed;
+    whether the point is on the curve, or on one that crosses it; and whether the determinant has the same sign.
+    """
+    turned = np.arccos(np.clip(np.sum(got.tangent * last.tangent, axis=1), -1.0, 1.0)) / np.arccos(TURN)
+    way, slope = got.u - ahead, got.tangent - normal
+    missed = np.linalg.norm(way, axis=1)
+    largest = lambda m: np.max(np.abs(m), axis=(1, 2))
+    smooth = largest(got.jacobian - last.jacobian) < SWING * (1 + largest(last.jacobian))
+    across = slope - np.sum(slope * normal, axis=1, keepdims=True) * normal
+    share = 1 / (2 / length + 2 / (length + apart))
+    off = np.linalg.norm(way - share[:, None] * across, axis=1)
+    belongs = off < np.maximum(np.minimum(ASTRAY, OF_LENGTH * length), OF_MISSED * missed)
+    sure = got.converged & (turned < 1) & (missed < BEND * length) & smooth & belongs
+
+    def orientation(points: Corrected) -> np.ndarray:
+        whole = np.concatenate([points.jacobian, points.tangent[:, None]], axis=1)
+        known = np.all(np.isfinite(whole), axis=(1, 2), keepdims=True)
+        return np.linalg.slogdet(np.where(known, whole, 0.0))[0]
+
+    return missed, turned, sure, orientation(got) == orientation(last)
 
 
 def predicted(last: Corrected, before: Corrected | None, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -320,24 +303,17 @@ def follow(
     steps: Steps,
     inside: Callable[[np.ndarray], np.ndarray],
     stop: Callable[[int, list[Corrected]], bool] = lambda lane, points: False,
-    update: Callable[[AbstractMapEquations, Corrected, np.ndarray], AbstractMapEquations] | None = None,
+    update: Callable[[AbstractEquations, Corrected, np.ndarray], AbstractEquations] | None = None,
 ) -> list[Trace]:
     """Follow many curves from their first points, each in the direction of its tangent.
 
-    A step to another curve is refused (see `_astray`). The error of each point is measured. Where it is too large the
-    revolutions get twice as many steps, the last point is solved for again by these, and the step along the curve is
-    repeated; where it is small they get half as many.
+    A step to another curve is refused (see `classified`). Where the error of a point is too large the revolutions get
+    twice as many steps, the last point is solved for again by these, and the step along the curve is repeated; where it
+    is small they get half as many.
 
-    **Arguments:**
-
-    - `curves`: as for `correct`.
-    - `start`: first points, the lanes first.
-    - `inside`: tells for unknowns, the lanes first, whether they are within the range; a curve ends with its
-        first point outside.
-    - `stop`: called with a lane and its points after each step.
-    - `update`: new equations from the last points of the lanes given, e.g. with fresh borders.
-
-    **Returns:** a `Trace` per lane.
+    **Arguments:** curves; first points, the lanes first; lengths of steps; whether unknowns, the lanes first, are
+    within the range, a curve ending with its first point outside; whether a lane is to stop, by its points; new
+    equations from the last points of some lanes, e.g. with fresh borders.
     """
     lanes = start.u.shape[0]
     points = [[take(start, np.array(i))] for i in range(lanes)]
@@ -350,49 +326,29 @@ def follow(
         """Solve for the last points again, by the steps that hold now."""
         last = [points[i][-1] for i in lanes]
         u, tangent = (np.stack([getattr(p, name) for p in last]) for name in ("u", "tangent"))
-        again = correct(curves.take(lanes), u, tangent, count[lanes], kept=True)
+        again = correct(curves.take(lanes), u, tangent, count[lanes])
         for k, i in enumerate(lanes):
             if again.converged[k]:
                 points[i][-1] = measured_as(take(again, np.array(k)), points[i][-1])
 
-    free = curves.equations.problem.free_speed
-    fresh = np.ones(lanes, dtype=bool)  # whether the last point is the first on its plane
-
-    def begin_planes(lanes: np.ndarray) -> None:
-        """Have the self-excited orbits of these lanes begin on planes through their last points."""
-        nonlocal curves
-        last: Corrected = jax.tree.map(lambda *x: np.stack(x), *(points[i][-1] for i in lanes))
-        curves = curves._replace(equations=through(curves.equations, last, lanes))
-        fresh[lanes] = True
-        go_over(lanes)
-
-    if free and np.any(start.converged):
-        begin_planes(np.flatnonzero(start.converged))
     while np.any(active := ended == ""):
         index = np.flatnonzero(active)
-        some = [points[i][-1:] if fresh[i] else points[i][-2:] for i in index]
+        some = [points[i] for i in index]
         last: Corrected = jax.tree.map(lambda *x: np.stack(x), *(p[-1] for p in some))
         ways = [predicted(p[-1], p[-2] if len(p) > 1 else None, length[i]) for p, i in zip(some, index, strict=True)]
         apart = np.array([np.linalg.norm(p[-1].u - p[-2].u) if len(p) > 1 else np.inf for p in some])
         ahead, normal = (np.stack(x) for x in zip(*ways, strict=True))
         closely = np.clip(OF_A_STEP * length[index], 2 * TOLERANCE, FOLLOWING)
-        got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True, kept=True)
+        got = correct(curves.take(index), ahead, normal, count[index], closely, measured=True)
         unknown = curves.chooses & got.converged & (count[index] >= most) & ~(got.error <= SETTLED)
         if np.any(unknown):  # by the steps, or by what Newton's method left
             far = np.flatnonzero(unknown)
-            closer = correct(
-                curves.take(index[far]), got.u[far], normal[far], count[index[far]], measured=True, kept=True
-            )
+            closer = correct(curves.take(index[far]), got.u[far], normal[far], count[index[far]], measured=True)
             got = put(got, far, closer)
-        missed, turned, sure, same = classified(steps, last, got, ahead, normal, length[index], apart)
-        if update is None:  # new equations have an orientation of their own
-            before: Corrected = jax.tree.map(lambda *x: np.stack(x), *(p[-2] if len(p) > 1 else p[-1] for p in some))
-            sure &= ~(same & (length[index] > apart * to_crossing(before, last)))
-        else:
-            same[:] = True
-        straight = upright(curves.take(index).equations, got) if free else np.ones(index.size)
+        missed, turned, sure, same = classified(last, got, ahead, normal, length[index], apart)
+        same |= update is not None  # new equations have an orientation of their own
         good = sure & (same | crosses[index])
-        finer, coarser, gone_back = np.zeros((3, lanes), dtype=bool)
+        finer, coarser = np.zeros((2, lanes), dtype=bool)
         for k, i in enumerate(index):
             may = curves.chooses and count[i] < most
             excess = max(got.over[k] / LOOSE, got.moved[k] / (MOVED * length[i]))
@@ -405,7 +361,7 @@ def follow(
             if sure[k] and not good[k] and length[i] < CROSSED:
                 while len(points[i]) > 1 and np.linalg.norm(points[i][-1].u - got.u[k]) < ASIDE:
                     points[i].pop()
-                crosses[i], length[i], gone_back[i] = True, 2 * ASIDE, True
+                crosses[i], length[i] = True, 2 * ASIDE
                 continue
             if not good[k]:
                 length[i] /= 2 if got.converged[k] else 4
@@ -414,16 +370,12 @@ def follow(
                     ended[i] = "" if may else "stuck"
                 continue
             points[i].append(take(got, np.array(k)))
-            fresh[i] = False
             crosses[i] &= bool(same[k])
             coarser[i] = curves.chooses and count[i] > least and excess < 1 / COARSER
             # What a cubic leaves out grows with the fourth power of the step.
             growth = min((AIM / max(missed[k], 1e-12)) ** 0.25, VEER / max(turned[k], 1e-12))
             length[i] = min(steps.longest, length[i] * np.clip(growth, 0.5, GROWTH))
-            if straight[k] < 0:  # on the other side of the equilibrium
-                points[i].pop()
-                ended[i] = "equilibrium"
-            elif not inside(got.u[k][None])[0]:
+            if not inside(got.u[k][None])[0]:
                 ended[i] = "range"
             elif stop(int(i), points[i]):
                 ended[i] = "stopped"
@@ -437,6 +389,4 @@ def follow(
         count = np.where(finer, 2 * count, np.where(coarser, count // 2, count))
         if np.any(finer | coarser):
             go_over(np.flatnonzero(finer | coarser))
-        if free and np.any(new := accepted & (straight < UPRIGHT) | gone_back[index]):
-            begin_planes(index[new])
     return [Trace(jax.tree.map(lambda *x: np.stack(x), *p), str(e)) for p, e in zip(points, ended, strict=True)]

@@ -1,22 +1,21 @@
 """Branches of periodic orbits over a parameter, stable and unstable, with their bifurcations located and labelled."""
 
 import dataclasses
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..integrate import AbstractMethod, Rodas4
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ._arclength import Corrected, Steps, Trace, follow, passes, take
-from ._by_name import SPEED, Parameter
 from ._follower import (
     Follower,
     Start,
@@ -30,10 +29,10 @@ from ._follower import (
     turned,
 )
 from ._located import Seen, account
-from ._normal_form import coefficients
 from ._orbit import NearOrbit, Orbit, guess_state
-from ._point import CRITICAL, FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
-from ._problem import Frame, Given
+from ._point import FOUND, NOT_CONVERGED, NOT_EXPLAINED, UNEXPLAINED, Point, value_at
+from ._problem import SPEED, Given, Parameter
+from ._singularity import CRITICAL
 from ._steps import SETTLED
 
 
@@ -73,7 +72,6 @@ class Branch:
         )
         rows = [
             f"  {p.kind:<16} {p.parameter} = {p.value:.8g} +- {p.error:.1g}, multiplier {p.critical:.4f}, {p.status}"
-            + f", {p.criticality}" * bool(p.criticality)
             for p in self.special
         ]
         return "\n".join([head, *rows])
@@ -90,7 +88,6 @@ def branch(
     upper: float,
     speed: Scalar | None = None,
     periods: int = 1,
-    period: str = "driven",
     steps: Steps = Steps(),
     method: AbstractMethod | None = None,
 ) -> Branch:
@@ -104,11 +101,10 @@ def branch(
     - `speed`: speed [rad/s] where it is not the parameter and `orbit` does not have it.
     - `steps`: step lengths; in units of 1/20 of the range for the parameter, and of the system's scale for the state.
 
-    **Returns:** `Branch`.
-
     **Raises:** `ValueError` if there is no orbit to start from, or none in a finite range.
     """
     require_x64()
+    require_at_least(1, periods=periods)
     require_range(parameter, lower, upper)
     if isinstance(orbit, Orbit | Point):
         speed, periods = orbit.speed, int(orbit.periods)
@@ -118,99 +114,62 @@ def branch(
     known_speed = at if parameter == SPEED else speed
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
+    require_speeds(system, known_speed)
     require_within("orbit", float(at), lower, upper)
-    follower = make_follower(system, known_speed, parameter, lower, upper, period, method)
+    given = Given(system, jnp.asarray(known_speed, dtype=float))
+    follower = make_follower(given, parameter, lower, upper, method, periods)
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
         follower = by_rodas4(follower)
     state = guess_state(system, known_speed, state)
-    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], periods, steps)
+    (found,) = follow_both_ways(follower, [(np.asarray(state), float(at))], steps)
     if found is None:
         raise ArgumentError("orbit", said=f"must be near a periodic orbit, but none is near it at {float(at):g}.")
     return found
 
 
-def branches(
-    systems: Sequence[AbstractForcedSystem],
-    orbits: Sequence[Orbit | Point],
-    parameter: Parameter = SPEED,
-    *,
-    lower: float,
-    upper: float,
-    speed: Scalar | None = None,
-    steps: Steps = Steps(),
-    method: AbstractMethod | None = None,
-) -> list[Branch | None]:
-    """The branches of many designs at a time, each from its own orbit: lanes of one continuation.
-
-    **Arguments:** systems that differ in their numbers only; an orbit of each, all of as many periods; the rest as for
-    `branch`.
-
-    **Returns:** a `Branch` per system; None where Newton's method finds no orbit to start from.
-    """
-    require_x64()
-    require_range(parameter, lower, upper)
-    if not systems or len(systems) != len(orbits):
-        raise ArgumentError(
-            "systems", "orbits", said=f"must be as many, above 0, but are {len(systems)} and {len(orbits)}."
-        )
-    starts = []
-    for system, orbit in zip(systems, orbits, strict=True):
-        at = orbit.speed if speed is None else speed
-        value = float(value_at(orbit, system, at, parameter))
-        require_within("orbits", value, lower, upper)
-        starts.append((np.asarray(orbit.state), value))
-    known_speed = jnp.asarray(orbits[0].speed if speed is None else speed, dtype=float)
-    each = [Given(s, known_speed) for s in systems]
-    given = jax.tree.map(lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0], *each)
-    single = make_follower(systems[0], known_speed, parameter, lower, upper, "driven", method)
-    follower = dataclasses.replace(single, given=given, designs=True)
-    return follow_both_ways(follower, starts, int(orbits[0].periods), steps)
-
-
 def follow_both_ways(
-    follower: Follower, starts: Sequence[Start], periods: int, steps: Steps, patience: int | None = None
+    follower: Follower,
+    starts: Sequence[Start],
+    steps: Steps,
+    patience: int | float = math.inf,
+    stop: Callable[[list[Corrected]], bool] = lambda points: False,
 ) -> list[Branch | None]:
     """A branch through each start; None where a start is not near an orbit, or on the branch of an earlier one.
 
-    A lane that comes upon what another has followed ends there: one branch may come in two parts. With `patience`, a
-    lane also ends after so many unstable orbits in a row: there is no end to how such a branch can wind.
+    A lane that comes upon what another has followed ends there: one branch may come in two parts. It also ends after
+    `patience` unstable orbits in a row, since there is no end to how such a branch can wind, or where `stop` says so.
     """
-    follower = stable_steps(follower, starts[0], periods)
-    frame = follower.frame(jnp.asarray(starts[0][0]), starts[0][1], periods)
-    first = seeds(follower, frame, starts)
+    follower = stable_steps(follower.around(starts[0][1]), starts[0])
+    first = seeds(follower, starts)
     count = len(starts)
     lanes, sign = np.tile(np.arange(count), 2), np.repeat([1.0, -1.0], count)
     taken = ~first.converged
     walked: dict[int, list[Corrected]] = {}
     unstable = dict.fromkeys(range(2 * count), 0)
 
-    def stop(lane: int, points: list[Corrected]) -> bool:
+    def ends(lane: int, points: list[Corrected]) -> bool:
         walked[lane] = points
         own = lane % count
         step = points[-2].u, points[-1].u
         calm = follower.unstable(points[-1]) == 0
         unstable[lane] = 0 if calm else unstable[lane] + 1
-        if taken[own] or (patience is not None and unstable[lane] >= patience):
+        if taken[own] or unstable[lane] >= patience or stop(points):
             return True
-        if follower.designs:
-            return False
         for other in range(own + 1, count):
             taken[other] |= passes(*step, first.u[other][None])
         others = [p.u for k, row in walked.items() if k % count != own and not taken[k % count] for p in row]
         return bool(others) and passes(*step, np.stack(others))
 
     both = turned(take(first, lanes), sign)
-    traces = follow(follower.curves(frame, lanes), both, steps=steps, inside=follower.inside, stop=stop)
+    traces = follow(follower.curves(2 * count), both, steps=steps, inside=follower.inside, stop=ends)
     kept = [i for i in range(count) if not taken[i]]
-    found = describe(follower, frame, [joined(follower, traces[i], traces[i + count]) for i in kept], kept)
+    found = describe(follower, [joined(follower, traces[i], traces[i + count]) for i in kept])
     return [found[kept.index(i)] if i in kept else None for i in range(count)]
 
 
 def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple[str, str]]:
-    """Both directions as one row of points.
-
-    A closed curve was gone round twice: it is taken once, from an unstable orbit on, so that no stable part is cut.
-    """
+    """Both directions as one row of points. A closed curve, which was gone round twice, is taken once, from an unstable
+    orbit on, so that no stable part is cut."""
     if "closed" in (up.ended, down.ended):
         up = up if up.ended == "closed" else down
         stable = follower.unstable(up.points) == 0
@@ -220,56 +179,23 @@ def joined(follower: Follower, up: Trace, down: Trace) -> tuple[Corrected, tuple
     return in_a_row(down.points, up.points), (down.ended, up.ended)
 
 
-def describe(
-    follower: Follower,
-    frame: Frame,
-    traces: Sequence[tuple[Corrected, tuple[str, str]]],
-    lanes: Sequence[int] = (0,),
-) -> list[Branch]:
-    """Branches from their points and lanes, with special points located, all at once."""
-    rows = account(follower, frame, [points for points, _ in traces], lanes)
-    every = [found for _, seen in rows for found in seen]
-    cubic = iter(())
-    if every:
-        lane = [i for i, (_, seen) in zip(lanes, rows, strict=True) for _ in seen]
-        places: Corrected = jax.tree.map(lambda *x: np.stack(x), *(found.point for found in every))
-        kinds = [found.kind for found in every]
-        own = follower.parameter == SPEED  # each in the scale at its own speed
-        scale_at = lambda i, value: follower.of(i).system.scale(value * follower.unit)
-        scales = [scale_at(i, u[-1]) if own else frame.scale for i, u in zip(lane, places.u, strict=True)]
-        finer = np.asarray(frame.scale) / np.array([[float(c) for c in row] for row in scales])
-        n = follower.problem.dimension
-        free = follower.problem.free_speed
-        cubic = iter(coefficients(follower.curves(frame, lane), places, kinds, n, finer=finer, free=free))
-    return [
-        _branch(follower, frame, points, [(s, next(cubic).tolist()) for s in seen], ended)
-        for (points, seen), (_, ended) in zip(rows, traces, strict=True)
-    ]
+def describe(follower: Follower, traces: Sequence[tuple[Corrected, tuple[str, str]]]) -> list[Branch]:
+    """Branches from their points, with special points located, all at once."""
+    rows = account(follower, [points for points, _ in traces])
+    return [_branch(follower, *row, ended) for row, (_, ended) in zip(rows, traces, strict=True)]
 
 
-def _branch(
-    follower: Follower,
-    frame: Frame,
-    points: Corrected,
-    seen: Sequence[tuple[Seen, list[float]]],
-    ended: tuple[str, str],
-) -> Branch:
-    problem, free = follower.problem, follower.problem.free_speed
+def _branch(follower: Follower, points: Corrected, seen: Sequence[Seen], ended: tuple[str, str]) -> Branch:
     multipliers = follower.multipliers(points)
     stable = follower.unstable(points) == 0
-    n = problem.dimension
-    scale = np.asarray(frame.scale)
+    n = follower.problem.dimension
+    scale, periods = np.asarray(follower.problem.scale), int(follower.problem.periods)
     name = follower.parameter if isinstance(follower.parameter, str) else "parameter"
-
-    def speed(u: np.ndarray) -> np.ndarray:
-        if name == SPEED:
-            return np.asarray(u[..., -1] * follower.unit)
-        found = u[..., n] * float(frame.speed) if free else np.full(u.shape[:-1], float(follower.of(0).speed))
-        return np.asarray(found)
-
+    fixed = None if name == SPEED else float(follower.given.speed)
+    speed = lambda u: u[..., -1] * follower.unit if fixed is None else np.full(u.shape[:-1], fixed)
     special = []
-    before = [found.after for found, _ in seen]
-    for i, ((k, kind, p, error), cubic) in enumerate(seen):
+    before = [found.after for found in seen]
+    for i, (k, kind, p, error) in enumerate(seen):
         mu = follower.multipliers(p)
         direction = np.zeros(n)
         if kind in CRITICAL:
@@ -285,15 +211,13 @@ def _branch(
                 kind=kind,
                 speed=float(speed(p.u)) * known,
                 state=p.u[:n] * scale,
-                periods=int(frame.periods),
+                periods=periods,
                 steps=int(p.steps),
                 parameter=name,
                 value=at * known,
                 error=error,
                 multipliers=mu,
                 direction=direction * scale,
-                coefficient=cubic[0],
-                coefficient_error=cubic[1],
                 outcome=outcome,
                 index=int(k),
                 edge=edge,
@@ -309,6 +233,6 @@ def _branch(
         steps=points.steps,
         error=points.error,
         special=tuple(special),
-        periods=int(frame.periods),
+        periods=periods,
         ended=ended,
     )

@@ -1,22 +1,24 @@
 """Period-doubling cascades: doubling after doubling along the doubled branches, and where they accumulate."""
 
 import dataclasses
+import itertools
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
-from .._types import Scalar
+from ..analysis import Edge
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
-from ._by_name import SPEED, Parameter
 from ._follower import Follower, make_follower, require_range
 from ._point import Point, require_found
-from ._problem import Frame
+from ._problem import SPEED, Given, Parameter
 from ._singularity import test_functions
 
 
@@ -33,8 +35,7 @@ class Cascade:
     limit: float
     """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
     error: float
-    """Distance of the last two extrapolations, with the errors of the last two points in it; infinite with fewer than
-    three points."""
+    """Distance of the last two extrapolations and errors of the last two points; infinite with fewer than three."""
     ended: str = ""
     """Why there are not as many points as were asked for."""
 
@@ -49,6 +50,10 @@ class Cascade:
         d = np.diff(self.values)
         return tuple((d[:-1] / d[1:]).tolist())
 
+    def as_edge(self, kind: str) -> Edge:
+        """The chaotic edge that the limit of one over speed is."""
+        return Edge(self.limit * 30 / np.pi, self.error * 30 / np.pi, kind, "period-doubling", "cascade")
+
     def __str__(self) -> str:
         rows = [
             f"  period {int(p.periods)} to {2 * int(p.periods)}: {float(p.value):.10g} +- {float(p.error):.1g}"
@@ -60,14 +65,6 @@ class Cascade:
     _repr_html_ = notebook_html
 
 
-def extrapolated(values: tuple[float, ...]) -> tuple[float, float]:
-    """Limit of a cascade from its points, and the distance to the extrapolation with one point less."""
-    limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in zip(values[:-1], values[1:], strict=True)]
-    if not limits:
-        return float("nan"), float("inf")
-    return limits[-1], abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
-
-
 def doubled_branch(
     system: AbstractForcedSystem,
     point: Point,
@@ -75,8 +72,6 @@ def doubled_branch(
     *,
     lower: float,
     upper: float,
-    speed: Scalar | None = None,
-    period: str = "driven",
     steps: Steps = Steps(first=0.01, shortest=1e-7),
     amplitude: float = 0.02,
     until_doubling: bool = False,
@@ -87,7 +82,7 @@ def doubled_branch(
     **Arguments:**
 
     - `point`: a period doubling, of an orbit of any number of revolutions.
-    - `lower`, `upper`, `speed`, `period`, `steps`: as for `branch`.
+    - `lower`, `upper`, `steps`: as for `branch`.
     - `amplitude`: how far from the doubling it is entered, in units of the system's scale along the critical direction.
     - `until_doubling`: end with the branch's own first period doubling.
 
@@ -99,40 +94,28 @@ def doubled_branch(
         raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
     require_found(point, point.value)
     at, periods = float(point.value), int(point.periods)
-    follower = make_follower(system, point.speed if speed is None else speed, parameter, lower, upper, period, method)
-    frame = follower.frame(jnp.asarray(point.state), at, 2 * periods)
-    curves = follower.curves(frame, [0])
-    scale = np.asarray(frame.scale)
-    free = [1.0] if follower.problem.free_speed else []
-    u = np.array([[*(np.asarray(point.state) / scale), *free, at / follower.unit]])
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
+    follower = make_follower(given, parameter, lower, upper, method).around(at, 2 * periods)
+    curves, half = follower.curves(1), follower.around(at, periods)
+    scale = np.asarray(follower.problem.scale)
+    u = np.array([[*(np.asarray(point.state) / scale), at / follower.unit]])
     across = np.zeros_like(u)
     across[0, : scale.size] = np.asarray(point.direction) / scale
     across /= np.linalg.norm(across)
     while amplitude > SMALLEST_AMPLITUDE:
         start = settle_on(curves, u + amplitude * across, across, int(point.steps))
         near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        if near and _doubling(follower, start)[0] > 0 and _half_way(follower, frame, start, across) > amplitude:
+        once = correct(half.curves(1), start.u, across, start.steps, ONCE)  # where it is half of its revolutions later
+        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # nothing if it is the orbit that doubles
+        if near and _doubling(follower, start)[0] > 0 and away > amplitude:
             break
         amplitude /= 4
     else:
         raise ArgumentError("point", said=f"must be a period doubling, but no doubled branch begins at {at:g}.")
     stop = lambda lane, points: until_doubling and bool(_doubling(follower, points[-1]) < 0)
     (trace,) = follow(curves, start, steps=steps, inside=follower.inside, stop=stop)
-    (found,) = describe(follower, frame, [(trace.points, ("doubling", trace.ended))])
+    (found,) = describe(follower, [(trace.points, ("doubling", trace.ended))])
     return found
-
-
-def _half_way(follower: Follower, frame: Frame, start: Corrected, across: np.ndarray) -> float:
-    """How far an orbit is from where it began after half of its revolutions, beside the flow, in units of the system's
-    scale: twice the amplitude if it doubled, nothing if it is the orbit that doubles, there or later."""
-    n = follower.problem.dimension
-    half = follower.curves(frame._replace(periods=frame.periods // 2), [0])
-    once = correct(half, start.u, across, start.steps, ONCE)
-    away = once.jacobian[0, :n] @ (start.u - once.u)[0]
-    if follower.problem.free_speed:
-        flow = once.jacobian[0, :n, n]
-        away = away - flow * (flow @ away) / (flow @ flow)
-    return float(np.linalg.norm(away))
 
 
 def _doubling(follower: Follower, points: Corrected) -> np.ndarray:
@@ -147,39 +130,20 @@ def cascade(
     lower: float,
     upper: float,
     levels: int = 4,
-    speed: Scalar | None = None,
-    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Cascade:
-    """Follow a period-doubling cascade from its first point.
-
-    **Arguments:** the first period doubling, of a period-1 orbit; parameter and its range [SI]; number of doublings.
-
-    **Returns:** `Cascade`.
-    """
+    """Follow a period-doubling cascade from its first point, the doubling of a period-1 orbit, over a range of the
+    parameter [SI] and so many doublings."""
     require_x64()
     require_range(parameter, lower, upper)
     require_found(point, point.value)
-    if levels < 1:
-        raise ArgumentError("levels", said=f"must be at least 1, but {levels} was given.")
-    own = parameter == SPEED or period == "free"  # each orbit has a speed of its own
-    fixed = None if own else (point.speed if speed is None else speed)
+    require_at_least(1, levels=levels)
     points = [point]
+    how: dict[str, Any] = {"lower": lower, "upper": upper, "until_doubling": True, "method": method}
     amplitude, ended = 0.02, ""
     while len(points) < levels:
         try:
-            doubled = doubled_branch(
-                system,
-                points[-1],
-                parameter,
-                lower=lower,
-                upper=upper,
-                speed=fixed,
-                period=period,
-                amplitude=amplitude,
-                until_doubling=True,
-                method=method,
-            )
+            doubled = doubled_branch(system, points[-1], parameter, amplitude=amplitude, **how)
         except ValueError as error:
             ended = str(error)
             break
@@ -189,6 +153,8 @@ def cascade(
             break
         points.append(following[0])
         amplitude /= 2
-    limit, error = extrapolated(tuple(float(p.value) for p in points))
+    pairs = itertools.pairwise(float(p.value) for p in points)
+    limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in pairs] or [float("nan")]
+    error = abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
     located = sum(w * float(np.nan_to_num(p.error)) for w, p in zip((1 + 1 / (FEIGENBAUM - 1), 0.3), points[::-1]))
-    return Cascade(tuple(points), limit, error + located, ended)
+    return Cascade(tuple(points), limits[-1], error + located, ended)

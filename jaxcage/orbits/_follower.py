@@ -1,5 +1,6 @@
 """What the lanes of one continuation of orbits over a parameter share, its first points, and multipliers along it."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -8,17 +9,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 
 from .._errors import ArgumentError
 from .._types import Scalar
 from ..integrate import AbstractMethod
-from ..models import AbstractForcedSystem
 from ._arclength import Corrected, Curves, settle_on, stack, take
-from ._by_name import SPEED, Parameter, with_value
-from ._orbit import OrbitEquations, is_free
-from ._problem import Frame, Given, OrbitProblem, make_frame
-from ._singularity import test_functions
+from ._orbit import OrbitEquations
+from ._problem import SPEED, Given, OrbitProblem, Parameter, make_problem
 from ._steps import Counts, counted, stiff
 
 
@@ -34,28 +31,26 @@ class Follower(eqx.Module):
     given: Given
     lower: float
     upper: float
-    unit: float
-    designs: bool = eqx.field(static=True, default=False)
-    """Whether every lane has a system of its own, stacked in `given`."""
 
-    def of(self, lanes: Any) -> Given:
-        """What is given in these lanes."""
-        return take(self.given, np.asarray(lanes)) if self.designs else self.given
-
-    def curves(self, frame: Frame, lanes: Any) -> Curves:
-        """The branches of these lanes."""
-        equations = stack(OrbitEquations(self.problem, frame), len(lanes))
-        return Curves(equations, self.of(lanes), self.counts, self.designs)
+    @property
+    def unit(self) -> float:
+        """Unit of the parameter."""
+        return (self.upper - self.lower) / 20
 
     @property
     def parameter(self) -> Parameter:
         return self.problem.parameters[0]
 
-    def frame(self, state: Array, at: Scalar, periods: Any) -> Frame:
-        """The frame of all lanes, around one of their orbits."""
-        given = self.of(0)
-        system, speed = with_value(given.system, given.speed, self.parameter, jnp.asarray(at, dtype=float))
-        return make_frame(self.problem, Given(system, speed), state, speed, jnp.full(1, self.unit), periods)
+    def around(self, at: Scalar, periods: Any = None) -> "Follower":
+        """The same in the system's scale at a value of the parameter, with other periods if they are given."""
+        there, mine = self.given.changed(self.parameter, jnp.asarray(at, dtype=float)), self.problem
+        periods = mine.periods if periods is None else periods
+        problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
+        return dataclasses.replace(self, problem=problem)
+
+    def curves(self, lanes: int) -> Curves:
+        """The branches of so many lanes."""
+        return Curves(stack(OrbitEquations(self.problem), lanes), self.given, self.counts)
 
     def inside(self, u: np.ndarray) -> np.ndarray:
         """Whether the parameter is within the range."""
@@ -70,27 +65,9 @@ class Follower(eqx.Module):
         """Those of each orbit, the largest first."""
         return eigenvalues(self.monodromy(points))
 
-    def nontrivial(self, points: Corrected) -> np.ndarray:
-        """The same without the one at 1 of a self-excited orbit."""
-        multipliers = self.multipliers(points)
-        return without_trivial(multipliers) if self.problem.free_speed else multipliers
-
-    def tests(self, points: Corrected) -> dict[str, np.ndarray]:
-        """Functions of each orbit that change sign at bifurcations (see `test_functions`)."""
-        found = test_functions(self.nontrivial(points))
-        if self.problem.free_speed:  # two multipliers near 1 cannot be told apart, but the equations are singular
-            m = self.problem.equations
-            found["fold"] = np.linalg.det(points.jacobian[..., :m, :m])
-        return found
-
-    @property
-    def certain(self) -> float:
-        """How near to 1 the multiplier of a fold is known to be: two that meet there are less certain."""
-        return 0.02 if self.problem.free_speed else 1e-3
-
     def unstable(self, points: Corrected, circle: float = 1.0) -> Any:
-        """How many multipliers of each orbit are outside a circle, without the one at 1 of a self-excited orbit."""
-        return np.sum(~(np.abs(self.nontrivial(points)) < circle), axis=-1)
+        """How many multipliers of each orbit are outside a circle."""
+        return np.sum(~(np.abs(self.multipliers(points)) < circle), axis=-1)
 
 
 AT_THE_END = 1e-9
@@ -111,41 +88,32 @@ def require_within(name: str, at: float, lower: float, upper: float) -> None:
     """**Raises:** `ArgumentError` for an orbit outside the range in which it is to be followed."""
     slack = AT_THE_END * max(abs(lower), abs(upper))
     if at < lower - slack or at > upper + slack:
-        raise ArgumentError(
-            name, said=f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
-        )
+        said = f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
+        raise ArgumentError(name, said=said)
 
 
 def make_follower(
-    system: AbstractForcedSystem,
-    speed: Any,
-    parameter: Parameter,
-    lower: float,
-    upper: float,
-    period: str = "driven",
-    method: AbstractMethod | None = None,
+    given: Given, parameter: Parameter, lower: float, upper: float, method: AbstractMethod | None, periods: int = 1
 ) -> Follower:
+    """A follower in the system's scale at its own speed."""
     chosen, counts = counted(method)
-    problem = OrbitProblem(chosen, system.dimension, is_free(period, system, speed), (parameter,))
-    given = Given(system, jnp.asarray(speed, dtype=float))
-    return Follower(problem, counts, given, lower, upper, (upper - lower) / 20)
+    problem = make_problem(given, (parameter,), [(upper - lower) / 20], periods, chosen)
+    return Follower(problem, counts, given, lower, upper)
 
 
-def seeds(follower: Follower, frame: Frame, starts: Sequence[Start], steps: int = 0) -> Corrected:
-    """Orbits near (state, value of the parameter), the parameter kept, by at least so many steps, the lanes first."""
-    free = follower.problem.free_speed
-    u = np.array([[*(s / np.asarray(frame.scale)), *([1.0] if free else []), p / follower.unit] for s, p in starts])
+def seeds(follower: Follower, starts: Sequence[Start]) -> Corrected:
+    """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
+    u = np.array([[*(s / np.asarray(follower.problem.scale)), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return settle_on(follower.curves(frame, range(len(starts))), u, normal, steps)
+    return settle_on(follower.curves(len(u)), u, normal)
 
 
-def stable_steps(follower: Follower, start: Start, periods: int) -> Follower:
+def stable_steps(follower: Follower, start: Start) -> Follower:
     """The follower itself or, where it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
     if not follower.counts.tolerance > 0:
         return follower
-    frame = follower.frame(jnp.asarray(start[0]), start[1], periods)
-    (u,) = seeds(follower, frame, [start]).jacobian
+    (u,) = seeds(follower.around(start[1]), [start]).jacobian
     return follower if np.all(np.isfinite(u)) else by_rodas4(follower)
 
 
@@ -169,10 +137,3 @@ def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
     """Multipliers, the largest first."""
     mu = np.linalg.eigvals(monodromy).astype(complex)
     return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
-
-
-def without_trivial(multipliers: np.ndarray) -> np.ndarray:
-    """Multipliers of self-excited orbits without the one at 1 that each has."""
-    trivial = np.argmin(np.abs(multipliers - 1), axis=-1)[..., None]
-    others = np.arange(multipliers.shape[-1]) != trivial
-    return multipliers[others].reshape(*multipliers.shape[:-1], -1)

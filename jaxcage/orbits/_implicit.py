@@ -7,41 +7,35 @@ The map is expanded around (u, k) by one program that serves equations of every 
 parameters stand behind the few numbers k does not matter, and because the tangent is a matrix times dgiven, reverse
 mode is had by transposing that matrix and not by running revolutions backwards. The rule itself is differentiable:
 second derivatives are derivatives of it.
+
+Roots are found by damped Newton's method, since orbits of stiff systems with contact have small basins, which a full
+step often leaves. A step is taken back by halves until Deuflhard's natural monotonicity test holds,
+|J^-1 f(new)| < |J^-1 f(old)| with the old Jacobian, which does not depend on how the equations are scaled
+(P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 3.3).
 """
 
 import abc
-import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from functools import partial
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
 from .._types import Scalar
 from ..integrate import StrobeMap, compiled
-from ._newton import DampedNewton, NewtonState
-from ._problem import Frame, OrbitProblem, Prepared, frozen, returned
+from ._problem import OrbitProblem, Prepared, frozen
 from ._steps import GIVEN_UP, Counts, by_steps
 
 
 class AbstractEquations(eqx.Module):
-    """As many equations as unknowns."""
-
-    @abc.abstractmethod
-    def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-        """The equations, their derivative, and what else is wanted at the root."""
-
-
-class AbstractMapEquations(AbstractEquations):
     """Equations in an orbit's state and more, split into what is cheap and what runs revolutions."""
 
     problem: eqx.AbstractVar[OrbitProblem]
-    frame: eqx.AbstractVar[Frame]
 
     @abc.abstractmethod
     def prepare(self, u: Float[Array, " n"], given: Any) -> Prepared:
@@ -54,39 +48,35 @@ class AbstractMapEquations(AbstractEquations):
         """The equations, with the image of the state and its derivatives (see `returned`), and what else is
         wanted at the root."""
 
+    def linearised(self, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
+        """The equations, their derivative along each unknown, and what else is wanted at the root."""
+
+        def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
+            strobe, drifts = prepared = self.prepare(u, given)
+            image, columns = self.problem.returned(strobe, u[: self.problem.dimension], drifts)
+            r, aux = self.closing(u, prepared, image, columns)
+            return r, (r, aux)
+
+        jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
+        return r, jacobian, aux
+
     @abc.abstractmethod
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed.
-
-        **Arguments:** the way from one to the other, shape (..., n), and the derivatives at both, (..., m, n); of JAX
-        or of NumPy.
-        """
+        """How far two roots are apart, the second by twice the steps: in a unit of its own, and over what is allowed;
+        from the way from one to the other, shape (..., n), and the derivatives at both, of JAX or of NumPy."""
 
 
-M = TypeVar("M", bound=AbstractMapEquations)
+class Newton(NamedTuple):
+    """The last point that Newton's method accepted, and what is known there."""
 
-
-def across(equations: M, u: Float[Array, " n"], given: Any, kept: Bool[Array, ""]) -> M:
-    """The equations on the plane through u (see `OrbitProblem.across`), if the one at hand is not to be kept."""
-    if not equations.problem.free_speed:
-        return equations
-    new = equations.problem.across(u, given, equations.frame)
-    frame = jax.tree.map(lambda own, through: jnp.where(kept, own, through), equations.frame, new)
-    return dataclasses.replace(equations, frame=frame)
-
-
-def differentiated(equations: AbstractMapEquations, u: Float[Array, " n"], given: Any) -> tuple[Array, Array, Any]:
-    """What `linearised` returns, by differentiating the equations along each unknown."""
-
-    def at(u: Array) -> tuple[Array, tuple[Array, Any]]:
-        prepared = equations.prepare(u, given)
-        strobe, drifts = prepared
-        image, columns = returned(strobe, equations.frame, u[: equations.frame.scale.size], drifts)
-        r, aux = equations.closing(u, prepared, image, columns)
-        return r, (r, aux)
-
-    jacobian, (r, aux) = jax.jacfwd(at, has_aux=True)(u)
-    return r, jacobian, aux
+    point: Float[Array, " n"]
+    jacobian: Float[Array, "n n"]
+    step: Float[Array, " n"]
+    """The full step from `point`."""
+    residual: Float[Array, " n"]
+    factor: Float[Array, ""]
+    """Share of `step` that is being tried."""
+    done: Bool[Array, ""]
 
 
 class Found(eqx.Module):
@@ -94,22 +84,23 @@ class Found(eqx.Module):
 
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
-    newton: NewtonState
+    newton: Newton
     aux: Any
     steps: Int[Array, ""]
     """Steps per revolution."""
     error: Float[Array, ""]
-    """Distance to the root by half as many (see `AbstractMapEquations.apart`), infinite where none was found; NaN where
+    """Distance to the root by half as many (see `AbstractEquations.apart`), infinite where none was found; NaN where
     that was not looked at."""
 
 
 TOLERANCE = 1e-9
 """Newton's last step is below this, in the unknowns' units; the error is of the order of its square."""
+SMALLEST_FACTOR, OF_A_NEAR_GUESS = 2.0**-10, 0.75
+"""Newton's method ends where a smaller share of its step would be tried."""
 
 
 def solve(
-    equations: AbstractEquations,
-    given: Any,
+    linearised: Callable[[Array], tuple[Array, Array, Any]],
     guess: Float[Array, " n"],
     max_steps: int = 40,
     tolerance: Scalar = TOLERANCE,
@@ -120,31 +111,51 @@ def solve(
     """Newton's method from `guess`; not a step of it in lanes that `skip` it. A guess that is said to be near is given
     up where a full step leads away.
 
+    It ends when the full step is below `tolerance` (1 + |u|) in every component; that step is still taken, so that the
+    error of the result is of the order of its square.
+
     **Returns:** the root and `Found`: its Newton state is that of the last point before the root or, if `at_root`, of
     the root, for one evaluation more.
     """
+    smallest = jnp.where(near, OF_A_NEAR_GUESS, SMALLEST_FACTOR)
+    size = lambda step: jnp.max(jnp.abs(step))
+    tiny = lambda step, u: size(step / (tolerance + tolerance * jnp.abs(u))) <= 1.0
 
-    def fn(u: Array, given: Any) -> tuple[Array, Any]:
-        r, jacobian, aux = equations.linearised(u, given)
-        return r, (jacobian, aux)
+    def turn(carry: tuple) -> tuple:
+        i, u, newton, _, _ = carry
+        r, jacobian, aux = linearised(u)
+        first = jnp.isinf(newton.step[0])
+        known = jnp.where(first, jnp.eye(u.size), newton.jacobian)
+        nearer = size(jnp.linalg.solve(known, r)) < size(newton.step)
+        there = tiny(newton.step, u)
+        accept = jnp.all(jnp.isfinite(r)) & jnp.all(jnp.isfinite(jacobian)) & (first | nearer | there)
+        step = -jnp.linalg.solve(jacobian, r)
+        done = there if at_root else tiny(step, u)
+        taken = Newton(u, jacobian, step, r, jnp.minimum(1.0, 2 * newton.factor), done)
+        refused = newton._replace(factor=newton.factor / 2)
+        new = jax.tree.map(lambda a, b: jnp.where(accept, a, b), taken, refused)
+        length = size(new.step)
+        share = jnp.minimum(new.factor, 1.0 / jnp.where(length > 0, length, 1.0))
+        onward = new.point + share * new.step
+        lost = (new.factor < smallest) | ~jnp.all(jnp.isfinite(u))
+        return i + 1, jnp.where(new.done, u, onward) if at_root else onward, new, lost, aux
 
-    smallest = jnp.where(near, 0.75, DampedNewton.smallest_factor)
-    solver = DampedNewton(tolerance, tolerance, smallest_factor=smallest, at_root=at_root)
-    options = {"skip": skip}
-    got = optx.root_find(fn, solver, guess, given, options, has_aux=True, max_steps=max_steps, throw=False)
-    converged = got.result == optx.RESULTS.successful
-    steps = jnp.zeros((), int)
-    return got.value, Found(converged, got.stats["num_steps"], got.state, got.aux[1], steps, jnp.asarray(jnp.nan))
+    unknown = lambda *shape: jnp.full(shape, jnp.inf)
+    n, like = guess.size, eqx.filter_eval_shape(linearised, guess)[2]
+    begin = Newton(guess, unknown(n, n), unknown(n), unknown(n), jnp.ones(()), jnp.asarray(skip))
+    aux = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), like)
+    start = jnp.zeros((), int), guess, begin, ~jnp.all(jnp.isfinite(guess)), aux
+    on = lambda carry: (carry[0] < max_steps) & ~carry[2].done & ~carry[3]
+    i, u, newton, lost, aux = jax.lax.while_loop(on, turn, start)
+    return u, Found(newton.done & ~lost, i, newton, aux, jnp.zeros((), int), jnp.asarray(jnp.nan))
 
 
 def settled(
-    equations: AbstractMapEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
+    equations: AbstractEquations, given: Any, guess: Float[Array, " n"], counts: Counts, at_root: bool = False
 ) -> tuple[Float[Array, " n"], Found]:
-    """The root by as many steps as it needs: solved again by twice as many until it stays where it is.
-
-    **Returns:** the root by the last number of steps, and `Found`.
-    """
-    once = lambda steps, u, skip: solve(by_steps(equations, steps), given, u, at_root=at_root, skip=skip)
+    """The root by as many steps as it needs: solved again by twice as many until it stays where it is."""
+    by = lambda steps: partial(by_steps(equations, steps).linearised, given=given)
+    once = lambda steps, u, skip: solve(by(steps), u, at_root=at_root, skip=skip)
 
     def turn(carry: tuple) -> tuple:
         i, u, before, done = carry
@@ -169,7 +180,7 @@ def settled(
 # --- derivatives ---------------------------------------------------------------------------------------------------
 
 
-def as_root(given: Any, *, equations: AbstractMapEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
+def as_root(given: Any, *, equations: AbstractEquations, u: Float[Array, " n"], aux: Any) -> tuple[Array, Any]:
     """u and what else is known at it, as functions of what is given: a root of the equations there."""
     # `jax.grad` of a Python number traces a number that is no array, and that a filter of arrays would not see
     given = jax.tree.map(lambda x: jnp.asarray(x) if isinstance(x, Tracer) else x, given)
@@ -177,17 +188,16 @@ def as_root(given: Any, *, equations: AbstractMapEquations, u: Float[Array, " n"
 
 
 @eqx.filter_custom_jvp
-def _as_root(given: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> tuple[Array, Any]:
+def _as_root(given: Any, *, equations: AbstractEquations, u: Array, aux: Any) -> tuple[Array, Any]:
     return u, aux
 
 
 @_as_root.def_jvp
-def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractMapEquations, u: Array, aux: Any) -> Any:
+def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, u: Array, aux: Any) -> Any:
     (given,), (given_dot,) = primals, tangents
     u, aux = _as_root(given, equations=equations, u=u, aux=aux)
     numbers, moving = eqx.filter_jvp(lambda g: numbers_around(equations, u, g), (given,), (given_dot,))
-    x = jnp.concatenate([u[: equations.frame.scale.size], numbers.k])
-    around, slopes = by_columns(x, f=Slopes(Push(frozen(numbers.like), equations.frame)))
+    around, slopes = expansion(equations.problem, u, numbers)
     return (u, aux), _moved(equations, u, numbers, around, slopes, moving.k)
 
 
@@ -201,19 +211,25 @@ class FieldNumbers(NamedTuple):
 
 
 @compiled
-def numbers_around(equations: AbstractMapEquations, u: Array, given: Any) -> FieldNumbers:
+def numbers_around(equations: AbstractEquations, u: Array, given: Any) -> FieldNumbers:
     """The numbers of the field at the unknowns u, and how they follow from these."""
     row = lambda v: numbers_of(equations.prepare(v, given))[0]
     return FieldNumbers(row(u), jax.jacfwd(row)(u), equations.prepare(u, given))
 
 
+def expansion(problem: OrbitProblem, u: Float[Array, " n"], numbers: FieldNumbers) -> tuple[Any, Any]:
+    """Image of the state and its derivatives, and the slopes of these by the state and by the numbers of the field."""
+    x = jnp.concatenate([u[: problem.dimension], numbers.k])
+    return by_columns(x, f=Slopes(Push(frozen(numbers.like), problem)))
+
+
 @compiled
 def _moved(
-    equations: AbstractMapEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
+    equations: AbstractEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
 ) -> tuple[Array, Any]:
     """Derivatives of a root, and of what else is known there, along `k_dot`."""
     k, k_of_u, like = numbers
-    n, m, remake = equations.frame.scale.size, u.size, numbers_of(like)[1]
+    n, m, remake = equations.problem.dimension, u.size, numbers_of(like)[1]
 
     def closing(moved: Array) -> tuple[Array, Any]:
         """The equations, with the map linear from here."""
@@ -228,36 +244,29 @@ def _moved(
 
 
 def numbers_of(prepared: Any) -> tuple[Float[Array, " k"], Callable[[Array], Any]]:
-    """All numbers of `prepared` that its results depend on in a row, and the function that puts such a row back.
-
-    Of a strobe map these are its field's: system and scale only say how far out a state is and how large an error.
-    """
-    numbers, rest = eqx.partition(prepared, jax.tree.map(_matters, prepared, is_leaf=_is_map))
+    """All numbers of `prepared` that its results depend on in a row, and the function that puts such a row back. Of a
+    strobe map these are its field's: system and scale only say how far out a state is and how large an error."""
+    is_map = lambda node: isinstance(node, StrobeMap)
+    matters = lambda node: (
+        eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
+        if is_map(node)
+        else eqx.is_inexact_array(node)
+    )
+    numbers, rest = eqx.partition(prepared, jax.tree.map(matters, prepared, is_leaf=is_map))
     k, unravel = ravel_pytree(numbers)
     return k, lambda row: eqx.combine(unravel(row), rest)
-
-
-def _is_map(node: Any) -> bool:
-    return isinstance(node, StrobeMap)
-
-
-def _matters(node: Any) -> Any:
-    """Which parts of `node` matter, as a filter of Equinox."""
-    if not isinstance(node, StrobeMap):
-        return eqx.is_inexact_array(node)
-    return eqx.tree_at(lambda m: m.field, jax.tree.map(lambda _: False, node), eqx.is_inexact_array)
 
 
 class Push(eqx.Module):
     """Image of a state and its derivatives, as a function of state and numbers of the field in a row."""
 
     like: Prepared
-    frame: Frame
+    problem: OrbitProblem
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        n = self.frame.scale.size
+        n = self.problem.dimension
         strobe, drifts = numbers_of(self.like)[1](x[n:])
-        return returned(strobe, self.frame, x[:n], drifts)
+        return self.problem.returned(strobe, x[:n], drifts)
 
 
 class Slopes(eqx.Module):
@@ -272,10 +281,8 @@ class Slopes(eqx.Module):
 
 @eqx.filter_custom_jvp
 def by_columns(x: Float[Array, " n"], *, f: Callable[[Array], Any]) -> Any:
-    """f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode, to any order.
-
-    `f` is a module; what it holds has no derivative.
-    """
+    """f(x), differentiated by f's Jacobian matrix in forward mode even in reverse mode, to any order. `f` is a module;
+    what it holds has no derivative."""
     return _evaluated(f, x)
 
 

@@ -8,6 +8,8 @@ it; those that do are coexisting orbits, which a cage meets only from other star
 As for chaotic zones, stretches narrower than a stated width do not count and windows narrower than it are closed, but
 only between stretches wider than the window. Else a row of slivers, some a tenth of a revolution per minute wide, would
 carry an edge far from the stretch it belongs to, to a bifurcation that every solver has elsewhere.
+
+Edges of chaotic zones, which are statistical, are matched with bifurcations and limits of cascades.
 """
 
 import dataclasses
@@ -16,9 +18,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._notebook import notebook_html
-from ..analysis import Edge, Zone, closing_width
+from ..analysis import Zone, Zones, closing_width
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem
+from ._cascade import Cascade, cascade
 from ._point import Point
 from ._search import Stretch, SynchronousOrbits
+
+
+CASCADE_REACH_RPM = 500.0
+"""Period doublings this far on the calm side of a chaotic edge are tried for a cascade that ends there."""
+CASCADE_LEVELS = 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,10 +71,7 @@ class _Group:
 
     def apart(self, other: "_Group") -> float:
         """Width of the gap between two groups [rpm], negative where they overlap."""
-        return max(
-            other.low.lower_rpm - self.high.upper_rpm,
-            self.low.lower_rpm - other.high.upper_rpm,
-        )
+        return max(other.low.lower_rpm - self.high.upper_rpm, self.low.lower_rpm - other.high.upper_rpm)
 
     @property
     def width(self) -> float:
@@ -87,9 +94,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     """Zones in which the synchronous orbit is lost, from the stable stretches that were found.
 
     **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
-    500 rpm and at most 5 % of the highest speed.
-
-    **Returns:** `LossZones`. Without any stretch there is no zone: nothing is known of the orbit.
+    500 rpm and at most 5 % of the highest speed. Without any stretch there is no zone: nothing is known of the orbit.
     """
     close_below_rpm = closing_width(found.sweep.rpm) if close_below_rpm is None else close_below_rpm
     if not found.stretches:
@@ -101,27 +106,24 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
     groups = _joined([first, *others], close_below_rpm)
     groups = [g for g in groups if principal in g.stretches or g.width >= close_below_rpm]
     groups.sort(key=lambda g: g.low.lower_rpm)
-    return _between(found, groups, principal, close_below_rpm)
-
-
-def _between(found: SynchronousOrbits, groups: list[_Group], principal: Stretch, close: float) -> LossZones:
     tops = [None, *(g.high for g in groups)]
     bottoms = [*(g.low for g in groups), None]
+    edge = lambda point: None if point is None else point.as_edge("synchronous-loss")
     zones: list[Zone] = []
     edges: dict[str, Point] = {}
     for before, after in zip(tops, bottoms, strict=True):
         onset = None if before is None else before.upper
         leaves = None if after is None else after.lower
-        open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close
-        open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close
+        open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close_below_rpm
+        open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close_below_rpm
         if open_below or open_above or (before is not None and onset is None):
             continue
-        zones.append(Zone("synchronous-loss", _edge(onset), _edge(leaves), _share(found, onset, leaves)))
+        zones.append(Zone("synchronous-loss", edge(onset), edge(leaves), _share(found, onset, leaves)))
         for name, point in (("onset", onset), ("exit", leaves)):
             if point is not None:
                 edges[f"zone {len(zones)} {name}"] = point
     coexisting = {name: found.coexisting(float(p.speed)) for name, p in edges.items()}
-    return LossZones(tuple(zones), edges, coexisting, principal, close)
+    return LossZones(tuple(zones), edges, coexisting, principal, close_below_rpm)
 
 
 def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
@@ -131,5 +133,56 @@ def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) 
     return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
 
 
-def _edge(point: Point | None) -> Edge | None:
-    return None if point is None else point.as_edge("synchronous-loss")
+@dataclasses.dataclass(frozen=True)
+class Explained:
+    """Chaotic zones with the mechanisms of their edges, and what these were taken from."""
+
+    zones: Zones
+    sources: dict[str, Point | Cascade]
+    """By edge, e.g. `zone 1 exit`: what the edge coincides with. Other edges stay statistical."""
+
+
+def explain(
+    zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
+) -> Explained:
+    """Give each chaotic edge the mechanism it coincides with, within its uncertainty and the resolution of the sweep: a
+    bar that is wider than that, for mean lives near the horizon or failed lanes, coincides with anything.
+
+    An onset can be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations themselves are
+    tried first, then the limits of the cascades that begin at period doublings on the calm side. Edges that coincide
+    with nothing that was located are left as they were.
+    """
+    sources: dict[str, Point | Cascade] = {}
+    changed: list[Zone] = []
+    for number, zone in enumerate(zones.zones, start=1):
+        ends = {}
+        for end, edge, calm in (("onset", zone.onset, -1), ("exit", zone.exit, 1)):
+            if edge is not None:
+                near = min(edge.uncertainty_rpm, zones.resolution_rpm)
+                points = [p for x in found.stretches if (p := x.upper if calm < 0 else x.lower) is not None]
+                source = _source(points, edge.speed_rpm, near, calm, system, method)
+                if source is not None:
+                    sources[f"zone {number} {end}"], edge = source, source.as_edge(edge.kind)
+            ends[end] = edge
+        changed.append(dataclasses.replace(zone, **ends))
+    return Explained(dataclasses.replace(zones, zones=tuple(changed)), sources)
+
+
+def _source(
+    points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
+) -> Point | Cascade | None:
+    """What lies within `near` of an edge at `rpm`, whose calm side is above or below it, of the points and cascades
+    that begin at them."""
+    away = lambda p: abs(p.speed_rpm - rpm)
+    here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
+    if here:
+        return min(here, key=away)
+    beyond = lambda p: 0 < calm * (p.speed_rpm - rpm) <= CASCADE_REACH_RPM
+    doublings = [p for p in points if p.kind == "period-doubling" and beyond(p)]
+    reach = 2 * CASCADE_REACH_RPM * np.pi / 30
+    for point in sorted(doublings, key=away):
+        speed = float(point.speed)
+        tried = cascade(system, point, lower=speed - reach, upper=speed + reach, levels=CASCADE_LEVELS, method=method)
+        if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - rpm) <= near:
+            return tried
+    return None

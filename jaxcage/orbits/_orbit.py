@@ -1,7 +1,7 @@
 """Periodic orbits: fixed points of powers of the strobe map, with their Floquet multipliers."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import diffrax as dfx
 import equinox as eqx
@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
-from .._arguments import shown
+from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -18,58 +18,47 @@ from .._types import Scalar, State
 from ..bearing import is_concrete
 from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
-from ._implicit import AbstractMapEquations, as_root, settled
-from ._problem import Frame, Given, OrbitProblem, Prepared, frozen, is_traced, make_frame, returned
+from ._implicit import AbstractEquations, as_root, settled
+from ._problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
 from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves
 
 
 if TYPE_CHECKING:
     from ._point import Point
 
-Period = Literal["driven", "free"]
 ROUNDING = 1e-13
 AT_REST = 1e-3
 """A simulation has led to an orbit where it moves by less, in units of the system's scale."""
-STILL = 1e-6
-"""Where a period's way at the speed of the flow is less, in the same units, a self-excited system is in equilibrium."""
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
-"""Parts of a revolution over which the divergence is integrated: of a method without steps, and of steps that are a
-multiple of so many."""
+"""Parts of a revolution over which the divergence is integrated, without steps, and of steps that are a multiple."""
 
 
-class OrbitEquations(AbstractMapEquations):
-    """P(z) = z, and the phase condition of a self-excited orbit: as many equations as unknowns, or, with a parameter of
-    the problem free, those of a branch.
-    """
+class OrbitEquations(AbstractEquations):
+    """P(z) = z: as many equations as unknowns, or, with a parameter of the problem free, those of a branch."""
 
     problem: OrbitProblem
-    frame: Frame
 
     def prepare(self, u: Array, given: Given) -> Prepared:
-        return self.problem.prepare(u, given, self.frame), []
+        return self.problem.prepare(u, given), []
 
     def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Array]:
         """The equations, and the monodromy matrix."""
-        return self.problem.orbit_residual(u[: self.problem.dimension], image, self.frame), columns
+        return image - u[: self.problem.dimension], columns
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
         """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
-        problem, frame, n = self.problem, self.frame, self.problem.dimension
-        drifts = [problem.drift(u, given, frame, i) for i in range(n, u.size)]
-        image, columns = returned(problem.prepare(u, given, frame), frame, u[:n], drifts)
-        r = problem.orbit_residual(u[:n], image, frame)
-        jacobian = columns - jnp.eye(n, u.size)
-        if problem.free_speed:
-            jacobian = jnp.concatenate([jacobian, jnp.zeros((1, u.size)).at[0, :n].set(frame.phase_direction)])
-        return r, jacobian, None
+        problem, n = self.problem, self.problem.dimension
+        drifts = [problem.drift(u, given, i) for i in range(n, u.size)]
+        image, columns = problem.returned(problem.prepare(u, given), u[:n], drifts)
+        return image - u[:n], columns - jnp.eye(n, u.size), None
 
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
         """By the change of the map, stated with the margin that lanes have, and of its derivative over its own size."""
         n = self.problem.dimension
         image = abs(fine @ moved[..., None])[..., 0].max(-1)
-        size = lambda m: abs(m[..., :n, :n]).max((-2, -1))
+        size = lambda m: abs(m[..., :n]).max((-2, -1))
         return SURE * image, image / IMAGE + size(fine - coarse) / (1 + size(fine)) / SLOPE
 
 
@@ -79,9 +68,9 @@ class Orbit(eqx.Module):
     state: Float[Array, " dim"]
     """State at phase 0 [SI]."""
     speed: Scalar
-    """Speed [rad/s]; of a self-excited orbit, 2 pi over its period."""
+    """Speed [rad/s]."""
     multipliers: Complex[Array, " dim"]
-    """Floquet multipliers over all its periods, the largest first; a self-excited orbit has one at 1."""
+    """Floquet multipliers over all its periods, the largest first."""
     monodromy: Float[Array, "dim dim"]
     """Derivative of the map, in units of the system's scale."""
     residual: Float[Array, ""]
@@ -98,11 +87,8 @@ class Orbit(eqx.Module):
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
-    self_excited: bool = eqx.field(static=True)
     solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
     """What takes these steps, or the whole method where it chooses them itself."""
-    equilibrium: Bool[Array, ""] | bool = False
-    """Whether Newton's method led to an equilibrium of a self-excited system, which has no period: not `converged`."""
 
     @property
     def method(self) -> AbstractMethod:
@@ -116,24 +102,17 @@ class Orbit(eqx.Module):
 
     @property
     def stable(self) -> Bool[Array, ""]:
-        """Whether every multiplier is inside the unit circle (but for the one at 1 of a self-excited orbit)."""
-        size = jnp.abs(self.multipliers)
-        if self.self_excited:
-            size = jnp.where(jnp.arange(size.size) == jnp.argmin(jnp.abs(self.multipliers - 1)), 0.0, size)
-        return self.converged & (jnp.max(size) < 1.0)
+        """Whether every multiplier is inside the unit circle."""
+        return self.converged & (jnp.max(jnp.abs(self.multipliers)) < 1.0)
 
     @property
     def status(self) -> str:
-        """`converged`, `no orbit`, `equilibrium` or `multipliers not trusted` (Liouville's identity is violated)."""
+        """`converged`, `no orbit` or `multipliers not trusted` (Liouville's identity is violated)."""
         if not bool(self.converged):
-            return "equilibrium" if bool(self.equilibrium) else "no orbit"
+            return "no orbit"
         return "converged" if abs(float(self.liouville)) <= LIOUVILLE_TOLERANCE else "multipliers not trusted"
 
     def __str__(self) -> str:
-        if bool(self.equilibrium):
-            return (
-                "No orbit found: Newton's method led to an equilibrium, which has no period; guess a state farther out"
-            )
         if not bool(self.converged):
             return f"No orbit found (residual {float(self.residual):.1e})"
         what = "stable" if bool(self.stable) else "unstable"
@@ -178,21 +157,14 @@ def _sorted_multipliers_jvp(primals: Any, tangents: Any) -> Any:
     return mu, jnp.diagonal(jnp.linalg.solve(v, m_dot.astype(v.dtype) @ v))
 
 
-def _resolved(m: Float[Array, "dim dim"]) -> Float[Array, ""]:
-    """log|det| of a matrix like `m` whose smallest singular value is at the level of rounding."""
-    size = jnp.linalg.svd(m, compute_uv=False)
-    return jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
-
-
 def divergence_integral(
     strobe: StrobeMap, state: Float[Array, " dim"], periods: Int[Array, ""] | int
 ) -> Float[Array, ""]:
     """Integral over `periods` revolutions of the field's divergence along the orbit through `state` (SI).
 
-    By Liouville's identity it is log|det M|; for a mechanical system the divergence is minus damping over mass. It
-    checks every monodromy matrix: integration error, differentiation and, in stiff systems, multipliers lost to
-    rounding show as a disagreement. By the trapezoidal rule at the integration steps, or at as many of them as is
-    enough: on a closed orbit it converges faster than any power of the step where the field is smooth.
+    By Liouville's identity it is log|det M|, which checks every monodromy matrix: integration error, differentiation
+    and, in stiff systems, multipliers lost to rounding show as a disagreement. By the trapezoidal rule at the
+    integration steps, or at as many of them as is enough: on a closed orbit it converges faster than any power of them.
     """
     parts = ADAPTIVE_PARTS
     if isinstance(strobe.method, FixedSteps):
@@ -214,7 +186,6 @@ def divergence_integral(
 def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts) -> Float[Array, " dim"]:
     """State after `revolutions` from `start` and, while that is not at rest, after as many again by twice the steps."""
     given = frozen(given)
-    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
     counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
 
     def turn(i: Array, carry: tuple) -> tuple:
@@ -224,43 +195,32 @@ def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, 
         row = tuple(begin[k] for k in range(start.size))
         spin = jnp.where(done, 0, revolutions)
         z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
-        return z, done | (jnp.max(jnp.abs(z - y) / scale) < AT_REST * counts.tolerance)
+        return z, done | (jnp.max(jnp.abs(z - y) / problem.scale) < AT_REST * counts.tolerance)
 
     return jax.lax.fori_loop(0, counts.tries, turn, (start, jnp.array(False)))[0]
 
 
 @compiled
 def _find(
-    problem: OrbitProblem,
-    counts: Counts,
-    spinning: Counts,
-    given: Given,
-    guess: Array,
-    speed: Scalar,
-    periods: Any,
-    revolutions: Any,
+    problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, revolutions: Any
 ) -> tuple[Orbit, OrbitEquations, Array]:
     """The orbit, without derivatives; its equations and unknowns."""
     if revolutions is not None:
-        guess = settle(problem, Given(given.system, speed), guess, revolutions, spinning)
-    frame = make_frame(problem, given, guess, speed, jnp.ones(0), periods)
-    u0 = guess / frame.scale
-    if problem.free_speed:
-        u0 = jnp.append(u0, 1.0)
-    equations = OrbitEquations(problem, frame)
-    u, found = settled(equations, given, u0, counts, at_root=True)
+        guess = settle(problem, given, guess, revolutions, spinning)
+    equations = OrbitEquations(problem)
+    u, found = settled(equations, given, guess / problem.scale, counts, at_root=True)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
-    equilibrium = converged & _is_still(problem, u, given, frame)
-    converged &= ~equilibrium
     u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
     monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
-    state, speed, multipliers = _place(equations, u, monodromy, given)
-    expected = divergence_integral(equations.problem.prepare(u, given, frame), state, frame.periods)
-    floor = _resolved(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0))
+    state, multipliers = _place(equations, u, monodromy)
+    expected = divergence_integral(equations.problem.prepare(u, given), state, problem.periods)
+    size = jnp.linalg.svd(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0), compute_uv=False)
+    # log|det| of a matrix like this one whose smallest singular value is at the level of rounding
+    floor = jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
     orbit = Orbit(
         state=state,
-        speed=speed,
+        speed=given.speed,
         multipliers=multipliers,
         monodromy=monodromy,
         residual=jnp.max(jnp.abs(at_root.residual[:n])),
@@ -269,31 +229,18 @@ def _find(
         error=found.error,
         converged=converged,
         iterations=found.iterations,
-        periods=frame.periods,
-        self_excited=problem.free_speed,
+        periods=problem.periods,
         solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
-        equilibrium=equilibrium,
     )
     return orbit, equations, u
 
 
-def _is_still(problem: OrbitProblem, u: Array, given: Given, frame: Frame) -> Bool[Array, ""]:
-    """Whether a self-excited system does not move at the unknowns u: any period closes there."""
-    if not problem.free_speed:
-        return jnp.array(False)
-    state = problem.state(u, frame)
-    flow = problem.prepare(u, given, frame).field(jnp.zeros(()), tuple(state[i] for i in range(state.size)))
-    rate = jnp.stack([jnp.asarray(c) for c in flow]) / frame.scale
-    return jnp.max(jnp.abs(rate)) * REVOLUTION * frame.periods.astype(float) < STILL
-
-
 @compiled
-def _place(equations: OrbitEquations, u: Array, monodromy: Array, given: Given) -> tuple[Array, Array, Array]:
-    """State, speed and multipliers of an orbit."""
-    problem, frame = equations.problem, equations.frame
+def _place(equations: OrbitEquations, u: Array, monodromy: Array) -> tuple[Array, Array]:
+    """State and multipliers of an orbit."""
     finite = jnp.isfinite(monodromy)
     multipliers = jnp.where(jnp.all(finite), sorted_multipliers(jnp.where(finite, monodromy, 0.0)), jnp.nan)
-    return problem.state(u, frame), jnp.asarray(problem.speed(u, given, frame), dtype=float), multipliers
+    return equations.problem.state(u), multipliers
 
 
 def periodic_orbit(
@@ -303,28 +250,25 @@ def periodic_orbit(
     *,
     guess: Guess | None = None,
     revolutions: int | None = None,
-    period: str = "driven",
     method: AbstractMethod | None = None,
 ) -> Orbit:
     """The orbit that closes after `periods` revolutions, by damped Newton on the strobe map.
 
     **Arguments:**
 
-    - `system`, `speed`: any forced system, and its speed [rad/s]; for a self-excited one, a guess.
+    - `system`, `speed`: any forced system, and its speed [rad/s].
     - `periods`: revolutions after which the orbit closes.
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
     - `revolutions`: simulate so many before Newton takes over; by default 200 without a guess and none with one.
-    - `period`: `free` for a self-excited system, whose law does not depend on the phase: the speed is then found too.
     - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, where that finds
         none that stays where it is with more steps, by Rodas4 (which only without `jit` and `vmap`).
 
     **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and
-    `vmap`. State, speed and multipliers have derivatives of every order with respect to `system` and `speed`, through
-    the equation P(z) = z.
+    `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`.
     """
     require_x64()
+    require_at_least(1, periods=periods)
     require_speeds(system, speed)
-    free = is_free(period, system, speed)
     if revolutions is not None and is_concrete(revolutions) and revolutions < 0:
         raise ArgumentError("revolutions", said=f"must be at least 0, but {int(revolutions)} was given.")
     given = Given(system, jnp.asarray(speed, dtype=float))
@@ -333,44 +277,21 @@ def periodic_orbit(
     if revolutions is None and guess is None:
         revolutions = 200
     spin = None if revolutions is None else jnp.asarray(revolutions)
-    first = guess.speed if isinstance(guess, Orbit) and period == "free" else given.speed
 
     def find(method: AbstractMethod, counts: Counts) -> Orbit:
-        problem = OrbitProblem(method, system.dimension, free, ())
+        here, begin = frozen((given, start))
+        problem = make_problem(here, (), jnp.ones(0), periods, method)
         counts = from_steps(counts, guess.steps if isinstance(guess, Orbit) else None)
         enough = jnp.minimum(counts.last, ENOUGH)
         spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
-        frozen_ones = frozen((given, start, first))
-        found, equations, u = _find(problem, counts, spinning, *frozen_ones, jnp.asarray(periods), spin)
+        found, equations, u = _find(problem, counts, spinning, here, begin, spin)
         if not is_traced(given):
             return found
         u, monodromy = as_root(given, equations=equations, u=u, aux=found.monodromy)
-        state, speed, multipliers = _place(equations, u, monodromy, given)
-        return dataclasses.replace(found, state=state, speed=speed, multipliers=multipliers, monodromy=monodromy)
+        state, multipliers = _place(equations, u, monodromy)
+        return dataclasses.replace(found, state=state, speed=given.speed, multipliers=multipliers, monodromy=monodromy)
 
-    return that_serves(find, method, serves=lambda found: found.converged | found.equilibrium)
-
-
-PHASES, PLACE = (0.4, 1.9, 3.4), (0.3, -0.7, 0.5)
-"""Where it is looked whether a law depends on the phase: in a state of these parts of its scale, in turn."""
-
-
-def is_free(period: str, system: AbstractForcedSystem, speed: Scalar) -> bool:
-    """Whether the period of an orbit is unknown.
-
-    **Raises:** `ValueError` where that cannot be, the law depending on the phase of the revolution.
-    """
-    if period not in get_args(Period):
-        raise ArgumentError("period", said=f"must be one of driven, free, but '{period}' was given.")
-    if period == "free" and not is_traced((system, speed)):
-        y = tuple(PLACE[i % 3] * jnp.asarray(s) for i, s in enumerate(system.scale(speed)))
-        field = system.at_speed(speed)
-        rates = np.array([[float(c) for c in field(jnp.asarray(phase), y)] for phase in PHASES])
-        if np.any(abs(rates - rates[0]) > 1e-9 * abs(rates).max(axis=0)):
-            raise ArgumentError(
-                "period", said="must be `driven` where the law depends on the phase, but `free` was given."
-            )
-    return period == "free"
+    return that_serves(find, method, serves=lambda found: found.converged)
 
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:

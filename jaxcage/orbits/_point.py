@@ -12,8 +12,8 @@ from .._notebook import notebook_html
 from .._types import Scalar
 from ..analysis import Edge
 from ..models import AbstractForcedSystem
-from ._by_name import SPEED, Parameter, value as value_of
-from ._normal_form import criticality
+from ._problem import SPEED, Parameter, value_of
+from ._singularity import CRITICAL
 
 
 Numbers = np.ndarray | Array
@@ -25,9 +25,6 @@ the multipliers are not those of the kind asked for (a neutral saddle instead of
 at which the multiplier hardly crosses, so that its place is not a function of the design; or one that is elsewhere by
 half the steps; the number of unstable multipliers changes and no bifurcation is found; not solved for yet."""
 FOUND, NO_SUCH_POINT, OTHER_KIND, TANGENT, NOT_CONVERGED, NOT_EXPLAINED, GIVEN = range(len(OUTCOMES))
-
-CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
-"""The multiplier that each kind is about, where it is real."""
 
 
 class Point(eqx.Module):
@@ -63,10 +60,6 @@ class Point(eqx.Module):
     transversality: Scalar = float("nan")
     """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
     p dP/d parameter of the map along the critical direction, with p q = 1. On a branch it is not computed."""
-    coefficient: Scalar = float("nan")
-    """Cubic coefficient of the normal form of a period doubling or Neimark-Sacker bifurcation in units of the system's
-    scale (see `_normal_form`), which tells the `criticality`; NaN for others, and under `jit`, `vmap` and `grad`."""
-    coefficient_error: Scalar = float("nan")
     outcome: Int[Array, ""] | int = GIVEN
     """Code: place in `OUTCOMES`."""
     iterations: Int[Array, ""] | int = 0
@@ -116,11 +109,6 @@ class Point(eqx.Module):
         return abs(float(np.angle(self.critical))) if bool(self.converged) else float("nan")
 
     @property
-    def criticality(self) -> str:
-        """`supercritical`, `subcritical` or, where the coefficient may be zero, `unknown`; nothing without one."""
-        return criticality(self.kind, float(self.coefficient), float(self.coefficient_error))
-
-    @property
     def status(self) -> str:
         """One of `OUTCOMES`."""
         return OUTCOMES[int(self.outcome)]
@@ -137,9 +125,8 @@ class Point(eqx.Module):
             return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
         angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "Neimark-Sacker" else ""
         error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
-        sort = f"{self.criticality} " if self.criticality else ""
         return (
-            f"{sort}{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
+            f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
             f"+- {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
             f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
         )

@@ -1,7 +1,6 @@
 """The equations of a periodic orbit, P(z) = z, in the unknowns that Newton's method and continuation work on.
 
-Unknowns are numbers of order one: the state z in units of the system's scale, then, as far as they are not given, the
-speed of a self-excited system over its guess, and the free parameters in units of their own.
+Unknowns are numbers of order one: the state z in units of the system's scale, then the free parameters in others.
 
 What is expensive, the revolutions, sees the system only through the numbers of its field at one speed (for a cage some
 twenty of them); how these follow from the design is cheap. `prepare` does the latter, `returned` the former, so that a
@@ -9,7 +8,7 @@ derivative with respect to any number of design parameters costs no more than on
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import equinox as eqx
 import jax
@@ -18,10 +17,52 @@ import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
+from .._errors import ArgumentError
+from .._parameters import get, parameter_paths
 from .._types import Scalar
 from ..integrate import AbstractMethod, StrobeMap, pushed, strobe_map
 from ..models import AbstractForcedSystem
-from ._by_name import Parameter, with_value
+
+
+Parameter: TypeAlias = str | Callable[[Any], Any]
+"""`"speed"`, the name of a parameter, or a function that picks it from the system, as `equinox.tree_at` takes."""
+
+SPEED = "speed"
+
+
+def _by_field_name(system: AbstractForcedSystem) -> dict[str, tuple[str, ...]]:
+    """Numbers of a user's own module by the last word of their path, dotted where that alone is ambiguous."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(system)
+    paths: list[tuple[str, ...]] = []
+    for path, leaf in leaves:
+        names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
+        public = len(names) == len(path) and not any(name.startswith("_") for name in names)
+        if public and (isinstance(leaf, float) or eqx.is_inexact_array(leaf)) and jnp.ndim(leaf) == 0:
+            paths.append(names)
+    last = [path[-1] for path in paths]
+    return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
+
+
+def pick(system: AbstractForcedSystem, parameter: Parameter) -> Callable[[Any], Any]:
+    """The function that picks `parameter` from a system; it raises for a name that this does not have, and for a
+    function that picks no number of it."""
+    if callable(parameter):
+        picked = parameter(system)
+        if not any(picked is leaf for leaf in jax.tree.leaves(system)) or jnp.ndim(picked):
+            said = "must pick a number that the system holds as it is, such as `lambda s: s.acceleration.force`"
+            raise ArgumentError("parameter", said=f"{said}, but picks something else.")
+        return parameter
+    paths = parameter_paths(system) or _by_field_name(system)
+    if parameter not in paths:
+        known = ", ".join([SPEED, *paths])
+        raise ArgumentError("parameter", said=f"must be one of {known}, but '{parameter}' was given.")
+    path = paths[parameter]
+    return lambda s: get(s, path)
+
+
+def value_of(system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
+    """What `parameter` is now."""
+    return jnp.asarray(speed if parameter == SPEED else pick(system, parameter)(system), dtype=float)
 
 
 def depends_on_input(f: Callable[[Array], list[Array]], x: Array) -> list[bool]:
@@ -51,40 +92,11 @@ class Given(eqx.Module):
     system: AbstractForcedSystem
     speed: Scalar
 
-
-class Frame(NamedTuple):
-    """Numbers that only fix units and the phase of a self-excited orbit; results do not depend on them."""
-
-    scale: Float[Array, " dim"]
-    speed: Float[Array, ""]
-    units: Float[Array, " parameters"]
-    phase_point: Float[Array, " dim"]
-    phase_direction: Float[Array, " dim"]
-    periods: Int[Array, ""]
-
-
-def returned(
-    strobe: StrobeMap, frame: Frame, z: Float[Array, " dim"], drifts: Sequence[Any] = ()
-) -> tuple[Array, Array]:
-    """The return map, `periods` applications of the strobe map, in units of the frame.
-
-    **Returns:** the image of z; its derivatives with respect to z, the monodromy matrix, and, behind these, along each
-    drift of the field's numbers (in a column each).
-    """
-    scale, n = frame.scale, z.size
-    zero = jnp.zeros(())
-    basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
-    start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
-    along = [*[None] * n, *drifts]
-
-    def once(_: Array, carry: tuple) -> tuple:
-        y, tangents = carry
-        moved = pushed(strobe, y, tangents, along)
-        return moved.y, moved.tangents
-
-    y, tangents = jax.lax.fori_loop(0, frame.periods, once, start)
-    columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
-    return jnp.stack(y) / scale, columns / scale[:, None]
+    def changed(self, parameter: Parameter, new: Any) -> "Given":
+        """The same with `parameter` set to `new`."""
+        if parameter == SPEED:
+            return Given(self.system, new)
+        return Given(eqx.tree_at(pick(self.system, parameter), self.system, new), self.speed)
 
 
 Prepared: TypeAlias = tuple[StrobeMap, list[Any]]
@@ -92,86 +104,70 @@ Prepared: TypeAlias = tuple[StrobeMap, list[Any]]
 
 
 class OrbitProblem(eqx.Module):
-    """A periodic orbit of a system, with the speed free for a self-excited one, and free parameters."""
+    """A periodic orbit of a system with free parameters, in units on which results do not depend."""
 
     method: AbstractMethod
-    dimension: int = eqx.field(static=True)
-    free_speed: bool = eqx.field(static=True)
     parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    scale: Float[Array, " dim"]
+    """Units of the state."""
+    units: Float[Array, " parameters"]
+    periods: Int[Array, ""]
+    """Revolutions after which the orbit closes."""
 
     @property
-    def equations(self) -> int:
-        """How many equations `residual` has."""
-        return self.dimension + self.free_speed
+    def dimension(self) -> int:
+        """Length of the state."""
+        return self.scale.shape[-1]
 
-    def speed(self, u: Float[Array, " n"], given: Given, frame: Frame) -> Scalar:
-        """Speed [rad/s] at the unknowns u."""
-        return self._located(u, given, frame)[1]
-
-    def values(self, u: Float[Array, " n"], frame: Frame) -> Float[Array, " parameters"]:
+    def values(self, u: Float[Array, " n"]) -> Float[Array, " parameters"]:
         """Values of the free parameters, in SI units."""
-        return u[self.equations :][: len(self.parameters)] * frame.units
+        return u[self.dimension :][: len(self.parameters)] * self.units
 
-    def state(self, u: Float[Array, " n"], frame: Frame) -> Float[Array, " dim"]:
+    def state(self, u: Float[Array, " n"]) -> Float[Array, " dim"]:
         """State at phase 0, in SI units."""
-        return u[: self.dimension] * frame.scale
+        return u[: self.dimension] * self.scale
 
-    def _located(self, u: Array, given: Given, frame: Frame) -> tuple[AbstractForcedSystem, Scalar]:
-        system, speed = given.system, given.speed
-        if self.free_speed:
-            speed = u[self.dimension] * frame.speed
-        values = self.values(u, frame)
+    def at(self, u: Float[Array, " n"], given: Given) -> Given:
+        """System and speed at the unknowns u."""
+        values = self.values(u)
         for i, parameter in enumerate(self.parameters):
-            system, speed = with_value(system, speed, parameter, values[i])
-        return system, speed
+            given = given.changed(parameter, values[i])
+        return given
 
-    def across(self, u: Float[Array, " n"], given: Given, frame: Frame) -> Frame:
-        """The frame with the plane on which a self-excited orbit begins through u, across the flow there."""
-        z = u[: self.dimension]
-        y = tuple(z[i] * frame.scale[i] for i in range(z.size))
-        flow = jnp.stack([jnp.asarray(c) for c in self.prepare(u, given, frame).field(jnp.zeros(()), y)]) / frame.scale
-        return frame._replace(phase_point=z, phase_direction=flow / jnp.linalg.norm(flow))
-
-    def prepare(self, u: Float[Array, " n"], given: Given, frame: Frame) -> StrobeMap:
+    def prepare(self, u: Float[Array, " n"], given: Given) -> StrobeMap:
         """The strobe map at the unknowns u: all that depends on speed and design."""
-        return strobe_map(*self._located(u, given, frame), self.method)
+        there = self.at(u, given)
+        return strobe_map(there.system, there.speed, self.method)
 
-    def drift(self, u: Float[Array, " n"], given: Given, frame: Frame, i: int) -> list[Any]:
+    def drift(self, u: Float[Array, " n"], given: Given, i: int) -> list[Any]:
         """How the field's numbers change with the i-th unknown; None for those that do not depend on it."""
-        row = lambda x: jax.tree.leaves(
-            eqx.filter(self.prepare(u.at[i].set(x), given, frame).field, eqx.is_inexact_array)
-        )
+        row = lambda x: jax.tree.leaves(eqx.filter(self.prepare(u.at[i].set(x), given).field, eqx.is_inexact_array))
         _, slope = jax.jvp(row, (u[i],), (jnp.ones_like(u[i]),))
         return [s if d else None for s, d in zip(slope, depends_on_input(row, u[i]), strict=True)]
 
-    def orbit_residual(
-        self, z: Float[Array, " dim"], image: Float[Array, " dim"], frame: Frame
-    ) -> Float[Array, " equations"]:
-        """P(z) - z, and the phase condition of a self-excited orbit."""
-        closing = image - z
-        if not self.free_speed:
-            return closing
-        return jnp.append(closing, jnp.dot(z - frame.phase_point, frame.phase_direction))
+    def returned(self, strobe: StrobeMap, z: Float[Array, " dim"], drifts: Sequence[Any] = ()) -> tuple[Array, Array]:
+        """The image of z by the return map, `periods` applications of the strobe map; its derivatives with respect to
+        z, the monodromy matrix, and, behind these, along each drift of the field's numbers (in a column each)."""
+        scale, n = self.scale, z.size
+        zero = jnp.zeros(())
+        basis = [tuple(scale[j] if i == j else zero for j in range(n)) for i in range(n)]
+        start = (tuple(z * scale), (*basis, *[(zero,) * n] * len(drifts)))
+        along = [*[None] * n, *drifts]
+
+        def once(_: Array, carry: tuple) -> tuple:
+            y, tangents = carry
+            moved = pushed(strobe, y, tangents, along)
+            return moved.y, moved.tangents
+
+        y, tangents = jax.lax.fori_loop(0, self.periods, once, start)
+        columns = jnp.stack([jnp.stack(t) for t in tangents], axis=1)
+        return jnp.stack(y) / scale, columns / scale[:, None]
 
 
-def make_frame(
-    problem: OrbitProblem,
-    given: Given,
-    state: Float[Array, " dim"],
-    speed: Scalar,
-    units: Float[Array, " parameters"],
-    periods: Any,
-) -> Frame:
-    """The frame around a first guess: `state` (SI) at `speed` [rad/s]."""
-    at = frozen(jnp.asarray(speed, dtype=float))
-    given, state, units = frozen((given, state, units))
-    system = given.system
-    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in system.scale(at)])
-    z = state / scale
-    if problem.free_speed:
-        rate = system.at_speed(at)(jnp.zeros(()), tuple(state[i] for i in range(state.size)))
-        direction = jnp.stack([jnp.asarray(c) for c in rate]) / scale
-        direction = direction / jnp.linalg.norm(direction)
-    else:
-        direction = jnp.zeros_like(z)
-    return frozen(Frame(scale, at, units, z, direction, jnp.asarray(periods, dtype=int)))
+def make_problem(
+    given: Given, parameters: tuple[Parameter, ...], units: Any, periods: Any, method: AbstractMethod
+) -> OrbitProblem:
+    """The problem in a system's scale at a speed."""
+    scale = jnp.stack([jnp.asarray(c, dtype=float) for c in given.system.scale(given.speed)])
+    numbers = frozen((scale, jnp.asarray(units, dtype=float), jnp.asarray(periods, dtype=int)))
+    return OrbitProblem(method, parameters, *numbers)

@@ -1,4 +1,5 @@
-"""The synchronous (period-1) orbits of a system over a range of speed, found without a hint of where they are.
+"""Orbits found without a hint of where they are: the synchronous (period-1) ones of a system over a range of speed, and
+all that many starts lead to at one speed.
 
 Newton's method leads from the ends of simulations on a coarse grid, from the system's starts and from their opposites,
 to stable orbits; each is followed both ways by arclength, until every orbit that was met lies on a branch that is
@@ -8,21 +9,27 @@ known. Stable stretches of the branches, bounded by bifurcations, are what the s
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._arguments import require_at_least
+from .._checks import require_x64
 from .._notebook import notebook_html
+from .._types import Scalar
 from ..analysis import Sweep
-from ..integrate import AbstractMethod
-from ..models import AbstractForcedSystem
+from ..integrate import AbstractMethod, compiled, strobe_map
+from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways
-from ._by_name import SPEED
-from ._follower import Follower, Start, make_follower, seeds, stable_steps
+from ._follower import Follower, make_follower, seeds, stable_steps
+from ._orbit import Orbit, periodic_orbit
 from ._point import Point
+from ._problem import SPEED, Given
 
 
 ROUND = 4
@@ -32,6 +39,10 @@ PATIENCE = 150
 """Unstable orbits in a row after which a branch is left."""
 ON_BRANCH = 0.03
 """An orbit lies on a branch if it is within this distance of it, in units of the system's scale."""
+SPREAD = 0.6
+"""Random starts are spread over this share of the system's scale in every direction."""
+SAME = 1e-4
+"""Orbits are the same within this: one that hardly attracts moves by a hundred times the error of its map."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Of the state, at a speed [rad/s]."""
@@ -225,30 +236,22 @@ def synchronous_orbits(
     **Returns:** `SynchronousOrbits`. Stable orbits with a small basin can escape the simulations: `missed` counts those
     that were met but not followed; those that were not met cannot be counted.
     """
+    require_at_least(1, count=count)
     say = progress or (lambda what, done, of: None)
     scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
 
     def simulate(speeds: np.ndarray, sign: float) -> Sweep:
-        return sweep(
-            system,
-            speeds,
-            starts=sign * initial_states(system, speeds, None),
-            discard=discard,
-            revolutions=8,
-            blocks=1,
-            keep=8,
-            exponents=0,
-            method=method,
-            progress=lambda done, of: say("simulations", done, of),
-        )
+        short: dict[str, Any] = {"discard": discard, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
+        starts, told = sign * initial_states(system, speeds, None), lambda done, of: say("simulations", done, of)
+        return sweep(system, speeds, starts=starts, **short, method=method, progress=told)
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
-    follower = make_follower(system, (lower + upper) / 2, SPEED, lower, upper, method=method)
+    follower = make_follower(Given(system, jnp.asarray((lower + upper) / 2)), SPEED, lower, upper, method)
     met = _met(settled)
     if met:
         middle = met[len(met) // 2]
-        follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])), 1)
+        follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])))
     orbits = _stable_orbits(follower, settled, scale)
     waiting = sorted(orbits + _stable_orbits(follower, opposite, scale), key=lambda o: o.speed)
     branches: list[Branch] = []
@@ -256,17 +259,17 @@ def synchronous_orbits(
         if not waiting:
             break
         say("branches", turn, ROUNDS)
-        branches += [
-            b for b in follow_both_ways(follower, _spread(waiting, ROUND), 1, steps, PATIENCE) if b is not None
-        ]
+        picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
+        starts = [(waiting[i].state, waiting[i].speed) for i in picked]
+        branches += [b for b in follow_both_ways(follower, starts, steps, PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w, scale(w.speed)) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi
     pieces = _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale)
     families = _families(branches, scale)
+    there = [o for o in orbits if o.settled]
     stretches = []
     for piece in pieces:
-        there = [o for o in orbits if o.settled]
         met = [o.start for o in there if piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
         family = families[piece.stretch.branch]
         stretches.append(dataclasses.replace(piece.stretch, family=family, met=len(met), met_first=met.count(0)))
@@ -284,8 +287,7 @@ class _Settled(NamedTuple):
 
 
 def _met(settled: Sweep) -> list[list[int]]:
-    """Speed and start of the simulations that ran to their end, whatever their label: where an orbit hardly attracts
-    they are still on the way to it, and where it attracts few of them Newton's method may come upon it."""
+    """Speed and start of the simulations that ran to their end, though some may be still on the way to an orbit."""
     return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
 
 
@@ -295,19 +297,13 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
-    frame = follower.frame(jnp.asarray(met[0][0]), met[0][1], 1)
-    points = seeds(follower, frame, met)
+    follower = follower.around(met[0][1])
+    points = seeds(follower, met)
     good = points.converged.copy()
     good[good] = follower.unstable(take(points, good)) == 0
-    states = points.u[:, :-1] * np.asarray(frame.scale)
+    states = points.u[:, :-1] * np.asarray(follower.problem.scale)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
-
-
-def _spread(orbits: Sequence[_Settled], most: int) -> list[Start]:
-    """At most `most` of the orbits, spread over them."""
-    picked = np.unique(np.linspace(0, len(orbits) - 1, min(most, len(orbits))).round().astype(int))
-    return [(orbits[i].state, orbits[i].speed) for i in picked]
 
 
 def _covers(branch: Branch, orbit: _Settled, scale: np.ndarray) -> bool:
@@ -326,3 +322,46 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
                 if why == "stopped" and i != j and _covers(other, last, scale(last.speed)):
                     family = [family[j] if f == family[i] else f for f in family]
     return family
+
+
+def coexisting_orbits(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    periods: int = 1,
+    *,
+    count: int = 24,
+    revolutions: int = 5,
+    seed: int = 0,
+    method: AbstractMethod | None = None,
+) -> list[Orbit]:
+    """Orbits that close after `periods` revolutions and not earlier, from the system's own starts and random ones.
+
+    **Arguments:** system and speed [rad/s]; number of random starts and their seed; revolutions of simulation before
+    Newton's method takes over: with few, unstable orbits are found as well.
+
+    **Returns:** distinct orbits, the stable ones first. There is no proof that these are all.
+    """
+    require_x64()
+    require_at_least(0, seed=seed)
+    require_at_least(1, periods=periods, count=count)
+    require_speeds(system, speed)
+    scale = np.array([float(c) for c in system.scale(speed)])
+    own = np.array([[float(c) for c in y] for y in system.starts(speed)])
+    random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
+    starts = jnp.asarray(np.concatenate([own, random]))
+    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
+    found = jax.vmap(find)(starts)
+    strobe = lambda orbit, y: strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)(tuple(y))
+    advance = compiled(jax.vmap(lambda orbit, y: jnp.stack(strobe(orbit, y).y)))
+    rows = [found.state]
+    for _ in range(periods - 1):
+        rows.append(advance(found, rows[-1]))
+    images = np.stack([np.asarray(row) / scale for row in rows], axis=1)
+    near = lambda a, b: bool(np.max(np.abs(a - b)) < SAME)
+    kept: list[int] = []
+    for i in np.flatnonzero(np.asarray(found.converged)):
+        shorter = any(near(images[i, 0], images[i, j]) for j in range(1, periods))
+        if not shorter and not any(near(images[i, 0], image) for k in kept for image in images[k]):
+            kept.append(int(i))
+    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
+    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))

@@ -4,6 +4,10 @@ An edge speed w is a rate. Whatever the units of mass, length and time, the same
 exponents a_i of a unit in every parameter p_i
     sum a_i p_i dw/dp_i = 0 for mass and length, = -w for time.
 These hold for every kind of edge and test a gradient without any reference.
+
+With P(z, k) = z an orbit and M(z, k) its monodromy matrix, dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple
+multiplier mu with left and right vectors l, r moves by l dM r / l r. One expansion of the return map to second order
+gives all of it, for edges and for the largest multiplier of an orbit.
 """
 
 import concurrent.futures
@@ -17,22 +21,22 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..integrate import AbstractMethod, compiled
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
-from ._by_name import SPEED
 from ._cascade import FEIGENBAUM, Cascade
-from ._implicit import Push, Slopes, by_columns, numbers_around, numbers_of
-from ._orbit import OrbitEquations
+from ._implicit import expansion, numbers_around, numbers_of
+from ._orbit import OrbitEquations, StateLike
 from ._point import Point
-from ._problem import Frame, Given, OrbitProblem, make_frame
+from ._problem import SPEED, Given, OrbitProblem, make_problem
 from ._singularity import Kind, bordered, null_vectors, singular_matrix
-from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, from_steps, that_serves
+from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, SLOPE, Counts, by_steps, counted, from_steps, that_serves
 
 
 PER_RPM = np.pi / 30
@@ -40,6 +44,8 @@ POLISHING = 6
 POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
 """Newton's steps end below the first, must be below the second, and may lead no further than the third, in units of the
 system's scale and of a tenth of the speed."""
+NEWTON, CLOSED, FAR = 20, 1e-10, 3.0
+"""The same of orbits: most steps, size of a last step, and how far an orbit may lie from its guess."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,54 +96,62 @@ class _Expansion(NamedTuple):
     """Derivatives of k with respect to the unknowns."""
 
 
-def _expand(problem: OrbitProblem, given: Given, frame: Frame, u: Float[Array, " n"]) -> _Expansion:
-    k, of_u, like = numbers_around(OrbitEquations(problem, frame), u, given)
-    x = jnp.concatenate([u[: problem.dimension], k])
-    (image, monodromy), (image_slope, monodromy_slope) = by_columns(x, f=Slopes(Push(like, frame)))
-    return _Expansion(image, monodromy, image_slope, monodromy_slope, of_u)
+def _expand(problem: OrbitProblem, given: Given, u: Float[Array, " n"]) -> _Expansion:
+    numbers = numbers_around(OrbitEquations(problem), u, given)
+    (image, monodromy), (image_slope, monodromy_slope) = expansion(problem, u, numbers)
+    return _Expansion(image, monodromy, image_slope, monodromy_slope, numbers.of_u)
 
 
 @compiled
-def _pull_back(problem: OrbitProblem, given: Given, frame: Frame, u: Array, weight: Array) -> AbstractForcedSystem:
+def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> AbstractForcedSystem:
     """d(weight . k) / d system."""
-    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed), frame))[0]
+    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed)))[0]
     _, pull = eqx.filter_vjp(row, given.system)
     return pull(weight)[0]
 
 
+def _pulled_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> dict[str, float]:
+    """d(weight . k) / d parameter [SI]."""
+    pulled = _pull_back(problem, given, u, weight)
+    return {n: float(get(pulled, path)) for n, path in parameter_paths(given.system).items()}
+
+
 class _Unfolding(NamedTuple):
-    """The equations of a bifurcation point and their derivatives at one orbit."""
+    """What is known of a bifurcation point at one orbit."""
 
     residual: Float[Array, " m"]
-    of_unknowns: Float[Array, "m m"]
-    of_numbers: Float[Array, "m k"]
+    """Newton's step to the point, in the unknowns' units."""
+    weight: Float[Array, " k"]
+    """Derivatives of the parameter at the point by the numbers of the field."""
     rate: Array
-    """d|mu| / d parameter in the frame's unit (at a fold: the drift along the critical direction)."""
+    """d|mu| / d parameter in the parameter's unit (at a fold: the drift along the critical direction)."""
 
 
 @compiled
-def _unfold(kind: Kind, z: Array, around: _Expansion) -> _Unfolding:
+def _unfold(kind: Kind, unit: Array, z: Array, around: _Expansion) -> _Unfolding:
     n = z.size
-    left, right = null_vectors(singular_matrix(kind, around.monodromy))
-    scalar = lambda m: bordered(singular_matrix(kind, m), left, right)[0]
+    borders = null_vectors(singular_matrix(kind, around.monodromy))
+    scalar = lambda m: bordered(singular_matrix(kind, m), *borders)[0]
     g, slope = jax.value_and_grad(scalar)(around.monodromy)
-    known = Singular(around.monodromy, *bordered(singular_matrix(kind, around.monodromy), left, right)[1:])
+    known = Singular(around.monodromy, *bordered(singular_matrix(kind, around.monodromy), *borders)[1:])
     closing = around.image_slope - jnp.eye(n, around.image_slope.shape[1])
     whole = jnp.concatenate([closing, jnp.einsum("ij,ijx->x", slope, around.monodromy_slope)[None]])
     of_numbers = whole[:, n:]
     of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.of_u[:, n])[:, None]], axis=1)
-    residual = jnp.append(around.image - z, g)
-    return _Unfolding(residual, of_unknowns, of_numbers, critical_rate(kind, n, of_unknowns, known, (left, right)))
+    step = jnp.linalg.solve(of_unknowns, jnp.append(around.image - z, g))
+    adjoint = jnp.linalg.solve(of_unknowns.T, jnp.zeros(n + 1).at[-1].set(1.0))
+    return _Unfolding(step, -(adjoint @ of_numbers) * unit, critical_rate(kind, n, of_unknowns, known, borders))
 
 
 class _Edge(NamedTuple):
     """An edge located to rounding, by some number of steps."""
 
     problem: OrbitProblem
-    given: Given
-    frame: Frame
     u: Array
-    unfolding: _Unfolding
+    residual: Array
+    weight: Array
+    rate: float
+    """See `_Unfolding`, here d|mu| / d speed."""
     found: bool
     error: float = float("nan")
     """Distance of the speed to that by half the steps [rad/s]."""
@@ -145,11 +159,7 @@ class _Edge(NamedTuple):
 
     @property
     def speed(self) -> float:
-        return float(self.problem.values(self.u, self.frame)[0])
-
-    @property
-    def residual(self) -> Array:
-        return self.unfolding.residual
+        return float(self.problem.values(self.u)[0])
 
     @property
     def status(self) -> str:
@@ -164,65 +174,56 @@ def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod 
 
 
 def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod, counts: Counts) -> _Edge:
-    problem = OrbitProblem(chosen, system.dimension, False, (SPEED,))
-    first, last, tolerance = (float(c) for c in from_steps(counts, int(point.steps) or None))
-    speed, state = jnp.asarray(point.speed, dtype=float), jnp.asarray(point.state)
-    given = Given(system, speed)
-    frame = make_frame(problem, given, state, speed, 0.1 * speed[None], point.periods)
-    begin = jnp.append(state / frame.scale, 10.0)
-    before, steps = None, int(first)
-    while True:
-        near = begin if before is None or not before.found else before.u
-        edge = _polished(by_steps(problem, steps), given, frame, point.kind, near)
+    counts = from_steps(counts, int(point.steps) or None)
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
+    problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
+    near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
+    edge = None
+    for steps in counts.each():
+        before, edge = edge, _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
         if before is not None:
             both = before.found and edge.found
             edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
-        edge = edge._replace(steps=steps)
-        lost = not edge.found and steps >= GIVEN_UP and not (before is not None and before.found)
-        if edge.error <= POINT * edge.speed * tolerance or steps >= last or lost:
-            return edge
-        before, steps = edge, min(2 * steps, int(last))
+        known = edge.found or (before is not None and before.found)
+        if edge.error <= POINT * edge.speed * float(counts.tolerance) or (steps >= GIVEN_UP and not known):
+            break
+        near = edge.u if edge.found else begin
+    assert edge is not None
+    return edge
 
 
-def _polished(problem: OrbitProblem, given: Given, frame: Frame, kind: Any, first: Array) -> _Edge:
+def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
     """The edge near the unknowns `first`, by the steps of the problem."""
-    u = first
-    unfold = lambda u: _unfold(kind, u[:-1], _expand(problem, given, frame, u))
+    u, unit = first, problem.units[0]
+    unfold = lambda u: _unfold(kind, unit, u[:-1], _expand(problem, given, u))
     here = unfold(u)
     for _ in range(POLISHING):
-        step = jnp.linalg.solve(here.of_unknowns, here.residual)
-        leads = jnp.max(jnp.abs(u - step - first))
-        if not bool((jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)):  # there, lost, or not a number
+        leads = jnp.max(jnp.abs(u - here.residual - first))
+        if not bool((jnp.max(jnp.abs(here.residual)) > POLISHED) & (leads < NEARBY)):  # there, lost, or not a number
             break
-        u = u - step
+        u = u - here.residual
         here = unfold(u)
-    size = jnp.max(jnp.abs(jnp.linalg.solve(here.of_unknowns, here.residual)))
-    return _Edge(problem, given, frame, u, here, bool(size < SETTLED_TO))
+    found = bool(jnp.max(jnp.abs(here.residual)) < SETTLED_TO)
+    return _Edge(problem, u, here.residual, here.weight, float(here.rate) / float(unit), found)
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
-    """Speed [rad/s] of the edge near `point`; NaN if Newton's method does not find it, or elsewhere by half the
-    steps."""
+    """Speed [rad/s] of the edge near `point`; NaN where it is not found, or elsewhere by half the steps."""
     require_x64()
     if point.kind == "branch-point":
-        raise ArgumentError(
-            "point", said="must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
-        )
+        said = "must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
+        raise ArgumentError("point", said=said)
     edge = _located(system, point, method)
     return edge.speed if edge.status == "converged" else float("nan")
 
 
 def sensitivity(
-    system: AbstractForcedSystem,
-    point: Point,
-    name: str = "edge",
-    method: AbstractMethod | None = None,
+    system: AbstractForcedSystem, point: Point, name: str = "edge", method: AbstractMethod | None = None
 ) -> Sensitivity:
     """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
-    The point is located by Newton's method first, and again with twice the steps until it no longer moves. One
-    expansion of the return map to second order serves this, every kind of bifurcation and all parameters; `bifurcation`
-    gives the same derivatives, and higher ones.
+    The point is located by Newton's method first, and again with twice the steps until it no longer moves.
+    `bifurcation` gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
@@ -235,47 +236,33 @@ def sensitivity(
     edge = _located(system, point, method)
     if edge.status != "converged":
         return _nowhere(system, point.kind, name, edge.status, edge.error / PER_RPM)
-    unit, here, speed = float(edge.frame.units[0]), edge.unfolding, edge.speed
-    adjoint = jnp.linalg.solve(here.of_unknowns.T, jnp.zeros(edge.u.size).at[-1].set(1.0))
-    weight = -(adjoint @ here.of_numbers) * unit
-    pulled = _pull_back(edge.problem, edge.given, edge.frame, edge.u, weight)
-    slope = {n: float(get(pulled, path)) for n, path in parameter_paths(system).items()}
+    speed = edge.speed
+    slope = _pulled_back(edge.problem, Given(system, jnp.asarray(point.speed, dtype=float)), edge.u, edge.weight)
     change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
-    rate = float(here.rate) / unit
+    units, bases = parameter_dimensions(system), {"mass": 0.0, "length": 0.0, "time": 1.0}
     return Sensitivity(
         name=name,
         kind=point.kind,
         value_rpm=speed / PER_RPM,
         derivative={n: s / PER_RPM for n, s in slope.items()},
         elasticity=change,
-        homogeneity=_homogeneity(system, change),
-        transversality=rate,
-        status="tangential" if abs(rate * speed) < TANGENTIAL else "converged",
-        state=np.asarray(edge.problem.state(edge.u, edge.frame)),
+        homogeneity={b: rate + sum(units[n][b] * e for n, e in change.items()) for b, rate in bases.items()},
+        transversality=edge.rate,
+        status="tangential" if abs(edge.rate * speed) < TANGENTIAL else "converged",
+        state=np.asarray(edge.problem.state(edge.u)),
         error_rpm=edge.error / PER_RPM,
         steps=edge.steps,
     )
 
 
 def _nowhere(
-    system: AbstractForcedSystem,
-    kind: str,
-    name: str,
-    status: str = "no such point",
-    error_rpm: float = float("nan"),
+    system: AbstractForcedSystem, kind: str, name: str, status: str = "no such point", error_rpm: float = float("nan")
 ) -> Sensitivity:
     """What is known of an edge that was not found again, or elsewhere."""
     nan = float("nan")
     row = dict.fromkeys(parameter_paths(system), nan)
     broken: dict[str, float] = dict.fromkeys(("mass", "length", "time"), nan)
     return Sensitivity(name, kind, nan, row, row, broken, nan, status, error_rpm=error_rpm)
-
-
-def _homogeneity(system: AbstractForcedSystem, elasticity: Mapping[str, float]) -> dict[str, float]:
-    """Residuals of the three identities, relative to the value."""
-    dimensions = parameter_dimensions(system)
-    total = {b: sum(dimensions[n][b] * e for n, e in elasticity.items()) for b in ("mass", "length", "time")}
-    return total | {"time": total["time"] + 1.0}
 
 
 def sensitivities(
@@ -322,3 +309,82 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
         status=next((s.status for _, s in parts if not s.trusted), "converged"),
         error_rpm=sum(abs(w) * s.error_rpm for w, s in parts),
     )
+
+
+class LeadingMultiplier(NamedTuple):
+    """The largest multiplier of the orbit near a guess; NaN where there is none."""
+
+    size: float
+    """|mu|: below 1 the orbit is stable."""
+    derivative: dict[str, float]
+    """d|mu| / d parameter [SI]."""
+    state: Float[np.ndarray, " dim"]
+    """Of the orbit at phase 0 [SI]."""
+    error: float = float("nan")
+    """Distance of the size to that by half the steps, infinite where these find no orbit."""
+    steps: int = 0
+    """Steps per revolution."""
+
+
+@compiled
+def _moved(n: int, around: _Expansion) -> tuple[Array, Array]:
+    """|mu|, and its derivatives by the numbers of the field."""
+    mu, right = jnp.linalg.eig(around.monodromy)
+    left = jnp.linalg.inv(right)  # in rows, with l r = 1
+    i = jnp.argmax(jnp.abs(mu))
+    closing = around.image_slope[:, :n] - jnp.eye(n)
+    orbit = -jnp.linalg.solve(closing, around.image_slope[:, n:])
+    matrix = around.monodromy_slope[:, :, n:] + jnp.einsum("abz,zk->abk", around.monodromy_slope[:, :, :n], orbit)
+    change = jnp.einsum("a,abk,b->k", left[i], matrix.astype(mu.dtype), right[:, i])
+    size = jnp.abs(mu[i])
+    return size, jnp.real(jnp.conj(mu[i]) * change) / size
+
+
+def leading_multiplier(
+    system: AbstractForcedSystem,
+    speed: float,
+    guess: StateLike,
+    *,
+    periods: int = 1,
+    method: AbstractMethod | None = None,
+) -> LeadingMultiplier:
+    """Size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
+
+    **Arguments:** a system whose parameters are declared, such as `CageModel`; speed [rad/s]; guess; revolutions after
+    which the orbit closes; integration method. Where two multipliers are equal in size, one of them is taken.
+    """
+    require_x64()
+    require_at_least(1, periods=periods)
+    require_speeds(system, speed)
+    chosen, counts = counted(method)
+    at, state = jnp.asarray(speed, dtype=float), jnp.asarray(guess, dtype=float)
+    given = Given(system, at)
+    problem = make_problem(given, (SPEED,), 0.1 * at[None], periods, chosen)
+    first = jnp.append(state / problem.scale, 10.0)
+    found, error, steps = None, np.inf, 0
+    for steps in counts.each():
+        before, found = found, _by_newton(by_steps(problem, steps), given, first if found is None else found[0])
+        error = np.inf if found is None or before is None else abs(float(found[1] - before[1]))
+        if error <= SLOPE * float(counts.tolerance) or (found is None and steps >= GIVEN_UP):
+            break
+    if found is None:
+        nan, names = float("nan"), parameter_paths(system)
+        return LeadingMultiplier(nan, dict.fromkeys(names, nan), np.full(system.dimension, nan), error, steps)
+    u, size, weight = found
+    slope = _pulled_back(by_steps(problem, steps), given, u, weight)
+    return LeadingMultiplier(float(size), slope, np.asarray(problem.state(u)), error, steps)
+
+
+def _by_newton(problem: OrbitProblem, given: Given, first: Array) -> tuple[Array, Array, Array] | None:
+    """The orbit near the unknowns `first`, the size of its largest multiplier, and the derivatives of that."""
+    n, u = problem.dimension, first
+    for _ in range(NEWTON):
+        around = _expand(problem, given, u)
+        step = jnp.linalg.solve(around.image_slope[:, :n] - jnp.eye(n), around.image - u[:n])
+        size = float(jnp.max(jnp.abs(step)))
+        if not size < FAR or float(jnp.max(jnp.abs(u - first))) > FAR:
+            return None
+        if size < CLOSED:
+            return u, *_moved(n, around)
+        u = u.at[:n].add(-step)
+    return None

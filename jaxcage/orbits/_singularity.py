@@ -18,6 +18,8 @@ from jaxtyping import Array, Complex, Float
 
 Kind = Literal["period-doubling", "Neimark-Sacker", "fold", "branch-point"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
+"""The multiplier that each kind is about, where it is real."""
 
 
 def second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
@@ -72,16 +74,9 @@ def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, F
     }
 
 
-def matches(kind: str, multipliers: Complex[np.ndarray, " n"], certain: float = 1e-3) -> bool:
-    """Whether the multipliers are those of a bifurcation of `kind`, and not e.g. of a neutral saddle, a real pair whose
-    product is 1.
-
-    A double multiplier is known to the square root of rounding only; the tolerance is wider than that, and as near as
-    `certain` at 1.
-    """
-    mu = np.asarray(multipliers)
-    if kind == "period-doubling":
-        return bool(np.min(np.abs(mu + 1)) < 1e-3)
-    if kind != "Neimark-Sacker":
-        return bool(np.min(np.abs(mu - 1)) < certain)
-    return bool(np.any((np.abs(np.imag(mu)) > 1e-9) & (np.abs(np.abs(mu) - 1) < 1e-4)))
+def to_critical(kind: str, multipliers: Complex[Array, " n"]) -> Float[Array, ""]:
+    """How far the nearest multiplier is from where a bifurcation of `kind` has one: of a Neimark-Sacker bifurcation a
+    complex one from the unit circle, since a real pair whose product is 1 is a neutral saddle's."""
+    if kind == "Neimark-Sacker":
+        return jnp.min(jnp.where(jnp.abs(multipliers.imag) > 1e-9, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
+    return jnp.min(jnp.abs(multipliers - CRITICAL[kind]))

@@ -59,23 +59,23 @@ class Counts(NamedTuple):
         """The i-th of them."""
         return jnp.minimum(self.first * 2**i, self.last)
 
+    def each(self) -> list[int]:
+        """All of them."""
+        return [int(self.steps(i)) for i in range(int(self.tries))]
+
 
 def counted(
     method: AbstractMethod | None, most: int = MOST, solver: str = "rk4", first: int = FIRST
 ) -> tuple[AbstractMethod, Counts]:
     """A method with its number of steps left open, and the numbers to try: those of the method and half as many, or,
     without a method, as many as are needed."""
-    chosen = make_method(solver) if method is None else method
+    chosen, begin, last = make_method(solver) if method is None else method, first, most
     if not isinstance(chosen, FixedSteps):
-        return chosen, _counts(1, 1, 0.0)
-    left_open = by_steps(chosen, 1)
-    if method is None:
-        return left_open, _counts(first, most, 1.0)
-    return left_open, _counts(jnp.maximum(chosen.steps // 2, 1), chosen.steps, 0.0)
-
-
-def _counts(first: Any, last: Any, tolerance: float) -> Counts:
-    return Counts(jnp.asarray(first, int), jnp.asarray(last, int), jnp.asarray(tolerance))
+        begin, last = 1, 1
+    elif method is not None:
+        begin, last = jnp.maximum(chosen.steps // 2, 1), chosen.steps
+    counts = Counts(jnp.asarray(begin, int), jnp.asarray(last, int), jnp.asarray(float(method is None)))
+    return by_steps(chosen, 1), counts
 
 
 def from_steps(counts: Counts, steps: Any) -> Counts:
@@ -101,10 +101,8 @@ def that_serves(
     most: int = MOST,
     serves: Callable[[Any], Array] = lambda found: jnp.all(jnp.isfinite(found.residual)),
 ) -> Any:
-    """What `find` finds by a method; without one by Runge-Kutta or, where that does not serve, by Rodas4.
-
-    Which one is a matter of compilation: inside `jit` and `vmap` it is Runge-Kutta.
-    """
+    """What `find` finds by a method; without one by Runge-Kutta or, where that does not serve, by Rodas4. Which one is
+    a matter of compilation: inside `jit` and `vmap` it is Runge-Kutta."""
     found = find(*counted(method, most))
     if method is not None or isinstance(found.residual, Tracer) or bool(serves(found)):
         return found

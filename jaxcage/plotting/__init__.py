@@ -4,14 +4,12 @@
 |------------------|-------------------------------------------------------------------------|
 | `_style`         | colours, frames, light, dark and print style, no global state           |
 | `_shaft`         | the shaft's speed beneath the cage's                                    |
-| `_in_units`      | a figure in other units                                                 |
 | `_marks`         | zones shaded and published edges marked on a speed axis                 |
 | `_orbit_diagram` | orbit diagram, zoomed diagram, exponents beneath it                     |
 | `_section`       | strobe section                                                          |
 | `_history`       | time history, orbit in the clearance circle, each force                 |
-| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra, animation  |
+| `_bearing`       | the whole bearing: drawing, slips around it, whirl, spectra             |
 | `_statics`       | load of every roller, impact of one on a cage bar                       |
-| `_waterfall`     | spectra over speed                                                      |
 | `_branches`      | branches of periodic orbits over speed, alone or over an orbit diagram  |
 | `_multipliers`   | Floquet multipliers in the complex plane                                |
 | `_elasticities`  | elasticities of edges, and of a whole bearing's statistics, as bars     |
@@ -20,12 +18,10 @@
 | `_compare`       | two designs beside each other on one scale                              |
 | `_ramp`          | run-up and run-down                                                     |
 | `_design`        | a search for a better design or whole bearing, and what came of it      |
-| `_paper`         | the paper's figures 5, 7, 8 and 9                                       |
 | `_stability_map` | bifurcation curves in two parameters over the largest exponent          |
 """
 
 from ._bearing import (
-    bearing_animation as bearing_animation,
     bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
     bearing_map_figure as bearing_map_figure,
@@ -53,7 +49,6 @@ from ._design import (
     bearing_design_figure as bearing_design_figure,
     design_figure as design_figure,
     design_history as design_history,
-    trade_off_diagram as trade_off_diagram,
 )
 from ._elasticities import (
     EDGE_COLOURS as EDGE_COLOURS,
@@ -66,7 +61,6 @@ from ._history import (
     simulation_figure as simulation_figure,
     time_history as time_history,
 )
-from ._in_units import in_units as in_units
 from ._marks import (
     mark_operating as mark_operating,
     mark_published as mark_published,
@@ -80,7 +74,6 @@ from ._orbit_diagram import (
     sweep_figure as sweep_figure,
     zoomed_diagram as zoomed_diagram,
 )
-from ._paper import paper_figures as paper_figures, readings_figure as readings_figure
 from ._ramp import ramp_figure as ramp_figure
 from ._section import START_COLOURS as START_COLOURS, strobe_section as strobe_section
 from ._shaft import add_shaft_axes as add_shaft_axes
@@ -104,5 +97,4 @@ from ._style import (
     new_figure as new_figure,
     restyle as restyle,
 )
-from ._waterfall import waterfall_map as waterfall_map
 from ._zone_strip import zone_strip as zone_strip

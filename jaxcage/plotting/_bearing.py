@@ -1,8 +1,7 @@
-"""The whole bearing: drawn to scale with pocket forces, slips around it, whirl of the cage, spectra, an animation."""
+"""The whole bearing: drawn to scale with pocket forces, slips around it, whirl of the cage, spectra."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -391,22 +390,3 @@ def over_shaft_speed(
         ax.errorbar(found.rpm, values[:, i], bars, **style)
     ax.set_ylabel(label)
     return ax
-
-
-def bearing_animation(
-    model: BearingModel, run: BearingRun, history: BearingHistory, path: str | Path, fps: int = 16
-) -> None:
-    """Write the last revolution of a run as an animated GIF: the drawing at every sample of it, at most 96 of them."""
-    from matplotlib.animation import FuncAnimation, PillowWriter
-
-    last = np.arange(len(history.time))[-history.samples - 1 :]
-    frames = last[:: max(1, -(-len(last) // 96))]
-    figure = Figure(figsize=(5.0, 5.2), layout="constrained", dpi=100)
-    ax = figure.subplots()
-
-    def draw(sample: int) -> list[Artist]:
-        ax.clear()
-        bearing_drawing(model, run, history, int(sample), ax)
-        return []
-
-    FuncAnimation(figure, draw, frames=[int(i) for i in frames], blit=False).save(path, PillowWriter(fps=fps))

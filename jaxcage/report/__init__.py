@@ -18,7 +18,7 @@
 | `_chances`       | chances of chaos, and ranges that measurements narrowed                     |
 | `_compare`       | two designs side by side                                                    |
 | `_design_tables` | designs before and after a search, and their tolerances                     |
-| `_paper_tables`  | the paper's results beside ours                                             |
+| `_reproduce`     | the paper's edges, conclusions and orbit diagrams beside ours               |
 | `_page_tables`   | tables that no command prints                                               |
 | `_page`          | the page                                                                    |
 """
@@ -62,8 +62,6 @@ from ._design_tables import (
     parameters_table as parameters_table,
     sobol_document as sobol_document,
     sobol_table as sobol_table,
-    trade_off_document as trade_off_document,
-    trade_off_table as trade_off_table,
 )
 from ._findings import (
     AllFailed as AllFailed,
@@ -73,7 +71,6 @@ from ._findings import (
     require_some as require_some,
 )
 from ._lasting import (
-    crisis_table as crisis_table,
     lasting_document as lasting_document,
     lasting_table as lasting_table,
     width_documents as width_documents,
@@ -109,11 +106,18 @@ from ._orbit_tables import (
     unsettled_notes as unsettled_notes,
 )
 from ._page import Assessed as Assessed, assess as assess, calmest as calmest, page as page
-from ._paper_tables import (
-    compared_table as compared_table,
-    ranges_table as ranges_table,
-    readings_table as readings_table,
-    two_zones_table as two_zones_table,
+from ._reproduce import (
+    CONCLUSIONS as CONCLUSIONS,
+    LASTING as LASTING,
+    ComparedEdge as ComparedEdge,
+    Conclusion as Conclusion,
+    Runs as Runs,
+    compare_edges as compare_edges,
+    paper_diagrams as paper_diagrams,
+    reproduction as reproduction,
+    run_all as run_all,
+    wide_zones as wide_zones,
+    zones_in_range as zones_in_range,
 )
 from ._slopes import (
     EXIT as EXIT,
@@ -146,9 +150,9 @@ from ._statics import (
     statics_table as statics_table,
 )
 from ._table import (
+    Speeds as Speeds,
     Table as Table,
     chosen as chosen,
-    in_units as in_units,
     number as number,
     shares_table as shares_table,
     shown_unit as shown_unit,

@@ -10,7 +10,7 @@ from ..design import SobolIndices
 from ..io import Measurement, Range
 from ..studies import Band, Clue, Ensemble, Narrowed, verdict_of
 from ._operating import Operating
-from ._table import Table, number
+from ._table import Table, speed
 
 
 MOST = 3
@@ -46,7 +46,7 @@ def chances_table(name: str, found: Ensemble) -> Table:
         p = found.chance[part]
         chance = _span(p[np.isfinite(p)])
         bar = f"{100 * low[part].min():.0f} to {100 * high[part].max():.0f} %"
-        ends = (number(float(found.rpm[i])) for i in (part[0], part[-1]))
+        ends = (speed(float(found.rpm[i])) for i in (part[0], part[-1]))
         rows.append((*ends, verdict_words(verdict), chance, bar, _counts(lost[part])))
     title = f"Chance of chaos of {name}, {found.place.shape[0]} draws from {len(found.unknowns)} ranges [rpm]"
     return Table(title, ("from", "to", "verdict", "chance", "95 % bars", "draws that failed"), rows, ("from", "to"))
@@ -78,7 +78,7 @@ def _span(p: np.ndarray) -> str:
 
 def bands_table(name: str, bands: Sequence[Band]) -> Table:
     """Where each edge may be."""
-    rows = [(b.name, *(number(rpm) for rpm in b.rpm), f"{b.share:.0%}") for b in bands]
+    rows = [(b.name, *(speed(rpm) for rpm in b.rpm), f"{b.share:.0%}") for b in bands]
     columns = ("edge", "5 %", "middle", "95 %", "draws that have it")
     return Table(
         f"Bands of the chaotic edges of {name} [rpm]",
@@ -208,7 +208,7 @@ def narrowed_document(found: Narrowed, measured: Sequence[Measurement]) -> dict[
 def measured_table(found: Narrowed, measured: Sequence[Measurement]) -> Table:
     """How near the best draw comes to each measurement."""
     rows = [
-        (m.quantity, number(m.cage_rpm), m.words or "-", f"{off:.2g}")
+        (m.quantity, speed(m.cage_rpm), m.words or "-", f"{off:.2g}")
         for m, off in zip(measured, found.nearest, strict=True)
     ]
     columns = ("measured", "cage [rpm]", "value", "off")

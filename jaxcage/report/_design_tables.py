@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import parameter_info, parameters
-from ..design import BearingBudget, BeforeAfter, Optimised, SobolIndices, ToleranceBudget, TradeOff
+from ..design import BearingBudget, BeforeAfter, Optimised, SobolIndices, ToleranceBudget
 from ..models import BearingModel, CageModel
-from ._table import Table, chosen, number
+from ._table import Table, chosen, speed
 
 
 MOST = 8
@@ -80,7 +80,7 @@ def before_and_after_tables(document: Mapping[str, Any]) -> list[Table]:
     for kind in ("chaotic", "synchronous_loss"):
         found = document[f"{kind}_zones"]
         rows = [
-            (when, str(i), *map(number, zone.values()))
+            (when, str(i), *map(speed, zone.values()))
             for when, listed in found.items()
             for i, zone in enumerate(listed, start=1)
         ]
@@ -88,25 +88,6 @@ def before_and_after_tables(document: Mapping[str, Any]) -> list[Table]:
             title = f"{kind.replace('_', '-').capitalize()} zones before and after [rpm]"
             tables.append(Table(title, ("design", "zone", "onset", "exit", "width"), rows, ("onset", "exit", "width")))
     return tables
-
-
-def trade_off_table(name: str, found: TradeOff) -> Table:
-    """Designs that no other beats, by their first objective."""
-    chosen = sorted((i for i, good in enumerate(found.efficient) if good), key=lambda i: found.values[i, 0])
-    columns = {
-        **{n: lambda i, n=n: f"{found.parameters(i)[n]:.4g}" for n in found.space.names},
-        **{n: lambda i, k=k: f"{found.values[i, k]:.4g}" for k, n in enumerate(found.names)},
-    }
-    title = f"Trade-offs of {name}: {len(chosen)} of {len(found.places)} designs that no other beats in everything"
-    return Table.of(title, columns, chosen)
-
-
-def trade_off_document(found: TradeOff) -> list[dict[str, Any]]:
-    """All designs for programs."""
-    return [
-        found.parameters(i) | dict(zip(found.names, found.values[i].tolist(), strict=True)) | {"efficient": bool(good)}
-        for i, good in enumerate(found.efficient)
-    ]
 
 
 def sobol_document(shares: SobolIndices) -> dict[str, Any]:

@@ -11,14 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
-from ..io import ShownUnits
 from ..models import CageModel
 from ..orbits import Sensitivity
 from ..plotting import (
     add_shaft_axes,
     chance_of_chaos,
     elasticity_bars,
-    in_units,
     load_bars,
     mark_operating,
     multiplier_circle,
@@ -55,13 +53,11 @@ class Picture:
     """Size [px at 96 per inch]."""
 
 
-def pictures(
-    findings: Findings, operating: list[Operating], chances: Ensemble | None, units: ShownUnits
-) -> dict[str, Picture]:
+def pictures(findings: Findings, operating: list[Operating], chances: Ensemble | None) -> dict[str, Picture]:
     """All figures that the findings allow, by name."""
     ratio = float(findings.model.bearing.cage_speed_ratio)
     return {
-        key: picture_of(in_units(add_shaft_axes(figure, ratio), units), alt, caption)
+        key: picture_of(add_shaft_axes(figure, ratio), alt, caption)
         for key, figure, alt, caption in _draw(findings, operating, chances)
     }
 

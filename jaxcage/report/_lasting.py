@@ -1,14 +1,14 @@
-"""How edges and widths of zones answer to the design, with standard errors: lasting chaos, its crises, exact edges."""
+"""How edges and widths of zones answer to the design, with standard errors: lasting chaos, exact edges."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..design import AbstractStatisticalEdge, CrisisEdge, LastingEdge, SolvedEdge, ZoneWidth, zone_width
+from ..design import LastingEdge, SolvedEdge, ZoneWidth, zone_width
 from ._slopes import FIRST, FIXED_RHO
-from ._table import Table, chosen
+from ._table import Speeds, Table, chosen
 
 
-def _elasticities(edge: AbstractStatisticalEdge) -> dict[str, tuple[float, float]]:
+def _elasticities(edge: LastingEdge) -> dict[str, tuple[float, float]]:
     """By parameter, and by gap and eccentricity together, each with its standard error."""
     return {name: edge.sum_of(*of) for name, of in _asked(edge.names).items()}
 
@@ -23,43 +23,17 @@ def _asked(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int) -> Table:
     """Edges of lasting chaos, and their elasticities."""
+    rows = {edge: _elasticities(found) for edge, found in edges.items()}
+    of = lambda n: lambda item: _with_error(*rows[item[0]][n])
     columns = {
         "edge": lambda item: item[0],
-        "speed [rpm]": lambda item: f"{item[1].speed_rpm:.0f} ± {item[1].standard_error_rpm:.0f}",
-        **_elasticity_columns(edges),
+        "speed [rpm]": lambda item: Speeds("{:.0f} ± {:.0f}", item[1].speed_rpm, item[1].standard_error_rpm),
+        **{n.replace("_", " "): of(n) for n in next(iter(rows.values()))},
         "escapes": lambda item: f"{item[1].fit.escapes} of {item[1].fit.lanes}",
         "status": lambda item: item[1].status,
     }
     title = f"Elasticities of the edges of {name} at which the mean life of chaos passes {horizon} revolutions"
     return Table.of(title, columns, edges.items(), ("speed [rpm]",))
-
-
-def crisis_table(name: str, crises: Mapping[str, CrisisEdge]) -> Table:
-    """Where the mean life of chaos diverges beyond each edge, and elasticities; nothing where that is not told."""
-    columns = {
-        "edge": lambda item: item[0],
-        "crisis [rpm]": lambda item: f"{item[1].speed_rpm:.0f}" if _shown(item[1]) else "-",
-        "95 % interval [rpm]": lambda item: (
-            "{:.0f} to {:.0f}".format(*item[1].interval_rpm) if _shown(item[1]) else "-"
-        ),
-        "power": lambda item: f"{item[1].fit.power:.2f} ± {item[1].fit.power_error:.2f}" if _shown(item[1]) else "-",
-        **_elasticity_columns(crises),
-        "p": lambda item: f"{item[1].fit.p_value:.2g}",
-        "status": lambda item: item[1].status,
-    }
-    title = f"Crises of {name}, where the mean life of chaos diverges, and their elasticities"
-    return Table.of(title, columns, crises.items(), ("crisis [rpm]", "95 % interval [rpm]"))
-
-
-def _elasticity_columns(edges: Mapping[str, AbstractStatisticalEdge]) -> dict[str, Any]:
-    rows = {name: _elasticities(edge) for name, edge in edges.items()}
-    of = lambda n: lambda item: _with_error(*rows[item[0]][n]) if _shown(item[1]) else "-"
-    return {n.replace("_", " "): of(n) for n in next(iter(rows.values()))}
-
-
-def _shown(edge: AbstractStatisticalEdge) -> bool:
-    """Numbers at the horizon are, beside their status; what is extrapolated only where it may be used."""
-    return isinstance(edge, LastingEdge) or edge.status == "converged"
 
 
 def widths_of(edges: Mapping[str, SolvedEdge]) -> dict[str, ZoneWidth]:
@@ -90,7 +64,9 @@ def width_table(title: str, widths: Mapping[str, ZoneWidth], names: Sequence[str
 def _width_cell(width: ZoneWidth) -> str:
     if width.open:
         return "open"
-    return f"{width.width_rpm:.0f} ± {width.standard_error_rpm:.0f}" if width.trusted else "-"
+    if not width.trusted or width.width_rpm is None or width.standard_error_rpm is None:
+        return "-"
+    return Speeds("{:.0f} ± {:.0f}", width.width_rpm, width.standard_error_rpm)
 
 
 def width_documents(widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> list[dict[str, Any]]:
@@ -108,34 +84,17 @@ def width_documents(widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> li
     ]
 
 
-def lasting_document(edges: Mapping[str, LastingEdge], crises: Mapping[str, CrisisEdge]) -> dict[str, Any]:
+def lasting_document(edges: Mapping[str, LastingEdge]) -> dict[str, Any]:
     """Edges and widths for programs."""
     names = next(iter(edges.values())).names
     return {
         "edges": [
             {"name": name, "elasticity": _pairs(_elasticities(edge)), "escapes": edge.fit.escapes}
-            | {"lanes": edge.fit.lanes, "crisis": _crisis_document(crises[name])}
+            | {"lanes": edge.fit.lanes}
             | chosen(edge, "speed_rpm standard_error_rpm horizon status")
             for name, edge in edges.items()
         ],
         "widths": width_documents(widths_of(edges), names),
-        "widths_to_crises": width_documents(widths_of(crises), names),
-    }
-
-
-def _crisis_document(edge: CrisisEdge) -> dict[str, Any]:
-    """Of one edge; null what is not told."""
-    told = edge.status == "converged"
-    found = {
-        **chosen(edge, "speed_rpm standard_error_rpm interval_rpm"),
-        "power": edge.fit.power,
-        "power_error": edge.fit.power_error,
-        "elasticity": _pairs(_elasticities(edge)),
-    }
-    return {n: value if told else None for n, value in found.items()} | {
-        "p_value": edge.fit.p_value,
-        "beyond": edge.fit.beyond,
-        "status": edge.status,
     }
 
 

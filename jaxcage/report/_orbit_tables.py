@@ -10,7 +10,7 @@ from .._types import Scalar
 from ..analysis import Edge, Zone
 from ..bearing import PublishedCase
 from ..orbits import LossZones, Point, Stretch, SynchronousOrbits
-from ._table import Table, chosen, number
+from ._table import Speeds, Table, chosen, number, speed
 from ._zone_tables import published_document, zone_document, zones_beside_published
 
 
@@ -34,7 +34,6 @@ def point_document(point: Point, branch: int | None) -> dict[str, Any]:
         **chosen(point, "kind speed_rpm error_rpm steps"),
         "multiplier": pairs([point.critical])[0],
         "angle_deg": angle_deg(point),
-        "criticality": point.criticality or None,
         "edge": point.edge,
         "branch": branch,
         "state": point.state,
@@ -101,7 +100,7 @@ def stretch_table(name: str, found: SynchronousOrbits) -> Table:
     rows = []
     for s in found.stretches:
         lower, upper = end_kinds(s, found)
-        speeds = [number(rpm, 2) for rpm in (s.lower_rpm, s.upper_rpm, s.width_rpm)]
+        speeds = [speed(rpm, 2) for rpm in (s.lower_rpm, s.upper_rpm, s.width_rpm)]
         rows.append((speeds[0], lower, speeds[1], upper, speeds[2], str(s.met), str(s.branch)))
     columns = ("from", "by", "to", "by", "width", "settled", "branch")
     return Table(
@@ -121,14 +120,16 @@ def _zone_cells(zone: Zone) -> list[str]:
     cells = []
     for edge in (zone.onset, zone.exit):
         cells += ["past range", "-"] if edge is None else [edge_cell(edge), edge.mechanism]
-    return [*cells, number(zone.width_rpm, 2, nothing="open")]
+    return [*cells, speed(zone.width_rpm, 2, nothing="open")]
 
 
 def edge_cell(edge: Edge) -> str:
-    """A located edge with its error, and as many digits as that has: the shaft's speed is made of them."""
+    """A located edge with its error, and as many digits as that has."""
     error = float(edge.uncertainty_rpm)
     digits = min(max(2, -math.floor(math.log10(error))), 6) if 0 < error < math.inf else 2
-    return f"{number(edge.speed_rpm, digits)} ± {error_cell(error)}"
+    if math.isnan(error):
+        return Speeds("{:.2f} ± -", edge.speed_rpm)
+    return Speeds(f"{{:.{digits}f}} ± {{:.1g}}", edge.speed_rpm, error)
 
 
 def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
@@ -136,9 +137,9 @@ def edge_table(name: str, found: SynchronousOrbits, loss: LossZones) -> Table:
     named = lambda p: next((name for name, q in loss.edges.items() if q is p), "-")
     rows = [
         (
-            number(float(p.speed_rpm), 3),
+            speed(float(p.speed_rpm), 3),
             error_cell(p.error_rpm),
-            f"{p.criticality} {p.kind}".strip(),
+            p.kind,
             multiplier_cell(p),
             number(angle_deg(p), 2),
             str(branch_of(found, p)),

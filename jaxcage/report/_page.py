@@ -12,7 +12,6 @@ import numpy as np
 
 from .._parameters import parameter_info, parameters
 from ..bearing import design_rule_violations
-from ..io import ShownUnits
 from ..studies import Ensemble
 from ._chances import chances_notes, chances_tables, operating_chances
 from ._figures import pictures
@@ -22,7 +21,7 @@ from ._orbit_tables import coexisting_notes, edge_table, loss_table
 from ._page_tables import at_speeds_table, checks_table, provenance_table, published_table, slope_tables
 from ._sources import parameter_rows, readings_words, shown
 from ._statics import statics_table
-from ._table import Table, in_units, number, with_shaft
+from ._table import Table, number, with_shaft
 from ._zone_tables import transient_tables, zone_span, zones_table
 
 
@@ -59,18 +58,15 @@ def page(
     command: str = "",
     chances: Ensemble | None = None,
     left: Sequence[str] = (),
-    units: ShownUnits | None = None,
 ) -> str:
     """The report as HTML.
 
     **Arguments:** findings; operating speeds; the nested mapping that the design was read from (None: a published
     case); the command line that asked for it; what draws from its ranges do (None: all is known); values that are
-    still those of the template, by dotted name; units of tables and figures, if not mm and the like.
+    still those of the template, by dotted name.
     """
     assessed = assess(findings, operating)
-    return rendered(
-        "page.html.j2", **_context(findings, assessed, table, command, chances, left, units or ShownUnits())
-    )
+    return rendered("page.html.j2", **_context(findings, assessed, table, command, chances, left))
 
 
 def rendered(template: str, **context: Any) -> str:
@@ -91,14 +87,13 @@ def _context(
     command: str,
     chances: Ensemble | None,
     left: Sequence[str],
-    units: ShownUnits,
 ) -> dict[str, Any]:
     name, model, swept, found = findings.name, findings.model, findings.sweep, findings.found
     span = float(swept.rpm[0]), float(swept.rpm[-1])
     what = f"Case {name}" if findings.published is not None else name
-    drawn = pictures(findings, [j.at for j in assessed], chances, units)
+    drawn = pictures(findings, [j.at for j in assessed], chances)
     ratio = float(model.bearing.cage_speed_ratio)
-    both = lambda table: in_units(with_shaft(table, ratio), units)
+    both = lambda table: with_shaft(table, ratio)
     slopes, statics, at_rest = slope_tables(findings), findings.statics, f"At rest under {float(model.load):g} N"
     context: dict[str, Any] = {
         "title": f"{what}: where the cage moves chaotically",
@@ -108,7 +103,7 @@ def _context(
         "summary": [*_summary(findings, assessed), *_of_the_unknown(chances, left)],
         "known_tables": [both(t) for t in _known_tables(findings, assessed, chances)],
         "known_notes": [] if chances is None else chances_notes(chances),
-        "key_figures": [(name, units.in_text(value)) for name, value in _key_figures(findings)],
+        "key_figures": _key_figures(findings),
         "pictures": drawn,
         "operating": [_operating_rows(findings, j) for j in assessed],
         "close_percent": f"{100 * CLOSE:g}",
@@ -123,14 +118,14 @@ def _context(
         "map_notes": [
             f"Not followed: {n} ({why})." for n, why in (findings.map.refused if findings.map else {}).items()
         ],
-        "slope_tables": [in_units(t, units) for t in slopes],
+        "slope_tables": slopes,
         "statics": None if statics is None else both(statics_table(at_rest, model, statics)),
         "warnings": [
-            *(units.in_text(w) for w in design_rule_violations(model.bearing, model.guidance_gap)),
+            *design_rule_violations(model.bearing, model.guidance_gap),
             *model.lubricant.doubts(),
         ],
         "parameters": [
-            (group, [row.in_units(units) for row in rows])
+            (group, list(rows))
             for group, rows in itertools.groupby(parameter_rows(model, table, left), key=lambda row: row.group)
         ],
         "checks": checks_table(findings),

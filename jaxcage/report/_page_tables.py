@@ -10,11 +10,11 @@ import numpy as np
 from .._parameters import parameter_info, parameter_paths, parameters
 from ..orbits import Sensitivity
 from ..plotting._elasticities import largest_first
-from ..reproduction import compare_edges
 from ._findings import Findings
 from ._operating import Operating
+from ._reproduce import compare_edges
 from ._sources import readings_words, shown
-from ._table import Table, number
+from ._table import Table, number, speed
 
 
 MOST = 14
@@ -32,7 +32,7 @@ def at_speeds_table(findings: Findings, operating: Sequence[Operating]) -> Table
         orbits = found.coexisting(rpm * np.pi / 30)
         sizes = [f"{float(np.max(np.abs(mu))):.3f}" for _, stable, _, mu in orbits if stable]
         unstable = str(sum(not stable for _, stable, _, _ in orbits))
-        rows.append((f"{rpm:.0f}", ", ".join(sizes) or "none", unstable, f"{labels} at {swept.rpm[near]:.0f} rpm"))
+        rows.append((speed(rpm), ", ".join(sizes) or "none", unstable, f"{labels} at {swept.rpm[near]:.0f} rpm"))
     columns = (
         "speed [rpm]",
         "stable orbits, by largest |multiplier|",

@@ -12,7 +12,7 @@ from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
 from ._orbit_tables import error_cell
-from ._table import Table, chosen, number
+from ._table import Table, chosen, number, speed
 
 
 FIRST = ("guidance_gap", "eccentricity")
@@ -77,7 +77,7 @@ def elasticities_table(name: str, slopes: Mapping[str, Sensitivity]) -> Table:
     columns = {
         "edge": lambda item: item[0],
         "by": "{0[1].kind}",
-        "speed [rpm]": lambda item: number(item[1].value_rpm, 2),
+        "speed [rpm]": lambda item: speed(item[1].value_rpm, 2),
         "±": lambda item: error_cell(item[1].error_rpm),
         **{n.replace("_", " "): f"{{0[1].elasticity[{n}]:+.4f}}" for n in FIRST},
         FIXED_RHO: lambda item: f"{at_fixed_rho(item[1].elasticity):+.4f}",

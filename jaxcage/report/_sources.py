@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import EXTRA, get, readings_of, walk
-from ..io import UNIT, ShownUnits, is_range
+from ..io import is_range
 from ..models import BearingModel, CageModel
 
 
@@ -47,11 +47,6 @@ class Row:
     def group(self) -> str:
         """The part of the model that it belongs to."""
         return self.path[0].replace("_", " ") if len(self.path) > 1 else "cage"
-
-    def in_units(self, units: ShownUnits) -> "Row":
-        """The same in the units that are asked for."""
-        *_, (value, unit) = units.in_rows(("value", UNIT), [(self.value, self.unit)])[1]
-        return dataclasses.replace(self, value=value, unit=unit)
 
     @property
     def name(self) -> str:

@@ -2,11 +2,8 @@
 
 import dataclasses
 import math
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
-
-from ..io import ShownUnits
 
 
 Row = TypeVar("Row")
@@ -35,35 +32,34 @@ class Table:
         return cls(title, tuple(columns), [tuple(cell(how, one) for how in columns.values()) for one in found], speeds)
 
 
-_NUMBER = re.compile(r"\d+(?:\.(\d+))?(?:e[+-]?\d+)?")
+class Speeds(str):
+    """Cage speeds, or differences of them [rpm], as a text that keeps its numbers."""
+
+    form: str
+    values: tuple[float, ...]
+
+    def __new__(cls, form: str, *values: float) -> "Speeds":
+        self = super().__new__(cls, form.format(*values))
+        self.form, self.values = form, values
+        return self
+
+    def of_shaft(self, cage_speed_ratio: float) -> "Speeds":
+        """The same of the shaft."""
+        return Speeds(self.form, *(value / cage_speed_ratio for value in self.values))
 
 
 def with_shaft(table: Table, cage_speed_ratio: float) -> Table:
     """The table with a column of the shaft's speed after each of the cage's."""
-
-    def times(match: re.Match[str]) -> str:
-        value = float(match[0]) / cage_speed_ratio
-        return f"{value:.1g}" if "e" in match[0] else f"{value:.{len(match[1] or '')}f}"
+    if not table.speeds:
+        return table
+    shaft = lambda cell: cell.of_shaft(cage_speed_ratio) if isinstance(cell, Speeds) else cell
+    called = lambda head: head.replace(" [rpm]", "") + ", shaft" + (" [rpm]" if "[rpm]" in head else "")
 
     def each(cells: Sequence[str], new: Callable[[str], str]) -> tuple[str, ...]:
         pairs = zip(table.columns, cells, strict=True)
         return tuple(c for head, cell in pairs for c in ((cell, new(cell)) if head in table.speeds else (cell,)))
 
-    if not table.speeds:
-        return table
-    heads = each(
-        table.columns, lambda head: head.replace(" [rpm]", "") + ", shaft" + (" [rpm]" if "[rpm]" in head else "")
-    )
-    rows = [each(row, lambda cell: _NUMBER.sub(times, cell)) for row in table.rows]
-    return Table(table.title, heads, rows)
-
-
-def in_units(table: Table, units: ShownUnits) -> Table:
-    """The table in the units that are asked for."""
-    if not units.names:
-        return table
-    columns, rows = units.in_rows(table.columns, table.rows)
-    return Table(units.in_text(table.title), columns, rows, table.speeds)
+    return Table(table.title, each(table.columns, called), [each(row, shaft) for row in table.rows])
 
 
 def chosen(found: object, names: str) -> dict[str, Any]:
@@ -81,6 +77,11 @@ def shares_table(title: str, what: str, counts: Mapping[str, int]) -> Table:
 def number(value: float | None, digits: int = 0, nothing: str = "-") -> str:
     """A number for a table."""
     return nothing if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
+
+
+def speed(value: float | None, digits: int = 0, nothing: str = "-") -> str:
+    """A cage speed [rpm] for a table."""
+    return nothing if value is None or not math.isfinite(value) else Speeds(f"{{:.{digits}f}}", value)
 
 
 def shown_unit(unit: str, value: float) -> tuple[str, float]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..analysis import Edge, Zone, Zones, lives_in_words
 from ..bearing import PublishedCase
-from ._table import Table, number
+from ._table import Speeds, Table, number, speed
 
 
 LIFE = "mean life [revolutions]"
@@ -115,7 +115,7 @@ def transient_tables(name: str, zones: Zones) -> list[Table]:
 def _zone_cells(zone: Zone) -> tuple[str, ...]:
     known = [edge.mechanism for edge in (zone.onset, zone.exit) if edge is not None]
     mechanism = " / ".join(dict.fromkeys(known)) or "-"
-    width = number(zone.width_rpm, nothing="open")
+    width = speed(zone.width_rpm, nothing="open")
     return _edge_cell(zone.onset), _edge_cell(zone.exit), width, mechanism, f"{zone.share:.0%}"
 
 
@@ -130,11 +130,9 @@ def _life_cell(zone: Zone) -> str:
 def _edge_cell(edge: Edge | None) -> str:
     if edge is None:
         return "past range"
-    return (
-        f"{edge.speed_rpm:.0f} ± {edge.uncertainty_rpm:.0f}"
-        if edge.basis == "statistical"
-        else number(edge.speed_rpm, 1)
-    )
+    if edge.basis == "statistical":
+        return Speeds("{:.0f} ± {:.0f}", edge.speed_rpm, edge.uncertainty_rpm)
+    return speed(edge.speed_rpm, 1)
 
 
 def _published_cell(spans: list[Span]) -> str:

@@ -7,36 +7,16 @@
 | `_stored`   | what a store must know of a study                                             |
 | `_study`    | what is computed of a cage's lane, the same bits anywhere                     |
 | `_whole_study` | what is computed of a whole bearing's                                      |
-| `_references` | what code refers to                                                         |
-| `_fingerprint` | digests of all that the numbers follow from                                |
 | `_store`    | the zarr folder, whole at any time                                            |
-| `_empty`    | what describes it                                                             |
-| `_manifest` | digests of what is finished                                                   |
-| `_zarr`     | reading and writing with them                                                 |
-| `_check`    | whether a store is what was written                                           |
 | `_run`      | runs what a store lacks, in this process                                      |
 | `_dask`     | or on dask.distributed                                                        |
-| `_adaptive` | a grid of labels refined where the label changes                              |
 | `_identify` | ranges narrowed by what was measured                                           |
 | `_ensemble` | chances of chaos of a cage that is known within ranges only                   |
-| `_label_map` | that grid over two parameters of a system                                    |
+| `_label_map` | labels and exponents over two parameters of a system                         |
 """
 
 from .._arguments import check_layer
 from .._sobol import sobol as sobol
-from ._adaptive import (
-    UNKNOWN as UNKNOWN,
-    AdaptiveGrid as AdaptiveGrid,
-    changes as changes,
-    found_share as found_share,
-    refine as refine,
-)
-from ._check import (
-    DamagedStore as DamagedStore,
-    OldStore as OldStore,
-    StoreState as StoreState,
-    check_study as check_study,
-)
 from ._ensemble import (
     ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
     REVOLUTIONS as REVOLUTIONS,
@@ -53,7 +33,15 @@ from ._identify import Narrowed as Narrowed, identify as identify, misses as mis
 from ._label_map import KINDS as KINDS, LabelMap as LabelMap, kinds as kinds, label_map as label_map
 from ._plan import Plan as Plan
 from ._run import run_study as run_study, study as study
-from ._store import OtherStudy as OtherStudy, Store as Store, label_names as label_names, open_study as open_study
+from ._store import (
+    DamagedStore as DamagedStore,
+    OtherStudy as OtherStudy,
+    Store as Store,
+    StoreState as StoreState,
+    check_study as check_study,
+    label_names as label_names,
+    open_study as open_study,
+)
 from ._stored import PENDING as PENDING, SPEED as SPEED, AbstractStudy as AbstractStudy
 from ._study import (
     LABELS as LABELS,

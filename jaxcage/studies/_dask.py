@@ -39,9 +39,9 @@ def chunks_on_dask(
     import_distributed()
     import cloudpickle  # comes with it
 
-    waiting, packed = iter(chunks), cloudpickle.dumps(about.anew())  # without what it has worked out
+    waiting, packed = iter(chunks), cloudpickle.dumps(about)
     with _client(scheduler, workers) as client:
-        submit = lambda n: client.submit(_compute, packed, n, about.fingerprint, pure=False, key=f"chunk-{n}")
+        submit = lambda n: client.submit(_compute, packed, n, about.description, pure=False, key=f"chunk-{n}")
         room = AHEAD * len(client.scheduler_info()["workers"])
         under_way = {submit(n): n for n in itertools.islice(waiting, room)}
         while under_way:
@@ -77,7 +77,7 @@ def import_distributed() -> Any:
     return distributed
 
 
-def _compute(packed: bytes, chunk: int, fingerprint: str) -> Results:
+def _compute(packed: bytes, chunk: int, description: str) -> Results:
     """In a worker. A worker with other versions of anything that matters refuses.
 
     The study comes as bytes: dask would unpack it before double precision is on, and so round its numbers.
@@ -88,7 +88,7 @@ def _compute(packed: bytes, chunk: int, fingerprint: str) -> Results:
         jax.config.update("jax_enable_x64", True)
         keep_compiled_programs()
         about: AbstractStudy = pickle.loads(packed)
-        if about.fingerprint != fingerprint:
+        if about.description != description:
             raise RuntimeError("A worker has another version of jaxcage, jax or NumPy than this process.")
         return about.chunk(chunk)
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from .._sobol import sobol
@@ -209,8 +210,7 @@ def ensemble(
     """
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
-    if draws < 1:
-        raise ArgumentError("draws", said=f"must be at least 1, but {draws} was given.")
+    require_at_least(1, draws=draws)
     place = sobol(len(unknowns), draws, seed)
     found = run_draws(draw(model, unknowns, place), speeds, method, progress, discard, revolutions, blocks)
     info = parameter_info(model)

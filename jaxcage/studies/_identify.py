@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
 from ..integrate import AbstractMethod
@@ -96,10 +97,8 @@ def narrow(
     """
     if not unknowns:
         raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
-    if draws < 16:
-        raise ArgumentError("draws", said=f"must be at least 16, but {draws} was given.")
-    if stages < 1:
-        raise ArgumentError("stages", said=f"must be at least 1, but {stages} was given.")
+    require_at_least(16, draws=draws)
+    require_at_least(1, stages=stages)
     lower, upper, stage = np.zeros(len(unknowns)), np.ones(len(unknowns)), 0
     while True:
         stage += 1

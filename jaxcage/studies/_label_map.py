@@ -1,21 +1,21 @@
-"""What a system does over two of its parameters: labels and exponents on a grid, refined where the label changes."""
+"""What a system does over two of its parameters: labels and exponents on a grid."""
 
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .._checks import require_x64
+from .._errors import ArgumentError
 from .._parameters import parameter_info
 from ..integrate import AbstractMethod, controlled
-from ..models import AbstractForcedSystem
+from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import require_persist
-from ._adaptive import AdaptiveGrid, Points, refine
 from ._plan import LANES, Plan
-from ._stored import PENDING, SPEED
+from ._stored import SPEED
 from ._study import LABELS, Study, too_short
 
 
@@ -24,15 +24,13 @@ if TYPE_CHECKING:
 
 KINDS = ("calm", "chaotic", "failed")
 """What a point counts as: chaotic if any of its starts is, else failed if any has or is inaccurate, else calm."""
-Refine = Literal["chaos", "label", "everything"]
-"""Where points are spent: where chaos begins or ends, where any label changes, or everywhere."""
 Stage = Callable[[str, int, int], None]
-"""Called with what is under way, and how many of its points are done."""
+"""Called with what is under way, and how many of its lanes are done."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LabelMap:
-    """Labels over two parameters. What has not been computed is `PENDING`, or NaN."""
+    """Labels over two parameters."""
 
     x: str
     x_value: Float[np.ndarray, " x"]
@@ -46,20 +44,17 @@ class LabelMap:
     """Per revolution."""
     too_short: Bool[np.ndarray, "x y starts"]
     """Labels that rest on too few revolutions for the error bars of their exponents."""
-    grid: AdaptiveGrid
-    """By what was refined; with `refine = "chaos"` places in `KINDS`."""
 
     @property
-    def filled_exponent(self) -> Float[np.ndarray, "x y"]:
-        """Largest exponent of the starts that finished; points that were left out take that of the nearest one."""
-        lowest = np.max(self.largest_exponent, axis=2, where=np.isfinite(self.largest_exponent), initial=-np.inf)
-        top = np.where(np.isfinite(lowest), lowest, np.nan)
-        return top[self.grid.nearest]
+    def top_exponent(self) -> Float[np.ndarray, "x y"]:
+        """Largest exponent of the starts that finished, NaN where none did."""
+        top = np.max(self.largest_exponent, axis=2, where=np.isfinite(self.largest_exponent), initial=-np.inf)
+        return np.where(np.isfinite(top), top, np.nan)
 
     @property
     def kind(self) -> Int[np.ndarray, "x y"]:
-        """What each point counts as, a place in `KINDS`; points that were left out take that of the nearest one."""
-        return kinds(self.label)[self.grid.nearest]
+        """What each point counts as, a place in `KINDS`."""
+        return kinds(self.label)
 
     def dataset(self, system: AbstractForcedSystem) -> "xr.Dataset":
         """Labels and largest exponents of all starts over both parameters, for xarray."""
@@ -67,8 +62,7 @@ class LabelMap:
 
         info = parameter_info(system)
         unit = lambda name: {"units": "rad/s" if name == SPEED else info[name].unit}
-        codes = [PENDING, *range(len(LABELS))]
-        flags: dict[str, Any] = {"flag_values": codes, "flag_meanings": " ".join(["pending", *LABELS])}
+        flags: dict[str, Any] = {"flag_values": list(range(len(LABELS))), "flag_meanings": " ".join(LABELS)}
         dims = (self.x, self.y, "start")
         return xr.Dataset(
             {
@@ -79,14 +73,12 @@ class LabelMap:
         )
 
     def __str__(self) -> str:
-        known = self.grid.known
-        counts = np.bincount(kinds(self.label)[known], minlength=len(KINDS))
-        across, upward = known.shape
+        counts = np.bincount(self.kind.ravel(), minlength=len(KINDS))
+        across, upward = self.kind.shape
         short = int(np.sum(self.too_short))
         return "\n".join(
             [
-                f"{across} x {upward} points over {self.x} and {self.y}: {self.grid.points} computed "
-                f"({self.grid.points / known.size:.1%}), {'complete' if self.grid.complete else 'not complete'}",
+                f"{across} x {upward} points over {self.x} and {self.y}",
                 *(f"  {n:6d} {kind}" for kind, n in zip(KINDS, counts, strict=True)),
                 *([f"  {short:6d} labels rest on too few revolutions"] if short else []),
             ]
@@ -106,32 +98,25 @@ def label_map(
     y: Mapping[str, Float[np.ndarray, " y"]],
     *,
     speed: float | None = None,
-    refine_by: Refine = "chaos",
-    most: int | None = None,
-    first: int | None = None,
     starts: int = 1,
     discard: int = 300,
     revolutions: int = 300,
     persist: int = 0,
     blocks: int = 20,
     method: AbstractMethod | None = None,
-    report: Callable[[LabelMap], None] | None = None,
     stage: Stage | None = None,
 ) -> LabelMap:
-    """Labels over two parameters, a coarse picture first, then more points along the edges.
+    """Labels over two parameters.
 
     **Arguments:**
 
     - `system`: any `AbstractForcedSystem`.
     - `x`, `y`: name and ascending values [SI] of a parameter each; `"speed"` is one.
     - `speed`: the speed [rad/s], if it is neither of them.
-    - `refine_by`: where points are spent.
-    - `most`, `first`: as for `refine`: points at most, stride of the coarse picture.
     - `starts`: how many of the system's own initial states are run at each point.
     - `discard`, `revolutions`, `blocks`, `method`: as for `sweep`.
     - `persist`: revolutions that chaos must outlast to count: starts found chaotic are run again with so many
         discarded, and what has died out by then was a transient. 0 turns this off.
-    - `report`: called with the coarse picture and after each refinement.
     - `stage`: called as lanes are done.
 
     **Returns:** `LabelMap`.
@@ -140,38 +125,24 @@ def label_map(
     """
     require_x64()
     (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())
+    if speed is not None:
+        require_speeds(system, speed)
+    shape = (len(x_value), len(y_value), starts)
+    if min(shape[:2]) < 2:
+        raise ArgumentError("x", "y", said=f"must have at least 2 values each, but have {shape[0]} and {shape[1]}.")
     fixed = {} if speed is None else {SPEED: np.array([speed])}
     plan = Plan({**fixed, x_name: x_value, y_name: y_value}, {}, 0, 0, starts, LANES)
     chosen = controlled() if method is None else method
     about = Study(system, plan, chosen, discard, revolutions, blocks, 1, 0)
     require_persist(persist, discard, 1, blocks)
-    longer = dataclasses.replace(about, discard=persist or discard)
-    shape = (len(x_value), len(y_value))
-    label = np.full((*shape, starts), PENDING, dtype=np.int8)
-    exponent = np.full((*shape, starts), np.nan)
-    short = np.zeros((*shape, starts), dtype=bool)
-
-    def evaluate(points: Points) -> np.ndarray:
-        first_lane = np.asarray(np.ravel_multi_index(tuple(points.T), shape)) * starts
-        lane = (first_lane[:, None] + np.arange(starts)).ravel()
-        say = None if stage is None else functools.partial(stage, f"{len(points)} points")
-        found = about.at(*plan.at(lane), progress=say)
-        again = np.flatnonzero(found["label"] == LABELS.index("chaotic")) if persist else np.array([], dtype=int)
-        if again.size:
-            say = None if stage is None else functools.partial(stage, f"{again.size} chaotic lanes again")
-            for name, x in longer.at(*plan.at(lane[again]), progress=say).items():
-                found[name][again] = x
-        place = points[:, 0], points[:, 1]
-        new = found["label"].reshape(-1, starts)
-        label[place], exponent[place] = new, found["largest_exponent"].reshape(-1, starts)
-        short[place] = too_short(found, revolutions).reshape(-1, starts)
-        return kinds(new) if refine_by == "chaos" else new @ len(LABELS) ** np.arange(starts)  # labels as one number
-
-    def make(grid: AdaptiveGrid) -> LabelMap:
-        return LabelMap(x_name, x_value, y_name, y_value, label.copy(), exponent.copy(), short.copy(), grid)
-
-    def say(grid: AdaptiveGrid) -> None:
-        if report is not None:
-            report(make(grid))
-
-    return make(refine(evaluate, shape, first=first, most=most, everywhere=refine_by == "everything", report=say))
+    say = lambda what: None if stage is None else functools.partial(stage, what)
+    every = np.arange(plan.size)
+    found = about.at(*plan.at(every), progress=say(f"{plan.size} lanes"))
+    again = every[found["label"] == LABELS.index("chaotic")] if persist else every[:0]
+    if again.size:
+        longer = dataclasses.replace(about, discard=persist)
+        for name, value in longer.at(*plan.at(again), progress=say(f"{again.size} chaotic lanes again")).items():
+            found[name][again] = value
+    label, exponent = found["label"].reshape(shape), found["largest_exponent"].reshape(shape)
+    short = too_short(found, revolutions).reshape(shape)
+    return LabelMap(x_name, x_value, y_name, y_value, label, exponent, short)

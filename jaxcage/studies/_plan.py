@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
 from ._vary import Spread
@@ -58,13 +59,8 @@ class Plan:
             raise ArgumentError(
                 "samples", said=f"needs an interval or a tolerance to sample, but {self.samples} was given."
             )
-        if self.seed < 0 or self.starts < 1 or self.lanes < 1:
-            raise ArgumentError(
-                "seed",
-                "starts",
-                "lanes",
-                said=f"must be at least 0, 1 and 1, but are {self.seed}, {self.starts} and {self.lanes}.",
-            )
+        require_at_least(0, seed=self.seed)
+        require_at_least(1, starts=self.starts, lanes=self.lanes)
 
     @property
     def names(self) -> tuple[str, ...]:

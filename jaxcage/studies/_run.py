@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..integrate import AbstractMethod, controlled
@@ -51,6 +52,8 @@ def study(
     scheduler: str | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
+    name: str = "",
+    version: str = "",
 ) -> "xr.Dataset":
     """Run a system over any grid or sample of its parameters, and keep what each lane does in a zarr folder.
 
@@ -74,6 +77,8 @@ def study(
     - `executor`: `"local"` runs on all cores of this process, `"dask"` on a dask.distributed cluster.
     - `scheduler`, `workers`: address of the scheduler of a cluster, by default one of its own with so many processes.
     - `progress`: called with lanes done and lanes in all, those that were stored before included.
+    - `name`, `version`: of a function or class of your own that the system is made of. They must be given then, since
+        a store cannot tell by itself whether your code is still the same: change the version whenever it changes.
 
     **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `start`.
 
@@ -82,8 +87,8 @@ def study(
     """
     require_x64()
     whole = isinstance(system, BearingModel)
-    sampled: dict[str, Spread] = {name: how for name, how in vary.items() if isinstance(how, Spread)}
-    grid = {name: np.asarray(x, dtype=float) for name, x in vary.items() if name not in sampled}
+    sampled: dict[str, Spread] = {each: how for each, how in vary.items() if isinstance(how, Spread)}
+    grid = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
     own = len(CAGE_STARTS if whole else system.starts(1.0)) if starts is None else starts
     most = (WHOLE_LANES if whole else LANES) if lanes is None else lanes
     plan = Plan(grid, sampled, samples, seed, own, most)
@@ -91,12 +96,12 @@ def study(
         if strobe or method is not None:
             raise ArgumentError("strobe", "method", said="must be left out for a whole bearing.")
         error = WHOLE_TOLERANCE if tolerance is None else tolerance
-        about = BearingStudy(system, plan, discard, revolutions, blocks, exponents, error)
+        about = BearingStudy(system, plan, discard, revolutions, blocks, exponents, error, name, version)
     else:
         if tolerance is not None:
             raise ArgumentError("tolerance", said="goes with a whole bearing; of other systems the `method` has it.")
         chosen = controlled() if method is None else method
-        about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe)
+        about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe, name, version)
     run_study(about, store, shard, executor, scheduler, workers, progress)
     return open_study(store)
 
@@ -116,6 +121,8 @@ def run_study(
         raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
     if executor not in ("local", "dask"):
         raise ArgumentError("executor", said=f"must be local or dask, but {executor!r} was given.")
+    if workers is not None:
+        require_at_least(1, workers=workers)
     store = Store(path, about)
     part = range(about.plan.chunks)[i - 1 :: n]
     mine, pending = set(part), store.pending(part)

@@ -2,23 +2,21 @@
 
 import abc
 import dataclasses
-import functools
-import hashlib
 import json
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from ._fingerprint import fingerprint, package_digest, platform_traits
 from ._plan import Plan
-from ._references import Unknown
 
 
 SPEED = "speed"
 """Name of the speed [rad/s] beside those of the system's parameters: the cage's, or a whole bearing's shaft's."""
 PENDING = -1
 """Code of a lane that has not been run yet."""
+
+KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
+"""Packages whose code is known by their versions."""
 
 Results = dict[str, np.ndarray]
 """Output by name; the lanes are the first axis."""
@@ -45,6 +43,9 @@ class AbstractStudy(abc.ABC):
     plan: Plan
     discard: int
     revolutions: int
+    name: str
+    version: str
+    """Of code of the user's own, which a store cannot recognise by itself."""
     speed_text: str = "cage speed"
     """In words."""
 
@@ -59,12 +60,7 @@ class AbstractStudy(abc.ABC):
 
     @abc.abstractmethod
     def settings(self) -> dict[str, Any]:
-        """How lanes are computed, as far as it is not their code."""
-
-    @property
-    @abc.abstractmethod
-    def law(self) -> dict[str, Any]:
-        """By name, the objects whose code and numbers the results follow from."""
+        """Parameters, lanes, and how they are computed."""
 
     @property
     def extents(self) -> dict[str, int]:
@@ -81,33 +77,28 @@ class AbstractStudy(abc.ABC):
         """What a TOML file would say of the subject; None where it cannot say it."""
         return None
 
-    def anew(self) -> "AbstractStudy":
-        """The same, without what it has worked out."""
-        return dataclasses.replace(self)  # pyright: ignore[reportArgumentType]
+    @property
+    def own_code(self) -> str | None:
+        """A class or function of the user's own that lanes are computed by, None if there is none."""
+        return _own_code([getattr(self, field.name) for field in dataclasses.fields(self)])  # pyright: ignore
 
     def describe(self) -> dict[str, Any]:
-        """Everything that the results follow from."""
-        return {
-            **self.settings(),
-            "version_jaxlib": version("jaxlib"),
-            "package": package_digest(),
-            "platform": platform_traits(),
-            "code": {"unknown": self.unknown} if self.unknown else self._code,
-        }
+        """All that a store is recognised by."""
+        return {"name": self.name, "version": self.version, **self.settings()}
 
-    @functools.cached_property
-    def _code(self) -> dict[str, str]:
-        return fingerprint(**self.law)
+    @property
+    def description(self) -> str:
+        """The same as JSON."""
+        return json.dumps(self.describe(), sort_keys=True)
 
-    @functools.cached_property
-    def unknown(self) -> str:
-        """Why it cannot be told whether another study is this one: a reason, or nothing if it can."""
-        try:
-            return "" if self._code else ""
-        except Unknown as error:
-            return str(error)
 
-    @functools.cached_property
-    def fingerprint(self) -> str:
-        """A digest of `describe`: studies that share it have the same results."""
-        return hashlib.sha256(json.dumps(self.describe(), sort_keys=True).encode()).hexdigest()
+def _own_code(x: Any) -> str | None:
+    """The first class or function in a tree that neither this package has nor one that it is built on."""
+    if isinstance(x, tuple | list | dict):
+        parts = list(x.values() if isinstance(x, dict) else x)
+    else:
+        module = getattr(x, "__module__", None) or type(x).__module__
+        if module.partition(".")[0] not in KNOWN:
+            return getattr(x, "__name__", type(x).__name__)
+        parts = [getattr(x, f.name, None) for f in dataclasses.fields(x)] if dataclasses.is_dataclass(x) else []
+    return next(filter(None, map(_own_code, parts)), None)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._glossary import component_names, quantity
 from .._parameters import replace
@@ -48,6 +49,8 @@ class Study(AbstractStudy):
     exponents: int
     strobe: int
     """Strobe states stored of each lane, the last ones; 0 for none."""
+    name: str = ""
+    version: str = ""
 
     def __post_init__(self):
         if SPEED not in self.plan.names:
@@ -60,8 +63,7 @@ class Study(AbstractStudy):
         own = len(self.system.starts(1.0))
         if self.plan.starts > own:
             raise ArgumentError("starts", said=f"must be at most {own}, but {self.plan.starts} was given.")
-        if self.exponents < 1:
-            raise ArgumentError("exponents", said=f"must be at least 1, but {self.exponents} was given.")
+        require_at_least(1, exponents=self.exponents)
         if not 0 <= self.strobe <= self.revolutions:
             raise ArgumentError(
                 "strobe", said=f"must lie between 0 and the {self.revolutions} revolutions, but is {self.strobe}."
@@ -73,11 +75,6 @@ class Study(AbstractStudy):
         keep = max(CLOSING, self.strobe)
         return make_plan(self.discard, self.revolutions, self.blocks, keep, self.exponents, self.system.dimension)
 
-    @property
-    def law(self) -> dict[str, Any]:
-        """System and method."""
-        return {"model": self.system, "integration": self.method}
-
     def settings(self) -> dict[str, Any]:
         """System, lanes, their length, and method."""
         return {
@@ -88,6 +85,7 @@ class Study(AbstractStudy):
             "blocks": self.blocks,
             "exponents": self.exponents,
             "strobe": self.strobe,
+            "method_numbers": _numbers(self.method),
             **settings_of(self.method),
         }
 

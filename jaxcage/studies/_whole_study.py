@@ -41,6 +41,8 @@ class BearingStudy(AbstractStudy):
     """1 for the largest, 0 for none."""
     tolerance: float
     """Largest estimated error of a step, as for `sweep_bearing`."""
+    name: str = ""
+    version: str = ""
 
     speed_text = "shaft speed"
 
@@ -52,11 +54,6 @@ class BearingStudy(AbstractStudy):
             if name not in (SPEED, *known):
                 raise ArgumentError("vary", said=f"must name {SPEED} or parameters of the bearing, but names {name}.")
         require_bearings([self.system], self.plan.starts, self.discard, self.revolutions, self.blocks, self.exponents)
-
-    @property
-    def law(self) -> dict[str, Any]:
-        """The bearing."""
-        return {"model": self.system}
 
     @property
     def configuration(self) -> Any:

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import BearingRecord, BearingSweep, summed_up
@@ -92,8 +93,8 @@ def sweep_bearing(
     cage comes nearly to rest (below 5 % of the speed of pure rolling) or leaves its land, `max_steps_reached` if it
     needs more than 20,000 steps a revolution (of slow shafts as many times more as more periods go to one).
 
-    **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, impossible counts, a quasi-static
-    ring or a film of finite length; `RuntimeError` without double precision.
+    **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, impossible counts or a
+    quasi-static ring; `RuntimeError` without double precision.
     """
     options: dict[str, Any] = dict(
         starts=starts,
@@ -135,8 +136,7 @@ def sweep_bearings(
     size = min(CHUNKS, key=lambda size: (-(-lanes // (size * cores())) * (size + CALL), size))
     chunks = np.split(np.argsort(table.lane_speed, kind="stable"), range(size, lanes, size))
     counted = _counted(progress, lanes, discard + revolutions)
-    if exponent_revolutions < 1:
-        raise ArgumentError("exponent_revolutions", said=f"must be at least 1, but {exponent_revolutions} was given.")
+    require_at_least(1, exponent_revolutions=exponent_revolutions)
     followed = min(blocks, max(2, -(-exponent_revolutions // block))) if exponents else 0
 
     def run(chunk: np.ndarray) -> dict[str, Any]:
@@ -182,8 +182,6 @@ def require_bearings(
     for model in models:
         if model.ring.ring_motion != "dynamic":
             raise ArgumentError("model", said="must have a dynamic inner ring, but its `ring_motion` is quasi_static.")
-        if model.film.model == "finite_length":
-            raise ArgumentError("model", said="must have a short film, but its film is of finite_length.")
     require_lengths(discard, revolutions, blocks)
     if exponents not in (0, 1):
         raise ArgumentError("exponents", said=f"must be 0 or 1, but {exponents} was given.")

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from .._arguments import require_above_zero, require_at_least
 from .._errors import ArgumentError
 from ..analysis import BearingSweep
 from ..analysis._zones import runs
@@ -89,6 +90,8 @@ def bearing_up_down(
     **Raises:** `ValueError` for speeds that are not positive and ascending, a rate that is not positive, counts that
     are impossible.
     """
+    require_above_zero(first=first, last=last)
+    require_at_least(1, steps=steps)
     if not 0 < first < last:
         raise ArgumentError("first", "last", said=f"must be positive and ascending, but are {first:g} and {last:g}.")
     if not rate > 0:

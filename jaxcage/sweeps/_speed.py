@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import wrong
+from .._arguments import require_at_least, wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._recent import jitted
@@ -37,10 +37,11 @@ def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> 
     **Raises:** `ValueError` for anything but finite numbers, and for a count below 1.
     """
     for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
-        if wrong("", float, value) or not math.isfinite(value):
+        if wrong(float, value) or not math.isfinite(value):
             raise ArgumentError(name, said=f"must be a finite number, but {reprlib.repr(value)} was given.")
-    if said := wrong("count", int, count):
+    if said := wrong(int, count):
         raise ArgumentError("count", said=f"must be {said}, but {count!r} was given.")
+    require_at_least(1, count=count)
     if last is None:
         return float(first) * math.pi / 30
     return np.linspace(first, last, count) * math.pi / 30
@@ -59,6 +60,7 @@ def checked_speeds(speeds: float | Float[Array, " speeds"] | Float[np.ndarray, "
 
 
 def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents: int, dimension: int) -> Plan:
+    require_at_least(1, keep=keep)
     require_lengths(discard, revolutions, blocks)
     if not 0 <= exponents <= dimension:
         allowed = f"at most {dimension}" if exponents > 0 else "at least 0"
@@ -68,16 +70,15 @@ def make_plan(discard: int, revolutions: int, blocks: int, keep: int, exponents:
 
 def require_lengths(discard: int, revolutions: int, blocks: int) -> None:
     """**Raises:** `ValueError` for what no sweep can have."""
-    if discard < 0 or revolutions < 1:
-        raise ArgumentError(
-            "discard", "revolutions", said=f"must be at least 0 and 1, but are {discard} and {revolutions}."
-        )
-    if blocks < 1 or revolutions % blocks:
+    require_at_least(0, discard=discard)
+    require_at_least(1, revolutions=revolutions, blocks=blocks)
+    if revolutions % blocks:
         raise ArgumentError("blocks", said=f"must divide the {revolutions} revolutions, but it is {blocks}.")
 
 
 def require_persist(persist: int, discard: int, exponents: int, blocks: int) -> None:
     """**Raises:** `ValueError`, also where no lane could be called chaotic for want of an exponent or its error."""
+    require_at_least(0, persist=persist)
     if persist and persist <= discard:
         raise ArgumentError(
             "persist", said=f"must be 0 or above the {discard} revolutions discarded, but is {persist}."
@@ -175,6 +176,7 @@ def sweep_designs(
     chosen = native() if method is None else method
     dim = systems[0].dimension
     plan = make_plan(discard, revolutions, blocks, keep, exponents, dim)
+    require_at_least(0, horizon=horizon)
     _require_settled(settled, discard, confirm, horizon)
     y0 = np.stack([initial_states(*each, starts) for each in zip(systems, speed, strict=True)])  # ..., starts, dim
     shape = y0.shape[1:3]

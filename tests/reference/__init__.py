@@ -12,8 +12,8 @@
 | `_whole`      | the whole bearing: rollers, cage and ring as free bodies                     |
 
 Formulas come from the physics page and, where that leaves a detail open, from the package's docstrings; none of its
-code is used but what makes a model and lists its numbers. The film of finite length is left out. Shared by the tests
-and `benchmarks.truth`.
+code is used but what makes a model and lists its numbers. Shared by the tests and
+`benchmarks.truth`.
 """
 
 from ._field import Field as Field, field as field, numbers_of as numbers_of

@@ -26,8 +26,6 @@ class Field:
 
     def __init__(self, given: dict[str, Any], omega: float):
         film, contact, support, gap = given["film"], given["contact"], given["support"], given["guidance_gap"]
-        if film["model"] == "finite_length":
-            raise ValueError("Argument `given` must hold a short film, but it is of finite length.")
         c = gap if given["clearance_reading"] == "as_printed" else gap / 2
         radius, width = (given["bearing"]["rib_diameter"] - gap) / 2, film["land_width"]
         self.omega, self.clearance, self.mass, self.gravity = omega, c, given["cage_mass"], given["gravity"]

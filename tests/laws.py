@@ -1,0 +1,33 @@
+"""Oscillators that several tests of orbits share, as a user would write them."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+import jaxcage as jc
+
+
+def numbers(**values):
+    return {name: jnp.asarray(x, dtype=float) for name, x in values.items()}
+
+
+class Duffing(eqx.Module):
+    """m x'' + d x' - k x + b x^3 = g cos(w t): double-well for k > 0, hardening for k < 0."""
+
+    m: jax.Array
+    d: jax.Array
+    k: jax.Array
+    b: jax.Array
+    g: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        (x,), (u,) = q, v
+        return ((-self.d * u + self.k * x - self.b * x**3 + self.g * jnp.cos(tau)) / self.m,)
+
+
+def double_well(g=0.26, d=0.3, k=1.0, b=1.0, **settings):
+    return jc.ForcedOscillator(Duffing(**numbers(m=1, d=d, k=k, b=b, g=g)), coordinates=1, **settings)
+
+
+def hardening(g=0.3, d=0.1, **settings):
+    return double_well(g, d, -1.0, **settings)

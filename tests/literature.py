@@ -1,0 +1,754 @@
+"""Numbers of this package beside numbers that others printed, or that follow from a closed form or another program.
+
+`python tests/literature.py` writes VALIDATION.md; `test_literature` checks its rows; other tests read numbers here.
+"""
+
+import math
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from scipy.sparse import csc_matrix, csr_array, diags_array, kron
+from scipy.sparse.linalg import spsolve
+from scipy.special import gamma, mathieu_a, mathieu_b
+
+import jaxcage as jc
+from jaxcage import analysis, bearing, forces
+
+
+class Number(NamedTuple):
+    """What they have, how far from it the source lets an exact number be, and where it is from."""
+
+    value: float
+    tolerance: float
+    source: str
+
+
+class Row(NamedTuple):
+    """A number of ours beside one that we did not make."""
+
+    what: str
+    theirs: float
+    ours: float
+    tolerance: float
+    source: str
+
+    @property
+    def passed(self) -> bool:
+        """False for a number that is not finite, too."""
+        return bool(abs(self.ours - self.theirs) <= self.tolerance)
+
+
+def row(what: str, theirs: Any, ours: Any, tolerance: float, source: str) -> Row:
+    return Row(what, float(theirs), float(ours), float(tolerance), source)
+
+
+def share(what: str, theirs: float, ours: Any, part: float, source: str) -> Row:
+    """A row with a tolerance relative to theirs."""
+    return row(what, theirs, ours, part * abs(theirs), source)
+
+
+def beside(what: str, number: Number, ours: Any, sample: float = 0.0) -> Row:
+    """A row with a number of the table; ours as a finite sample is uncertain by `sample`."""
+    return row(what, number.value, ours, number.tolerance + sample, number.source)
+
+
+# The table of numbers.
+
+ROSS = "as printed by ROSS `tests/test_fluid_film_literature.py`"
+FRISWELL = (
+    "M. I. Friswell et al., Dynamics of Rotating Machines (2010), p. 177, as printed by ROSS `CylindricalBearing` "
+    "(525 N, 30 x 100 mm, c 0.1 mm, 0.1 Pa s, 1500 rpm)"
+)
+LUND_THOMSEN = (
+    "J. W. Lund and K. K. Thomsen, A calculation method and data for the dynamic coefficients of oil-lubricated "
+    f"journal bearings, ASME (1978), two axial grooves of 20 degrees, {ROSS} and by DTU course 41524"
+)
+NICHOLAS = f"J. C. Nicholas, L. E. Barrett and M. E. Leader, ASME J. Mech. Des. 102 (1980) 344, table 6, set A, {ROSS}"
+ASYMPTOTE = f"J. C. Nicholas (1994), large S, {ROSS}"
+SOMMERFELD = "A. Sommerfeld (1904), long bearing, closed form"
+GUEMBEL = "L. Guembel (1914), long bearing without negative pressure, closed form"
+CONCENTRIC = "closed form of a concentric film, 3 (1 - tanh(l)/l)/l^2"
+FINITE_VOLUMES = "finite volumes in SciPy on three grids, extrapolated (`tests/literature.py`)"
+SHORT = "Routh's criterion on the short bearing's closed-form coefficients"
+NSK = "NSK, Rolling Bearings, CAT. No. E728g, section 5, (5): Q_max = 4.08 F/Z for rollers without clearance"
+SJOEVALL = "Sjoevall's load integral of line contacts, by SciPy's quad"
+PALMGREN = "A. Palmgren: delta = 3.84e-5 Q^0.9/l^0.8 in N and mm"
+BRENTQ = "line contacts added up in NumPy, the shift by SciPy's brentq"
+ROLLING = "rolling without slip, (1 - d_w/d_m)/2"
+CENTRIFUGAL = "m w^2 d_m/2 of a steel cylinder of 7800 kg/m^3"
+HUNT_CROSSLEY = (
+    "K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42 (1975) 440, force law; the restitution asked for, as SciPy's "
+    "DOP853 measures it on our force"
+)
+NEAR_ONE = "K. H. Hunt and F. R. E. Crossley (1975), chi = 3 (1 - e)/2 for e near 1"
+IMPACT = "energy of an elastic impact with force K p^(10/9), closed form"
+TRACE = "mean divergence, exact"
+EIGENVALUES = "eigenvalues at the fixed point, exact"
+SPROTT = "J. C. Sprott, Common Chaotic Systems (2004), sprott.physics.wisc.edu/chaos/comchaos.htm"
+ENSEMBLE = "2048 runs of 500 periods in NumPy, Runge-Kutta on the variational equation (`tests/literature.py`)"
+DOP853 = "SciPy's DOP853 at 1e-12 with Newton's method on the variational equations"
+SHOOTING = f"{DOP853} (`tests/literature.py`)"
+FEIGENBAUM_1978 = "M. J. Feigenbaum (1978): distances of period doublings shrink by 4.669..."
+SCALING = "exact: under x -> s x the force at any edge goes with b^(-1/2)"
+MATHIEU = "characteristic values at q = 1: DLMF chapter 28, computed by SciPy's `mathieu_a` and `mathieu_b`"
+JEFFCOTT = "H. H. Jeffcott, Phil. Mag. 37 (1919) 304: unbalance response of a mass on springs"
+NEWKIRK = "B. L. Newkirk and H. D. Taylor, General Electric Review 28 (1925) 559: oil whirl at half speed"
+ROUTH = "short film of vanishing load: omega = sqrt(24/pi) sqrt(g/c)"
+DAMPING = "mean divergence, -2 B/M times the period, exact"
+POLAR = "(16)-(27) in polar form in plain Python (`tests/reference`), integrated by SciPy's DOP853"
+
+# The short bearing, by entry of the stiffness matrix [N/m]; cut off, not rounded.
+SHORT_BEARING = {"xx": 12807959.0, "xy": 16393593.0, "yx": -25060393.0, "yy": 8815302.0}
+# L/D, S, eps, attitude angle [deg], K_xx, K_xy, K_yx, K_yy, B_xx, B_xy, B_yy.
+GROOVED = """
+0.5 6.430 0.071 81.89 1.55 14.41 -6.60 1.88 28.75 1.89 13.31
+0.5 2.634 0.165 72.36 1.61 6.74 -3.01 1.91 13.36 2.00 6.28
+0.5 1.656 0.244 65.85 1.69 5.06 -2.20 1.95 9.93 2.15 4.80
+0.5 0.917 0.372 57.45 2.12 4.01 -1.30 1.85 7.70 2.06 3.23
+0.5 0.580 0.477 51.01 2.67 3.70 -0.78 1.75 6.96 1.94 2.40
+0.5 0.244 0.655 40.25 4.21 3.74 -0.13 1.64 6.87 1.82 1.54
+0.5 0.086 0.809 30.04 7.51 4.42 0.47 1.59 8.03 1.79 1.03
+1.0 0.991 0.150 70.58 1.56 7.29 -2.16 1.52 14.66 1.58 4.49
+1.0 0.635 0.224 63.54 1.62 5.33 -1.57 1.56 10.80 1.70 3.41
+1.0 0.235 0.460 49.27 2.19 3.57 -0.80 1.55 7.36 1.89 2.19
+1.0 0.159 0.559 44.33 2.73 3.36 -0.48 1.48 6.94 1.78 1.74
+1.0 0.108 0.650 39.72 3.45 3.34 -0.23 1.44 6.89 1.72 1.43
+"""
+COEFFICIENTS = "K_xx", "K_xy", "K_yx", "K_yy", "B_xx", "B_xy", "B_yy"
+# L/D 1. S: eps; the whirl threshold omega sqrt(c/g) of both is 2.1.
+GROOVED_WHIRL = {5.3: 0.03, 4.3: 0.04}
+# Largest exponent per unit of time; the tolerance is three standard errors.
+EXPONENTS = {
+    "Ueda x'' + .05 x' + x^3 = 7.5 sin t": Number(0.10355, 0.0004, ENSEMBLE),
+    "Duffing x'' + .25 x' - x + x^3 = .4 cos t": Number(0.15712, 0.0005, ENSEMBLE),
+    "pendulum x'' + .05 x' + sin x = .6 cos .7t": Number(0.14114, 0.0004, ENSEMBLE),
+    "Duffing x'' + .3 x' - x + x^3 = .5 cos 1.2t": Number(0.10480, 0.00065, ENSEMBLE),
+    "Duffing x'' + .15 x' - x + x^3 = .3 cos t": Number(0.18333, 0.00045, ENSEMBLE),
+    "pendulum x'' + .5 x' + sin x = 1.5 cos 2t/3": Number(0.11235, 0.0003, ENSEMBLE),
+}
+# Lorenz's system and Roessler's: all exponents per unit of time, and Kaplan and Yorke's dimension.
+LORENZ = Number(0.9056, 0.005, SPROTT), Number(0.0, 0.002, SPROTT), Number(-14.5723, 0.007, SPROTT)
+LORENZ_DIMENSION = Number(2.06215, 1e-3, SPROTT)
+ROESSLER = Number(0.0714, 0.002, SPROTT), Number(0.0, 0.001, SPROTT), Number(-5.3943, 0.02, SPROTT)
+# x'' + .3 x' - x + x^3 = g cos 1.2t. Periods: a force inside the stable range, the force at which the period doubles.
+DUFFING_DOUBLINGS = {
+    1: (0.262, Number(0.265581786, 2e-9, SHOOTING)),
+    2: (0.285, Number(0.286693158, 2e-9, SHOOTING)),
+    4: (0.2908, Number(0.291089909, 2e-9, SHOOTING)),
+    8: (0.29196, Number(0.292031000, 2e-9, SHOOTING)),
+}
+DUFFING_SLOPES = {
+    "the mass": Number(0.163248905, 2e-9, DOP853),
+    "the damping": Number(0.543875937, 2e-9, DOP853),
+    "a factor of both stiffnesses": Number(-0.060829900, 2e-9, DOP853),
+}
+FEIGENBAUM = 4.669201609
+# x'' + .1 x' + x + x^3 = .3 cos wt: w at the folds where the large orbit ends, and the small one.
+DUFFING_FOLDS = {"up": Number(1.77971952, 2e-8, DOP853), "down": Number(1.3242362, 1e-7, DOP853)}
+VAN_DER_POL_LET_GO = Number(1.0175566306, 1e-9, DOP853)
+
+
+# Film. Frame of the tables: x along the load (here -y) and y a quarter turn on in the direction of rotation, so that
+# their K_xx, K_xy, K_yx, K_yy are our K_yy, -K_yx, -K_xy, K_xx, and so with damping; the attitude angle runs from the
+# load line to the line of centres in the direction of rotation. S = mu N L D (R/c)^2/W with N in revolutions per second
+# is 1/(4 pi lambda^2 f) of a force f in units of mu R L^3/c^2 omega, lambda = L/D.
+
+
+def short_bearing() -> Iterator[Row]:
+    speed = 1500 * math.pi / 30
+    eps = analysis.eccentricity_ratio(525 / (forces.film_scale(0.1, 0.05, 0.03, 1e-4) * speed))
+    yield row("short bearing, eccentricity ratio", 0.266298, eps, 6e-7, FRISWELL)
+    at_load = dict(load=525.0, clearance=1e-4, speed=speed)
+    stiffness, _ = analysis.dimensional(analysis.film_coefficients(eps), **at_load)
+    for (name, printed), ours in zip(SHORT_BEARING.items(), np.asarray(stiffness).ravel(), strict=True):
+        yield row(f"short bearing, k_{name} [N/m]", printed, ours, 1.0, FRISWELL)
+    small = analysis.film_coefficients(1e-6)
+    whirl = analysis.whirl_threshold(small.stiffness, small.damping)
+    what = "whirl threshold of a vanishing load, omega sqrt(c/g)"
+    yield row(what, math.sqrt(24 / math.pi), whirl.speed, 1e-9, SHORT)
+    yield row("whirl ratio there", 0.5, whirl.whirl_ratio, 1e-9, SHORT)
+
+
+def _film(r: Any, v: Any, slenderness: float, **grid: Any) -> np.ndarray:
+    from reynolds import film_force  # benchmarks, which read the numbers above, do not find it
+
+    return film_force(r, v, slenderness, **grid)
+
+
+def film_limits() -> Iterator[Row]:
+    for eps in (0.3, 0.7):
+        tangential = 12 * math.pi * eps / ((2 + eps**2) * math.sqrt(1 - eps**2))
+        radial = -12 * eps**2 / ((2 + eps**2) * (1 - eps**2))
+        # What the ends of a long bearing take off goes with D/L: extrapolated from L/D = 10 and 20.
+        long = lambda how, lam: 4 * lam**2 * _film((eps, 0.0), (0.0, 0.0), lam, cavitation=how, profiles=8)
+        full, half = (2 * long(how, 20.0) - long(how, 10.0) for how in ("full", "guembel"))
+        where = f"long bearing, eps {eps}"
+        yield share(f"{where}, tangential force", tangential, full[1], 2e-3, SOMMERFELD)
+        yield share(f"{where}, half film, tangential", tangential / 2, half[1], 2e-3, GUEMBEL)
+        yield share(f"{where}, half film, radial", radial, half[0], 5e-3, GUEMBEL)
+    for lam in (0.25, 1.0):
+        ours = _film((1e-6, 0.0), (0.0, 0.0), lam, cavitation="full", profiles=8)[1] / (math.pi / 2 * 1e-6)
+        theirs = 3 * (1 - math.tanh(lam) / lam) / lam**2
+        yield share(f"concentric film over short film, L/D {lam}", theirs, ours, 1e-4, CONCENTRIC)
+
+
+def full_bearings() -> Iterator[Row]:
+    """A bearing fed at the widest gap, where the pressure is zero, as in A. A. Raimondi and J. Boyd's tables (1958)."""
+    for lam, eps in ((lam, eps) for lam in (1.0, 0.5, 0.25) for eps in (0.2, 0.4, 0.6, 0.8)):
+        radial, tangential = _film((eps, 0.0), (0.0, 0.0), lam, held=np.arange(256) == 128)
+        number, angle = finite_volumes(lam, eps)
+        ours = 1 / (4 * math.pi * lam**2 * math.hypot(radial, tangential))
+        where = f"full bearing, L/D {lam:g}, eps {eps}"
+        yield share(f"{where}, S", number, ours, 3e-4, FINITE_VOLUMES)
+        ours = math.degrees(math.atan2(tangential, -radial))
+        yield row(f"{where}, attitude angle [deg]", angle, ours, 0.01, FINITE_VOLUMES)
+
+
+def finite_volumes(slenderness: float, eps: float) -> np.ndarray:
+    """S and attitude angle [deg] of a full bearing a second time, extrapolated from grids whose errors fall by four.
+
+        d/dtheta (H^3 dp/dtheta) + (D/L)^2 H^3 d^2p/dzeta^2 = 6 dH/dtheta,  H = 1 + eps cos theta,
+    by finite volumes of five points on a grid that is even in theta, from the widest gap, and across half of the land.
+    """
+    wet, found = np.arange(1, 20)[:, None] < 11, []
+    for around, across in ((240, 16), (480, 32), (960, 64)):
+        h, k = 2 * math.pi / around, 1 / across
+        theta, gap = h * np.arange(1, around), 1 + eps * np.cos(h * (np.arange(around) + 0.5))
+        face, thick = gap**3 / h, (1 + eps * np.cos(theta)) ** 3 * h / slenderness**2
+        half = np.concatenate([[0.5], np.ones(across - 1)])  # the first cell across begins at the middle of the land
+        size, ends = k * half, np.full(across - 1, -1 / k)
+        along = diags_array([-face[1:-1], face[:-1] + face[1:], -face[1:-1]], offsets=[-1, 0, 1])  # pyright: ignore
+        over = diags_array([ends, 2 / k * half, ends], offsets=[-1, 0, 1])  # pyright: ignore
+        matrix = csr_array(kron(along, diags_array(size)) + kron(diags_array(thick), over))
+        source = 6 * np.outer(gap[:-1] - gap[1:], size).ravel()
+        rows = (np.arange(1, around) * (wet.shape[0] + 1) // around).clip(1, wet.shape[0]) - 1
+        on = wet[rows][:, np.arange(across) * wet.shape[1] // across].ravel()  # as on the coarser grid
+        while True:  # until p >= 0, and where p > 0 the equation holds
+            p = np.zeros(source.size)
+            p[on] = np.asarray(spsolve(csc_matrix(matrix[on][:, on]), source[on]))
+            before, on = on, np.where(on, p > 0, source - matrix @ p > 0)
+            if np.array_equal(on, before):
+                break
+        wet, p = on.reshape(around - 1, across), p.reshape(around - 1, across)
+        mean = (p[:, 0] / 2 + p[:, 1:].sum(axis=1)) / across
+        radial, tangential = (h * float(mean @ f(theta)) for f in (np.cos, np.sin))
+        angle = math.degrees(math.atan2(tangential, -radial))
+        found.append((1 / (math.pi * math.hypot(radial, tangential)), angle))
+    _, middle, fine = np.array(found)
+    return fine + (fine - middle) / 3
+
+
+TINY = 1e-30
+
+
+def grooved_bearing(eps: float, slenderness: float, angle: float) -> tuple[float, float, np.ndarray, np.ndarray]:
+    """S, attitude angle, stiffness over W/c and damping over W/(c omega) in our frame; grooves of 20 degrees.
+
+    By Newton's method on the angle between load and grooves, from a guess; derivatives by imaginary steps.
+    """
+    degrees = np.arange(288) * 1.25
+    away = np.minimum(np.abs((degrees + 90) % 360 - 90), np.abs(degrees - 180))
+    force = lambda r, v: _film(r, v, slenderness, stations=288, profiles=2, held=away < 10.1)
+    place = lambda a: eps * np.array([np.sin(a), -np.cos(a)])
+    for _ in range(8):
+        sideways = force(place(angle + 1j * TINY), (0.0, 0.0))[0]
+        angle -= sideways.real / (sideways.imag / TINY)
+    r, still, steps = place(angle), np.zeros(2), 1j * TINY * np.eye(2)
+    load = force(r, still)[1]
+    k = np.stack([force(r + h, still).imag / TINY for h in steps], axis=1)
+    c = np.stack([force(r, h).imag / TINY for h in steps], axis=1)
+    return 1 / (4 * math.pi * slenderness**2 * load), angle, -k / load, -c / load
+
+
+def lund_thomsen() -> Iterator[Row]:
+    for line in GROOVED.split("\n")[1:-1]:
+        lam, number, eps, angle, *printed = map(float, line.split())
+        sommerfeld, attitude, k, c = grooved_bearing(eps, lam, math.radians(angle))
+        ours = (k[1, 1], -k[1, 0], -k[0, 1], k[0, 0], c[1, 1], -c[1, 0], c[0, 0])
+        where = f"two grooves, L/D {lam:g}, eps {eps}"
+        yield share(f"{where}, S", number, sommerfeld, 0.02, LUND_THOMSEN)
+        yield row(f"{where}, attitude angle [deg]", angle, math.degrees(attitude), 0.5, LUND_THOMSEN)
+        for name, theirs, value in zip(COEFFICIENTS, printed, ours, strict=True):
+            yield row(f"{where}, {name}", theirs, value, max(0.06 * abs(theirs), 0.06), LUND_THOMSEN)
+
+
+def nicholas() -> Iterator[Row]:
+    """Their eccentricity ratios have two digits: ours is solved for at their S, by the secant rule."""
+    whirl = lambda eps: analysis.whirl_threshold(*map(jnp.asarray, grooved_bearing(eps, 1.0, 1.5)[2:])).speed
+    for number, printed in GROOVED_WHIRL.items():
+        eps = printed
+        for _ in range(4):  # the load is all but proportional to eps
+            eps *= grooved_bearing(eps, 1.0, 1.5)[0] / number
+        where = f"two grooves, L/D 1, S {number}"
+        yield row(f"{where}, eps", printed, eps, 0.006, NICHOLAS)
+        yield row(f"{where}, whirl threshold omega sqrt(c/g)", 2.1, whirl(eps), 0.05, NICHOLAS)
+    yield row("two grooves, L/D 1, no load, whirl threshold omega sqrt(c/g)", 2.05, whirl(1e-3), 0.05, ASYMPTOTE)
+
+
+# Statics.
+
+
+def load_factors() -> Iterator[Row]:
+    """400 thin rollers: the sum over them is the integral J_r = F/(Z Q_max), at the zone 1/2 - G_r/(4 delta_s)."""
+    many = lambda gap: bearing.Bearing(0.05, 0.11, 0.04, 400, 5e-4, 0.027, 0.0921, 0.065, gap, 3e-4)
+    free = float(bearing.load_distribution(many(0.0), 4450.0).max_load) * 400 / 4450
+    yield row("Q_max Z/F without clearance", 4.08, free, 0.006, NSK)
+
+    def integral(zone: float) -> float:
+        part = lambda a: max(1 - (1 - math.cos(a)) / (2 * zone), 0.0) ** (10 / 9) * math.cos(a)
+        return quad(part, 0.0, math.acos(1 - 2 * zone), epsabs=0.0, epsrel=1e-12, limit=200)[0] / math.pi
+
+    yield share("load integral at zone parameter 0.5", integral(0.5), 1 / free, 1e-4, SJOEVALL)
+    at = lambda load: bearing.load_distribution(many(4e-6), load)
+    for zone in (0.1, 0.2, 0.3, 0.4):
+        off = lambda load: 0.5 * (1 - 4e-6 / (2 * float(at(load).shaft_shift))) - zone
+        load: Any = brentq(off, 10.0, 1e6, xtol=1e-3)
+        ours = load / (400 * float(at(load).max_load))
+        yield share(f"load integral at zone parameter {zone}", integral(zone), ours, 1e-4, SJOEVALL)
+    for load, length in ((1000.0, 10.0), (5000.0, 27.0)):
+        stiffness = bearing.line_contact_stiffness(bearing.PALMGREN_CONSTANT, 1e-3 * length)
+        ours = 1e3 * bearing.line_contact_approach(stiffness, load)
+        what = f"approach at {load:g} N and {length:g} mm [mm]"
+        yield share(what, 3.84e-5 * load**0.9 / length**0.8, ours, 1e-3, PALMGREN)
+
+
+def loads_by_scipy(load: float, clearance: float, rollers: int, length: float) -> tuple[float, np.ndarray]:
+    """Shift of the shaft [m] and loads of the rollers [N], one at the bottom, of a diametral clearance [m].
+
+    The length of the rollers is in millimetres.
+    """
+    both = 8.06e4 * length ** (8 / 9) * 1e3 ** (10 / 9) / 2 ** (10 / 9)
+    direction = np.cos(2 * np.pi * np.arange(rollers) / rollers)
+    loads = lambda shift: both * np.maximum(shift * direction - clearance / 2, 0.0) ** (10 / 9)
+    shift: Any = brentq(lambda s: loads(s) @ direction - load, clearance / 2, 1e-3, xtol=1e-16)
+    return shift, loads(shift)
+
+
+def nu2310() -> Iterator[Row]:
+    ours = bearing.nu2310()
+    for clearance, load in ((0.0, 4450.0), (40e-6, 4450.0), (40e-6, 18600.0)):
+        found = bearing.load_distribution(jc.replace(ours, radial_clearance=clearance), load)
+        shift, loads = loads_by_scipy(load, clearance, 13, 27.0)
+        where = f"NU2310, {load:g} N, clearance {1e6 * clearance:g} um"
+        yield share(f"{where}, Q_max [N]", loads[0], found.max_load, 1e-6, BRENTQ)
+        yield share(f"{where}, shift [um]", 1e6 * shift, 1e6 * found.shaft_shift, 1e-6, BRENTQ)
+    ratio, shaft = 0.5 * (1 - 16 / 81), 6700 * math.pi / 30
+    yield row("NU2310, cage speed over shaft speed", ratio, ours.cage_speed_ratio, 1e-12, ROLLING)
+    force = math.pi / 4 * 0.016**2 * 0.027 * 7800 * (ratio * shaft) ** 2 * 0.0405
+    what = "NU2310, centrifugal force of a roller at 6700 rpm [N]"
+    yield share(what, force, ours.roller_centrifugal_force(shaft), 5e-3, CENTRIFUGAL)
+
+
+# Contact.
+
+
+def contact() -> Iterator[Row]:
+    mass, stiffness, v0, n = 0.2, 3e8, 0.1, 10 / 9
+    scale = (mass * v0**2 / stiffness) ** (1 / (n + 1))
+
+    def impact(restitution: float) -> tuple[float, float, float]:
+        """Speed after over speed before, greatest depth [m] and duration [s] of an impact on our contact force."""
+        chi = float(forces.restitution_damping(restitution))
+        normal = jax.jit(lambda p, v: forces.contact_force(p, v, stiffness, chi / v0))
+        push = lambda t, y: [float(y[1]), -float(normal(jnp.asarray(max(y[0], 0.0)), jnp.asarray(y[1]))) / mass]
+        out, deepest = (lambda t, y: float(y[0])), (lambda t, y: float(y[1]))
+        out.terminal, out.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
+        how: Any = dict(method="DOP853", events=[out, deepest], rtol=1e-10, atol=[1e-11 * scale, 1e-11 * v0])
+        done = solve_ivp(push, (0.0, 200 * scale / v0), [0.0, v0], **how)
+        return -done.y[1, -1] / v0, float(done.y_events[1][0][0]), float(done.t[-1])
+
+    for restitution in (0.9, 0.7, 0.5, 0.3):
+        yield row(f"restitution, {restitution} asked for", restitution, impact(restitution)[0], 1e-5, HUNT_CROSSLEY)
+    near = forces.restitution_damping(0.9999) / 1.5e-4
+    yield row("damping number over 3 (1 - e)/2 at e = 0.9999", 1.0, near, 2e-4, NEAR_ONE)
+    speed, depth, duration = impact(1.0)
+    deepest = ((n + 1) / 2) ** (1 / (n + 1)) * scale
+    lasting = 2 * deepest / v0 * math.sqrt(math.pi) * gamma(1 + 1 / (n + 1)) / gamma(0.5 + 1 / (n + 1))
+    yield row("restitution of an elastic impact", 1.0, speed, 1e-6, IMPACT)
+    yield share("greatest depth [um]", 1e6 * deepest, 1e6 * depth, 1e-6, IMPACT)
+    yield share("duration [us]", 1e6 * lasting, 1e6 * duration, 1e-6, IMPACT)
+
+
+# Exponents.
+
+
+class Oscillator(NamedTuple):
+    """x'' = f(t, x, x') with period 2 pi over `frequency`, in NumPy, and f's derivatives, written by hand."""
+
+    f: Callable[[Any, Any, Any], Any]
+    by_position: Callable[[Any], Any]
+    damping: float
+    """Minus the derivative with respect to x', a constant."""
+    frequency: float
+
+
+def duffing(damping: float, force: float, frequency: float) -> Oscillator:
+    """x'' + d x' - x + x^3 = g cos wt."""
+    push = lambda t, x, v: -damping * v + x - x * x * x + force * math.cos(frequency * t)
+    return Oscillator(push, lambda x: 1 - 3 * x * x, damping, frequency)
+
+
+def pendulum(damping: float, torque: float, frequency: float, stiffness: float = 1.0) -> Oscillator:
+    """x'' + d x' + k sin x = g cos wt."""
+    push = lambda t, x, v: -damping * v - stiffness * np.sin(x) + torque * math.cos(frequency * t)
+    return Oscillator(push, lambda x: -stiffness * np.cos(x), damping, frequency)
+
+
+UEDA = Oscillator(lambda t, x, v: -0.05 * v - x * x * x + 7.5 * math.sin(t), lambda x: -3 * x * x, 0.05, 1.0)
+
+
+_ueda = lambda tau, q, v, speed: (-0.05 * v[0] - q[0] ** 3 + 7.5 * jnp.sin(tau),)
+_duffing = lambda d, g: lambda tau, q, v, speed: (-d * v[0] + q[0] - q[0] ** 3 + g * jnp.cos(tau),)
+_pendulum = lambda d, g: lambda tau, q, v, speed: (-d * v[0] - jnp.sin(q[0]) + g * jnp.cos(tau),)
+LAWS = (
+    (_ueda, UEDA),
+    (_duffing(0.25, 0.4), duffing(0.25, 0.4, 1.0)),
+    (_pendulum(0.05, 0.6), pendulum(0.05, 0.6, 0.7)),
+    (_duffing(0.3, 0.5), duffing(0.3, 0.5, 1.2)),
+    (_duffing(0.15, 0.3), duffing(0.15, 0.3, 1.0)),
+    (_pendulum(0.5, 1.5), pendulum(0.5, 1.5, 2 / 3)),
+)
+"""In the order of the table: for the package, and in NumPy."""
+
+
+def largest_exponent(of: Oscillator, starts: int, discard: int, periods: int, steps: int) -> tuple[float, float]:
+    """Largest exponent per unit of time of the chaotic motion, by Runge-Kutta steps, and its standard error.
+
+    From starts in the square of side 2; those that end on a periodic orbit, with a negative exponent, are left out.
+    """
+    f, slope, damping, frequency = of
+    span = 2 * math.pi / frequency
+    h, growth, y = span / steps, np.zeros(starts), np.zeros((4, starts))
+    y[:2], y[2] = np.random.default_rng(7).uniform(-1, 1, (2, starts)), 1.0
+    rates = lambda t, y: np.stack([y[1], f(t, y[0], y[1]), y[3], slope(y[0]) * y[2] - damping * y[3]])
+    for period in range(discard + periods):
+        for t in h * np.arange(steps):
+            k1 = rates(t, y)
+            k2 = rates(t + h / 2, y + h / 2 * k1)
+            k3 = rates(t + h / 2, y + h / 2 * k2)
+            y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(t + h, y + h * k3))
+        length = np.hypot(y[2], y[3])
+        y[2:] /= length
+        growth += np.log(length) if period >= discard else 0.0
+    each = growth[growth > 0] / (periods * span)
+    return float(each.mean()), float(each.std(ddof=1) / math.sqrt(each.size))
+
+
+def _exponents(
+    system: Any, speed: float, centre: tuple[float, ...], starts: int, count: int, steps: int, discard: int, length: int
+) -> jc.Sweep:
+    around = np.asarray(centre) + np.random.default_rng(0).uniform(-1, 1, (starts, len(centre)))
+    how: Any = dict(exponents=count, blocks=10, keep=1, method=jc.method("rodas4", steps=steps))
+    begin = [tuple(map(float, s)) for s in around]
+    return jc.sweep(system, np.array([speed]), starts=begin, discard=discard, revolutions=length, **how)
+
+
+def driven_exponents() -> Iterator[Row]:
+    for (name, theirs), (law, of) in zip(EXPONENTS.items(), LAWS, strict=True):
+        system = jc.ForcedOscillator(law, coordinates=1)
+        found = _exponents(system, of.frequency, (0.0, 0.0), 256, 1, 64, 500, 2000)
+        each = found.exponents[found.label == "chaotic", 0] * of.frequency / (2 * math.pi)
+        sample = 3 * float(each.std(ddof=1)) / math.sqrt(each.size)
+        yield beside(f"{name}, largest exponent", theirs, each.mean(), sample)
+    found = _exponents(jc.ForcedOscillator(_ueda, coordinates=1), 1.0, (0.0, 0.0), 4, 2, 512, 20, 100)
+    ours = found.exponents[0].mean(axis=0).sum() / (2 * math.pi)
+    yield row("Ueda, sum of the exponents", -0.05, ours, 1e-6, TRACE)
+
+
+ORDER = "largest", "second", "third"
+
+
+def flows() -> Iterator[Row]:
+    """An autonomous system has no period: a unit of time takes its place."""
+    law = lambda rho: (
+        lambda tau, y, speed: (
+            10 * (y[1] - y[0]),
+            y[0] * (rho - y[2]) - y[1],
+            y[0] * y[1] - 8 / 3 * y[2],
+        )
+    )
+    system = lambda rho: jc.ForcedSystem(law(rho), dimension=3)
+    found = _exponents(system(28.0), 2 * math.pi, (5.0, 5.0, 25.0), 64, 3, 256, 50, 500).exponents[0].mean(axis=0)
+    name = "Lorenz 10, 28, 8/3"
+    yield from (beside(f"{name}, {n} exponent", theirs, x) for n, theirs, x in zip(ORDER, LORENZ, found, strict=True))
+    yield row(f"{name}, sum", -41 / 3, found.sum(), 1e-4, TRACE)
+    yield beside(f"{name}, dimension of Kaplan and Yorke", LORENZ_DIMENSION, 2 + found[0] / abs(found[2]))
+    fixed = math.sqrt(8 / 3 * 19)
+    still = _exponents(system(20.0), 2 * math.pi, (fixed, fixed, 19.0), 2, 3, 256, 200, 500).exponents[0].mean(axis=0)
+    decay = np.linalg.eigvals(np.array([[-10, 10, 0], [1, -1, -fixed], [fixed, fixed, -8 / 3]])).real
+    yield row("Lorenz 10, 20, 8/3, largest exponent", decay.max(), still[0], 2e-3, EIGENVALUES)
+    yield row("Lorenz 10, 20, 8/3, third exponent", decay.min(), still[2], 2e-3, EIGENVALUES)
+    rates = lambda tau, y, speed: (-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7))
+    found = _exponents(jc.ForcedSystem(rates, dimension=3), 1.0, (0.0, -5.0, 0.0), 64, 3, 512, 20, 400)
+    each = found.exponents[0].mean(axis=0) / (2 * math.pi)
+    for n, theirs, x in zip(ORDER, ROESSLER, each, strict=True):
+        yield beside(f"Roessler .2, .2, 5.7, {n} exponent", theirs, x)
+
+
+# Bifurcations.
+
+FINE = jc.method("rodas4", steps=1024)
+
+
+def doubling(family: Callable[[float], Oscillator], periods: int, bracket: Any, start: Any) -> float:
+    """Parameter at which an orbit of `periods` periods of the drive has the multiplier -1, a second time.
+
+    DOP853 on the variational equations; Newton's method on the orbit, Brent's on 1 + tr M + det M. The orbit is stable
+    at the first end of the bracket, and reached from `start` by simulation.
+    """
+
+    def map_of(oscillator: Oscillator, at: np.ndarray, turns: int, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+        f, slope, damping, frequency = oscillator
+
+        def rates(t: float, y: np.ndarray) -> list[float]:
+            k = slope(y[0])
+            return [y[1], f(t, y[0], y[1]), y[3], k * y[2] - damping * y[3], y[5], k * y[4] - damping * y[5]]
+
+        how: Any = dict(method="DOP853", rtol=tolerance, atol=tolerance)
+        end = solve_ivp(rates, (0.0, turns * periods * 2 * math.pi / frequency), [*at, 1, 0, 0, 1], **how).y[:, -1]
+        return end[:2], np.array([[end[2], end[4]], [end[3], end[5]]])
+
+    at = np.array(start, dtype=float)
+    for _ in range(8):
+        at = map_of(family(bracket[0]), at, 40, 1e-9)[0]
+
+    def characteristic(parameter: float) -> float:
+        nonlocal at
+        for _ in range(20):
+            end, matrix = map_of(family(parameter), at, 1, 1e-12)
+            step = np.linalg.solve(matrix - np.eye(2), at - end)
+            at = at + step
+            if np.abs(step).max() < 1e-10:
+                return float(1 + np.trace(matrix) + np.linalg.det(matrix))
+        raise RuntimeError("Newton's method did not find the orbit.")
+
+    found: Any = brentq(characteristic, *bracket, xtol=1e-13)
+    return found
+
+
+class Law(eqx.Module):
+    """Rates or accelerations of a system with constants by name."""
+
+    c: dict[str, jax.Array]
+    f: Callable[..., Any] = eqx.field(static=True)
+
+    def __call__(self, tau: Any, *state: Any) -> Any:
+        return self.f(self.c, tau, *state)
+
+
+def _system(f: Callable[..., Any], dimension: int = 0, **c: float) -> Any:
+    """A system of first order, or without a dimension an oscillator."""
+    law = Law({name: jnp.asarray(x, float) for name, x in c.items()}, f)
+    return jc.ForcedSystem(law, dimension=dimension) if dimension else jc.ForcedOscillator(law, coordinates=1)
+
+
+def _point(system: Any, kind: Any, near: Any, name: str, **options: Any) -> Any:
+    """The value of a constant at a bifurcation."""
+    pick = lambda s: getattr(s, "acceleration" if isinstance(s, jc.ForcedOscillator) else "rates").c[name]
+    return jc.bifurcation(system, kind, near, pick, method=FINE, **options).value
+
+
+def _duffing_of_all(c: Any, tau: Any, q: Any, v: Any, speed: Any) -> Any:
+    return ((-c["d"] * v[0] + c["k"] * q[0] - c["b"] * q[0] ** 3 + c["g"] * jnp.cos(tau)) / c["m"],)
+
+
+def doublings() -> Iterator[Row]:
+    name, found = "Duffing x'' + .3 x' - x + x^3 = g cos 1.2t", []
+    for periods, (inside, theirs) in DUFFING_DOUBLINGS.items():
+        system = _system(_duffing_of_all, m=1.0, d=0.3, k=1.0, b=1.0, g=inside)
+        orbit = jc.periodic_orbit(system, 1.2, periods, guess=(1.0, 0.0), revolutions=400, method=FINE)
+        found.append(float(_point(system, "period-doubling", orbit, "g", speed=1.2, periods=periods)))
+        yield beside(f"{name}: g where period {periods} doubles", theirs, found[-1])
+    ratio = (found[1] - found[0]) / (found[2] - found[1])
+    yield row(f"{name}: first ratio of distances", FEIGENBAUM, ratio, 0.25, FEIGENBAUM_1978)
+    system = _system(_duffing_of_all, m=1.0, d=0.3, k=1.0, b=1.0, g=0.262)
+    orbit = jc.periodic_orbit(system, 1.2, 1, guess=(1.0, 0.0), revolutions=400, method=FINE)
+    force = lambda system: _point(system, "period-doubling", orbit, "g", speed=1.2)
+    value, slope = eqx.filter_value_and_grad(force)(system)
+    of, name = slope.acceleration.c, "Duffing x'' + .3 x' - x + x^3 = g cos 1.2t: slope of the first by"
+    for (what, theirs), ours in zip(DUFFING_SLOPES.items(), (of["m"], of["d"], of["k"] + of["b"]), strict=True):
+        yield beside(f"{name} {what}", theirs, ours)
+    yield row(f"{name} b", -value / 2, of["b"], 1e-9, SCALING)
+
+
+PENDULUM = {1: (1.06, 1.07), 2: (1.075, 1.08), 4: (1.081, 1.0823), 8: (1.0825, 1.0828)}
+"""Periods: a drive strength at which the orbit is stable, and one at which it is not."""
+
+
+def pendulum_doublings() -> Iterator[Row]:
+    """The driven pendulum of J. R. Taylor, Classical Mechanics (2005), chapter 12."""
+    speed, found = 2 * math.pi, []
+    square = (1.5 * speed) ** 2
+
+    def law(c: Any, tau: Any, q: Any, v: Any, speed: Any) -> Any:
+        natural = 1.5 * speed
+        return (-natural / 2 * v[0] + natural**2 * (c["g"] * jnp.cos(tau) - jnp.sin(q[0])),)
+
+    for n, bracket in PENDULUM.items():
+        start = (-math.pi / 2, 0.0)
+        theirs = doubling(lambda g: pendulum(0.75 * speed, g * square, speed, square), n, bracket, start)
+        system = _system(law, g=bracket[0])
+        orbit = jc.periodic_orbit(system, speed, n, guess=start, revolutions=320, method=FINE)
+        found.append(float(_point(system, "period-doubling", orbit, "g", speed=speed, periods=n)))
+        yield row(f"pendulum: drive strength where period {n} doubles", theirs, found[-1], 2e-9, SHOOTING)
+    ratio = (found[2] - found[1]) / (found[3] - found[2])
+    yield share("pendulum: second ratio of distances", FEIGENBAUM, ratio, 0.02, FEIGENBAUM_1978)
+
+
+def folds() -> Iterator[Row]:
+    system = _system(_duffing_of_all, m=1.0, d=0.1, k=-1.0, b=1.0, g=0.3)
+    for speed, start, theirs in ((1.7, (0.6, 2.4), "up"), (1.4, (-0.3, 0.05), "down")):
+        orbit = jc.periodic_orbit(system, speed, 1, guess=start, revolutions=400, method=FINE)
+        ours = jc.bifurcation(system, "fold", orbit, method=FINE).value
+        yield beside("Duffing x'' + .1 x' + x + x^3 = .3 cos wt: w at a fold", DUFFING_FOLDS[theirs], ours)
+
+
+def van_der_pol() -> Iterator[Row]:
+    def law(c: Any, tau: Any, y: Any, speed: Any) -> Any:
+        return (y[1], c["mu"] * (1 - y[0] ** 2) * y[1] - y[0] + c["g"] * jnp.cos(tau))
+
+    driven = _system(law, 2, mu=0.3, g=1.2)
+    held = jc.periodic_orbit(driven, 1.3, guess=(-1.3, -0.4), method=FINE)
+    what = "van der Pol, mu 0.3, g cos 1.3t: g where it is let go (Neimark-Sacker)"
+    yield beside(what, VAN_DER_POL_LET_GO, _point(driven, "Neimark-Sacker", held, "g"))
+
+
+def mathieu() -> Iterator[Row]:
+    """x'' + (a - 2 q cos 2t) x = 0 with tau = 2 t."""
+    system = _system(lambda c, tau, q, v, speed: (-(c["a"] - 2 * jnp.cos(tau)) * q[0],), a=1.0)
+    for name in ("b1", "a1", "a0", "b2", "a2"):
+        order, of = int(name[1]), mathieu_b if name[0] == "b" else mathieu_a
+        kind, theirs = "period-doubling" if order == 1 else "branch-point", float(of(order, 1))
+        ours = _point(system, kind, ((0.0, 0.0), theirs + 0.03), "a", speed=2.0)
+        yield row(f"Mathieu's equation: {name}", theirs, ours, 1e-8, MATHIEU)
+
+
+# The cage.
+
+RPM = math.pi / 30
+BEYOND_SPRINGS = "cubic_stiffness", "cubic_ratio", "cross_stiffness"
+
+
+def _cage(without: tuple[str, ...], **changes: Any) -> jc.CageModel:
+    return jc.replace(jc.case("1a"), **(dict.fromkeys((*without, *BEYOND_SPRINGS), 0.0) | changes))
+
+
+def _without_film(model: jc.CageModel) -> jc.CageModel:
+    return eqx.tree_at(lambda m: m.film.land_width, model, jnp.asarray(1e-7))
+
+
+def unbalance() -> Iterator[Row]:
+    """Steady position at phase 0 below and above resonance: r = e w^2/(K/M - w^2 + i w B/M)."""
+    mass, k, damping, arm = 0.25, 4e4, 20.0, 30e-6
+    support = dict(cage_mass=mass, stiffness_x=k, stiffness_y=k, damping=damping, eccentricity=arm)
+    model = _without_film(_cage(("gravity", "amplitude"), unbalance="physical", **support))
+    for part in (0.8, 1.5):
+        speed = part * math.sqrt(k / mass)
+        run = jc.simulate(model, speed, revolutions=1, discard=120, samples=1, start=(0.0, 0.0, 0.0, 0.0))
+        exact = arm * speed**2 / (k / mass - speed**2 + 1j * speed * damping / mass)
+        for axis, theirs, ours in (("x", exact.real, run.state[0, 0]), ("y", exact.imag, run.state[0, 1])):
+            what = f"unbalance response at {part} of resonance, {axis} at phase 0 [um]"
+            yield share(what, 1e6 * theirs, 1e6 * ours, 1e-5, JEFFCOTT)
+
+
+def divergence() -> Iterator[Row]:
+    model, speed = _without_film(jc.replace(jc.case("1a"), restitution=1.0)), 15000 * RPM
+    how: Any = dict(exponents=4, blocks=10, keep=1, method=jc.method(steps=2048), confirm=False, horizon=0)
+    found = jc.sweep(model, np.array([speed]), discard=20, revolutions=50, **how)
+    theirs = -2 * float(model.support.damping / model.cage_mass) * 2 * math.pi / speed
+    what = "case 1a without film at 15000 rpm: sum of the four exponents"
+    yield share(what, theirs, found.exponents.sum(axis=-1).mean(), 1e-3, DAMPING)
+
+
+def whirl() -> Iterator[Row]:
+    def light(mass: float, gap: float) -> jc.CageModel:
+        alone = "stiffness_x", "stiffness_y", "damping", "eccentricity", "amplitude"
+        return eqx.tree_at(lambda m: m.cage_mass, _cage(alone, guidance_gap=gap, gravity=9.81), jnp.asarray(mass))
+
+    for gap in (0.45e-3, 0.60e-3):
+        theirs = math.sqrt(24 / math.pi * 9.81 / gap) / RPM
+        ours = analysis.film_whirl_speed(light(1e-6, gap)) / RPM
+        yield share(f"whirl threshold of a light cage, gap {1e3 * gap:g} mm [rpm]", theirs, ours, 1e-4, ROUTH)
+    model = light(1e-5, 0.45e-3)
+    speed = float(analysis.film_whirl_speed(model)) * 1.01
+    at = analysis.equilibrium(model, speed).coordinates
+    start = (*map(float, at), 1e-3 * float(model.clearance) * speed, 0.0)
+    fine = jc.method(steps=256)
+    run = jc.simulate(model, speed, revolutions=40, discard=10, samples=16, start=start, method=fine)
+    away = run.state[:, :2] - np.asarray(at)
+    turned = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
+    ratio = (turned[-1] - turned[0]) / (run.tau[-1] - run.tau[0])
+    yield row("whirl of a light cage over its speed, simulated", 0.5, ratio, 0.005, NEWKIRK)
+
+
+@eqx.filter_jit
+def _half_a_revolution(model: jc.CageModel, speed: Any, start: Any) -> Any:
+    return jc.strobe_map(model, speed, jc.method(steps=1024)).part(start, 0, 2).y
+
+
+def half_a_revolution() -> Iterator[Row]:
+    """Off the rib; contact is compared in the contact's own topic."""
+    import reference
+
+    for name in bearing.PUBLISHED_CASES:
+        model, speed = jc.case(name), 9000 * RPM
+        c = float(model.clearance)
+        field, start = reference.field(model, speed), np.array([0.2, 0.1, 0.0, 0.0])
+        rates = lambda tau, z: np.array(field(tau, (z * field.scale).tolist())) / field.scale
+        how: Any = dict(method="DOP853", rtol=1e-10, atol=1e-11)
+        done = solve_ivp(rates, (0.0, math.pi), start, **how)
+        ours = _half_a_revolution(model, jnp.asarray(speed), tuple(jnp.asarray(s) for s in start * field.scale))
+        for i, axis in enumerate("xy"):
+            what = f"case {name}, 9000 rpm, {axis} over clearance after half a revolution"
+            yield row(what, done.y[i, -1], float(ours[i]) / c, 1e-6, POLAR)
+
+
+Rows = Callable[[], Iterator[Row]]
+TOPICS: dict[str, tuple[Rows, ...]] = {
+    "film": (short_bearing, film_limits, full_bearings, lund_thomsen, nicholas),
+    "statics": (load_factors, nu2310),
+    "contact": (contact,),
+    "exponents": (driven_exponents, flows),
+    "bifurcations": (doublings, pendulum_doublings, folds, van_der_pol, mathieu),
+    "cage": (unbalance, divergence, whirl, half_a_revolution),
+}
+
+
+def page(found: dict[str, list[Row]]) -> str:
+    """All rows as Markdown."""
+    rows = [r for of in found.values() for r in of]
+    lines = [
+        f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass. Made by "
+        "`python tests/literature.py`.\n",
+        "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
+        "where theirs was computed on a coarse grid or ours is a finite sample. FAILS marks a difference beyond it.",
+        "A source is one that can be opened, or a second computation that shares no code with what it is held against.",
+        "In the rows of long and concentric films, of full bearings and of grooves, ours is the solver of Reynolds'",
+        "equation in `tests/reynolds.py`, with which the tests compare the short film of the package.",
+    ]
+    for topic, of in found.items():
+        lines += [f"\n## {topic.capitalize()}\n", "| what | theirs | ours | difference | tolerance | | source |"]
+        lines += ["|---|---:|---:|---:|---:|---|---|", *map(_line, of)]
+    return "\n".join(lines) + "\n"
+
+
+def _line(r: Row) -> str:
+    """Ours has as many digits as the tolerance asks for, and one more."""
+    digits = 2
+    while digits < 12 and abs(r.ours) * 10.0 ** (1 - digits) > r.tolerance:
+        digits += 1
+    numbers = f"{r.theirs:.10g} | {r.ours:.{digits}g} | {r.ours - r.theirs:+.2g} | {r.tolerance:.2g}"
+    return f"| {r.what} | {numbers} | {'pass' if r.passed else '**FAILS**'} | {r.source} |"
+
+
+if __name__ == "__main__":
+    jc.enable_x64()
+    made = {topic: [r for rows in of for r in rows()] for topic, of in TOPICS.items()}
+    (pathlib.Path(__file__).parents[1] / "VALIDATION.md").write_text(page(made), encoding="utf-8")
