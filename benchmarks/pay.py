@@ -97,7 +97,7 @@ class Case:
         self.objective = whole(self.space, chaotic_width(*range_, SPEEDS, discard=DISCARD, revolutions=REVOLUTIONS))
         shift = 0.25 * (range_[1] - range_[0]) / (4 * SPEEDS)
         inside = range_[0] + shift, range_[1] - shift
-        length: Any = dict(starts=3, discard=150, revolutions=100, method=jc.controlled(DEFAULT_ERROR / 4))
+        length: Any = dict(starts=3, discard=150, revolutions=100, method=jc.native(error=DEFAULT_ERROR / 4))
         self.fine = whole(self.space, chaotic_width(*inside, 4 * SPEEDS, **length))
 
 

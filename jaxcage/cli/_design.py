@@ -30,10 +30,11 @@ from ..design import (
     tolerance_budget,
     unchanged,
 )
-from ..integrate import DEFAULT_ERROR, controlled
+from ..integrate import DEFAULT_ERROR
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
 from ..plotting import design_figure, elasticity_bars
+from ..solve import native
 from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job
@@ -153,7 +154,7 @@ def _finer(options: DesignOptions) -> ChaosMeasure:
     steps."""
     between = (options.last - options.first) / (8 * options.speeds)
     range_ = options.first + between, options.last - between, FINER * options.speeds
-    return chaotic_width(*range_, starts=STARTS, method=controlled(DEFAULT_ERROR / 4))
+    return chaotic_width(*range_, starts=STARTS, method=native(error=DEFAULT_ERROR / 4))
 
 
 def _objective(

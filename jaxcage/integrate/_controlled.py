@@ -225,6 +225,7 @@ def _turned(tangent: tuple[Any, ...], other: tuple[Any, ...], scale: tuple[Any, 
 
 def stated(method: AbstractMethod) -> ControlledSteps:
     """`method` with its error measured: a number of steps beside half as many, a tolerance beside a larger one."""
+    method = method.in_jax
     if isinstance(method, ControlledSteps):
         return method
     if isinstance(method, FixedSteps):

@@ -89,6 +89,11 @@ def _term(solver: dfx.AbstractSolver) -> Any:
 class AbstractMethod(eqx.Module):
     """How to integrate a field over a part of a revolution."""
 
+    @property
+    def in_jax(self) -> "AbstractMethod":
+        """The method that stands for this one inside JAX's programs."""
+        return self
+
     @abc.abstractmethod
     def advance(
         self,

@@ -31,6 +31,10 @@ class NativeSteps(AbstractMethod):
     pair: str = eqx.field(static=True)
     instead: ControlledSteps
 
+    @property
+    def in_jax(self) -> AbstractMethod:
+        return self.instead
+
     def advance(
         self,
         field: AbstractField,

@@ -16,9 +16,10 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from .._sobol import sobol
 from ..analysis import Sweep, zones
-from ..integrate import AbstractMethod, controlled
+from ..integrate import AbstractMethod
 from ..io import Unknown, check_together
 from ..models import CageModel
+from ..solve import native
 from ..sweeps import Progress, sweep_designs
 
 
@@ -250,7 +251,7 @@ def run_draws(
         blocks=blocks,
         keep=32,
         settled=SETTLED if discard >= SETTLED else 0,
-        method=controlled(ERROR) if method is None else method,
+        method=native(error=ERROR) if method is None else method,
         progress=progress,
     )
 

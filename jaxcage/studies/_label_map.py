@@ -11,8 +11,9 @@ from jaxtyping import Bool, Float, Int
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._parameters import parameter_info
-from ..integrate import AbstractMethod, controlled
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import native
 from ..sweeps import require_persist
 from ._plan import LANES, Plan
 from ._stored import SPEED
@@ -132,7 +133,7 @@ def label_map(
         raise ArgumentError("x", "y", said=f"must have at least 2 values each, but have {shape[0]} and {shape[1]}.")
     fixed = {} if speed is None else {SPEED: np.array([speed])}
     plan = Plan({**fixed, x_name: x_value, y_name: y_value}, {}, 0, 0, starts, LANES)
-    chosen = controlled() if method is None else method
+    chosen = native() if method is None else method
     about = Study(system, plan, chosen, discard, revolutions, blocks, 1, 0)
     require_persist(persist, discard, 1, blocks)
     say = lambda what: None if stage is None else functools.partial(stage, what)

@@ -10,9 +10,10 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod, controlled
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, BearingModel
 from ..models.whole import CAGE_STARTS
+from ..solve import native
 from ..sweeps import Progress
 from ._plan import LANES, Plan
 from ._store import Store, open_study
@@ -100,7 +101,7 @@ def study(
     else:
         if tolerance is not None:
             raise ArgumentError("tolerance", said="goes with a whole bearing; of other systems the `method` has it.")
-        chosen = controlled() if method is None else method
+        chosen = native() if method is None else method
         about = Study(system, plan, chosen, discard, revolutions, blocks, exponents, strobe, name, version)
     run_study(about, store, shard, executor, scheduler, workers, progress)
     return open_study(store)

@@ -10,8 +10,9 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Sweep
-from ..integrate import AbstractMethod, controlled
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
+from ..solve import native
 from ._engine import Progress, run_lanes
 from ._speed import assemble, checked_speeds, initial_states, make_plan, settings_of
 
@@ -76,7 +77,7 @@ def run_up_down_designs(
     """
     require_x64()
     speed = checked_speeds(speeds)
-    chosen = controlled() if method is None else method
+    chosen = native() if method is None else method
     if not systems:
         raise ArgumentError("systems", said="must hold at least one system, but it is empty.")
     plan = make_plan(discard, revolutions, blocks, keep, exponents, systems[0].dimension)

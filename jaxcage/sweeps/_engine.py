@@ -23,7 +23,7 @@ from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
 from ..integrate import BLOCK, AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
 from ..solve import NativeSteps
-from ._native import observe_native
+from ._native import Lanes, observe_native
 
 
 CHUNKS = (16, 32, 64, 128, 256, 384, 512)
@@ -76,14 +76,6 @@ class Designs(eqx.Module):
 
     systems: AbstractForcedSystem
     count: int = eqx.field(static=True)
-
-    @property
-    def each(self) -> list[AbstractForcedSystem]:
-        """The systems one by one."""
-        if self.count == 1:
-            return [self.systems]
-        one = lambda i: jax.tree.map(lambda x: x[i] if eqx.is_array(x) else x, self.systems)
-        return [one(i) for i in range(self.count)]
 
     @classmethod
     def of(cls, systems: Sequence[AbstractForcedSystem]) -> "Designs":
@@ -220,7 +212,7 @@ def _run_native(
     onward: bool,
 ) -> Observation:
     """Lanes in machine code; those that need an implicit method, or all where a law cannot be translated, by JAX."""
-    alone = systems.each if isinstance(systems, Designs) else list(systems)
+    designs = systems if isinstance(systems, Designs) else Designs.of(systems)
     which = np.zeros(speed.size, int) if which is None else which
     plan = Plan(*map(int, plan))
     each, done = plan.discard + plan.block * plan.blocks, 0.0
@@ -232,13 +224,11 @@ def _run_native(
             progress(min(int(done + 1e-9), speed.size), speed.size)
 
     def otherwise(lanes: Int[np.ndarray, " some"]) -> Observation:
-        return run_lanes(systems, method.instead, plan, speed[lanes], y0[lanes], None, which[lanes], onward)
+        return run_lanes(designs, method.instead, plan, speed[lanes], y0[lanes], None, which[lanes], onward)
 
-    limit = ESCAPE if onward else 1.0
-    seen = observe_native(
-        alike(alone, "systems", "systems"), method, plan, speed, y0, which, limit, cores(), report, otherwise
-    )
-    return run_lanes(systems, method.instead, plan, speed, y0, progress, which, onward) if seen is None else seen
+    lanes = Lanes(designs.systems, designs.count, which, speed, cores())
+    seen = observe_native(lanes, method, plan, y0, ESCAPE if onward else 1.0, report, otherwise)
+    return run_lanes(designs, method.instead, plan, speed, y0, progress, which, onward) if seen is None else seen
 
 
 def run_lanes(

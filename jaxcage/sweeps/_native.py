@@ -3,7 +3,7 @@
 import collections
 import functools
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -56,26 +56,35 @@ def engine_of(system: AbstractForcedSystem, tangents: int, several: bool, pair: 
     return _engines[key]
 
 
-class _Lanes:
-    """Lanes of some systems of one structure, by number."""
+class Lanes:
+    """Lanes by number: which design and which speed each has."""
 
     def __init__(
         self,
-        systems: Sequence[AbstractForcedSystem],
+        designs: AbstractForcedSystem,
+        count: int,
         which: Int[np.ndarray, " lanes"],
         speed: Float[np.ndarray, " lanes"],
         threads: int,
     ):
-        self.systems, self.which, self.speed, self.threads = systems, which, speed, threads
-        self.several = len(systems) > 1
-        rows = [split(s, eqx.is_inexact_array)[1] for s in systems]
-        self._rows = [np.stack(x) for x in zip(*rows, strict=True)] if self.several else rows[0]
+        """`designs` is a system, or `count` of them with their arrays stacked."""
+        number = lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x
+        self.form, rows = split(jax.tree.map(number, designs), eqx.is_inexact_array)
+        self.several, self.which, self.speed, self.threads = count > 1, which, speed, threads
+        self._rows = [np.asarray(x) for x in rows]
+
+    @property
+    def system(self) -> AbstractForcedSystem:
+        """One of the designs."""
+        return self.form.filled([jnp.asarray(x[0] if self.several else x) for x in self._rows])
 
     def rows(self, lanes: Int[np.ndarray, " some"]) -> list[Any]:
+        """Numbers of the designs of some lanes, or those that all have."""
         return [x[self.which[lanes]] for x in self._rows] if self.several else self._rows
 
     def engine(self, tangents: int, pair: str) -> Engine | None:
-        return engine_of(self.systems[0], tangents, self.several, pair)
+        """The compiled code with so many tangent vectors."""
+        return engine_of(self.system, tangents, self.several, pair)
 
 
 @functools.lru_cache(maxsize=32)
@@ -90,50 +99,42 @@ def _scales(form: Any, several: bool) -> Any:
 
 
 def _begin(
-    lanes: _Lanes, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some dim"]
+    lanes: Lanes, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some dim"]
 ) -> tuple[Float[np.ndarray, "some dim"], Float[np.ndarray, " some"]]:
     """Scale of each lane, and excursion of its state."""
     count = some.size
     room = 1 << max(3, (count - 1).bit_length())
     filled = np.concatenate([some, np.broadcast_to(some[-1:], room - count)])
     states = np.concatenate([y, np.broadcast_to(y[-1:], (room - count, y.shape[1]))])
-    form = split(lanes.systems[0], eqx.is_inexact_array)[0]
-    scale, excursion = _scales(form, lanes.several)(lanes.speed[filled], lanes.rows(filled), states)
+    scale, excursion = _scales(lanes.form, lanes.several)(lanes.speed[filled], lanes.rows(filled), states)
     return np.asarray(scale)[:count], np.asarray(excursion)[:count]
 
 
 def observe_native(
-    systems: Sequence[AbstractForcedSystem],
+    lanes: Lanes,
     method: NativeSteps,
     plan: Plan,
-    speed: Float[np.ndarray, " lanes"],
     y0: Float[np.ndarray, "lanes dim"],
-    which: Int[np.ndarray, " lanes"],
     limit: float,
-    threads: int,
     report: Report,
     otherwise: Callable[[Int[np.ndarray, " some"]], Observation],
 ) -> Observation | None:
     """Observe lanes in machine code.
 
-    **Arguments:** systems that differ in their numbers only, and `which` of them each lane has; method; plan; speeds;
-    states to begin from, with an excursion of at most `limit`; threads; `report(revolutions)` is called with what has
-    been run; `otherwise(lanes)` observes lanes that need another method.
+    **Arguments:** lanes; method; plan; states to begin from, with an excursion of at most `limit`;
+    `report(revolutions)` is called with what has been run; `otherwise(lanes)` observes lanes that need another method.
 
     **Returns:** an `Observation` with the lanes last, None where the law cannot be translated.
     """
-    lanes = _Lanes(systems, which, speed, threads)
+    count = lanes.speed.size
     if any(lanes.engine(k, method.pair) is None for k in {0, plan.exponents}):
         return None
     parts = [
-        _observe(lanes, method, plan, np.arange(i, min(i + CHUNK, speed.size)), y0, limit, report)
-        for i in range(0, speed.size, CHUNK)
+        _observe(lanes, method, plan, np.arange(i, min(i + CHUNK, count)), y0, limit, report)
+        for i in range(0, count, CHUNK)
     ]
-    seen, stuck = (
-        Observation(*(np.concatenate(x, axis=-1) for x in zip(*(p for p, _ in parts), strict=True))),
-        np.concatenate([s for _, s in parts]),
-    )
-    again = np.flatnonzero(stuck)
+    seen = Observation(*(np.concatenate(x, axis=-1) for x in zip(*(p for p, _ in parts), strict=True)))
+    again = np.flatnonzero(np.concatenate([stuck for _, stuck in parts]))
     if again.size:
         for x, late in zip(seen, otherwise(again), strict=True):
             x[..., again] = late  # pyright: ignore
@@ -141,7 +142,7 @@ def observe_native(
 
 
 def _observe(
-    lanes: _Lanes,
+    lanes: Lanes,
     method: NativeSteps,
     plan: Plan,
     some: Int[np.ndarray, " some"],
@@ -172,7 +173,7 @@ def _observe(
 
 
 def _once(
-    lanes: _Lanes,
+    lanes: Lanes,
     method: NativeSteps,
     plan: Plan,
     some: Int[np.ndarray, " some"],
