@@ -26,7 +26,6 @@ def test_branch_does_not_jump_to_its_copies(apart):
 NEAR = {
     "lines that cross": crossing(0.0, 1),
     "lines that pass": crossing(1e-3, 1),
-    "lines that turn": crossing(1e-3, -1),
     "lines that turn sharply": crossing(1e-4, -1),
     "what is left of a pitchfork, passing": imperfect(1e-4, 1),
     "what is left of a pitchfork, turning": imperfect(1e-4, -1),
