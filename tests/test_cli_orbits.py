@@ -435,7 +435,6 @@ REFUSALS = [
     ("bifurcations 4z", "'4z' is unknown: it must be one of 1a, 1b, 2a, 2b, 3a, 3b"),
     ("bifurcations 1a --first 0", "--first must be a speed above 0 rpm, but 0 was given"),
     ("bifurcations 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
-    ("bifurcations 1a --solver euler", "--solver must be one of rodas3, rodas4"),
     ("map 1a --y gap", "--y must be one of bore, "),
     ("map 1a --x guidance_gap", "must be two different parameters, but both are guidance_gap"),
     ("map 1a --rows 1", "--rows must be 0 or at least 2, but 1 was given"),

@@ -63,7 +63,6 @@ def pitchfork(gap, side):
 NEAR = {
     "lines that cross": (lines(0.0, 1), [("branch-point", 0.0)]),
     "lines that pass": (lines(1e-3, 1), []),
-    "lines that turn": (lines(1e-3, -1), [("fold", 2.5e-3)]),
     "lines that turn sharply": (lines(1e-4, -1), [("fold", 2.5e-4)]),
     "what is left of a pitchfork, passing": (pitchfork(1e-4, 1), []),
     "what is left of a pitchfork, turning": (pitchfork(1e-4, -1), [("fold", 3 * (1e-4 / 2) ** (2 / 3))]),
