@@ -66,7 +66,7 @@ NEAR = {
     "lines that turn sharply": (lines(1e-4, -1), [("fold", 2.5e-4)]),
     "what is left of a pitchfork, passing": (pitchfork(1e-4, 1), []),
     "what is left of a pitchfork, turning": (pitchfork(1e-4, -1), [("fold", 3 * (1e-4 / 2) ** (2 / 3))]),
-    "pitchfork along the side that turns": (pitchfork(0.0, 1), [("branch-point", 0.0)]),
+    "pitchfork along the side that turns": (pitchfork(0.0, 1), [("branch-point", 0.0), ("fold", 0.0)]),
 }
 
 
