@@ -1,6 +1,5 @@
 """Programs kept on disk: damaged, foreign or out of reach they cost a compilation and one sentence, no more."""
 
-import os
 import stat
 import subprocess
 import sys
@@ -12,7 +11,6 @@ import pytest
 
 from jaxcage import keep_compiled_programs
 from jaxcage.cli import main
-from jaxcage.cli._console import tell_of_kept_programs
 
 
 @pytest.fixture(autouse=True)
@@ -48,12 +46,6 @@ def test_a_folder_that_is_not_fit_is_left_alone(tmp_path: Path, spoil, why: str)
         assert keep_compiled_programs(tmp_path) is None
 
 
-def test_the_folder_of_another_user_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(os, "getuid", lambda: 12345)
-    with pytest.warns(RuntimeWarning, match="it belongs to another user"):
-        assert keep_compiled_programs(tmp_path) is None
-
-
 def test_a_command_says_it_in_one_sentence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
@@ -64,14 +56,6 @@ def test_a_command_says_it_in_one_sentence(
         assert main(["statics", "1a", "--out", str(tmp_path / "out")]) == 0
     said = [line for line in capsys.readouterr().err.splitlines() if "design rule" not in line]
     assert len(said) == 1 and said[0].startswith("Warning: Compiled programs are not kept in ")
-
-
-def test_many_warnings_of_jax_are_one_sentence(capsys: pytest.CaptureFixture[str]):
-    tell_of_kept_programs()
-    for n in range(3):
-        warnings.showwarning(f"Error reading persistent compilation cache entry for 'f{n}'", UserWarning, "x", 1)
-    said = capsys.readouterr().err
-    assert said == "Warning: a compiled program that was kept cannot be used, or not be kept: it is compiled anew.\n"
 
 
 CODE = """
