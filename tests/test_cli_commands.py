@@ -52,19 +52,6 @@ def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep_1a.png", "sweep_1a.zarr"]
 
 
-def test_sweep_prints_the_zone_table_beside_the_published_edges(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    assert main(["sweep", "1a", *TINY, "--out", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    assert "Chaotic zones of 1a [rpm], resolution 500 rpm" in out
-    rows = out.splitlines()
-    assert any(row.startswith("zone ") and row.endswith("published") for row in rows)
-    assert any("9100 to 12000" in row for row in rows)
-    assert any(row.endswith("25500 and up") for row in rows)
-    assert f"Figure: {tmp_path / 'sweep_1a.png'}" in out
-    assert f"Data: {tmp_path / 'sweep_1a.zarr'}" in out
-    assert "Failed lanes: none" in out
-
-
 @pytest.mark.wide
 def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     arguments = ["--speed", "15000", "--discard", "20", "--revolutions", "20", "--solver", "rk4", "--steps", "256"]

@@ -1,4 +1,4 @@
-"""`jaxcage study` and `jaxcage map --points`: stores, figures, one sentence for every misuse, Ctrl-C and going on."""
+"""`jaxcage study` and `jaxcage map --points`: stores, figures, one sentence for every misuse, going on."""
 
 import json
 import sys

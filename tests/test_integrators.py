@@ -162,6 +162,15 @@ def test_named_solvers_agree_on_a_revolution_of_the_cage(name):
     np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rodas3", "rodas4", "tsit5", "kvaerno3", "kvaerno5", "kencarp4"])
+def test_named_solvers_agree_with_adaptive_steps(name):
+    tolerance = 1e-7
+    end = one_revolution(CAGE, SPEED, method(name, tolerance=tolerance), START)
+    expected = confirmed(FIELD, [float(c) for c in START]).strobe[-1]
+    np.testing.assert_allclose(end / UNIT, expected / UNIT, rtol=0, atol=100 * tolerance)
+
+
 @pytest.mark.wide
 @pytest.mark.parametrize("name", NAMED)
 def test_fixed_steps_of_every_solver_are_forward_differentiable(name):

@@ -1,4 +1,4 @@
-"""Steps as one compiled loop over the lanes: values, tangents, error control, other devices."""
+"""Steps as one compiled loop over the lanes: values, tangents, error control."""
 
 import dataclasses
 import functools

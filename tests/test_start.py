@@ -1,4 +1,4 @@
-"""What is loaded when: help, version and errors of typing answer without JAX, the library comes with its first name."""
+"""What is loaded when: help, version and errors of typing answer without JAX."""
 
 import subprocess
 import sys
