@@ -22,7 +22,6 @@ from .common import ROOT, columns, made_with, markdown
 
 Part = Callable[[str], str | None]
 """From what a command printed to the text of a block; None if the text stays."""
-EDGES = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 RIVALS = "jaxcage, default|diffrax Tsit5, vmap|SciPy LSODA, numba|diffrax Kvaerno3, vmap|C, rodas4|C, rk4".split("|")
 
 
@@ -66,16 +65,6 @@ def every_kind(text: str) -> str:
     return printed(columns([("case", "edge", "published", *kinds), *body], right=True))
 
 
-def readings(text: str) -> str:
-    """The readings of case 1a that `jaxcage reproduce` tried."""
-    rows: list[tuple[str, ...]] = [("reading", "chaotic", "zones", *EDGES)]
-    for r in (r for r in json.loads(text)["readings"] if r["case"] == "1a"):
-        at = ("-" if r["edges"].get(e) is None else f"{r['edges'][e]:.0f}" for e in EDGES)
-        name = f"{r['question']}: {r['answer']}".removesuffix(": -")
-        rows.append((name, f"{100 * r['chaotic_share']:.0f} %", str(r["zones"]), *at))
-    return printed(columns(rows, right=True))
-
-
 def speed(text: str) -> str:
     """Microseconds of some rivals, from the first table of `python -m benchmarks`."""
     rows = [[c.strip() for c in x.strip("|").split("|")] for x in text.split("\n## ")[1].splitlines() if x[:2] == "| "]
@@ -85,7 +74,6 @@ def speed(text: str) -> str:
 
 README, EDGE, DESIGN, PAPER = "README.md", "docs/edges.md", "docs/design.md", "docs/reproduction.md"
 REPRODUCE = "jaxcage reproduce --json"
-LEDGER = "python experiments/identify_nu2310.py --trade-off --ledger experiments/lasting_search"
 BETTER = 'jaxcage design nu2310 --speed "10000 rpm shaft"'
 CHAOS = ("Chaotic zones of", "Transient chaos of")
 BLOCKS: dict[str, tuple[str, str, Part]] = {
@@ -102,10 +90,6 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "searches-of-eight": (DESIGN, "python -m benchmarks.pay --table", printed),
     "both-kinds": (PAPER, REPRODUCE, every_kind),
     "reproduction-figure": (PAPER, REPRODUCE, figure("fig7a.png", "reproduce_7a.png")),
-    "readings": (PAPER, REPRODUCE, readings),
-    "without-1b": (PAPER, f"{LEDGER}_without_1b.csv".replace("trade-off", "check"), printed),
-    "trade-off": (PAPER, f"{LEDGER}.csv", printed),
-    "trade-off-physical": (PAPER, f"{LEDGER}_physical.csv", printed),
     "bearing-design": ("docs/whole-bearing.md", BETTER, tables("Design of", "Before and after")),
     "transcript": ("docs/transcript.md", "python -m benchmarks.transcript", printed),
 }

@@ -1,60 +1,14 @@
 """Public functions compare their arguments with their annotations, and numbers with their bounds."""
 
 import inspect
-import pickle
 from collections.abc import Callable
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage._arguments import check_call
-from jaxcage._errors import ArgumentError
-
-
-class Stranger:
-    """Nothing that any argument may be."""
-
-
-@pytest.mark.parametrize(
-    "f, name",
-    [
-        (jc.sweep, "system"),
-        (jc.sweep, "speeds"),
-        (jc.sweep, "discard"),
-        (jc.sweep, "confirm"),
-        (jc.sweep_designs, "systems"),
-        (jc.simulate, "speed"),
-        (jc.simulate, "start"),
-        (jc.simulate, "method"),
-        (jc.studies.study, "vary"),
-        (jc.studies.study, "executor"),
-        (jc.bearing.vg, "grade"),
-    ],
-)
-def test_wrong_kinds_are_refused(f: Callable[..., Any], name: str):
-    for value in (Stranger(), np.ma.array([1.0, 2.0], mask=[0, 1]), np.array(["2020-01-01"], dtype="datetime64[D]")):
-        with pytest.raises(ArgumentError, match=rf"^Argument `{name}` must be .*, but .* was given\.$"):
-            check_call(f, **{name: value})
-
-
-def test_counts_are_whole_and_sensible():
-    for value in (2.5, True, "3", 1e3, 3j, 10**400, np.nan, {}, [3], np.array([])):
-        with pytest.raises(ArgumentError, match="`discard` must be (a whole number|of real)"):
-            check_call(jc.sweep, discard=value)
-    for value in (4, np.int64(4), jnp.asarray(4)):
-        check_call(jc.sweep, discard=value)
-
-
-def test_numbers_are_real():
-    for value in (1j, np.array([1j, 2]), np.array([None, 1]), {}, "x", np.nan):
-        with pytest.raises(ArgumentError, match="`tolerance` must be "):
-            check_call(jc.method, tolerance=value)
-    for value in (2, 2.0, np.float64(2.0), jnp.asarray(2.0)):
-        check_call(jc.method, tolerance=value)
 
 
 DUFFING = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.2 * v[0] - q[0] + 0.3 * jnp.cos(tau),), coordinates=1)
@@ -139,22 +93,6 @@ def test_what_was_said_by_others(call: Callable[[], Any], said: str):
     """By Python, NumPy or JAX, in words of theirs, or by nobody."""
     with pytest.raises(ValueError, match=said):
         call()
-
-
-def test_models_take_what_they_are_made_for():
-    assert jc.ForcedOscillator(DUFFING_LAW, 1, scale=(1.0, 2.0), starts=((0.0, 1.0),)).dimension == 2
-    assert np.isclose(jc.rpm(30), np.pi) and jc.rpm(1, 2, 3).size == 3 and jc.rpm(-30.0) < 0
-    gradient = jax.grad(lambda gap: jc.replace(jc.case("1a"), guidance_gap=gap).clearance)(4e-4)
-    assert gradient > 0
-
-
-def test_what_is_traced_has_no_value_yet():
-    jax.make_jaxpr(lambda x: check_call(jc.simulate, DUFFING, x, start=(x, 2.0)) or x)(1.0)
-
-
-def test_a_checked_function_is_where_pickle_looks_for_it():
-    for f in (jc.sweep, jc.studies.study, jc.simulate):
-        assert pickle.loads(pickle.dumps(f)) is f
 
 
 def test_numbers_that_no_formula_takes_are_refused():

@@ -4,8 +4,6 @@
 with this library. "Planted" systems have orbits and multipliers that are known exactly.
 """
 
-import dataclasses
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -395,4 +393,3 @@ def test_no_doubled_branch_begins_at_a_fold(over_speed):
 def test_lengths_of_steps_must_be_in_order(steps):
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
         jc.orbits.Steps(**steps)
-    assert dataclasses.replace(jc.orbits.Steps(), first=0.1).first == 0.1

@@ -106,44 +106,6 @@ def test_a_design_that_no_other_beats_stays(
     assert "No design that was looked at is better than the given one, which stays as it is." in capsys.readouterr().out
 
 
-@pytest.mark.slow
-@pytest.mark.wide
-def test_design_lists_optima_and_checks_them_afresh(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    said = document(capsys, *DESIGN, "--out", str(tmp_path))
-    assert said["vary"] == {
-        "guidance_gap": pytest.approx([0.42e-3, 0.84e-3]),
-        "eccentricity": pytest.approx([4.6e-6, 23e-6]),
-    }
-    assert all(low <= said["optimum"][n] <= high for n, (low, high) in said["vary"].items())
-    assert sum(o["starts"] for o in said["optima"]) == 2
-    assert said["designs_swept"] == 2 + 2 * 4
-    assert set(said["chaotic_rpm"]) == {"before", "after"} == set(said["chaotic_zones"])
-    assert said["chaotic_rpm"]["before"] > 1000
-    assert said["synchronous_loss_zones"] == {}
-    assert Path(said["figure"]).parent == tmp_path and Path(said["figure"]).stat().st_size > 10_000
-
-
-@pytest.mark.slow
-@pytest.mark.wide
-def test_design_under_scatter_prints_tables(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    scatter = ["--scatter", "guidance_gap=10%", "--scatter", "eccentricity=rayleigh", "--worst", "0.5"]
-    small = ["--starts", "1", "--steps", "1", "--out", str(tmp_path)]
-    assert main([*DESIGN, *small, *scatter]) == 0
-    text = capsys.readouterr().out
-    assert "Design of 1b" in text and "Optima" in text and "Chaotic zones before and after" in text
-    assert "64 designs swept" in text  # a batch of four x sixteen made cages
-
-
-@pytest.mark.wide
-def test_sensitivity_shares_the_variance(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    said = document(capsys, *SENSITIVITY, "--out", str(tmp_path))
-    assert said["sobol"]["designs"] == 2 * 4
-    for order in ("first", "total"):
-        assert set(said["sobol"][order]) == {"guidance_gap", "eccentricity"}
-        assert all(low <= high for low, high in said["sobol"][f"{order}_interval"].values())
-    assert said["edges"] == [] and said["figure"] is None
-
-
 def test_sensitivity_of_a_known_objective(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -1,6 +1,5 @@
 """Commands about synchronous orbits: bifurcations, gradient, map."""
 
-import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -24,30 +23,16 @@ from jaxcage.orbits import (
     Stretch,
     SynchronousOrbits,
     loss_zones,
-    width,
 )
 from jaxcage.report import (
-    coexisting_notes,
     contact_notes,
-    edge_table,
-    gradient_document,
-    gradient_table,
-    homogeneity_notes,
-    loss_table,
-    missing_notes,
-    multiplier_cell,
     orbits_document,
-    shown_unit,
-    stretch_table,
     touching,
-    unsettled_notes,
 )
 
 
 PNG = b"\x89PNG\r\n"
 PER_RPM = np.pi / 30
-PERIOD_DOUBLING_RPM = 12355.535
-"""Period doubling of case 1a, found by the search over the whole range and by Newton's method."""
 
 
 def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = True) -> Point:
@@ -132,73 +117,6 @@ def test_document_of_a_search(found: SynchronousOrbits):
     json.dumps(document, allow_nan=False)
 
 
-def test_search_says_what_is_unexplained_and_what_is_not_confirmed(found: SynchronousOrbits):
-    change = dataclasses.replace(point("unexplained", 9500.0, 1.1, 14), error=0.2 * PER_RPM)
-    wide, rough = (
-        point("period-doubling", 9600.0, -1.0, 15),
-        dataclasses.replace(point("fold", 9600.5, 1.0, 16), error=1.0),
-    )
-    narrow = Stretch(wide, rough, 9600.0, 9600.5, 0)
-    first = dataclasses.replace(found.branches[0], special=(change, wide, rough))
-    doubtful = dataclasses.replace(found, branches=(first,), stretches=(narrow,))
-    assert unsettled_notes(found) == [] and not narrow.confirmed and all(s.confirmed for s in found.stretches)
-    assert unsettled_notes(doubtful) == [
-        "Not confirmed: the stretch from 9600.00 rpm is narrower than its error",
-        "Unexplained: the stability changes at 9500.000 ± 0.2 rpm on branch 0, and no bifurcation was found there",
-    ]
-    document = plain(orbits_document("1a", doubtful, loss_zones(doubtful), None))
-    assert [p["speed_rpm"] for p in document["unexplained"]] == pytest.approx([9500.0])
-    assert document["stretches"][0]["confirmed"] is False
-
-
-def test_tables_of_a_search(found: SynchronousOrbits):
-    loss = loss_zones(found)
-    stretches = stretch_table("1a", found)
-    assert stretches.rows[1] == ("12000.00", "period-doubling", "20000.00", "Neimark-Sacker", "8000.00", "30", "0")
-    zones = loss_table("1a", found, loss, PUBLISHED_CASES["1a"])
-    assert zones.rows[0] == (
-        "1",
-        "7000.0000 ± 0.0001",
-        "fold",
-        "12000.0000 ± 0.0001",
-        "period-doubling",
-        "5000.00",
-        "9100 to 12000",
-    )
-    assert zones.rows[1] == ("2", "20000.0000 ± 0.0001", "Neimark-Sacker", "past range", "-", "open", "25500 and up")
-    edges = edge_table("1a", found, loss)
-    assert edges.rows[0] == ("7000.000", "0.0001", "fold", "1.0000", "0.00", "0", "zone 1 onset")
-    assert edges.rows[2] == (
-        "20000.000",
-        "0.0001",
-        "Neimark-Sacker",
-        "-0.4161 ± 0.9093i",
-        "114.59",
-        "0",
-        "zone 2 onset",
-    )
-    (note,) = coexisting_notes(loss)
-    assert note.startswith("At zone 2 onset (20000.00 rpm) another synchronous orbit is stable")
-
-
-def test_published_zone_that_was_not_searched_has_its_own_row(found: SynchronousOrbits):
-    loss = loss_zones(found)
-    rows = loss_table("1a", SynchronousOrbits((), (), found.sweep, 0, 1e3, 2e3), loss, PUBLISHED_CASES["1a"]).rows
-    assert [row[-1] for row in rows] == ["9100 to 12000", "25500 and up"]
-    empty = SynchronousOrbits((), (), found.sweep, 0, 1e3, 2e3)
-    rows = loss_table("1a", empty, loss_zones(empty), PUBLISHED_CASES["1a"]).rows
-    assert [row[1] for row in rows] == ["not searched", "not searched"]
-    assert loss_table("design", empty, loss_zones(empty), None).rows[0][0] == "none"
-    assert (
-        stretch_table("design", empty).rows[0][0] == edge_table("design", empty, loss_zones(empty)).rows[0][0] == "none"
-    )
-
-
-def test_multipliers_read_as_people_write_them():
-    assert multiplier_cell(point("period-doubling", 1.0, -1.0, 0)) == "-1.0000"
-    assert multiplier_cell(point("Neimark-Sacker", 1.0, 0.6 + 0.8j, 0)) == "0.6000 ± 0.8000i"
-
-
 def edge(name: str, rpm: float, status: str = "converged", **elasticity: float) -> Sensitivity:
     model = jc.case("1a")
     value = {n: float(v) for n, v in jc.parameters(model).items()}
@@ -206,59 +124,6 @@ def edge(name: str, rpm: float, status: str = "converged", **elasticity: float) 
     slope = {n: e * rpm / value[n] if e else 0.0 for n, e in change.items()}
     residual = {"mass": 1e-12, "length": -3e-12, "time": 0.0}
     return Sensitivity(name, "fold", rpm, slope, change, residual, 1e-3, status, error_rpm=2e-3)
-
-
-def test_gradient_table_has_the_designers_two_on_top_and_counts_what_does_not_move():
-    model = jc.case("1a")
-    found = edge("zone 1 onset", 7000.0, gravity=0.5, cage_mass=-0.75, guidance_gap=0.1)
-    table = gradient_table("1a", model, found)
-    assert [row[0] for row in table.rows] == [
-        "guidance_gap",
-        "eccentricity",
-        "gap at fixed rho",
-        "cage_mass",
-        "gravity",
-    ]
-    assert table.rows[2][-1] == "+0.100000"
-    printed = edge("zone 1 exit", 12355.5, guidance_gap=-0.2783, eccentricity=0.2849)
-    assert gradient_table("1a", model, printed).rows[2] == ("gap at fixed rho", "", "", "", "+0.006600")
-    assert table.rows[0] == ("guidance_gap", "0.00045", "m", "+1.55556e+06", "+0.100000")
-    assert table.rows[1][3:] == ("+0", "0")
-    assert table.title.startswith("Zone 1 onset of 1a: 7000.000 ± 0.002 rpm (shaft 17446 rpm), fold; ")
-    assert f"; {len(jc.parameters(model)) - 4} other parameters do not move the cage's speed" in table.title
-    assert table.columns[3] == "rpm of the cage per unit"  # the shaft's moves with the ratio of both too
-
-
-def test_gradient_document_has_the_width_and_the_worst_residuals():
-    onset, leaves = edge("zone 1 onset", 7000.0, cage_mass=-0.75), edge("zone 1 exit", 12000.0, cage_mass=-1.0)
-    wide = width(onset, leaves, "zone 1 width")
-    document = plain(gradient_document({"zone 1 onset": onset, "zone 1 exit": leaves}, wide))
-    assert document["width"]["value_rpm"] == pytest.approx(5000)
-    assert document["width"]["kind"] == "synchronous-loss"
-    assert document["width"]["elasticity"]["cage_mass"] == pytest.approx((-1.0 * 12000 + 0.75 * 7000) / 5000)
-    assert document["homogeneity"] == {"mass": 1e-12, "length": 3e-12, "time": 0.0}
-    assert document["edges"][0]["trusted"] is True
-    assert "length 3.0e-12" in homogeneity_notes(document)[0]
-    without = plain(gradient_document({}, None))
-    assert without["width"] is None and without["homogeneity"]["mass"] is None
-
-
-def test_edges_that_are_missing_or_not_trusted_are_said_in_a_line_each():
-    good, bad = edge("zone 1 exit", 12000.0), edge("zone 1 onset", 7000.0, status="tangential")
-    notes = missing_notes({"zone 1 onset": bad, "zone 1 exit": good})
-    assert notes == [
-        "There is no zone 2 onset in the range.",
-        "Left out: zone 1 onset, fold (tangential).",
-        "Without both edges zone 1 has no width.",
-    ]
-
-
-@pytest.mark.parametrize(
-    "unit, value, shown",
-    [("m", 4.5e-4, ("mm", 1e3)), ("m", 2.3e-5, ("µm", 1e6)), ("1", 0.9, ("", 1.0)), ("kg", 0.2, ("kg", 1.0))],
-)
-def test_lengths_on_the_map_have_units_that_people_read(unit: str, value: float, shown: tuple[str, float]):
-    assert shown_unit(unit, value) == shown
 
 
 def is_png(path: str) -> bool:
@@ -269,22 +134,6 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, A
     """The only thing that `arguments` with --json print on standard output."""
     assert main([*arguments, "--json"]) == 0
     return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
-
-
-@pytest.mark.wide
-def test_bifurcations_of_a_narrow_range(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    narrow = ["--first", "12000", "--last", "13000", "--count", "9", "--discard", "1500"]
-    got = document(capsys, "bifurcations", "1a", *narrow, "--out", str(tmp_path))
-    doublings = [p for p in got["points"] if p["kind"] == "period-doubling" and p["edge"]]
-    nearest = min(doublings, key=lambda p: abs(p["speed_rpm"] - PERIOD_DOUBLING_RPM))
-    assert nearest["speed_rpm"] == pytest.approx(PERIOD_DOUBLING_RPM, abs=0.01)
-    assert nearest["multiplier"] == pytest.approx([-1.0, 0.0], abs=1e-6)
-    assert [p["speed_rpm"] for p in got["points"]] == sorted(p["speed_rpm"] for p in got["points"])
-    assert is_png(got["figure"]) and is_png(got["multipliers"])
-    columns = read_columns(got["data"])
-    size = np.hypot(columns["multiplier 1 (real part)"], columns["multiplier 1 (imaginary part)"])
-    assert np.array_equal(columns["stable"] == 1, size < 1)
-    assert np.ptp(columns["speed [rpm]"]) > 700
 
 
 def test_bifurcations_command(
@@ -356,17 +205,6 @@ def test_gradient_command(
     assert "Zone 2 onset of 1a" not in out
 
 
-def test_gradient_without_an_edge_to_be_trusted_fails(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: SynchronousOrbits
-):
-    lost = {"zone 1 onset": edge("zone 1 onset", 7000.0, status="tangential")}
-    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: found)
-    monkeypatch.setattr(_orbits, "sensitivities", lambda *_, **__: lost)
-    assert main(["gradient", "1a", "--out", str(tmp_path)]) == 1
-    out, err = capsys.readouterr()
-    assert out == "" and "No edge is a function of the design here (zone 1 onset: tangential)" in err
-
-
 def lines_through(system: Any, point: Any, x: str, y: str, **given: Any) -> Curve:
     """In place of the continuation: straight up, and none through a Neimark-Sacker bifurcation."""
     if point.kind == "Neimark-Sacker":
@@ -435,7 +273,6 @@ REFUSALS = [
     ("bifurcations 4z", "'4z' is unknown: it must be one of 1a, 1b, 2a, 2b, 3a, 3b"),
     ("bifurcations 1a --first 0", "--first must be a speed above 0 rpm, but 0 was given"),
     ("bifurcations 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
-    ("bifurcations 1a --solver euler", "--solver must be one of rodas3, rodas4"),
     ("map 1a --y gap", "--y must be one of bore, "),
     ("map 1a --x guidance_gap", "must be two different parameters, but both are guidance_gap"),
     ("map 1a --rows 1", "--rows must be 0 or at least 2, but 1 was given"),
@@ -475,22 +312,6 @@ def test_search_without_a_result_says_so(
     assert out == ""
     assert "No simulation between 2500 and 27500 rpm settled on a synchronous orbit" in err
     assert not any(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("command, what", [("gradient", "differentiate"), ("map", "follow")])
-def test_search_without_an_edge_says_so(
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    found: SynchronousOrbits,
-    command: str,
-    what: str,
-):
-    whole = Stretch(None, None, 18000.0, 27500.0, 0, 0, 3, 3)
-    steady = SynchronousOrbits(found.branches[1:], (whole,), found.sweep, 0, 18000.0, 27500.0)
-    monkeypatch.setattr(_orbits, "synchronous_orbits", lambda *_, **__: steady)
-    assert main([command, "1a", "--out", str(tmp_path)]) == 1
-    assert f"between 18000 and 27500 rpm: there is no edge to {what}." in capsys.readouterr().err
 
 
 # Case 3a: strobe states of two edges' orbits, over the scale; that of the second is beyond contact by 0.007.

@@ -1,8 +1,6 @@
-"""`jaxcage study` and `jaxcage map --points`: stores, figures, one sentence for every misuse, Ctrl-C and going on."""
+"""`jaxcage study` and `jaxcage map --points`: stores, figures, one sentence for every misuse, going on."""
 
 import json
-import signal
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ import xarray as xr
 from helpers import raw_sweep
 
 import jaxcage as jc
-from jaxcage.cli import _console, _label_map, main
+from jaxcage.cli import _label_map, main
 from jaxcage.cli._vary import read_vary
 from jaxcage.orbits import Curve
 from jaxcage.studies import label_names
@@ -56,29 +54,6 @@ def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_pat
     np.testing.assert_allclose(mine["peak"], swept.peak, rtol=0, atol=1e-3)
     counts = dict(zip(*np.unique(label_names(stored), return_counts=True), strict=True))
     assert whole["labels"] == counts and sum(counts.values()) == 24
-
-
-@pytest.mark.slow
-def test_interrupted_and_gone_on(tmp_path: Path):
-    """Ctrl-C says in one sentence how to go on; killed and started again, the command finishes the study."""
-    long = [*SMALL, "--out", str(tmp_path), "--chunk", "2"]
-    start = [sys.executable, "-m", "jaxcage", *long]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(start, text=True, stdout=pipe, stderr=pipe) as process:
-        done = tmp_path / "study_1a.zarr" / "outcome" / "c"
-        while process.poll() is None and not (done.exists() and any(done.rglob("0"))):
-            try:
-                process.wait(0.02)
-            except subprocess.TimeoutExpired:
-                pass
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, ""), err
-    said = [line for line in err.splitlines() if not line.startswith("Warning:")]
-    assert said == ["Interrupted: what is stored stays, and the same command goes on from there."]
-    again = subprocess.run([*start, "--json"], text=True, capture_output=True)
-    found = json.loads(again.stdout)
-    assert 0 < found["stored_before"] < found["stored"] == 24
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -160,12 +135,6 @@ def test_stores_of_others_and_missing_dask_get_one_sentence(
     assert 'dask.distributed is missing: python -m pip install "jaxcage[dask]"' in said
 
 
-def test_a_scheduler_needs_an_address(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    said = refused(capsys, *SMALL, "--out", str(tmp_path), "--executor", "dask", "--scheduler", "nowhere")
-    assert said == "Option --scheduler must be an address such as tcp://host:8786, but 'nowhere' was given."
-
-
 def test_what_can_be_varied():
     """Bare speeds are rpm, all else SI or with its unit; grids, lists, single values, intervals and tolerances."""
     given = ["speed=9000:12000:4", "guidance_gap=0.4mm:5e-4", "eccentricity=20um±3um", "oil=32,56.5,78"]
@@ -178,19 +147,6 @@ def test_what_can_be_varied():
     np.testing.assert_array_equal(got["oil"], [32, 56.5, 78])
     one = read_vary(["speed=100rad/s"], jc.case("1a"))
     np.testing.assert_allclose(one["speed"], [100.0], rtol=1e-14)
-
-
-def test_a_line_a_minute_where_there_is_no_terminal(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
-    """200 lanes, 50 of them stored before, two a second from then on."""
-    clock = [0.0]
-    monkeypatch.setattr(_console.time, "monotonic", lambda: clock[0])
-    with _console.progress("study x", "lanes", "go on") as bar:
-        for done in range(50, 201, 10):
-            clock[0] = 1000.0 + (done - 50) / 2
-            bar("", done, 200)
-    assert capsys.readouterr().err.splitlines() == ["study x: 170 of 200 lanes, 2 a second, 0.2 min left"]
 
 
 @pytest.mark.wide

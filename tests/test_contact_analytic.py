@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.forces import contact_force, inverse_root, power_10_9, restitution_damping, smooth_plus, smooth_plus_slope
+from jaxcage.forces import contact_force, power_10_9, restitution_damping, smooth_plus
 from jaxcage.models import case
 
 
@@ -132,29 +132,6 @@ def test_smooth_plus_joins_with_three_continuous_derivatives(joint):
     assert abs(inside) * WIDTH**2 > 1.0  # it is not zero everywhere
 
 
-def test_inverse_root():
-    x = np.logspace(-200, 200, 101)
-    np.testing.assert_allclose(jax.vmap(inverse_root)(jnp.asarray(x)), x**-0.5, rtol=4e-16)
-
-
-def test_smooth_plus_is_exact_outside_and_close_inside():
-    u = np.linspace(-3, 3, 601) * WIDTH
-    found = np.asarray(jax.vmap(lambda x: smooth_plus(x, WIDTH))(jnp.asarray(u)))
-    exact = np.maximum(u, 0.0)
-    outside = np.abs(u) >= 1.001 * WIDTH
-    np.testing.assert_array_equal(found[outside], exact[outside])
-    excess = found - exact
-    assert np.all(excess >= -1e-22) and np.all(np.diff(found) >= 0)
-    assert excess.max() == pytest.approx(5 / 32 * WIDTH, rel=1e-12)
-
-
-def test_slope_of_smooth_plus_is_its_derivative():
-    u = jnp.linspace(-1.5, 1.5, 61) * WIDTH
-    exact = jax.vmap(jax.grad(lambda x: smooth_plus(x, WIDTH)))(u)
-    found = jax.vmap(lambda x: smooth_plus_slope(x, WIDTH))(u)
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13)
-
-
 @pytest.mark.wide
 def test_power_is_exact_with_finite_derivatives_at_touch():
     p = np.geomspace(1e-12, 1.0, 25)
@@ -166,16 +143,6 @@ def test_power_is_exact_with_finite_derivatives_at_touch():
     slope, curvature = derivatives(power_10_9, 2)[1:]
     assert float(slope(0.3)) == pytest.approx(10 / 9 * 0.3 ** (1 / 9), rel=1e-13)
     assert float(curvature(0.3)) == pytest.approx(10 / 81 * 0.3 ** (-8 / 9), rel=1e-13)
-
-
-@pytest.mark.wide
-def test_regularised_contact_sets_in_with_three_continuous_derivatives():
-    """p^(10/9) after `smooth_plus` is of order 40/9 in the distance from the joint."""
-    chain = derivatives(lambda u: power_10_9(smooth_plus(u, 1.0)), 3)
-    for order, f in enumerate(chain):
-        assert float(f(-1.0)) == 0.0
-        near, nearer = float(f(-1.0 + 1e-3)), float(f(-1.0 + 1e-4))
-        assert np.log10(near / nearer) == pytest.approx(40 / 9 - order, abs=2e-3)
 
 
 def test_slopes_of_the_force_are_its_derivatives():

@@ -1,30 +1,25 @@
 """Ranges in a file, what is drawn from them, and the chances that come of it."""
 
-import dataclasses
 import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from report_example import findings
 
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.io import (
     ConfigError,
-    Measurement,
     Range,
     Unknown,
     model_from,
     read_bearing,
     read_range,
-    template,
     write_template,
 )
-from jaxcage.report import chances_notes, chances_table, operating_chances, page, read_operating
-from jaxcage.studies import Band, Ensemble, binomial_interval, draw, ensemble, identify, sobol, verdict_of
+from jaxcage.report import chances_notes, chances_table, operating_chances, read_operating
+from jaxcage.studies import Band, Ensemble, binomial_interval, draw, ensemble, sobol, verdict_of
 
 
 STIFF = Unknown("support.stiffness", ("stiffness_x", "stiffness_y"), Range(1e4, 1e6))
@@ -93,20 +88,6 @@ def test_one_key_for_both_stiffnesses_is_one_unknown():
     assert [float(m.support.stiffness_y) for m in models] == pytest.approx([1e4, 10**5.5])
 
 
-def test_the_template_declares_support_impact_and_contact_unknown(tmp_path: Path):
-    file = read_bearing(write_template(tmp_path / "mine.toml"))
-    assert {u.label.split(".")[0] for u in file.unknowns} == {"support", "impact", "contact"} and len(
-        file.unknowns
-    ) == 9
-    info = jc.parameter_info(file.model)
-    assert all((u.range.lower, u.range.upper) == info[n].within for u in file.unknowns for n in u.names)
-    assert "cage_mass" in file.left and "support.stiffness" in file.left and "unbalance" not in file.left
-    text = template().replace('cage_mass = "0', 'cage_mass = "1')
-    (tmp_path / "other.toml").write_text(text)
-    assert "cage_mass" not in read_bearing(tmp_path / "other.toml").left
-    assert tomllib.loads(text)["speeds"] == "shaft"
-
-
 def test_binomial_bars_against_printed_ones():
     """0 of 10: 0 to 0.3085; 5 of 10: 0.1871 to 0.8129 (Clopper and Pearson's tables)."""
     low, high = binomial_interval([0, 5, 10], [10, 10, 10])
@@ -129,16 +110,6 @@ def test_what_is_not_decided_says_what_to_measure():
     assert at[0][3] == "not decided by what is known" and "tap the cage" in at[0][4] and at[1][3:] == ("calm", "-")
 
 
-def test_a_measured_stiffness_decides():
-    """The same cage with its support known: what was open before is not any more."""
-    wide, place = by_stiffness(), sobol(2, 64, 1)
-    assert np.any(wide.undecided)
-    narrow = 0.7 + 0.1 * place[:, 0] < 0.4
-    known = planted(np.stack([np.ones(64, dtype=bool), narrow, narrow, narrow], axis=1), place)
-    assert not np.any(known.undecided) and known.clues() == []
-    assert chances_notes(known)[0] == "What is known decides at every speed."
-
-
 def test_verdicts_and_lanes_that_failed():
     assert [verdict_of(k, 64, 64) for k in (3, 4, 60, 61)] == ["calm", "not decided", "not decided", "chaotic"]
     assert [verdict_of(0, n, 64) for n in (61, 60)] == ["calm", "calm as computed"]  # those that failed may be chaotic
@@ -154,22 +125,6 @@ def test_verdicts_and_lanes_that_failed():
     failed = Ensemble(*(lost if name == "failed" else value for name, value in vars(found).items()))
     assert failed.verdict[3] == "too few draws" and np.isnan(failed.chance[3])
     assert [bound[3] for bound in failed.interval] == [0.0, 1.0]
-
-
-def test_what_failed_widens_the_bars_and_is_said():
-    """4 of 64 draws fail: 0 of 64 to 4 of 64 are chaotic, 0 to 15.2 % with 95 % confidence (Clopper and Pearson)."""
-    found = by_stiffness()
-    lost = np.zeros((64, 4), dtype=bool)
-    lost[:4, 3] = True
-    some = dataclasses.replace(found, failed=lost)
-    assert some.interval[0][3] == 0.0 and some.interval[1][3] == pytest.approx(0.1524, abs=1e-3)
-    assert some.verdict[3] == "calm as computed" and some.chance[3] == 0.0
-    table = chances_table("mine", some)
-    assert table.rows[-1][2:] == ("calm where computed", "0 %", "0 to 15 %", "4")
-    notes = " ".join(chances_notes(some))
-    assert "4 of 256 simulations failed" in notes and "At 1 of 4 speeds the verdict is that of the draws" in notes
-    calm = dataclasses.replace(some, chaotic=np.zeros((64, 4), dtype=bool))
-    assert chances_notes(calm)[0].endswith("at every speed, as far as the draws could be computed.")
 
 
 def test_commands_answer_a_file_with_ranges_by_chances(
@@ -196,45 +151,9 @@ def test_commands_answer_a_file_with_ranges_by_chances(
     )
 
 
-class Asked(Exception):
-    """What a sweep was asked for, instead of one."""
-
-
-@pytest.mark.parametrize("what", ["ensemble", "identify"])
-def test_every_draw_starts_on_its_own_rib(monkeypatch: pytest.MonkeyPatch, what: str):
-    """Where contact begins earlier, the resting place of another draw lies inside the rib: a stiff one shoots the cage
-    off at speeds that no steps follow."""
-
-    def refuse(models: Any, speeds: Any, *, starts: Any, **options: Any) -> None:
-        raise Asked(models, speeds, starts)
-
-    monkeypatch.setattr("jaxcage.studies._ensemble.sweep_designs", refuse)
-    model = dataclasses.replace(jc.case("1a"), clearance_reading="radial")
-    onset, speeds = Unknown("contact.onset", ("onset",), Range(0.85, 0.99)), jc.rpm(3000, 4000, 2)
-    with pytest.raises(Asked) as asked:
-        if what == "ensemble":
-            ensemble(model, [onset], speeds, draws=8)
-        else:
-            identify(model, [onset], [Measurement("calm", 4000.0, 0.0, 0.0)], draws=16)
-    models, speeds, starts = asked.value.args
-    places = [jc.sweeps.initial_states(m, np.atleast_1d(speeds), starts)[0] for m in models]
-    rest = [float(m.excursion(tuple(each[0]))) for m, each in zip(models, places, strict=True)]
-    assert len(models) >= 8 and rest == pytest.approx([float(m.contact.onset) for m in models], rel=1e-6)
-
-
 def test_an_ensemble_of_no_draws_is_refused():
     with pytest.raises(ValueError, match="`draws` must be at least 1, but 0 was given"):
         ensemble(jc.case("1a"), [STIFF], jc.rpm(6000, 7000, 2), draws=0)
-
-
-@pytest.mark.wide
-def test_draws_that_run():
-    """A support that is as stiff as may be, and no impact: calm in every draw, as alone."""
-    base = jc.replace(jc.case("1a"), amplitude=0.0)
-    found = ensemble(
-        base, [STIFF], jc.rpm(6000, 7000, 2), draws=2, discard=20, revolutions=20, method=jc.method("rk4", steps=256)
-    )
-    assert found.chaotic.shape == (2, 2) and not np.any(found.chaotic | found.failed)
 
 
 def test_unknowns_names_the_measurement(
@@ -264,15 +183,3 @@ def test_unknowns_names_the_measurement(
     assert "do not tell what to measure first" in said and "Too few samples" in said and "nan" not in said
     assert main(["unknowns", "1a", "--out", str(tmp_path)]) == 2
     assert "Case 1a must be a TOML file with ranges" in capsys.readouterr().err
-
-
-@pytest.mark.wide
-def test_the_page_shows_what_is_known_and_what_it_decides():
-    at = read_operating("6500")
-    text = page(findings(), at, table={"base": "1a"}, chances=by_stiffness(), left=("cage_mass",))
-    assert 'id="known"' in text and 'id="fig-chance"' in text and 'href="#known"' in text
-    assert "All zones of this page are those of the best guesses: 2 values are known within ranges only." in text
-    assert "not decided by what is known" in text and "Measure support.stiffness (tap the cage)" in text
-    assert (
-        "the template&#39;s, not yours" in text and "still the template&#39;s, another bearing&#39;s: cage_mass" in text
-    )

@@ -1,9 +1,7 @@
-"""The command in other surroundings: home folder, locale, time zone, terminal, paths, no sources; the same numbers."""
+"""The command in other surroundings: home folder, locale, time zone, terminal, paths; the same numbers."""
 
-import compileall
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -74,15 +72,6 @@ def test_any_path_will_do(tmp_path: Path, name: str, usual: dict[str, object]):
     same = ("left_as_in_template",)  # what a file adds
     assert {k: v for k, v in numbers(found).items() if k not in same} == usual and not said(found)
     assert (folder / "out").is_dir() and len(list((folder / "out").iterdir())) == 2
-
-
-@pytest.mark.wide
-def test_without_sources_it_is_the_same(tmp_path: Path, usual: dict[str, object]):
-    package = Path(shutil.copytree(PACKAGE, tmp_path / "jaxcage", ignore=shutil.ignore_patterns("__pycache__")))
-    assert compileall.compile_dir(package, quiet=1, legacy=True)
-    for path in package.rglob("*.py"):
-        path.unlink()
-    assert numbers(command(tmp_path, OURS | {"PYTHONPATH": str(tmp_path)}, *STATICS)) == usual
 
 
 @pytest.mark.wide

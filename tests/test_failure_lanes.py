@@ -12,7 +12,7 @@ import pytest
 from helpers import wide_but
 
 from jaxcage.analysis import Plan
-from jaxcage.integrate import OUTCOMES, controlled, method, revolution, strobe_map
+from jaxcage.integrate import OUTCOMES, method
 from jaxcage.models import ForcedOscillator, case
 from jaxcage.sweeps import run_lanes, sweep
 
@@ -119,19 +119,6 @@ def test_lanes_without_damping_leave_the_model():
     assert np.all(np.isnan(result.chaotic_share))
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize("exponents", [0, 4])
-def test_failed_lanes_whatever_is_observed(exponents):
-    settings = SETTINGS | dict(exponents=exponents)
-    bad = (2 * C, 0.0, 0.0, 0.0)
-    mixed = sweep(MODEL, SPEEDS[:1], starts=[HEALTHY, bad], **settings)
-    healthy = sweep(MODEL, SPEEDS[:1], starts=[HEALTHY, OTHER], **settings)
-    assert_same_bytes(mixed, healthy, np.s_[:, 0])
-    assert_failed(mixed, (0, 1))
-    assert mixed.exponents.shape == (1, 2, exponents)
-    assert np.all(np.isfinite(mixed.exponents[0, 0]))
-
-
 def pendulum(tau, q, v, speed):
     return (-0.2 * v[0] - jnp.sin(q[0]) + 0.4 * jnp.cos(tau),)
 
@@ -168,12 +155,3 @@ def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
     ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 1), SPEEDS[:1], outside, onward=on) for on in (False, True)]
     assert [OUTCOMES[int(end.outcome[0])] for end in ends] == ["outside", "successful"]
     assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005
-
-
-@pytest.mark.wide
-def test_a_lane_that_is_not_to_run_costs_nothing_and_stays():
-    strobe = strobe_map(MODEL, SPEEDS[0], controlled(3e-3, [("rk4", 128), ("rk4", 256), ("rk4", 512)]))
-    state = tuple(map(jnp.asarray, HEALTHY))
-    stays, runs = (revolution(strobe, state, (), jnp.asarray(level)) for level in (-1, 0))
-    assert stays.y == state and np.isinf(stays.error)
-    assert runs.y != state and runs.error < 3e-3

@@ -200,47 +200,6 @@ def test_gradient_at_the_centre_is_the_mean_of_opposite_limits(model):
         assert jump > 0.5 if model == "fixed_half" else jump < 1e-4
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize("model", ["positive_pressure", "full"])
-def test_second_derivative_at_the_centre_against_differences(model):
-    slope = jax.jacfwd(force, argnums=1)
-    second = np.asarray(jax.jacfwd(slope, argnums=1)(model, CENTRE, VELOCITY))
-    h = 1e-5
-    for k in range(2):
-        d = h * np.eye(2)[k]
-        difference = (slope(model, d, VELOCITY) - slope(model, -d, VELOCITY)) / (2 * h)
-        np.testing.assert_allclose(second[..., k], difference, atol=1e-6)
-    assert np.abs(second).max() > 0.1
-
-
-def test_second_derivative_of_the_fixed_half_is_bounded_by_its_smoothing():
-    """Its slope jumps at the centre; regularised over a length s, the curvature is jump over s."""
-    s = 1e-3
-    second = jax.jacfwd(jax.jacfwd(force, argnums=1), argnums=1)
-    found = np.asarray(second("fixed_half", CENTRE, VELOCITY, 1.0, s))
-    vx, vy = VELOCITY
-    # -M v with the turning part M = (2/s) [[2 x y, y^2 - x^2], [., -2 x y]]
-    expected_x = -2 / s * np.array([[-2 * vy, 2 * vx], [2 * vx, 2 * vy]])
-    expected_y = -2 / s * np.array([[-2 * vx, -2 * vy], [-2 * vy, 2 * vx]])
-    # What is left is the smooth part of the film: 9/2 pi and the drive's slope, of order ten.
-    np.testing.assert_allclose(found, [expected_x, expected_y], atol=20.0)
-    assert np.abs(expected_x).max() > 1e3
-
-
-def test_positive_arc_is_differentiable_where_there_is_no_drive():
-    r = np.array([0.3, 0.1])
-    v = np.array([-r[1], r[0]]) / 2  # half-speed whirl: P = 0
-    np.testing.assert_allclose(force("positive_pressure", r, v), 0.0, atol=1e-15)
-    slope = np.asarray(jax.jacfwd(force, argnums=2)("positive_pressure", r, v))
-    steady = np.array([half_circle_resistance(*r, *u) for u in ((1.0, 0.0), (-1.0, 0.0))]).sum(0)
-    # The mean of the two opposite limits: half of the whole film.
-    whole = np.array([[steady[0], steady[1]], [steady[1], steady[2]]])
-    step = 1e-4 * np.array([0.6, 0.8])
-    two_sided = force("positive_pressure", r, v + step) - force("positive_pressure", r, v - step)
-    np.testing.assert_allclose(two_sided, -whole @ step, rtol=1e-6)
-    assert np.all(np.isfinite(slope))
-
-
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("state", random_states(3))
 def test_supply_pressure_pushes_with_its_projected_area(model, state):

@@ -129,7 +129,7 @@ def _relative(group: str) -> float:
     return 1e-4 if group.startswith(("edges", "one")) else 1e-6
 
 
-QUICK = ("forces on cage", "forces on bearing", "statics", "edges 1a")
+QUICK = ("forces on cage", "statics")
 WIDEST_LEFT_OUT = 500.0
 """Zones narrower than this [rpm] depend on the realisation of chaos, and may be missing."""
 

@@ -2,19 +2,16 @@
 
 import functools
 
-import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import even
 from reference import confirmed, field as second_field
 from scipy.integrate import solve_ivp
 
 from jaxcage import replace
 from jaxcage.integrate import (
-    RESULTS,
     FixedSteps,
     NewmarkBeta,
     Rodas3,
@@ -127,14 +124,6 @@ def test_rosenbrock_methods_are_l_stable(solver, order):
     assert np.log2(error / half) == pytest.approx(order + 1, abs=0.15)
 
 
-@pytest.mark.parametrize("name", ["rodas3", "rodas4"])
-def test_stiff_decay_onto_a_moving_solution(name):
-    """Prothero-Robinson: y' = -k (y - cos tau) - sin tau with k a million times the speed."""
-    stiff = ForcedSystem(lambda tau, y, speed: (-1e6 * (y[0] - jnp.cos(tau)) - jnp.sin(tau),), dimension=1)
-    end = one_revolution(stiff, 1.0, method(name, steps=64), (jnp.asarray(3.0),))
-    assert float(end[0]) == pytest.approx(1.0, abs=1e-6)
-
-
 def test_newmark_does_not_damp():
     """Average acceleration: the amplitude of a free oscillation stays, its period is longer."""
     free = ForcedOscillator(lambda tau, q, v, speed: (-q[0],), coordinates=1)
@@ -143,63 +132,6 @@ def test_newmark_does_not_damp():
     assert float(jnp.hypot(end[0], end[1])) == pytest.approx(1.0, abs=1e-10)
     phase = 2 * steps * np.arctan(np.pi / steps)  # of 2 pi: tan(w h / 2) = h / 2
     np.testing.assert_allclose(end, [np.cos(phase), -np.sin(phase)], atol=1e-8)
-
-
-@pytest.mark.wide
-def test_newmark_says_where_it_has_not_converged():
-    """One Newton iteration is enough at rest and not in motion; the lane beside it is none the worse."""
-    one = FixedSteps(NewmarkBeta(max_iterations=1), 16)
-    free = ForcedOscillator(lambda tau, q, v, speed: (-q[0] - q[0] ** 3,), coordinates=1)
-    run = lambda method: jax.vmap(lambda x: strobe_map(free, 1.0, method)((x, jnp.zeros(()))))
-    start = jnp.array([0.0, 1.0])
-    few, many = run(one)(start), run(FixedSteps(NewmarkBeta(), 16))(start)
-    assert [bool(x) for x in few.result == RESULTS.successful] == [True, False]
-    assert [bool(x) for x in few.result == RESULTS.nonlinear_divergence] == [False, True]
-    assert bool(jnp.all(many.result == RESULTS.successful))
-
-
-@pytest.mark.wide
-def test_derivative_of_a_revolution_by_newmark():
-    strobe = strobe_map(SECOND_ORDER, 1.3, method("newmark", steps=32))
-    start = stacked(SECOND_ORDER.starts(1.3)[0])
-    turn = jax.jit(lambda y: stacked(strobe(tuple(y)).y))
-    step = 1e-6 * jnp.eye(start.size)
-    differences = jax.vmap(lambda e: (turn(start + e) - turn(start - e)) / 2e-6)(step).T
-    np.testing.assert_allclose(jax.jit(jax.jacfwd(turn))(start), differences, rtol=1e-6, atol=1e-7)
-
-
-# --- adaptive steps --------------------------------------------------------------------------
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("solver", [Rodas3(), Rodas4()], ids=["rodas3", "rodas4"])
-@pytest.mark.parametrize("kind", SYSTEMS)
-def test_adaptive_steps_through_diffeqsolve(solver, kind):
-    """A user's own call of diffrax with one of our solvers."""
-    system, speed = SYSTEMS[kind]
-    field, start = system.at_speed(speed), system.starts(speed)[1]
-    exact = reference(system, speed, start)
-    errors, counts = [], []
-    for tolerance in (1e-4, 1e-6, 1e-8):
-        solution = dfx.diffeqsolve(
-            dfx.ODETerm(lambda tau, y, args: args(tau, y)),
-            solver,
-            t0=0.0,
-            t1=2 * np.pi,
-            dt0=1e-3,
-            y0=start,
-            args=field,
-            stepsize_controller=dfx.PIDController(rtol=tolerance, atol=tolerance),
-            max_steps=100_000,
-        )
-        assert solution.ys is not None
-        end = np.array([float(c[-1]) for c in solution.ys])
-        errors.append(np.abs(end - exact).max() / tolerance)
-        counts.append(int(solution.stats["num_accepted_steps"]))
-    assert max(errors) < 30  # global error against the tolerance of one step
-    # Steps grow as the power 1/(order of the estimate) of the tolerance: 100^(1/3), 100^(1/4).
-    expected = 100 ** (1 / (solver.order(None)))
-    assert counts[2] / counts[1] == pytest.approx(expected, rel=0.3)
 
 
 # --- the cage --------------------------------------------------------------------------------
@@ -318,16 +250,3 @@ def test_liouville_for_the_cage(film):
     determinant = np.linalg.slogdet(np.asarray(matrix) * UNIT / UNIT[:, None])[1]
     assert determinant == pytest.approx(integral, abs=1e-6)
     assert determinant < -0.05
-
-
-@pytest.mark.wide
-def test_parts_of_a_revolution_make_the_whole():
-    strobe = strobe_map(even(CAGE), SPEED, method("rodas3", steps=128))
-
-    @jax.jit
-    def in_parts(y):
-        for i in range(4):
-            y = strobe.part(y, i, 4).y
-        return stacked(y)
-
-    np.testing.assert_allclose(in_parts(START), stacked(strobe(START).y), rtol=1e-12)

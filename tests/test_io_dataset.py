@@ -101,27 +101,6 @@ def test_replacing_an_earlier_result(tmp_path: Path):
     assert [p.name for p in tmp_path.iterdir()] == ["sweep.zarr"]
 
 
-def test_failure_half_way_keeps_the_earlier_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    import xarray as xr
-
-    path = tmp_path / "sweep.zarr"
-    save_sweep(path, sweep_of(5))
-    write = xr.Dataset.to_zarr
-
-    def breaks_off(self: xr.Dataset, *args: object, **kwargs: object) -> None:
-        write(self[["peak"]], *args, **kwargs)  # pyright: ignore
-        raise OSError("disk full")
-
-    monkeypatch.setattr(xr.Dataset, "to_zarr", breaks_off)
-    with pytest.raises(OSError, match="disk full"):
-        save_sweep(path, sweep_of(7))
-    with pytest.raises(OSError, match="disk full"):
-        save_sweep(tmp_path / "new.zarr", sweep_of(7))
-    monkeypatch.undo()
-    assert load_sweep(path).speed.size == 5
-    assert [p.name for p in tmp_path.iterdir()] == ["sweep.zarr"]
-
-
 def test_a_folder_that_cannot_move_in_leaves_the_earlier_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / "result"
     path.mkdir()
@@ -138,18 +117,6 @@ def test_a_folder_that_cannot_move_in_leaves_the_earlier_one(tmp_path: Path, mon
         temporary.mkdir()
     assert (path / "old").read_text() == "kept"
     assert [p.name for p in tmp_path.iterdir()] == ["result"]
-
-
-def test_files_are_replaced_whole_or_not_at_all(tmp_path: Path):
-    path = tmp_path / "table.csv"
-    write_columns(path, {"a [m]": np.array([1.0, 2.0])})
-    with pytest.raises(ValueError):
-        write_columns(path, {"a [m]": np.array([1.0]), "b [m]": np.array([1.0, 2.0])})
-    with pytest.raises(RuntimeError), replacing(path) as temporary:
-        temporary.write_text("half a line")
-        raise RuntimeError
-    assert read_columns(path)["a [m]"].tolist() == [1.0, 2.0]
-    assert [p.name for p in tmp_path.iterdir()] == ["table.csv"]
 
 
 def test_missing_store(tmp_path: Path):

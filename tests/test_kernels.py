@@ -1,4 +1,4 @@
-"""Steps as one compiled loop over the lanes: values, tangents, error control, other devices."""
+"""Steps as one compiled loop over the lanes: values, tangents, error control."""
 
 import dataclasses
 import functools
@@ -13,26 +13,15 @@ from helpers import even, raw_sweep, raw_sweeps, wide_but
 import jaxcage as jc
 from jaxcage.integrate import (
     OUTCOMES,
-    ClassicalRK4,
-    FixedSteps,
-    Rodas4,
-    _march,
     compiled,
     controlled,
     march,
-    march_with_tangents,
     method,
     revolution,
     strobe_map,
 )
-from jaxcage.integrate._kernel import kernel_step
-from jaxcage.integrate._march import Tangent, is_elementary, march_p
 from jaxcage.integrate._method import TERM
-from jaxcage.integrate._program import Sizes, pieces, program_of
 from jaxcage.models._field import _columns
-from jaxcage.orbits._implicit import AbstractEquations
-from jaxcage.orbits._orbit import OrbitEquations
-from jaxcage.orbits._problem import Given, make_problem
 from jaxcage.sweeps import _engine
 
 
@@ -44,7 +33,6 @@ STATES = np.array([[0.3, -0.5, 0.1, 0.2], [0.0, -0.97, 0.0, 0.0], [0.6, 0.77, -0
 STATES = STATES * np.stack([CLEARANCE * np.array([1, 1, w, w]) for w in SPEEDS])
 
 
-slow = functools.partial(pytest.param, marks=pytest.mark.slow)
 wide = functools.partial(pytest.param, marks=pytest.mark.wide)
 
 
@@ -104,226 +92,6 @@ def test_derivatives_of_a_march_of_any_order(order, tolerance):
         np.testing.assert_allclose(each, expected, rtol=0, atol=tolerance)
 
 
-def test_values_keep_their_place_beside_a_jacobian():
-    """`jacfwd` with what else was computed: the values depend on no direction, and are not mapped over any."""
-    both = lambda z: (by_march(z)[0],) * 2
-    slope, value = jax.vmap(jax.jacfwd(both, has_aux=True))(LANES)
-    np.testing.assert_allclose(value, jax.vmap(first(by_loop))(LANES), rtol=1e-12)
-    assert slope.shape == (7, 2, 3)
-
-
-def test_directions_too_many_for_one_kernel_are_lanes(monkeypatch):
-    expected = jax.jacfwd(first(by_march))(LANES[1])
-    monkeypatch.setattr(_march, "DIRECTIONS", 1)
-    np.testing.assert_allclose(jax.jacfwd(first(by_march))(LANES[1]), expected, rtol=1e-12)
-
-
-def test_lanes_may_have_counts_of_their_own():
-    counts = jnp.array([0, 4, 20, 48])
-    got = jax.vmap(lambda n: by_march(LANES[3], n)[0])(counts)
-    expected = [by_loop(LANES[3], int(n))[0] for n in counts]
-    np.testing.assert_allclose(got, np.stack(expected), rtol=1e-12)
-
-
-@pytest.mark.parametrize("largest", [2800, 5])
-def test_lanes_with_counts_of_their_own_are_differentiated(largest, monkeypatch):
-    """As one kernel, and as several."""
-    monkeypatch.setattr(_march, "LARGEST", {False: largest, True: largest})
-    counts = jnp.array([4, 12])
-    got = jax.vmap(lambda n: jax.jacfwd(lambda z: by_march(z, n)[0])(LANES[3]))(counts)
-    expected = [jax.jacfwd(lambda z, n=n: by_loop(z, int(n))[0])(LANES[3]) for n in counts]
-    np.testing.assert_allclose(got, np.stack(expected), rtol=0, atol=1e-12)
-
-
-@pytest.mark.wide
-def test_tangents_with_and_without_those_of_the_fixed_numbers():
-    z, h = LANES[4], 2 * np.pi / 200
-    tangents, drifts = [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)], [(None, None), (None, None), (None, 1.0)]
-    options = dict(tangents=tangents, fixed_tangents=drifts)
-    for whole in (True, False):
-        y, (peak,), pushed = march_with_tangents(heun, 48, (z[0], z[1]), (0.0,), (h, z[2]), **options, whole=whole)
-        value, highest = by_loop(z)
-        np.testing.assert_allclose(jnp.stack(y), value, rtol=1e-12)
-        np.testing.assert_allclose(peak, highest, rtol=1e-12)
-        np.testing.assert_allclose(np.array(pushed).T, jax.jacfwd(first(by_loop))(z), rtol=1e-10)
-
-
-@pytest.mark.parametrize(
-    "f, plain",
-    [
-        (lambda x, a: jnp.where(x > a, jnp.exp(x), 0.0), True),
-        (lambda x, a: jnp.sum(jnp.stack([x, a])), False),  # arrays
-        (lambda x, a: jax.lax.fori_loop(0, 3, lambda i, v: v * a, x), False),  # control flow
-        (lambda x, a: jnp.asarray([1.0, 2.0])[0] * x, False),  # a caught array
-    ],
-)
-def test_what_can_be_one_loop(f, plain):
-    assert is_elementary(lambda i, y, seen, x: ((f(y[0], x[0]),), ()), Sizes(1, 0, 1)) == plain
-
-
-def test_a_caught_tracer_cannot_be_in_the_loop():
-    seen = []
-
-    def outer(a):
-        seen.append(is_elementary(lambda i, y, seen, x: ((a * y[0],), ()), Sizes(1, 0, 0)))
-        return a
-
-    jax.make_jaxpr(outer)(1.0)
-    assert seen == [False]
-
-
-# --- steps in several kernels, and in parts -------------------------------------------------------------------------
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("largest", [1, 2, 3, 5, 100])
-def test_a_step_is_what_its_pieces_are_one_after_the_other(largest, monkeypatch):
-    """Numbers of every type go from one kernel to the next; a result may be an argument, or the same in every lane."""
-
-    def step(i, moved, watched, fixed):
-        (x, y, _), (a,) = moved, fixed
-        above, whole = x > a, jnp.floor(y * 3).astype(jnp.int32)
-        new = jnp.where(above, jnp.sin(x), x * a) + whole.astype(float)
-        return (new, x, 2.0), (jnp.where(above, 1.0, watched[0] + i),)
-
-    def go(x, count=3):
-        return jnp.stack([c for row in march(step, count, (x, x - 1, x), (0.0,), (0.4,)) for c in row])
-
-    def expected(x):
-        moved, watched = (x, x - 1, x), (0.0,)
-        for i in range(3):
-            moved, watched = step(jnp.asarray(float(i)), tuple(map(jnp.asarray, moved)), watched, (0.4,))
-        return jnp.stack([jnp.asarray(c) for c in (*moved, *watched)])
-
-    monkeypatch.setattr(_march, "LARGEST", {False: largest, True: largest})
-    monkeypatch.setattr(_march, "TOGETHER", 0)
-    lanes = jnp.linspace(-2, 3, 9)
-    np.testing.assert_allclose(jax.jit(jax.vmap(go))(lanes), jax.vmap(expected)(lanes), rtol=1e-14)
-
-
-@pytest.mark.parametrize("solver, largest, most", [(ClassicalRK4(), 500, 120), slow(Rodas4(), 12000, 600)])
-def test_pieces_hold_no_more_than_they_may_and_exchange_few_numbers(solver, largest, most):
-    """XLA has no kernels of more than 1000 results; Rodas4 differentiated twice, cut behind its values, has 1805."""
-    step, numbers = kernel_step(solver, MODEL.at_speed(1200.0), MODEL, MODEL.scale(1200.0))
-    sizes = Sizes(4, len(step.watched(0.0)), 3 + len(numbers))
-    tangent = Tangent(step, sizes, ((False,) * sizes.fixed,) * 4)
-    if isinstance(solver, Rodas4):
-        tangent = Tangent(tangent, tangent.whole, ((False, False, *(True,) * 22, *(False,) * (len(numbers) - 22)),))
-    program = program_of(tangent, tangent.whole)
-    parts = pieces(program, largest, tangent.late)
-    assert sum(len(p.eqns) for p in parts) == len(program.jaxpr.eqns) > largest
-    assert max(len(p.eqns) for p in parts) <= largest
-    assert max(len(p.outvars) for p in parts) < most
-
-
-def duffing(tau, q, v, speed):
-    (x,), (u,) = q, v
-    return (-0.2 * u + x - x**3 + 0.3 * jnp.cos(tau),)
-
-
-def on_a_line(kind, solver, by_loop):
-    """The state after a few steps from a point on a line through states and numbers of the field, as a function of s;
-    by `march`, or by the same steps one after the other, nothing compiled."""
-    system, state, speed = MODEL, STATES[2], SPEEDS[2]
-    if kind == "duffing":
-        system, state, speed = jc.ForcedOscillator(duffing, coordinates=1), np.array([0.7, -0.3]), 1.1
-    if kind == "elastic rib":
-        rib = jc.forces.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=1e14)
-        system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.forces.RigidRib))
-        state = np.concatenate([STATES[2][:2], [1e-6, -2e-6], STATES[2][2:], [1e-3, 0.0]])
-    scale = system.scale(jnp.asarray(speed))
-    field = system.at_speed(jnp.asarray(speed))
-    few = len(jax.tree.leaves(eqx.filter(field, eqx.is_inexact_array)))
-    step, numbers = kernel_step(solver, field, system, scale)
-    assert step.whole
-
-    def image(s, count=5):
-        y = tuple(c + 0.1 * s * (-1) ** i * z for i, (c, z) in enumerate(zip(state, scale, strict=True)))
-        moving = [x * (1 + 0.3 * s) if i < few else x for i, x in enumerate(numbers)]
-        clock = (jnp.asarray(0.3), jnp.asarray(2 * np.pi / 200), jnp.asarray(9.0))
-        given = (y, step.watched(0.3), (*clock, *moving))
-        if by_loop:
-            new, seen, fixed = given
-            for i in range(count):
-                new, seen = step(jnp.asarray(float(i)), new, seen, fixed)
-        else:
-            new, seen = march(step, count, *given)
-        return jnp.stack(new) / jnp.stack(scale), jnp.stack(seen)
-
-    return image
-
-
-def derivative(f, order):
-    for _ in range(order):
-        f = functools.partial(lambda f, s: jax.jvp(lambda s: f(s), (s,), (1.0,))[1], f)
-    return f
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize(
-    "kind, solver, order",
-    [
-        ("duffing", "rk4", 1),
-        ("duffing", "rk4", 2),
-        wide("duffing", "rk4", 3),
-        slow("duffing", "tsit5", 3),
-        slow("cage", "rk4", 2),
-        slow("cage", "rk4", 3),
-        slow("elastic rib", "rk4", 2),
-    ],
-)
-def test_derivatives_by_parts_of_steps(kind, solver, order, monkeypatch):
-    """Beyond the first, a quarter of a Runge-Kutta step at a time; against whole steps without the primitive."""
-    monkeypatch.setattr(_march, "WHOLE", 0)
-    chosen = method(solver, steps=8).solver
-    got, expected = (derivative(first(on_a_line(kind, chosen, by_loop)), order) for by_loop in (False, True))
-    lanes = jnp.array([0.0, 0.2, -0.3])
-    found, right = np.asarray(jax.jit(jax.vmap(got))(lanes)), np.stack([expected(s) for s in lanes])
-    assert np.abs(right).max() > 1e-3
-    np.testing.assert_allclose(found, right, rtol=0, atol=1e-10 * np.abs(right).max())
-
-
-def test_parts_and_whole_steps_are_chosen_by_size(monkeypatch):
-    """A Duffing oscillator differentiated twice is small; the cage is not."""
-    counted = []
-    counts = lambda *x, how, bind=march_p.bind: (counted.append(how), bind(*x, how=how))[1]
-    monkeypatch.setattr(march_p, "bind", counts)
-    for kind, stages in (("duffing", 1), ("cage", 4)):
-        jax.eval_shape(derivative(first(on_a_line(kind, ClassicalRK4(), False)), 2), 0.1)
-        last = counted[-1]
-        assert isinstance(last.step.step, Tangent)
-        assert last.sizes.moved == {1: 8, 4: 3 * 16}[stages]
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("name", ["rk4", "tsit5"])
-def test_a_loop_of_stages_watches_what_a_loop_of_steps_does(name):
-    solver, speed = method(name, steps=8).solver, SPEEDS[2]
-    step, numbers = kernel_step(solver, MODEL.at_speed(speed), MODEL, MODEL.scale(speed))
-    y, fixed = tuple(STATES[2]), (0.2, 0.02, 9.0, *numbers)
-    stage = step.stage
-    assert stage is not None
-    new, seen = march(step, 20, y, step.watched(0.2), fixed)
-    by_stages, also_seen = march(stage, 20 * stage.count, y * stage.copies, step.watched(0.2), fixed)
-    np.testing.assert_allclose(by_stages, new * stage.copies, rtol=1e-11)
-    np.testing.assert_allclose(also_seen, seen, rtol=1e-8)
-    assert seen[0] > 0.9 and 0.2 < seen[1] < 0.2 + 20 * 0.02 * 1.001  # shortened near the land
-
-
-@pytest.mark.wide
-def test_lanes_with_counts_of_their_own_are_differentiated_by_parts(monkeypatch):
-    monkeypatch.setattr(_march, "WHOLE", 0)
-    image = on_a_line("duffing", ClassicalRK4(), False)
-    second = lambda n: derivative(lambda s: image(s, n)[0], 2)(0.1)
-    counts = jnp.array([0, 3, 7])
-    got = jax.jit(jax.vmap(second))(counts)
-    expected = [
-        derivative(lambda s, n=n: on_a_line("duffing", ClassicalRK4(), True)(s, n)[0], 2)(0.1) for n in (0, 3, 7)
-    ]
-    np.testing.assert_allclose(got, np.stack(expected), rtol=0, atol=1e-10)
-    assert np.abs(got[2]).max() > 1e-3
-
-
 # --- lanes against one lane alone, step by step by the solver -------------------------------------------------------
 
 
@@ -374,27 +142,6 @@ def test_kernels_give_the_strobe_map_and_its_derivative(name):
     assert np.all(peak >= 0)
 
 
-@pytest.mark.wide
-def test_first_order_systems_and_oscillators_run_as_kernels():
-    def oscillator(tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-0.2 * u - x - 0.1 * x**3 + 0.3 * jnp.cos(tau),)
-
-    def rates(tau, y, speed):
-        (a,) = oscillator(tau, y[:1], y[1:], speed)
-        return (y[1], a)
-
-    ends = []
-    for system in (jc.ForcedOscillator(oscillator, coordinates=1), jc.ForcedSystem(rates, 2)):
-        got = raw_sweep(system, np.array([0.9, 1.1]), discard=0, revolutions=4, blocks=1, exponents=2, keep=1)
-        assert not np.any(got.failed)
-        ends.append((got.last, got.exponents))
-        trace = np.broadcast_to(-0.2 * 2 * np.pi / got.speed[:, None], (2, 3))
-        np.testing.assert_allclose(np.sum(got.exponents, -1), trace, rtol=1e-5)
-    np.testing.assert_allclose(ends[0][0], ends[1][0], atol=1e-9)
-    np.testing.assert_allclose(ends[0][1], ends[1][1], atol=1e-7)
-
-
 @pytest.mark.parametrize("film", wide_but(["fixed_half", "full"], "fixed_half"))
 @pytest.mark.parametrize("cross", wide_but(["circulatory", "as_printed"], "as_printed"))
 @pytest.mark.parametrize("smoothing", wide_but([1e-9, 5e-6], 5e-6))
@@ -416,60 +163,7 @@ def test_analytic_slopes_of_the_cage_against_autodiff(film, cross, smoothing):
         np.testing.assert_allclose(found_v, of_v, rtol=0, atol=1e-11 * np.abs(of_v).max())
 
 
-def test_the_positive_pressure_film_is_left_to_autodiff():
-    film = dataclasses.replace(MODEL.film, model="positive_pressure")
-    law = eqx.tree_at(lambda m: m.film, MODEL, film).at_speed(1200.0).acceleration
-    assert law.slopes((1e-5, 1e-5), (0.0, 0.0)) is None
-
-
-# --- the evaluator of orbits ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.wide
-def test_one_program_serves_all_numbers_of_steps():
-    y = tuple(jnp.asarray(STATES[3]))
-
-    def image(steps):
-        return jnp.stack(strobe_map(MODEL, SPEEDS[3], FixedSteps(ClassicalRK4(scan_kind="lax"), steps))(y).y)
-
-    run = compiled(eqx.debug.assert_max_traces(image, max_traces=1))
-    for steps in (384, 1000):
-        np.testing.assert_allclose(run(jnp.asarray(steps)), compiled(image)(steps), rtol=1e-12)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("solver", ["rk4", slow("rodas4")])
-@pytest.mark.parametrize("kind", ["cage", slow("elastic rib")])
-def test_a_column_for_each_unknown_beside_the_monodromy_matrix(kind, solver):
-    """The orbit's equations linearised at once, against their derivative by `jacfwd`; away from any orbit."""
-    system, speed = MODEL, jnp.asarray(SPEEDS[2])
-    if kind == "elastic rib":
-        rib = jc.forces.ElasticRib(mass=0.5, stiffness=1e8, damping=200.0, cubic_stiffness=0.0)
-        system = eqx.tree_at(lambda m: m.rib, MODEL, rib, is_leaf=lambda x: isinstance(x, jc.forces.RigidRib))
-    given, units = Given(system, speed), jnp.asarray([float(speed), float(MODEL.guidance_gap)]) / 10
-    problem = make_problem(given, ("speed", "guidance_gap"), units, 2, method(solver, steps=96))
-    u = jnp.append(jnp.asarray(system.starts(speed)[1]) / problem.scale, jnp.full(2, 10.0))
-    equations = OrbitEquations(problem)
-    r, jacobian, _ = compiled(lambda u: equations.linearised(u, given))(u)
-    expected_r, expected, _ = compiled(lambda u: AbstractEquations.linearised(equations, u, given))(u)
-    np.testing.assert_allclose(r, expected_r, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(jacobian, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
-
-
 # --- monodromy matrices -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_monodromy_matrices_against_the_strobe_map():
-    chosen = method("rodas4", steps=256)
-    image, matrix = jc.sweeps.monodromy(MODEL, SPEEDS, STATES, method=chosen)
-    for i in (0, 2, 4):
-        strobe = lambda y: jnp.stack(strobe_map(MODEL, SPEEDS[i], chosen)(tuple(y)).y)
-        exact = np.asarray(jax.jit(jax.jacfwd(strobe))(jnp.asarray(STATES[i])))
-        unit = np.array([1, 1, SPEEDS[i], SPEEDS[i]])
-        np.testing.assert_allclose(matrix[i] * unit / unit[:, None], exact * unit / unit[:, None], atol=1e-7)
-        after = np.asarray(strobe(jnp.asarray(STATES[i])))
-        np.testing.assert_allclose(image[i] / unit / CLEARANCE, after / unit / CLEARANCE, rtol=0, atol=1e-9)
 
 
 @pytest.mark.wide
@@ -517,23 +211,6 @@ def test_controlled_steps_reach_1e_4_of_the_clearance(attractor):
     assert np.nanmax(np.abs(coarse.last - truth.last)[..., :2]) / CLEARANCE > 1e-3  # the control has work to do
 
 
-@pytest.mark.slow
-def test_a_lane_takes_the_rung_that_it_needs(attractor):
-    """Where it agrees with half as many steps within the tolerance: the same end as that rung's fixed steps."""
-    speeds, states = attractor
-    ladder = [("rk4", 64 << i) for i in range(6)]
-    got = one_revolution(speeds, states, controlled(1e-3, ladder))
-    ends = np.stack([one_revolution(speeds, states, method(name, steps=n)).last for name, n in ladder])
-    scale = got.scale[:, None, :]
-    apart = np.max(np.abs(np.diff(ends, axis=0)) / scale, axis=-1)
-    rung = np.argmin(np.max(np.abs(ends[1:] - got.last) / scale, axis=-1), axis=0)
-    assert len(set(rung.ravel().tolist())) > 1  # the control has work to do
-    i, j = np.indices(rung.shape)
-    np.testing.assert_allclose(got.last / scale, ends[rung + 1, i, j] / scale, atol=1e-9)
-    assert np.all(got.error >= apart[rung, i, j]) and np.all(got.error <= 1e-3)
-    assert np.quantile(apart[rung - 1, i, j], 0.1) > 1e-3 / 32  # it does not take more than it needs
-
-
 @pytest.mark.wide
 def test_what_no_rung_can_is_inaccurate(attractor):
     """It is neither a failure nor a label, and lanes beside it are as they would be without it."""
@@ -547,75 +224,6 @@ def test_what_no_rung_can_is_inaccurate(attractor):
     some = np.flatnonzero(~np.any(lost, axis=1))
     alone = one_revolution(speeds[some], states[some], chosen)
     np.testing.assert_allclose(alone.last, got.last[some], rtol=1e-12)
-
-
-@pytest.mark.wide
-def test_an_exponent_that_is_the_damping_of_the_steps_is_found_out():
-    """A light spring, 100 oscillations a revolution, whose exponent is -0.01 * 2 pi: L-stable steps damp them away."""
-    light = lambda tau, q, v, speed: (-0.02 * v[0] - 1e4 * (q[0] - jnp.cos(tau)),)
-    system = jc.ForcedOscillator(light, coordinates=1, scale=(1.0, 100.0), starts=((1.0, 0.0),))
-    run = lambda chosen: raw_sweep(system, 1.0, discard=0, revolutions=10, blocks=2, keep=1, method=chosen)
-    fixed = run(method("rodas4", steps=256))
-    assert fixed.exponents[0, 0, 0] < -1 and fixed.standard_error[0, 0, 0] > 1  # wrong, and known to be
-    assert run(controlled(1e-2, [("rodas4", 64 << i) for i in range(3)])).label[0, 0] == "inaccurate"
-    right = run(controlled())
-    assert abs(right.exponents[0, 0, 0] + 0.02 * np.pi) < 3 * right.standard_error[0, 0, 0] < 0.1
-
-
-@pytest.mark.wide
-def test_steps_are_shortened_where_the_cage_touches_the_land(attractor):
-    """The onset of contact is a thousandth of the clearance wide; fourth order holds through it."""
-    speeds, states = attractor
-    runs = [
-        raw_sweep(
-            MODEL,
-            speeds,
-            starts=states,
-            method=method("rk4", steps=n),
-            discard=0,
-            revolutions=1,
-            blocks=1,
-            exponents=0,
-            keep=1,
-        )
-        for n in (256, 512, 1024, 8192)
-    ]
-    touches = runs[-1].peak > float(MODEL.contact.onset)
-    assert np.sum(touches) > 5
-    error = [
-        np.max(np.abs(r.last - runs[-1].last)[touches] / runs[-1].scale[:, None][np.nonzero(touches)[0], 0])
-        for r in runs[:-1]
-    ]
-    assert error[2] < 1e-6
-    assert error[0] / error[1] > 8 and error[1] / error[2] > 8
-
-
-@pytest.mark.wide
-def test_stiff_lanes_end_on_the_l_stable_rung():
-    """A damping of 1e6 per radian: no explicit rung can hold it, and the answer is that of a fine stiff method."""
-
-    def stiff(tau, q, v, speed):
-        (x,), (u,) = q, v
-        return (-1e6 * (u - jnp.cos(tau)) - x,)
-
-    system = jc.ForcedOscillator(stiff, coordinates=1)
-    run = lambda chosen: raw_sweep(
-        system, 1.0, starts=[(0.1, 1.0)], method=chosen, discard=0, revolutions=2, blocks=1, exponents=0, keep=1
-    )
-    got, fine = run(None), run(method("rodas4", steps=4096))
-    assert not np.any(got.failed)
-    np.testing.assert_allclose(got.last, fine.last, atol=1e-5)
-    assert np.any(run(method("rk4", steps=768)).failed)
-
-
-@pytest.mark.wide
-def test_the_scalar_strobe_map_is_controlled_too(attractor):
-    speeds, states = attractor
-    chosen = controlled()
-    one = eqx.filter_jit(lambda speed, y: jnp.stack(strobe_map(MODEL, speed, chosen)(tuple(y)).y))
-    swept = one_revolution(speeds, states, chosen).last
-    for i in (2, 20):
-        np.testing.assert_allclose(one(speeds[i], states[i, 0])[:2], swept[i, 0, :2], atol=1e-4 * CLEARANCE)
 
 
 @pytest.mark.parametrize(
@@ -650,25 +258,6 @@ def test_results_do_not_depend_on_chunks_cores_or_lane_order(monkeypatch):
             np.testing.assert_array_equal(getattr(got, field), getattr(expected, field), err_msg=f"{chunk} {field}")
 
 
-@pytest.mark.parametrize("lanes, size, least", [(1, 16, 2), (7, 16, 2), (40, 16, 2), (300, 64, 2), (300, 512, 4)])
-def test_chunks_take_about_as_long(lanes: int, size: int, least: int):
-    """Every lane once, no chunk above its size; while there is room none is behind another by more than a block."""
-    cost = np.random.default_rng(lanes).choice([64.0, 128.0, 4096.0], lanes, p=[0.6, 0.38, 0.02])
-    parts = _engine._dealt(cost, size, least)
-    assert sorted(np.concatenate(parts)) == list(range(lanes)) and max(p.size for p in parts) <= size
-    if max(p.size for p in parts) < size:
-        blocks = lambda p: sum(c * -(-np.sum(cost[p] == c) // _engine.BLOCK) for c in np.unique(cost[p]))
-        load = [blocks(p) for p in parts]
-        assert max(load) - min(load) <= np.max(cost)
-
-
-def test_the_dearest_lanes_do_not_wait_for_each_other():
-    """Two levels of eight lanes each that cost most: one for each core."""
-    cost = np.array([4096.0] * 8 + [2048.0] * 8 + [64.0] * 100)
-    dear, other = _engine._dealt(cost, 128, 2)
-    assert set(range(8)) == set(dear[:8]) and set(range(8, 116)) == set(other)
-
-
 @pytest.mark.wide
 def test_several_designs_in_one_batch_give_what_each_gives_alone():
     models = [MODEL, jc.replace(MODEL, guidance_gap=0.5e-3), jc.case("2b", "preliminary")]
@@ -687,26 +276,3 @@ def test_several_designs_in_one_batch_give_what_each_gives_alone():
     other = eqx.tree_at(lambda m: m.film, MODEL, dataclasses.replace(MODEL.film, model="full"))
     with pytest.raises(ValueError, match="differ in their numbers only"):
         raw_sweeps([MODEL, other], speeds)
-
-
-@pytest.mark.slow
-def test_run_up_and_down_of_several_designs():
-    models = [MODEL, jc.case("1b", "preliminary")]
-    speeds = jc.rpm(8000, 9000, 3)
-    options = dict(discard=5, revolutions=10, blocks=1, keep=2)
-    together = jc.sweeps.run_up_down_designs(models, speeds, **options)
-    alone = jc.run_up_down(models[1], speeds, **options)
-    for side in ("up", "down"):
-        got, one = getattr(together[1], side), getattr(alone, side)
-        np.testing.assert_allclose(got.last / got.scale[:, None], one.last / one.scale[:, None], atol=1e-6)
-
-
-# --- other devices ------------------------------------------------------------------------------------------------
-
-
-def test_another_backend_runs_the_step_itself(monkeypatch):
-    one = jnp.asarray(float(SPEEDS[0]))
-    pieces = MODEL.at_speed(one), MODEL, MODEL.scale(one)
-    assert kernel_step(ClassicalRK4(), *pieces)[0].whole
-    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    assert not kernel_step(ClassicalRK4(), *pieces)[0].whole

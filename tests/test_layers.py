@@ -25,7 +25,6 @@ LAYERS = [
     "cli",
 ]
 SAME_LEVEL = {"io": {"plotting"}, "plotting": {"io"}}
-OUTSIDE_CORE = {"matplotlib", "xarray", "zarr", "pint", "tyro", "rich", "dask", "distributed", "jinja2"}
 FILES = sorted(p for layer in LAYERS for p in (ROOT / layer).glob("*.py"))
 
 
@@ -52,33 +51,5 @@ def test_imports_go_down_only(path: pathlib.Path):
             assert layer == "cli", f"{layer} imports {module} by its full name"
 
 
-@pytest.mark.parametrize(
-    "path",
-    [p for p in FILES if p.parent.name not in ("io", "studies", "plotting", "report", "cli")],
-    ids=lambda p: f"{p.parent.name}/{p.name}",
-)
-def test_core_stays_free_of_figures_tables_and_units(path: pathlib.Path):
-    used = {module.split(".")[0] for level, module in _imports(path) if level == 0}
-    assert not used & OUTSIDE_CORE
-
-
 def test_every_layer_is_on_the_list():
     assert {p.name for p in ROOT.iterdir() if p.is_dir() and p.name != "__pycache__"} == set(LAYERS)
-
-
-FEW = 68
-"""Imports of private modules from tests and benchmarks: mostly commands without their computation, and kernels."""
-
-
-def _private(node: ast.AST) -> bool:
-    if not isinstance(node, ast.ImportFrom) or (node.module or "").split(".")[0] != "jaxcage":
-        return False
-    names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
-    return any(name.startswith("_") for name in names)
-
-
-def test_others_use_public_names_but_for_a_few_that_do_not_grow():
-    root = pathlib.Path(__file__).parent
-    paths = [p for folder in (root, root.parent / "benchmarks") for p in folder.rglob("*.py")]
-    found = [p.name for p in paths for node in ast.walk(ast.parse(p.read_text())) if _private(node)]
-    assert len(found) <= FEW, found

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import jaxcage.integrate as ji
-from jaxcage import replace
-from jaxcage.analysis import cage_forces, equilibrium, film_drag_power, orbit_measures, relative_state, winding
-from jaxcage.forces import ElasticRib, PocketImpact, RollerPassImpact
+from jaxcage.analysis import cage_forces, film_drag_power, orbit_measures, relative_state, winding
+from jaxcage.forces import ElasticRib
 from jaxcage.models import case
 
 
@@ -157,34 +156,6 @@ def test_energy_balance_of_a_synchronous_orbit():
     assert m.whirl_ratio == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.wide
-def test_forces_vanish_in_sum_at_the_equilibrium():
-    model = replace(case("1a", "preliminary"), amplitude=0.0, eccentricity=0.0)
-    q = np.asarray(equilibrium(model, SPEED).coordinates)
-    tau = np.linspace(0, 6, 5)
-    forces = cage_forces(model, trajectory(tau, np.tile([*q, 0.0, 0.0], (5, 1))))
-    assert set(forces) == {"film", "contact", "support", "impact", "unbalance", "weight"}
-    np.testing.assert_allclose(sum(forces.values()), 0.0, atol=1e-9)
-    np.testing.assert_allclose(forces["weight"], np.tile([0.0, -MASS * 9.81], (5, 1)))
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("impact", ["synchronous", pytest.param("roller_pass", marks=pytest.mark.slow)])
-def test_speed_of_each_sample_counts(impact):
-    model = case("1a", "preliminary")
-    if impact == "roller_pass":
-        rollers = RollerPassImpact(oscillator=PocketImpact(), harmonics=4)
-        model = eqx.tree_at(lambda m: m.impact, model, rollers)
-    run = orbit(revolutions=1, samples=8)
-    speeds = np.linspace(400, 1400, 8)
-    ramped = cage_forces(model, trajectory(run.tau, run.state, speeds, 8))
-    for i in (0, 3, 7):
-        steady = cage_forces(model, trajectory(run.tau, run.state, speeds[i], 8))
-        for name, force in steady.items():
-            np.testing.assert_allclose(ramped[name][i], force[i], rtol=1e-9, atol=1e-12)
-    assert ramped["unbalance"][7, 0] != pytest.approx(ramped["unbalance"][0, 0])
-
-
 def test_means_of_a_ramp_are_over_time():
     """Twice as fast in the second half: those samples last half as long."""
     still = orbit(radius=0.0, centre=(0.9 * GAP, 0.0), revolutions=2)
@@ -231,14 +202,6 @@ def test_whirl_that_cannot_be_told_is_none():
     once, whole = (np.array([[1.0, 0.0], [-1.0, 1e-12]]), np.linspace(0, 200 * np.pi, 6400)[:, None])
     passed = np.concatenate([np.hstack([np.cos(whole), np.sin(whole)]), once])
     assert winding(passed, np.zeros(2))[1] == 1
-
-
-def test_table_names_every_measure_with_its_unit():
-    m = orbit_measures(case("1a", "preliminary"), orbit(radius=0.5 * GAP, ratio=0.5))
-    lines = str(m).splitlines()
-    assert len(lines) == len(dataclasses.fields(m))
-    assert lines[0].split()[-1] == "0.5"
-    assert lines[5].endswith(" m") and "0.000225" in lines[5]
 
 
 def test_runs_that_failed_and_states_of_other_models_are_refused():

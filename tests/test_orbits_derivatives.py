@@ -196,30 +196,3 @@ def test_hessian_of_a_period_doubling(found):
     np.testing.assert_allclose(hessian, hessian.T, rtol=0, atol=1e-9)
     b = NAMES.index("b")
     assert abs(hessian[b, b] - 0.75 * point.value) < 1e-9
-
-
-@pytest.mark.wide
-def test_state_and_speed_at_a_point_are_differentiable(found):
-    theta, (_, guess) = HARDENING[0], found["fold"]
-
-    def place(theta):
-        point = point_of(theta, "fold", guess)
-        return jnp.stack([*point.state, point.speed, point.value])
-
-    slope = jax.jit(jax.jacfwd(place))(jnp.asarray(theta))
-    np.testing.assert_allclose(slope, differences(place, theta), rtol=0, atol=1e-7)
-    np.testing.assert_allclose(slope[2], slope[3], rtol=0, atol=1e-14)
-
-
-@pytest.mark.wide
-def test_directional_derivative_and_batch_of_points(found):
-    """A tangent through the design and the speed at once, in a batch."""
-    theta, (_, guess) = DOUBLE_WELL[0], found["period-doubling"]
-    thetas = jnp.asarray(theta + 0.01 * np.outer(np.arange(3.0), [1, 1, 0, 0.5, 1, 0, 0.5]))
-    direction = jnp.asarray([0.3, -0.2, 0.1, 0.4, 0.5, 0.0, 0.2])
-    along = lambda t: jax.jvp(lambda x: edge(x, "period-doubling", guess), (t,), (direction,))
-    values, slopes = jax.jit(jax.vmap(along))(thetas)
-    np.testing.assert_allclose(values, [edge(t, "period-doubling", guess) for t in thetas], rtol=0, atol=1e-12)
-    expected = [EDGE_GRADIENT(t, "period-doubling", guess) @ direction for t in thetas]
-    np.testing.assert_allclose(slopes, expected, rtol=0, atol=1e-11)
-    assert np.ptp(values) > 1e-3

@@ -102,33 +102,6 @@ def test_orbit_of_a_light_cage_that_few_steps_lose(tmp_path: Path):
 
 
 @pytest.mark.wide
-def test_steps_that_are_asked_for_are_kept():
-    orbit = jc.periodic_orbit(stop(), 0.6, method=jc.method("rk4", steps=300))
-    assert orbit.steps == 300 and orbit.error > 0
-    half = jc.periodic_orbit(stop(), 0.6, guess=orbit, method=jc.method("rk4", steps=150))
-    jacobian = orbit.monodromy - jnp.eye(2)
-    scale = np.array(stop().scale(0.6))
-    assert orbit.error == pytest.approx(3 * np.max(np.abs(jacobian @ ((orbit.state - half.state) / scale))), rel=1e-6)
-    own = jc.periodic_orbit(stop(), 0.6, method=jc.method("tsit5", tolerance=1e-8))
-    assert own.converged and np.isnan(own.error)
-
-
-@pytest.mark.wide
-def test_choice_is_made_inside_jit_and_in_each_lane():
-    free, touching = 2.5, 1.1
-    plain = [jc.periodic_orbit(stop(), w) for w in (free, touching)]
-    assert plain[0].steps < plain[1].steps
-    lanes = jax.vmap(lambda w: jc.periodic_orbit(stop(), w))(jnp.array([free, touching]))
-    jitted = jax.jit(lambda w: jc.periodic_orbit(stop(), w))
-    for i, w in enumerate((free, touching)):
-        assert lanes.steps[i] == plain[i].steps == jitted(w).steps
-        np.testing.assert_allclose(lanes.state[i], plain[i].state, rtol=1e-9)
-    slope = jax.jacfwd(lambda f: jc.periodic_orbit(stop(f), touching, guess=plain[1]).state)(0.3)
-    ends = [jc.periodic_orbit(stop(0.3 + h), touching, guess=plain[1]).state for h in (1e-6, -1e-6)]
-    np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-6, rtol=1e-5)
-
-
-@pytest.mark.wide
 def test_error_of_a_bifurcation_holds_the_true_value_and_the_gradient_belongs_to_it():
     inside, exact = DUFFING_DOUBLINGS[1]
     orbit = jc.periodic_orbit(double_well(inside), 1.2, guess=(1.0, 0.0), revolutions=200)

@@ -9,19 +9,17 @@ import dataclasses
 from pathlib import Path
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
-from helpers import beyond_range, elastic, raw_sweep, roller_pass
+from helpers import beyond_range, raw_sweep
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
 from jaxcage.forces import AbstractForce, AbstractForcing, parameter
 from jaxcage.io import ConfigError, configuration, save_model, to_dataset
 from jaxcage.orbits import Point, edge_speed
-from jaxcage.plotting import force_history
 
 
 class ViscousDrag(AbstractForce):
@@ -62,8 +60,6 @@ SHARE = 1.5
 """Damping [N s/m] that the drag takes over from the support."""
 OWN = jc.replace(CASE, damping=CASE.support.damping - SHARE, extra=(ViscousDrag(SHARE, arm=0.05),))
 SPEED = jc.rpm(11200.0)
-NEAR = (1.37021e-05, -5.62481e-05, 0.513971, 0.0203827)
-"""A state of the stable orbit there."""
 METHOD = jc.method("rk4", steps=128)
 
 
@@ -72,17 +68,6 @@ def with_extra(*laws: AbstractForce) -> jc.CageModel:
 
 
 # --- motion ----------------------------------------------------------------------------------
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("solver", ["rk4", "rodas4"])
-@pytest.mark.parametrize("rib", ["rigid", "elastic"])
-def test_a_drag_moves_the_cage_like_the_damping_of_its_support(solver: str, rib: str):
-    """Rodas4 asks the law for its derivatives; an elastic rib feels the reaction."""
-    models = [elastic(model) if rib == "elastic" else model for model in (OWN, CASE)]
-    runs = [jc.simulate(m, SPEED, revolutions=3, samples=8, method=jc.method(solver, steps=512)) for m in models]
-    scale = np.array([float(c) for c in CASE.scale(SPEED)]).repeat(1 if rib == "rigid" else 2)
-    assert np.max(np.abs(runs[0].state - runs[1].state) / scale) < 1e-10
 
 
 def test_a_drag_that_nobody_has_moves_the_cage_as_scipy_says():
@@ -104,39 +89,7 @@ def test_a_drag_that_nobody_has_moves_the_cage_as_scipy_says():
     assert np.max(np.abs(free.y[:, -1] - exact.y[:, -1]) / scale) > 1e-3
 
 
-@pytest.mark.wide
-def test_a_sweep_with_a_drag_is_that_with_the_damping():
-    speeds = jc.rpm(11200, 12000, 2)
-    swept = [raw_sweep(m, speeds, discard=2, revolutions=4, blocks=2, method=METHOD) for m in (OWN, CASE)]
-    np.testing.assert_allclose(*(s.exponents for s in swept), atol=1e-9)
-    np.testing.assert_allclose(*(s.last / s.scale[:, None] for s in swept), atol=1e-9)
-    assert np.min(np.abs(swept[0].exponents)) > 0
-
-
-def test_a_force_of_many_harmonics_keeps_the_steps_short():
-    assert with_extra(Shaker(1.0, times=40)).harmonics == 40
-    assert with_extra(ViscousDrag(1.0, arm=0.0)).harmonics == 1
-    rollers = roller_pass(CASE)
-    assert jc.replace(rollers, extra=(Shaker(1.0, times=3),)).harmonics == rollers.harmonics > 40
-
-
 # --- orbits ----------------------------------------------------------------------------------
-
-
-@pytest.mark.wide
-def test_an_orbit_moves_with_a_drag_as_differences_say():
-    method = jc.method("rk4", steps=512)
-    orbit = jc.periodic_orbit(OWN, SPEED, guess=NEAR, method=method)
-    assert orbit.converged
-
-    def state(coefficient):
-        model = jc.replace(OWN, **{"extra.ViscousDrag.coefficient": coefficient})
-        return jc.periodic_orbit(model, SPEED, guess=orbit, method=method).state
-
-    slope = jax.jacfwd(state)(SHARE)  # a Python number, as a user writes it
-    np.testing.assert_allclose(jax.grad(lambda c: state(c)[0])(SHARE), slope[0], rtol=1e-9)
-    differences = (state(SHARE + 3e-4) - state(SHARE - 3e-4)) / 6e-4
-    np.testing.assert_allclose(slope, differences, atol=1e-6 * float(jnp.max(jnp.abs(slope))))
 
 
 TORUS = Point("Neimark-Sacker", float(jc.rpm(11023.07)), np.array([1.33877e-5, -5.11828e-5, 0.520974, 0.0221109]))
@@ -159,15 +112,6 @@ def test_an_edge_moves_with_a_drag_as_with_the_damping(torus: jc.orbits.Sensitiv
     assert torus.derivative["extra.ViscousDrag.arm"] == 0.0
 
 
-@pytest.mark.wide
-def test_units_of_a_force_of_ones_own_enter_the_identities(torus: jc.orbits.Sensitivity):
-    assert max(abs(r) for r in torus.homogeneity.values()) < 1e-8
-    plain = jc.replace(CASE, extra=(QuadraticDrag(0.5),))
-    unknown = jc.sensitivity(plain, TORUS, method=METHOD)
-    assert unknown.trusted and np.isfinite(unknown.derivative["extra.QuadraticDrag.coefficient"])
-    assert all(np.isnan(r) for r in unknown.homogeneity.values())  # its unit is not known
-
-
 # --- parameters ------------------------------------------------------------------------------
 
 
@@ -184,17 +128,6 @@ def test_parameters_of_a_force_of_ones_own_have_names():
     assert float(changed.extra[1].amplitude) == 5.0 and float(changed.guidance_gap) == 5e-4
     with pytest.raises(ValueError, match=r"`extra.Shaker.times` must name a part .*extra.Shaker.amplitude"):
         jc.replace(model, **{"extra.Shaker.times": 2})
-
-
-def test_a_design_space_holds_a_force_of_ones_own():
-    value = jc.design.Smooth(lambda m: (m.extra[0].coefficient - 2.0) ** 2)
-    found = jc.optimise(OWN, {"extra.ViscousDrag.coefficient": (0.5, 5.0)}, value, starts=1).best
-    assert float(found.values["extra.ViscousDrag.coefficient"]) == pytest.approx(2.0, abs=5e-3)
-
-
-def test_a_unit_that_is_none_is_refused_where_it_is_declared():
-    with pytest.raises(ValueError, match="`unit` must be made of .* but 'lbf' was given"):
-        parameter("lbf", 0.0, 1.0, "a force")
 
 
 # --- what acts, and what is measured ---------------------------------------------------------
@@ -217,16 +150,6 @@ def test_forces_and_moments_of_a_run_name_it(tmp_path: Path):
     pressed = dataclasses.replace(run, state=np.concatenate([place, run.state[:, 2:]], axis=1))
     power = jc.analysis.film_drag_power(OWN, run.speed, outside)
     np.testing.assert_allclose(-jc.analysis.cage_moments(OWN, pressed)["film"] * SPEED, power, rtol=1e-6)
-
-
-@pytest.mark.wide
-def test_a_figure_draws_each_force_of_ones_own_in_a_line_of_its_own():
-    model = with_extra(ViscousDrag(1.0, arm=0.0), Shaker(1.0))
-    run = jc.simulate(model, SPEED, revolutions=1, samples=16, method=METHOD)
-    lines = force_history(run, jc.analysis.cage_forces(model, run)).get_lines()
-    assert [line.get_label() for line in lines] == [*jc.models.FORCES, "ViscousDrag", "Shaker"]
-    assert len({line.get_color() for line in lines}) == len(lines)
-    assert [line.get_linestyle() for line in lines] == ["-"] * len(jc.models.FORCES) + ["--"] * 2
 
 
 @pytest.mark.wide
@@ -268,22 +191,6 @@ def test_no_file_holds_a_force_of_ones_own(tmp_path: Path):
             write()
     assert not list(tmp_path.iterdir())
     assert "configuration" not in to_dataset(swept).attrs
-
-
-@pytest.mark.wide
-def test_a_study_of_a_force_of_ones_own_knows_its_law_and_numbers(tmp_path: Path):
-    """Another number or version of the law is another study; nothing pretends to be a configuration."""
-    brief = {"discard": 1, "revolutions": 2, "blocks": 1, "method": METHOD, "starts": 1, "name": "drag", "version": "1"}
-    run = lambda model: jc.study(model, {"speed": np.array([SPEED])}, store=tmp_path / "own", **brief)
-    assert "configuration" not in run(OWN).attrs
-    name = "extra.ViscousDrag.coefficient"
-    with pytest.raises(ValueError, match="holds another study, which differs in extra.ViscousDrag"):
-        run(jc.replace(OWN, **{name: 2.0}))
-    with pytest.raises(ValueError, match="which differs in version"):
-        jc.study(OWN, {"speed": np.array([SPEED])}, store=tmp_path / "own", **brief | {"version": "2"})
-    varied = {"speed": np.array([SPEED]), name: np.array([1.0, 2.0])}
-    found = jc.study(OWN, varied, store=tmp_path / "varied", **brief)
-    assert found[name].attrs["units"] == "N s/m" and np.ptp(found["peak"].values) > 0
 
 
 def test_what_is_not_honoured_is_refused():

@@ -25,12 +25,3 @@ def test_marks_are_closed_and_the_page_says_once_with_which_version_it_was_made(
     whole = re.findall("<!-- made: (?:(?!<!-- made: ).)*?\n<!-- end -->", text, re.S)
     assert len(whole) == text.count("<!-- made: ") == text.count("<!-- end -->")
     assert len(re.findall("^Numbers on this page were made with jaxcage ", text, re.M)) == 1
-
-
-def test_a_block_is_replaced_and_the_rest_stays(monkeypatch: pytest.MonkeyPatch, tmp_path):
-    around = "Before\n\n<!-- made: law -->\n{}\n<!-- end -->\n\n{}\n"
-    (tmp_path / "page.md").write_text(around.format("old", "Numbers on this page were made with it."))
-    monkeypatch.setattr(pages, "ROOT", tmp_path)
-    monkeypatch.setattr(pages, "BLOCKS", {"law": ("page.md", "python -c print(7)", pages.printed)})
-    pages.refresh("page.md")
-    assert (tmp_path / "page.md").read_text() == around.format("```text\n7\n```", pages.made_with())

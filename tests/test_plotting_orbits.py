@@ -1,7 +1,5 @@
 """Figures of branches, multipliers, elasticities and stability maps show what they should."""
 
-import itertools
-
 import matplotlib.colors as colours
 import numpy as np
 import pytest
@@ -10,21 +8,13 @@ from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.patches import Circle
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
-from test_io_dataset import sweep_of
 
 from jaxcage.orbits import Branch, Curve, Point, Sensitivity
 from jaxcage.plotting import (
-    BLUE,
-    GREY,
     MARKS,
-    ORANGE,
     branch_diagram,
     elasticity_bars,
-    move_apart,
     multiplier_circle,
-    new_figure,
-    orbit_diagram_with_branches,
-    polyline,
     stability_map,
 )
 
@@ -85,10 +75,6 @@ def extents(ax: Axes) -> list[Bbox]:
     return [Text.get_window_extent(text) for text in ax.texts]
 
 
-def overlaps(boxes: list[Bbox]) -> int:
-    return sum(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
-
-
 def test_branch_is_thick_where_it_is_stable_up_to_the_bifurcations():
     ax = branch_diagram([s_curve()])
     stable, unstable = data(ax, "period-1, stable"), data(ax, "period-1, unstable")
@@ -122,84 +108,12 @@ def test_edges_are_filled_and_named_and_other_bifurcations_hollow():
     assert names == ["period-1, stable", "period-1, unstable", "fold (F)", "hollow: unstable on both sides"]
 
 
-def test_each_number_of_periods_has_its_colour():
-    first, second = s_curve(), s_curve(2)
-    ax = branch_diagram([first, second, first])
-    colour = {line.get_label(): line.get_color() for line in ax.get_lines()}
-    assert (colour["period-1, stable"], colour["period-2, stable"]) == (BLUE, ORANGE)
-    assert len(finite(data(ax, "period-1, stable"))) == 2 * len(finite(data(ax, "period-2, stable")))
-    assert len(ax.texts) == 2, "edges that branches share are named once"
-
-
-def test_two_bifurcations_between_the_same_points_are_in_order():
-    rpm, y = np.array([8000.0, 8100.0, 8200.0]), np.array([0.0, 1e-4, 2e-4])
-    points = [special("Neimark-Sacker", 8180.0, 1.8e-4, 1, False), special("period-doubling", 8120.0, 1.2e-4, 1, True)]
-    x, shown, stable = polyline(branch_of(rpm, y, np.array([True, True, False]), points), 1)
-    np.testing.assert_allclose(x, [8000, 8100, 8120, 8180, 8200])
-    np.testing.assert_allclose(shown, [0, 0.1, 0.12, 0.18, 0.2])
-    assert stable.tolist() == [True, True, False, False]
-
-
-def test_zoomed_branches_fit_what_is_in_the_range():
-    ax = branch_diagram([s_curve()], limits_rpm=(9050.0, 9200.0))
-    assert ax.get_xlim() == (9050, 9200)
-    inside = 0.1 * T[(s_rpm(T) >= 9050) & (s_rpm(T) <= 9200)]
-    low, high = ax.get_ylim()
-    assert low < inside.min() and high > inside.max()
-    assert high - low < 1.15 * np.ptp(inside)
-    assert [text.get_text() for text in ax.texts] == ["F 9100"]
-
-
-@pytest.mark.parametrize("count", [8, 30, 200])
-def test_names_of_crowded_edges_do_not_overlap(count: int):
-    rng = np.random.default_rng(0)
-    rpm, y = np.linspace(2500, 27500, 401), np.linspace(0, 1e-4, 401)
-    speeds = np.sort(np.concatenate([rng.normal(8000, 150, count // 2), rng.uniform(2600, 27400, count - count // 2)]))
-    kinds = itertools.cycle(MARKS)
-    points = [special(k, s, 1e-5, int(np.searchsorted(rpm, s)) - 1, True) for s, k in zip(speeds, kinds, strict=False)]
-    ax = branch_diagram([branch_of(rpm, y, np.ones(401, bool), points)])
-    boxes = extents(ax)
-    panel, label, legend = ax.get_window_extent(), ax.xaxis.label.get_window_extent(), ax.get_legend()
-    assert overlaps(boxes) == 0
-    assert len(boxes) == count if count < 10 else count // 5 < len(boxes) < 60
-    assert all(b.y0 > panel.y1 and panel.x0 - 20 < b.x0 and b.x1 < panel.x1 + 20 for b in boxes)
-    shown = [float(text.get_text().split()[-1]) for text in ax.texts]
-    far = [abs((b.x0 + b.x1) / 2 - ax.transData.transform((x, 0.0))[0]) for b, x in zip(boxes, shown, strict=True)]
-    assert max(far) < 2.2 * 1.3 * 7.5 * ax.figure.dpi / 72  # near to where they belong
-    assert shown == sorted(shown) and [b.x0 for b in boxes] == sorted(b.x0 for b in boxes)
-    assert legend.get_window_extent().y1 <= label.y0
-
-
-def test_places_are_moved_apart_no_more_than_needed():
-    np.testing.assert_allclose(move_apart(np.array([0.1, 0.5, 0.9]), 0.2, 0.0, 1.0), [0.1, 0.5, 0.9])
-    np.testing.assert_allclose(move_apart(np.array([0.1, 0.5, 0.5]), 0.2, 0.0, 1.0), [0.1, 0.4, 0.6])
-    np.testing.assert_allclose(move_apart(np.array([0.9, 0.99]), 0.2, 0.0, 1.0), [0.8, 1.0])
-    assert move_apart(np.zeros(0), 0.2, 0.0, 1.0).size == 0
-
-
 @pytest.mark.parametrize("parameter", ["guidance_gap", None])
 def test_branches_must_be_over_speed(parameter: str | None):
     b = s_curve()
     other = Branch("guidance_gap", b.value, b.speed, b.state, b.multipliers, b.stable, (), 1, b.ended, b.steps, b.error)
     with pytest.raises(ValueError, match="guidance_gap was given" if parameter else "no branch was given"):
         branch_diagram([b, other] if parameter else [])
-
-
-def test_orbit_diagram_is_grey_beneath_the_branches():
-    sweep = sweep_of()
-    rpm = np.linspace(7900, 8500, 31)
-    ax = orbit_diagram_with_branches(sweep, [branch_of(rpm, (rpm - 7900) * 1e-6, rpm < 8205)])
-    clouds = [line for line in ax.get_lines() if line.get_label().endswith("simulated")]
-    assert {line.get_color() for line in clouds} == {GREY}
-    assert sum(len(finite(np.asarray(line.get_xydata()))) for line in clouds) == (5 * 3 - 1) * 16
-    stable = next(line for line in ax.get_lines() if line.get_label() == "period-1, stable")
-    assert max(line.get_zorder() for line in clouds) < stable.get_zorder()
-    assert ax.get_xlim() == pytest.approx((8000, 8400))
-    low, high = ax.get_ylim()
-    shown = 1e3 * sweep.strobe[..., 1][np.isfinite(sweep.strobe[..., 1])]
-    assert low < min(shown.min(), 0.1) and high > max(shown.max(), 0.5)
-    names = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert names == ["simulated", "failed", "period-1, stable", "period-1, unstable"]
 
 
 def test_multipliers_along_a_branch():
@@ -229,25 +143,6 @@ def test_multipliers_along_a_branch():
     assert sorted(text.get_text() for text in ax.texts) == sorted(["◆ NS 8300", "■ PD 8700\n□ PD 8400"])
 
 
-def test_names_of_many_multipliers_do_not_overlap():
-    rpm = np.linspace(8000, 9000, 31)
-    kinds = ["Neimark-Sacker"] * 6 + ["fold"] * 4 + ["period-doubling"] * 12
-    points = [special(kind, 8000 + 40 * i, 0.0, i, i % 2 == 0) for i, kind in enumerate(kinds)]
-    ax = multiplier_circle(branch_of(rpm, 1e-7 * rpm, rpm < 8300, points))
-    boxes = extents(ax)
-    assert overlaps(boxes) == 0
-    panel = ax.get_window_extent()
-    assert all(panel.x0 <= b.x0 and b.x1 <= panel.x1 for b in boxes)
-    column = next(text.get_text() for text in ax.texts if "PD" in text.get_text()).split("\n")
-    assert len(column) == 10 and column[0] == "■ PD 8400" and column[6] == "□ PD 8440" and column[-1] == "+ 3 more"
-
-
-def test_multipliers_alone():
-    ax = multiplier_circle(np.array([0.5 + 0.5j, 0.5 - 0.5j, -3.0]))
-    np.testing.assert_allclose(data(ax, "multipliers"), [[0.5, 0.5], [0.5, -0.5]])
-    assert not ax.child_axes
-
-
 def edge(name: str, status: str = "converged", **elasticity: float) -> Sensitivity:
     return Sensitivity(name, "fold", 9100.0, dict(elasticity), dict(elasticity), {}, 1.0, status)
 
@@ -273,27 +168,6 @@ def test_elasticities_are_in_order_with_the_designers_two_on_top():
     assert texts[0.0004, 0] == "≈0"
     frame = ax.get_window_extent()
     assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in extents(ax))
-
-
-def test_only_the_largest_elasticities_are_shown():
-    many = {f"p_{i}": 0.1 * i for i in range(1, 20)} | {"guidance_gap": 0.0, "eccentricity": 1e-6}
-    ax = elasticity_bars([edge("onset", **many)], most=5)
-    assert [t.get_text() for t in ax.get_yticklabels()] == ["guidance gap", "eccentricity", "p 19", "p 18", "p 17"]
-    assert ax.texts[0].get_text() == "0"
-    with pytest.raises(ValueError, match="at least one"):
-        elasticity_bars([])
-
-
-def test_values_of_many_bars_do_not_overlap():
-    rng = np.random.default_rng(1)
-    all_of = [edge(f"edge {k}", **{f"p_{i}": v for i, v in enumerate(rng.uniform(0.1, 1, 12))}) for k in range(3)]
-    ax = elasticity_bars(all_of, new_figure(9.0, 5.0).subplots())
-    assert len(ax.texts) == 36
-    # A line of text is higher than its figures: what is left above and below them may overlap.
-    assert (
-        overlaps([Bbox.from_extents(b.x0, b.y0 + 0.15 * b.height, b.x1, b.y1 - 0.15 * b.height) for b in extents(ax)])
-        == 0
-    )
 
 
 def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, x: str = "speed", y: str = "guidance_gap"):
@@ -326,17 +200,6 @@ def test_curves_have_the_colour_of_their_kind_and_the_unit_of_the_parameter():
     assert low < 0.4 and high > 0.6 and len(ax.figure.axes) == 1
 
 
-def test_neutral_saddles_are_dotted_and_named_once():
-    doubling, torus = two_curves()
-    torus.genuine[6:] = False
-    ax = stability_map([doubling, torus, torus])
-    np.testing.assert_allclose(finite(data(ax, "Neimark-Sacker"))[:, 0], 10000 + 100 * np.arange(6))
-    np.testing.assert_allclose(finite(data(ax, "neutral saddles"))[:, 0], 10000 + 100 * np.arange(5, 10))
-    assert next(line for line in ax.get_lines() if line.get_label() == "neutral saddles").get_linestyle() == ":"
-    names = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert sorted(names) == ["Neimark-Sacker", "neutral saddles", "period-doubling"]
-
-
 def test_exponents_beneath_the_curves_are_white_at_zero():
     rpm, gap = np.linspace(9000, 11000, 5), np.array([4e-4, 5e-4, 6e-4])
     largest = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3])
@@ -359,15 +222,3 @@ def test_exponents_beneath_the_curves_are_white_at_zero():
 def test_curves_must_share_their_parameters(other: dict[str, str]):
     with pytest.raises(ValueError, match="one parameter over speed, but .*load"):
         stability_map([*two_curves(), curve_of("fold", np.ones(2), np.ones(2), **other)])
-
-
-def test_axes_that_are_given_are_used():
-    ax = new_figure(9.0, 5.0).subplots()
-    for made in (
-        lambda a: branch_diagram([s_curve()], 1, a),
-        lambda a: multiplier_circle(s_curve(), a),
-        lambda a: elasticity_bars([edge("onset", bore=1.0)], a),
-        lambda a: stability_map(two_curves(), a),
-    ):
-        ax = new_figure(9.0, 5.0).subplots()
-        assert made(ax) is ax

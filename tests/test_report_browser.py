@@ -138,14 +138,6 @@ def _inside(image: np.ndarray, left: float, top: float, width: float, height: fl
     return image[int(top) : int(top + height), int(left) : int(left + width)]
 
 
-def test_a_page_with_a_mistake_would_be_noticed(report: Path):
-    """The checks above can fail: a picture from outside is forbidden, and said on the console."""
-    wrong = report.with_name("wrong.html")
-    wrong.write_text(report.read_text().replace("<main>", '<main><img src="https://example.invalid/a.png">'))
-    with pytest.raises(AssertionError):
-        shot(wrong, "wrong.png")
-
-
 def test_it_prints(report: Path):
     path = report.with_name("report.pdf")
     browse(report.parent, report, f"--print-to-pdf={path}", "--no-pdf-header-footer")

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers import declared
-from report_example import findings, orbits, swept
+from report_example import findings, swept
 
 import jaxcage as jc
-from jaxcage.analysis import Edge, MeanLife, Zone, Zones
+from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.cli import _page as _command, main
 from jaxcage.report import (
     AllFailed,
@@ -21,7 +21,6 @@ from jaxcage.report import (
     Operating,
     _findings,
     _page,
-    assess,
     calmest,
     chaotic_verdict,
     examine,
@@ -115,11 +114,6 @@ def test_verdicts(low: float, high: float, state: str, away: float, percent: flo
         assert (v.distance_rpm, v.percent) == pytest.approx((away, percent))
 
 
-def test_an_edge_within_its_own_uncertainty_is_close_however_small_the_share():
-    wide = (Zone("chaotic", Edge(20000.0, 3000.0, "chaotic"), None, 1.0),)
-    assert loss_verdict(Operating(17500.0, 17500.0), wide, 2500.0, 27500.0, True).state == "close"
-
-
 def test_nothing_is_said_of_speeds_that_were_not_swept_or_failed():
     zones, sweep = Zones(ZONES, (), 100.0, 500.0), swept()
     assert chaotic_verdict(Operating(2000.0, 2000.0), zones, sweep).state == "unknown"
@@ -140,13 +134,6 @@ def test_calmest_range_is_outside_both_kinds(example: Findings):
     assert calmest(example) == pytest.approx((12050.0, 20000.0))  # chaos ends at 12050, the orbit is lost at 20000
 
 
-def test_both_kinds_assess_each_speed(example: Findings):
-    (first,) = assess(example, [Operating(8500.0, 8500.0)])
-    assert first.verdicts["synchronous-loss"].state == "inside"
-    assert first.verdicts["chaotic"].state == "clear"
-    assert first.verdicts["chaotic"].edge_rpm == pytest.approx(9050.0)
-
-
 def test_sources_of_a_published_case():
     rows = {row.path: row for row in parameter_rows(jc.case("1a"), None)}
     assert len(rows) == len(list(declared(jc.case("1a"))))
@@ -158,20 +145,6 @@ def test_sources_of_a_published_case():
     assert rows[("cage_mass",)].source == "identified, not printed"
     assert rows[("lubricant", "temperature")].value == "40"
     assert rows[("gravity",)].source == "default"
-
-
-def test_sources_of_a_file():
-    table = {
-        "base": "1a",
-        "guidance_gap": "0.5 mm",
-        "lubricant": {"grade": 68, "temperature": "70 degC"},
-        "bearing": {"designation": "NU2310", "bore": "51 mm"},
-    }
-    rows = {row.path: row.source for row in parameter_rows(jc.case("1a"), table)}
-    assert rows[("guidance_gap",)] == rows[("lubricant", "temperature")] == rows[("bearing", "bore")] == "this file"
-    assert rows[("eccentricity",)] == rows[("film", "land_width")] == "case 1a"
-    assert rows[("lubricant", "viscosity_1")] == "grade 68"
-    assert rows[("bearing", "width")] == "catalogue, NU2310"
 
 
 class Reader(html.parser.HTMLParser):
@@ -237,33 +210,11 @@ def test_page_says_what_was_found(text: str):
     assert "What moves the edges" in words and "bearing outside diameter" in words
 
 
-def test_what_is_partly_inside_or_in_transient_chaos_is_said_to_be(without_figures: None, example: Findings):
-    lives = MeanLife(200.0, 6400.0, False), MeanLife(900.0, 6500.0, False)
-    dying = Zone("transient", Edge(6000.0, 100.0, "transient"), Edge(7000.0, 100.0, "transient"), 1.0, lives)
-    zones = dataclasses.replace(example.zones, transient=(dying,))
-    with_it = dataclasses.replace(example, explained=dataclasses.replace(example.explained, zones=zones))
-    operating = read_operating("6500, 6500-7500, 9000-9500, 10000")
-    verdicts = [one.verdicts["chaotic"] for one in assess(with_it, operating)]
-    states = ["in transient chaos", "partly in transient chaos", "partly inside", "inside"]
-    assert [v.state for v in verdicts] == states
-    assert verdicts[0].where.startswith("in transient chaos, mean life up to 8.3 s")
-    words = plain(page(with_it, operating))
-    kinds = ["in transient chaos", "partly in transient chaos", "partly inside chaotic zones", "inside chaotic zones"]
-    for one, said in zip(operating, kinds, strict=True):
-        assert re.search(rf"{one} \(shaft [^)]*\): [a-z ]+ synchronous-loss zones, {said}\.", words)
-
-
 def test_quick_page_leaves_out_gradients_and_says_so(without_figures: None):
     words = plain(page(findings(quick=True)))
     assert "quick report: no gradients" in words
     assert "What moves the edges" not in words and "Operating speeds" not in words
     assert "not tried" in words
-
-
-def test_page_of_edges_without_a_gradient(without_figures: None, example: Findings):
-    lost = {n: dataclasses.replace(s, status="not converged") for n, s in example.slopes.items()}
-    words = plain(page(dataclasses.replace(example, slopes=lost)))
-    assert "largest relative residual none is to be trusted" in words and "(not converged)" in words
 
 
 def test_words_of_a_file_cannot_break_the_page(without_figures: None, example: Findings):
@@ -319,33 +270,6 @@ def test_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments
     out, err = capsys.readouterr()
     assert out == "" and said in err and "Traceback" not in err
     assert not (tmp_path / "out").exists()
-
-
-def test_quick_examination_leaves_out_what_takes_long(monkeypatch: pytest.MonkeyPatch):
-    asked: dict[str, Any] = {}
-
-    def exponents(model: Any, speeds: np.ndarray, y: Any, rows: int, **options: Any) -> Any:
-        asked["map"] = (speeds.size, rows, options["starts"])
-        return speeds / PER_RPM, np.linspace(y.lower, y.upper, rows), np.zeros((speeds.size, rows))
-
-    too_long = lambda *_, **__: pytest.fail("this takes too long for a quick report")
-    monkeypatch.setattr(_findings, "sweep", lambda *_, **options: asked.update(options) or swept())
-    monkeypatch.setattr(_findings, "synchronous_orbits", lambda *_, settled, **__: orbits(settled))
-    monkeypatch.setattr(_findings, "explain", too_long)
-    monkeypatch.setattr(_findings, "edge_slopes", too_long)
-    monkeypatch.setattr(_findings, "largest_exponents", exponents)
-    common: dict[str, Any] = {"speeds": jc.rpm(2500, 27500, 251), "discard": 300, "revolutions": 300, "blocks": 20}
-    common |= {"sweep_method": None, "orbit_method": jc.method()}
-    found = examine("1a", jc.case("1a"), None, **common, quick=True)
-    assert (asked["discard"], asked["revolutions"], asked["blocks"]) == (300, 300, 20)
-    assert asked["map"] == (40, 7, 1)
-    assert found.map is not None and found.map.curves == [] and found.slopes == {}
-    assert (found.map.axis.lower, found.map.axis.upper) == pytest.approx((0.36e-3, 0.5625e-3))
-    assert found.map.exponents[1][0] == pytest.approx(0.36e-3)
-    assert [z.onset and z.onset.speed_rpm for z in found.zones.zones] == pytest.approx([9050.0, 20050.0])
-    assert list(found.seconds) == ["sweep", "synchronous orbits", "map"]
-    with pytest.raises(pytest.fail.Exception, match="takes too long"):
-        examine("1a", jc.case("1a"), None, **common, quick=False)
 
 
 def test_nothing_is_reported_when_every_simulation_failed(monkeypatch: pytest.MonkeyPatch):

@@ -8,7 +8,6 @@ import random
 import signal
 import subprocess
 import sys
-import threading
 import warnings
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ import xarray as xr
 from scipy import stats
 
 import jaxcage as jc
-from jaxcage.studies import KINDS, LABELS, OtherStudy, Plan, Store, Study, _dask, kinds, label_names, with_values
+from jaxcage.studies import KINDS, LABELS, OtherStudy, Plan, Study, kinds, label_names
 
 
 class Duffing(eqx.Module):
@@ -85,14 +84,6 @@ def test_lanes_are_those_of_a_sweep(whole: Path, places: tuple[tuple[int, int], 
         assert {f"periodic-{k}" for k in np.unique(mine["period"]) if k} == set(np.unique(swept.label)) - {"undecided"}
 
 
-def test_a_lane_that_runs_away_is_failed_and_nothing_else(whole: Path):
-    found = jc.open_study(whole).load()
-    away = found.sel(cubic=-4.0).isel(start=1)  # starts at 0.9, beyond the edge of the well at 0.5
-    assert np.all(away["label"] == LABELS.index("failed")) and np.all(away["outcome"] > 0)
-    assert np.all(np.isnan(away["largest_exponent"])) and np.all(away["period"] == 0)
-    assert np.all(found.sel(cubic=CUBICS[:3])["outcome"] == 0)
-
-
 def test_plain_xarray_opens_it_with_names_and_units(whole: Path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -125,32 +116,6 @@ def test_shards_fill_one_store(whole: Path, tmp_path: Path):
     assert np.sum(pending) == 80 and np.all(np.isnan(half["peak"].values[pending]))
     assert set(label_names(half).values[pending].tolist()) == {"pending"}
     duffing_study(store, shard=(1, 2))
-    assert contents(store) == contents(whole)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("written", [0, 1, 3, 6])
-def test_a_chunk_half_written_is_written_again(
-    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
-):
-    """The process dies when so many of a chunk's seven variables are in place."""
-    store, put, left = tmp_path / "study.zarr", Store.write, [2]
-
-    def write(self: Store, chunk: int, results: dict) -> None:
-        left[0] -= 1
-        if left[0] >= 0:
-            return put(self, chunk, results)
-        for name in sorted(results, key=lambda name: name == "outcome")[:written]:
-            self._chunks.arrays[name][self.study.plan.region(chunk)] = results[name]
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Store, "write", write)
-    with pytest.raises(KeyboardInterrupt):
-        duffing_study(store)
-    monkeypatch.setattr(Store, "write", put)
-    done: list[int] = []
-    duffing_study(store, progress=lambda lanes, _: done.append(lanes))
-    assert done[0] == 2 * 9 and done[-1] == 144
     assert contents(store) == contents(whole)
 
 
@@ -198,20 +163,6 @@ def test_dask_survives_a_worker_and_finds_the_same(whole: Path, tmp_path: Path):
     duffing_study(store, executor="dask", workers=2, progress=kill_one)
     assert killed
     assert contents(store) == contents(whole)
-
-
-def test_a_cluster_without_workers_is_not_waited_for(monkeypatch: pytest.MonkeyPatch):
-    """A cluster of which all workers died for good is an error; one whose worker comes back is not."""
-    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    monkeypatch.setattr(_dask, "WAIT_S", 0.02)
-    with distributed.Client(n_workers=0, processes=False, dashboard_address=":0") as client:
-        future = client.submit(abs, -3)
-        with pytest.raises(OSError, match="has had no workers for"):
-            _dask._finished(client, [future])
-        monkeypatch.setattr(client, "scheduler_info", lambda: {"workers": {"one": {}}})
-        threading.Timer(0.2, client.cluster.scale, [1]).start()
-        (found,) = _dask._finished(client, [future])
-        assert found.result() == 3
 
 
 @pytest.mark.parametrize(
@@ -268,38 +219,6 @@ def test_what_makes_no_sense_is_refused(tmp_path: Path, change: dict, words: str
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.wide
-def test_orbit_data_when_asked_for(tmp_path: Path):
-    options = OPTIONS | {"lanes": 18, "exponents": 2, "strobe": 5, "blocks": 1}
-    found = jc.study(OSCILLATOR, {"speed": SPEEDS}, store=tmp_path / "study.zarr", **options)
-    assert found["strobe"].dims == ("speed", "start", "revolution", "component")
-    assert found["revolution"].values.tolist() == [76, 77, 78, 79, 80]
-    # the sum of the exponents is the mean divergence, -damping times the period
-    np.testing.assert_allclose(found["exponents"].sum("exponent"), (-0.2 * np.pi / SPEEDS)[:, None] * [1, 1], atol=1e-5)
-    np.testing.assert_array_equal(found["exponents"].isel(exponent=0), found["largest_exponent"])
-    still = found["period"].values == 1
-    assert np.max(np.ptp(found["strobe"].values, axis=2)[still]) < 1e-4
-    assert np.all(np.isinf(found["standard_error"]))
-
-
-@pytest.mark.parametrize(
-    "shape, lanes", [((3, 7, 5), 12), ((3, 7, 5), 1), ((3, 7, 5), 1000), ((1000,), 96), ((6, 2), 4)]
-)
-def test_chunks_cover_every_lane_once(shape: tuple[int, ...], lanes: int):
-    grid = {f"p{i}": np.arange(1.0, n + 1.0) for i, n in enumerate(shape)}
-    plan = Plan(grid, {}, 0, 0, 2, lanes)
-    parts = [plan.lanes_of(i) for i in range(plan.chunks)]
-    assert np.array_equal(np.sort(np.concatenate(parts)), np.arange(plan.size))
-    assert max(map(len, parts)) <= max(lanes, 1)
-    for number in (0, plan.chunks - 1):  # the numbers of a lane are those of its place in the block
-        values, start = plan.at(parts[number])
-        block = np.zeros(plan.shape)[plan.region(number)]
-        coordinates = np.meshgrid(*grid.values(), np.arange(2), indexing="ij")
-        for name, grid_values in zip(grid, coordinates, strict=False):
-            assert np.array_equal(values[name], grid_values[plan.region(number)].ravel())
-        assert np.array_equal(start.reshape(block.shape), coordinates[-1][plan.region(number)])
-
-
 def test_samples_fill_their_distributions():
     """A Sobol sequence has one point in each of n equal parts, of every parameter; a tolerance is a normal distribution
     cut off at three standard deviations."""
@@ -312,50 +231,6 @@ def test_samples_fill_their_distributions():
     inside = (normal.cdf(first["b"]) - normal.cdf(9.7)) / (normal.cdf(10.3) - normal.cdf(9.7))
     assert np.array_equal(np.sort(np.floor(inside * 256)), np.arange(256))
     assert np.array_equal(Plan({}, sampled, 100, 0, 1).cloud["b"], first["b"][:100])
-
-
-@pytest.mark.parametrize(
-    "make, words",
-    [
-        (lambda: jc.studies.Between(2.0, 2.0), "must ascend"),
-        (lambda: jc.studies.Between(2.0, math.inf), "must ascend"),
-        (lambda: jc.studies.Tolerance(1.0, 0.0), "above 0"),
-        (lambda: jc.studies.Tolerance(math.nan, 1.0), "above 0"),
-    ],
-)
-def test_impossible_distributions_are_refused(make: Any, words: str):
-    with pytest.raises(ValueError, match=words):
-        make()
-
-
-def test_designs_of_a_cage_by_name():
-    """Gap, land width and oil of many lanes at once are those of one design after the other."""
-    model = jc.case("1a")
-    values = {
-        "guidance_gap": np.array([4e-4, 5e-4]),
-        "land_width": np.array([3e-3, 4e-3]),
-        "oil": np.array([32.0, 78.0]),
-    }
-    many = eqx.filter_vmap(lambda own: with_values(model, own))({k: jnp.asarray(v) for k, v in values.items()})
-    for i in range(2):
-        one = jc.replace(
-            model,
-            guidance_gap=values["guidance_gap"][i],
-            land_width=values["land_width"][i],
-            lubricant=jc.bearing.vg(values["oil"][i], model.lubricant.temperature),
-        )
-        mine = jax.tree.map(lambda x, i=i: x[i] if eqx.is_array(x) else x, many)
-        for name, value in jc.parameters(one).items():
-            assert float(jc.parameters(mine)[name]) == pytest.approx(float(value), rel=1e-14), name
-
-
-def test_a_store_is_made_once_by_whoever_comes_first(tmp_path: Path):
-    """Two shards that begin together: the second finds the store in place, and nothing is left beside it."""
-    plan = Plan({"speed": SPEEDS}, {}, 0, 0, 2, 12)
-    study = Study(OSCILLATOR, plan, LENGTH["method"], 40, 40, 4, 1, 0, "duffing", "1")
-    first, second = (Store(tmp_path / "study.zarr", study) for _ in range(2))
-    assert first.pending() == second.pending() == list(range(plan.chunks))
-    assert [p.name for p in tmp_path.iterdir()] == ["study.zarr"]
 
 
 @pytest.mark.wide

@@ -36,16 +36,6 @@ def test_lanes_do_not_depend_on_their_neighbours_or_chunks():
         assert np.array_equal(whole.block_growth[i::2], piece.block_growth)
 
 
-@pytest.mark.wide
-def test_kept_states_are_the_last_ones_in_order():
-    long = raw_sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=20, method=FAST)
-    short = raw_sweep(HARDENING, np.array([1.5]), discard=3, revolutions=20, blocks=4, keep=7, method=FAST)
-    assert np.array_equal(short.strobe, long.strobe[:, :, -7:])
-    assert np.array_equal(long.last, long.strobe[:, :, -1])
-    one = raw_sweep(HARDENING, np.array([1.5]), discard=22, revolutions=1, blocks=1, exponents=0, method=FAST)
-    assert np.allclose(one.last, long.last, rtol=0, atol=1e-13)
-
-
 @pytest.fixture(scope="module")
 def followed():
     """Ueda's oscillator, whose chaos is an attractor at some speeds and a transient at others."""
@@ -95,25 +85,6 @@ def test_labels_are_confirmed_by_finer_steps(followed):
     where = rough.label != sure.label
     assert sure.confirmed[0].changed >= np.sum(where) > 0
     assert np.all(sure.error[where] < rough.error[where])
-
-
-@pytest.mark.wide
-def test_number_of_exponents_does_not_change_the_first():
-    a, b = (
-        raw_sweep(
-            HARDENING,
-            np.array([1.2, 1.5]),
-            discard=20,
-            revolutions=40,
-            blocks=4,
-            exponents=k,
-            method=jc.method("rodas4", steps=128),
-        )
-        for k in (1, 2)
-    )
-    assert np.allclose(a.exponents[..., 0], b.exponents[..., 0], rtol=0, atol=1e-12)
-    # the sum of the spectrum is the mean divergence, -damping times the period
-    assert np.allclose(b.exponents.sum(-1), -0.1 * 2 * np.pi / b.speed[:, None], rtol=0, atol=1e-6)
 
 
 @pytest.mark.wide
@@ -205,17 +176,6 @@ def test_unknown_methods_are_refused(options: dict, words: str):
         jc.method(**options)
 
 
-def test_replace_by_name():
-    model = jc.case("1a", "preliminary")
-    changed = jc.replace(model, guidance_gap=0.5e-3, **{"film.model": "full"})
-    assert float(changed.guidance_gap) == 0.5e-3 and changed.film.model == "full"
-    assert float(model.guidance_gap) == pytest.approx(0.45e-3)
-    with pytest.raises(ValueError, match="must name a part of the model"):
-        jc.replace(model, gap=1.0)
-    with pytest.raises(ValueError, match="must be one of fixed_half, positive_pressure, full"):
-        jc.replace(model, **{"film.model": "half"})
-
-
 class Decay(jc.models.AbstractForcedSystem):
     """It falls to zero from where it starts, its farthest point."""
 
@@ -245,17 +205,6 @@ def test_the_peak_of_a_run_counts_the_state_it_is_kept_from(discard: int):
     run = jc.simulate(Decay(), 1.0, revolutions=2, samples=4, discard=discard, method=FAST)
     assert run.peak == pytest.approx(0.8 * FALL**discard, rel=1e-6)
     assert run.peak >= np.abs(run.state).max() * (1 - 1e-12)
-
-
-def test_the_peak_of_a_ramp_counts_its_start():
-    assert jc.ramp(Decay(), 1.0, 1.2, revolutions=2, samples=4, method=FAST).peak == 0.8
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("discard", [0, 3])
-def test_the_peak_of_a_sweep_counts_the_state_it_is_observed_from(discard: int):
-    found = raw_sweep(Decay(), np.array([1.0]), discard=discard, revolutions=2, exponents=0, blocks=1, method=FAST)
-    np.testing.assert_allclose(found.peak, 0.8 * FALL**discard, rtol=1e-6)
 
 
 def test_a_lane_that_never_started_has_no_peak():

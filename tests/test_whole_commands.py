@@ -164,21 +164,6 @@ def test_speeds_of_the_cage_with_a_turning_outer_ring(capsys: pytest.CaptureFixt
 
 
 @pytest.mark.wide
-def test_compare(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    """Two bearings that differ in the oil only: what differs, and each as a sweep has it."""
-    path = tmp_path / "thin.toml"
-    path.write_text('base = "nu2310"\n[lubricant]\nviscosity_1 = "28 mm^2/s"')
-    asked = ["compare", "nu2310", str(path), "--first", "8000", "--last", "10000", "--count", "2", "--discard", "0"]
-    assert main([*asked, "--revolutions", "10", "--json", "--out", str(tmp_path)]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["cases"] == ["nu2310", "thin"] and len(found["differences"]) == 1
-    thick, thin = (np.array(found["designs"][name]["friction_power_W"]) for name in found["cases"])
-    assert np.all(thin < 0.7 * thick) and pathlib.Path(found["figure"]).stat().st_size > 30_000
-    one = jc.sweep_bearing(jc.whole_bearing("nu2310"), jc.rpm(8000, 10000, 2), discard=0, revolutions=10, blocks=10)
-    np.testing.assert_allclose(thick, one.block_means["friction_power_W"].mean(axis=(1, 2)), rtol=1e-9)
-
-
-@pytest.mark.wide
 def test_the_report(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
     """A page that needs nothing from outside, with what sweep and simulate say."""
     monkeypatch.setattr(_whole_page, "REVOLUTIONS", 2)

@@ -11,7 +11,7 @@ import pytest
 import jaxcage as jc
 from jaxcage.analysis import BearingSweep
 from jaxcage.cli import main
-from jaxcage.design import COMPARED, BearingRuns, DesignSpace, bearing_objective, before_and_after, usual_bounds
+from jaxcage.design import COMPARED, BearingRuns, DesignSpace, bearing_objective, before_and_after
 from jaxcage.models.whole import drawn_places
 
 
@@ -144,12 +144,6 @@ def test_the_command_in_earnest(capsys: pytest.CaptureFixture[str], tmp_path: pa
     assert all(np.isfinite([row["before"], row["after"], row["change_error"]]).all() for row in rows)
 
 
-def test_usual_bounds_leave_out_what_is_nothing():
-    model = jc.whole_bearing("nu2310")
-    assert usual_bounds(model)["guidance_gap"] == pytest.approx((0.315e-3, 0.63e-3))
-    assert "eccentricity" not in usual_bounds(jc.replace(model, eccentricity=0.0))
-
-
 @pytest.mark.parametrize(
     "arguments, said",
     [
@@ -197,19 +191,6 @@ def test_refusals_in_python(given, said):
 def test_runs_that_cannot_be(given):
     with pytest.raises(ValueError, match=f"`{next(iter(given))}`"):
         BearingRuns(SPEED, **given)
-
-
-@pytest.mark.wide
-def test_drawn_places_are_starts_of_every_design():
-    """Designs with other gaps begin at the same part of their clearance; states given instead are the same runs."""
-    model, places = jc.whole_bearing("nu2310"), drawn_places(2, 5)
-    assert np.all(np.hypot(*np.array(places)[:, :2].T) < 0.8) and drawn_places(2, 5) == places != drawn_places(2, 6)
-    how = dict(discard=0, revolutions=1, blocks=1, exponents=0)
-    a = jc.sweep_bearing(model, SPEED, starts=places, **how)
-    states = [jc.models.rolling_start(model, SPEED, place=place) for place in places]
-    b = jc.sweep_bearing(model, SPEED, starts=states, **how)
-    np.testing.assert_allclose(a.friction_power_W, b.friction_power_W, rtol=1e-6)
-    assert abs(np.diff(a.friction_power_W[0])[0]) > 1e-3 * a.friction_power_W[0, 0]
 
 
 @pytest.mark.parametrize("starts", [[(0.0, 1.2, 0.0, 0.0)], [(np.nan, 0.0, 0.0, 0.0)]])

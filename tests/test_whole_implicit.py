@@ -1,9 +1,5 @@
 """Implicit steps of the whole bearing: the arrow against dense matrices, order, stiff arcs beside SciPy's."""
 
-import dataclasses
-import time
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -162,32 +158,3 @@ def test_energy_of_implicit_steps(stiff):
     lost = sum(run.total(name) for name in LEDGER[1:])
     assert run.outcome == "successful"
     assert abs(run.total("input") - lost - gain) < 1e-8 * abs(lost)
-
-
-@pytest.mark.wide
-def test_twice_the_rollers_cost_twice_as_much():
-    """Operations of an implicit step, as the compiler counts them; it is compiled within 30 s."""
-    flops = []
-    for n in (13, 26):
-        model = jc.replace(jc.whole_bearing("nu2310"), **{"roller_diameter": 6e-3, "bearing.n_rollers": n})
-        state = BearingState(jnp.ones((5, n)), jnp.ones(9), jnp.ones(2))
-        numbers, at = (state, jnp.ones(INTEGRALS)), jax.eval_shape(lambda m=model: m.at_speed(jnp.asarray(SPEED)))
-        step = jax.jit(lambda at, numbers, h: implicit_step(at, numbers, numbers, h, over_angle=True))
-        begun = time.process_time()
-        cost: Any = step.lower(at, numbers, jnp.asarray(1e-3)).compile().cost_analysis()
-        assert time.process_time() - begun < 30
-        flops.append(cost["flops"])
-    assert 1.2 < flops[1] / flops[0] < 2.2
-
-
-@pytest.mark.wide
-def test_implicit_steps_are_taken_where_they_pay(stiff):
-    """At the land in cold oil at low speed, and nowhere at the usual ones; a quasi-static ring has none."""
-    model, start = stiff
-    slow = jc.simulate_bearing(model, SLOW, revolutions=1, tolerance=1e-5, samples=32)
-    assert 0.1 < slow.implicit_share < 1 and slow.outcome == "successful"
-    usual = jc.simulate_bearing(jc.whole_bearing("nu2310"), SPEED, revolutions=1, samples=32)
-    assert usual.implicit_share == 0
-    ring = dataclasses.replace(model.ring, ring_motion="quasi_static")
-    with pytest.raises(ValueError, match="quasi-static"):
-        jc.simulate_bearing(dataclasses.replace(model, ring=ring), SLOW, revolutions=1, implicit=True)

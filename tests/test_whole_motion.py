@@ -57,13 +57,6 @@ def moving(model, **parts):
     return BearingState.of(Rollers(*rollers), bodies, parts.get("angle", 0.0))
 
 
-@pytest.mark.wide
-def test_a_start_without_load_is_that_of_next_to_none():
-    none, little = (rolling_start(bearing(load=load), SPEED) for load in (0.0, 1e-2))
-    np.testing.assert_allclose(none.rollers, little.rollers, rtol=1e-6, atol=1e-9)
-    assert float(none.bodies[6]) == pytest.approx(float(little.bodies[6]), abs=1e-9)
-
-
 @pytest.fixture(scope="module")
 def run():
     """One revolution, from a cage in the middle of its clearance to its land, by tight steps."""
@@ -290,18 +283,6 @@ def test_held_cage_is_that_of_the_cage_model():
         np.testing.assert_allclose(found[:4], expected, rtol=0, atol=1e-13 * np.abs(expected).max())
         torque = float(rates.integrals[(*LEDGER, *MEANS).index("hold_torque")])
         assert found[4] == 0 and abs(torque) > 1e-3
-
-
-@pytest.mark.wide
-def test_a_revolution_of_the_held_cage():
-    held, cage = cage_alone()
-    omega, c = 450.0, float(held.clearance)
-    place = np.array([0.4, 0.3, 0.1 * omega, -0.2 * omega]) * c
-    start = moving(held, cage_speed=omega, x=place[0], y=place[1], vx=place[2], vy=place[3])
-    ran = jc.simulate_bearing(held, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-11)
-    image = jc.strobe_map(cage, omega, jc.method("rk4", steps=4096))(tuple(map(jnp.asarray, place)))
-    unit = np.array([c, c, c * omega, c * omega])
-    np.testing.assert_allclose((ran.bodies[-1, :4] - np.array(image.y)) / unit, 0, atol=1e-10)
 
 
 def test_steps_that_are_too_long_are_said():

@@ -126,10 +126,3 @@ def test_in_earnest(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
 def test_refusals(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     assert main([*COMMAND, *arguments, "--out", str(tmp_path / "out")]) == 2
     assert said in capsys.readouterr().err and not (tmp_path / "out").exists()
-
-
-def test_it_goes_with_a_whole_bearing(capsys: pytest.CaptureFixture[str]):
-    assert main(["sensitivity", "1a", "--of", "wear"]) == 2
-    assert "Option --of goes with a whole bearing, such as nu2310" in capsys.readouterr().err
-    assert main(["sensitivity", "nu2310"]) == 2
-    assert "Option --speed must be given for a whole bearing" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`study` of whole bearings: every lane in its place, the same numbers as a sweep, a store that goes on."""
+"""`study` of whole bearings: every lane in its place, the same numbers as a sweep."""
 
 import json
 import pathlib
@@ -70,22 +70,6 @@ def test_every_lane_is_in_its_place(told_apart: list[int], order: tuple[str, ...
         assert names[0] == "pending" and names[1 + int(found["state"].values.flat[0])] == "circular"
         assert found["speed"].attrs["long_name"] == "shaft speed" and sum(told_apart) == 18
         told_apart.clear()
-
-
-def test_samples_and_what_is_stored_already(told_apart: list[int], tmp_path: pathlib.Path):
-    vary = {"load": Between(500.0, 900.0), "speed": np.array([900.0, 1000.0])}
-    options: dict[str, Any] = dict(store=tmp_path / "store", samples=4, starts=1, lanes=2, **LENGTH)
-    half = jc.study(BEARING, vary, shard=(1, 2), **options)
-    assert int((half["outcome"] >= 0).sum()) == 4 and told_apart == [2, 2]
-    whole = jc.study(BEARING, vary, **options)
-    assert told_apart == [2] * 4 and np.all(whole["outcome"] == 0)
-    expected = whole["load"] + float(BEARING.cage_mass) + 10 * whole["speed"]
-    np.testing.assert_array_equal(whole["land_force_max_N"].isel(start=0), expected)
-    with pytest.raises(ValueError, match="holds another study, which differs in revolutions"):
-        jc.study(BEARING, vary, **{**options, "revolutions": 20})
-    heavier = jc.replace(BEARING, cage_mass=0.3)
-    with pytest.raises(ValueError, match="holds another study, which differs in cage_mass"):
-        jc.study(heavier, vary, **options)
 
 
 def test_a_tolerance_is_not_ignored(tmp_path: pathlib.Path):
