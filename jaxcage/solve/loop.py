@@ -7,6 +7,7 @@ a revolution the strobe state is stored, and tangent vectors are orthonormalised
 does depends neither on its neighbours nor on the number of threads.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -36,7 +37,8 @@ FINISHED, OUTSIDE, NOT_FINITE, STUCK = 1.0, 2.0, 3.0, 4.0
 one because the state is not finite, or because the error cannot be met; also too many steps in a revolution."""
 
 
-class Layout(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Layout:
     """Rows of a lane's numbers in the working memory of a vector, by name: first row, number of rows."""
 
     rows: dict[str, tuple[int, int]]

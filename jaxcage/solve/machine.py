@@ -33,11 +33,13 @@ from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
 LARGEST_STEP = REVOLUTION / 4
 SMALLEST_STEP = 1e-7
 MOST_STEPS = 20_000.0
-"""Limits of steps [rad] and of the number of steps of a revolution."""
+"""Limits of a step [rad], and of the mean number of steps of a revolution."""
 FIRST_STEP = 0.05
+"""Step that is tried first [rad]."""
 WIDTH = 8
 """Lanes of a vector."""
-STARTED, WAKES = 0.05, 0.1
+WAKES = 0.1
+"""Seconds between looks at threads that run."""
 
 
 # --- tracing ----------------------------------------------------------------------------------------------------------
@@ -303,13 +305,15 @@ class Engine:
         with np.errstate(divide="ignore"):
             grown = 0.5 * np.log(growth)
         return March(
-            stored[:n].T.copy(),
-            stored[n:moving].T.reshape(lanes, self.field.tangents, n),
-            *(part(name) for name in ("step", "peak")),
-            np.sqrt(part("size")),
-            *(part(name) for name in ("steps", "mark")),
-            turned,
-            grown,
+            state=stored[:n].T.copy(),
+            tangents=stored[n:moving].T.reshape(lanes, self.field.tangents, n),
+            step=part("step"),
+            peak=part("peak"),
+            size=np.sqrt(part("size")),
+            steps=part("steps"),
+            mark=part("mark"),
+            strobe=turned,
+            growth=grown,
         )
 
 
