@@ -470,7 +470,6 @@ def test_every_file_is_put_in_place_whole():
         found |= {(name, _called(n)) for n in ast.walk(tree) if _writes(n) and id(n) not in sheltered}
     assert found == {
         ("studies/_store.py", "to_zarr"),  # the empty store, made aside
-        ("io/_files.py", "open"),  # aside, in place by `os.replace`
         ("design/_kept.py", "open"),  # a kept search, moved into place
         ("design/_kept.py", "savez"),
         ("design/_surrogate.py", "save"),  # of a kept search
