@@ -328,7 +328,7 @@ class StudyOptions(_Length, IntegrationOptions):
     """Processes of the cluster on this machine; one a core if left out."""
 
     verify: Annotated[bool, tyro.conf.arg(name="check")] = False
-    """Compute nothing: compare every byte of the store with what was written. Needs only the case, and --store if it
+    """Compute nothing: compare every chunk of the store with its checksum. Needs only the case, and --store if it
     was given."""
 
     def check(self) -> None:

@@ -15,7 +15,6 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar, State
-from ..bearing import is_concrete
 from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractEquations, as_root, settled
@@ -269,8 +268,8 @@ def periodic_orbit(
     require_x64()
     require_at_least(1, periods=periods)
     require_speeds(system, speed)
-    if revolutions is not None and is_concrete(revolutions) and revolutions < 0:
-        raise ArgumentError("revolutions", said=f"must be at least 0, but {int(revolutions)} was given.")
+    if revolutions is not None:
+        require_at_least(0, revolutions=revolutions)
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)
     once = revolutions is not None  # and no more than asked for
