@@ -23,7 +23,6 @@ from .._arguments import check_layer
 from ._bearing_history import (
     Around as Around,
     BearingHistory as BearingHistory,
-    NamedLine as NamedLine,
     around as around,
     bearing_history as bearing_history,
     bearing_orders as bearing_orders,
@@ -50,9 +49,6 @@ from ._bearing_zones import BearingZone as BearingZone, bearing_zones as bearing
 from ._equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,
-    FilmCoefficients as FilmCoefficients,
-    StabilityChart as StabilityChart,
-    WhirlThreshold as WhirlThreshold,
     attitude_angle as attitude_angle,
     dimensional as dimensional,
     eccentricity_ratio as eccentricity_ratio,
@@ -122,7 +118,6 @@ from ._transients import (
 from ._zero_one import mean_square_displacement as mean_square_displacement, zero_one as zero_one
 from ._zones import (
     Edge as Edge,
-    MeanLife as MeanLife,
     Zone as Zone,
     Zones as Zones,
     closing_width as closing_width,

@@ -29,7 +29,6 @@ from ._cases import (
 from ._catalogue import (
     BEARINGS as BEARINGS,
     NU2310_RATINGS as NU2310_RATINGS,
-    CatalogueRatings as CatalogueRatings,
     nu2310 as nu2310,
 )
 from ._geometry import Bearing as Bearing, design_rule_violations as design_rule_violations
@@ -42,7 +41,6 @@ from ._kinematics import (
     raceway_surface_speed as raceway_surface_speed,
 )
 from ._line_contact import (
-    LINE_CONTACT_EXPONENT as LINE_CONTACT_EXPONENT,
     PALMGREN_CONSTANT as PALMGREN_CONSTANT,
     line_contact_approach as line_contact_approach,
     line_contact_load as line_contact_load,
@@ -61,7 +59,6 @@ from ._materials import (
     brass as brass,
 )
 from ._statics import (
-    DEFAULT_SHAFT_LOAD as DEFAULT_SHAFT_LOAD,
     Guidance as Guidance,
     LoadDistribution as LoadDistribution,
     load_distribution as load_distribution,

@@ -27,7 +27,6 @@ from ._bearing_design import (
     BearingObjective as BearingObjective,
     BearingRuns as BearingRuns,
     BeforeAfter as BeforeAfter,
-    balance_grade as balance_grade,
     bearing_objective as bearing_objective,
     before_and_after as before_and_after,
     usual_bounds as usual_bounds,
@@ -50,7 +49,6 @@ from ._bearing_sensitivity import (
 from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
 from ._edges import (
     EdgeClearance as EdgeClearance,
-    EdgeSum as EdgeSum,
     FollowedEdges as FollowedEdges,
     StabilityMargin as StabilityMargin,
     zone_width as zone_width,
@@ -76,7 +74,7 @@ from ._objective import (
     rayleigh as rayleigh,
     uniform as uniform,
 )
-from ._optimise import Optimised as Optimised, Optimum as Optimum, optimise as optimise
+from ._optimise import Optimised as Optimised, optimise as optimise
 from ._scatter import (
     SobolIndices as SobolIndices,
     ToleranceBudget as ToleranceBudget,

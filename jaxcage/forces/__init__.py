@@ -42,8 +42,6 @@ from ._film import (
 )
 from ._gravity import WeightForce as WeightForce, weight as weight
 from ._impact_forcing import (
-    PulseTrain as PulseTrain,
-    RollerPassForce as RollerPassForce,
     RollerPassImpact as RollerPassImpact,
     SynchronousForce as SynchronousForce,
     SynchronousImpact as SynchronousImpact,
@@ -79,10 +77,7 @@ from ._smooth import (
     smooth_plus_slope as smooth_plus_slope,
 )
 from ._support import (
-    Cross as Cross,
-    Cubic as Cubic,
     Support as Support,
-    SupportForce as SupportForce,
     cross_force as cross_force,
     cubic_stiffness as cubic_stiffness,
     spring_force as spring_force,

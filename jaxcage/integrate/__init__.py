@@ -21,7 +21,7 @@
 """
 
 from .._arguments import check_layer
-from ._arrow import Arrow as Arrow, Factors as Factors, Parts as Parts, arrow as arrow, factors as factors
+from ._arrow import Parts as Parts, arrow as arrow, factors as factors
 from ._bearing import (
     BearingRun as BearingRun,
     bearing_over_time as bearing_over_time,
@@ -32,7 +32,6 @@ from ._bearing_blocks import (
     SAMPLES as SAMPLES,
     SPACING as SPACING,
     WITH_TANGENT as WITH_TANGENT,
-    BearingBlock as BearingBlock,
     BearingLanes as BearingLanes,
     bearing_states as bearing_states,
     begin_lanes as begin_lanes,
@@ -66,11 +65,9 @@ from ._newmark import NewmarkBeta as NewmarkBeta
 from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
 from ._revolution import BLOCK as BLOCK, pushed as pushed, revolution as revolution
 from ._rosenbrock import (
-    RODAS3 as RODAS3,
     RODAS4 as RODAS4,
     Rodas3 as Rodas3,
     Rodas4 as Rodas4,
-    RosenbrockTableau as RosenbrockTableau,
     rosenbrock_step as rosenbrock_step,
 )
 from ._simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate

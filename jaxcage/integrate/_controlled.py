@@ -12,11 +12,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .._errors import ArgumentError
@@ -47,9 +45,6 @@ levels, the finer one may be a little further from the truth than from the coars
 EASY = 8
 """A lane whose error is so many times below the tolerance begins the next revolution one level lower: in vain that
 costs an eighth of the steps of the level that is taken."""
-
-IMPLICIT = 3.0
-"""An implicit step takes about as long as so many explicit ones."""
 
 Levels = FixedSteps | AdaptiveSteps
 Attempt = Callable[[Levels, Int[Array, ""], Bool[Array, "*lanes"]], Moved]
@@ -97,11 +92,6 @@ class ControlledSteps(AbstractMethod):
         return [r.steps.size if isinstance(r, FixedSteps) else 1 for r in self.ladder]  # pyright: ignore
 
     @property
-    def work(self) -> Float[np.ndarray, " levels"]:
-        """Of each level, about how long it takes, in steps of an explicit method."""
-        return np.concatenate([np.broadcast_to(_work(r), n) for r, n in zip(self.ladder, self.sizes, strict=True)])
-
-    @property
     def floors(self) -> list[int]:
         """For each level, the lowest one of its own solver whose error can be measured by that solver too."""
         firsts = [0, *itertools.accumulate(self.sizes)]
@@ -124,13 +114,6 @@ class ControlledSteps(AbstractMethod):
         of = lambda r: f"{type(r.solver).__name__} {', '.join(map(str, r.steps.tolist()))}"  # pyright: ignore
         levels = [of(r) if isinstance(r, FixedSteps) else str(r) for r in self.ladder]
         return f"steps per revolution for an error of {float(self.tolerance):g}: {'; '.join(levels)}"
-
-
-def _work(levels: Levels) -> Any:
-    """Of each level. By tolerances it is not known."""
-    if not isinstance(levels, FixedSteps):
-        return 1.0
-    return np.asarray(levels.steps) * (1.0 if isinstance(levels.solver, dfx.AbstractERK) else IMPLICIT)
 
 
 def run_level(

@@ -37,7 +37,6 @@ from ._csv import (
 )
 from ._dataset import (
     bearing_dataset as bearing_dataset,
-    from_dataset as from_dataset,
     load_sweep as load_sweep,
     open_sweep as open_sweep,
     save_bearing_sweep as save_bearing_sweep,

@@ -22,18 +22,12 @@
 """
 
 from ._bearing import (
-    bearing_drawing as bearing_drawing,
     bearing_figure as bearing_figure,
     bearing_map_figure as bearing_map_figure,
     bearing_ramp_figure as bearing_ramp_figure,
     bearing_sweep_figure as bearing_sweep_figure,
     bearings_beside as bearings_beside,
-    cage_orbit as cage_orbit,
-    force_over_time as force_over_time,
-    marked_spectrum as marked_spectrum,
     over_shaft_speed as over_shaft_speed,
-    pocket_force_around as pocket_force_around,
-    slip_around as slip_around,
 )
 from ._branches import (
     MARKS as MARKS,
@@ -41,14 +35,12 @@ from ._branches import (
     branch_diagram as branch_diagram,
     move_apart as move_apart,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
-    polyline as polyline,
 )
 from ._chance import chance_of_chaos as chance_of_chaos
 from ._compare import over_speed as over_speed, sweeps_beside as sweeps_beside
 from ._design import (
     bearing_design_figure as bearing_design_figure,
     design_figure as design_figure,
-    design_history as design_history,
 )
 from ._elasticities import (
     EDGE_COLOURS as EDGE_COLOURS,
@@ -56,7 +48,6 @@ from ._elasticities import (
     statistic_bars as statistic_bars,
 )
 from ._history import (
-    force_history as force_history,
     orbit as orbit,
     simulation_figure as simulation_figure,
     time_history as time_history,

@@ -29,7 +29,6 @@ from ._bearing_page import (
     bearing_parameters_table as bearing_parameters_table,
 )
 from ._chances import (
-    bands_table as bands_table,
     chances_document as chances_document,
     chances_notes as chances_notes,
     chances_table as chances_table,
@@ -39,7 +38,6 @@ from ._chances import (
     narrowed_document as narrowed_document,
     narrowed_table as narrowed_table,
     operating_chances as operating_chances,
-    unknowns_table as unknowns_table,
     verdict_table as verdict_table,
 )
 from ._compare import (
@@ -100,7 +98,6 @@ from ._orbit_tables import (
     edge_table as edge_table,
     error_cell as error_cell,
     loss_table as loss_table,
-    multiplier_cell as multiplier_cell,
     orbits_document as orbits_document,
     stretch_table as stretch_table,
     unsettled_notes as unsettled_notes,
@@ -109,7 +106,6 @@ from ._page import Assessed as Assessed, assess as assess, calmest as calmest, p
 from ._reproduce import (
     CONCLUSIONS as CONCLUSIONS,
     LASTING as LASTING,
-    ComparedEdge as ComparedEdge,
     Conclusion as Conclusion,
     Runs as Runs,
     compare_edges as compare_edges,
@@ -117,7 +113,6 @@ from ._reproduce import (
     reproduction as reproduction,
     run_all as run_all,
     wide_zones as wide_zones,
-    zones_in_range as zones_in_range,
 )
 from ._slopes import (
     EXIT as EXIT,

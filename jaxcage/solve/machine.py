@@ -30,10 +30,10 @@ from .ir import is_variable
 from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
 
 
-LARGEST_STEP = REVOLUTION / 4
+FEWEST_STEPS, MOST_STEPS = 4, 20_000.0
+"""Of a revolution; also two at least in the period of the forcing's highest harmonic."""
 SMALLEST_STEP = 1e-7
-MOST_STEPS = 20_000.0
-"""Limits of a step [rad], and of the mean number of steps of a revolution."""
+"""Step below which a lane is given up [rad]."""
 FIRST_STEP = 0.05
 """Step that is tried first [rad]."""
 WIDTH = 8
@@ -265,6 +265,7 @@ class Engine:
         """**Raises:** `UnknownOperation` for a law with an operation that has no translation."""
         self.numbers = Numbers(system, several)
         self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents)
+        self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
         self.rows: Layout = layout_of(self.field, len(Tableau.named(pair).phase))
         self._library, self._march = _loaded(march_ir(self.field, pair, WIDTH))
 
@@ -294,7 +295,7 @@ class Engine:
         stored = np.zeros((rows.end("mark"), lanes))
         strobe = np.full((lanes, keep, n), np.nan)
         growth = np.full((lanes, revolutions, self.field.tangents), np.nan)
-        settings = np.array([tolerance, LARGEST_STEP, SMALLEST_STEP, MOST_STEPS])
+        settings = np.array([tolerance, self._largest, SMALLEST_STEP, MOST_STEPS])
         queue = np.zeros(2, dtype=np.int64)
         arrays = (queue, settings, np.append(shared, 0.0), loaded, stored, strobe, growth)
         at = [x.ctypes.data for x in arrays]

@@ -37,7 +37,6 @@ from ._store import (
     DamagedStore as DamagedStore,
     OtherStudy as OtherStudy,
     Store as Store,
-    StoreState as StoreState,
     check_study as check_study,
     label_names as label_names,
     open_study as open_study,

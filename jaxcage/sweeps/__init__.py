@@ -25,7 +25,7 @@ from ._bearing_ramp import (
     BearingUpDown as BearingUpDown,
     bearing_up_down as bearing_up_down,
 )
-from ._carried import Hysteresis as Hysteresis, run_up_down as run_up_down, run_up_down_designs as run_up_down_designs
+from ._carried import run_up_down as run_up_down
 from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
 from ._motion import Motion as Motion, motions as motions
@@ -50,5 +50,5 @@ from ._speed import (
 
 check_layer(
     globals(),
-    "bearing_up_down monodromy run_up_down run_up_down_designs sweep sweep_bearing sweep_bearings sweep_designs",
+    "bearing_up_down monodromy run_up_down sweep sweep_bearing sweep_bearings sweep_designs",
 )

@@ -6,7 +6,6 @@ full size, so that the arithmetic of a lane does not depend on how many neighbou
 """
 
 import concurrent.futures
-import heapq
 import os
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ from jaxtyping import Array, Float, Int
 from .._errors import ArgumentError
 from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
-from ..integrate import BLOCK, AbstractMethod, StrobeMap, compiled, stated, strobe_map
+from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
 from ..solve import NativeSteps
 from ._native import Lanes, observe_native
@@ -31,8 +30,6 @@ CHUNKS = (16, 32, 64, 128, 256, 384, 512)
 CALL = 32
 """What a call costs beside its lanes, in lanes."""
 
-LOOK = 16
-"""Revolutions after which lanes are dealt out anew."""
 
 Progress = Callable[[int, int], None]
 """Called with lanes done and lanes in all."""
@@ -121,40 +118,11 @@ def _padded(lanes: np.ndarray, size: int) -> np.ndarray:
     return np.pad(lanes, (0, size - lanes.size), constant_values=-1)
 
 
-def _dealt(cost: Float[np.ndarray, " lanes"], size: int, least: int) -> list[Int[np.ndarray, " some"]]:
-    """Numbers of lanes in chunks that take about as long, `least` chunks at least if there are enough blocks of lanes.
-
-    Lanes that cost the same are packed into blocks of as many as are run together, so that a block costs what one of
-    them does. The dearest come first, each block into the chunk that has the least to do.
-    """
-    order = np.argsort(-cost, kind="stable")
-    alike = np.split(order, np.flatnonzero(np.diff(cost[order])) + 1)
-    blocks = [block for lanes in alike for block in np.split(lanes, range(BLOCK, lanes.size, BLOCK))]
-    chunks = max(-(-cost.size // size), min(least, len(blocks)))
-    parts, room = [[order[:0]] for _ in range(chunks)], [size] * chunks
-    load = [(0.0, i) for i in range(chunks)]  # of chunks with room, the least first
-    for block in blocks:
-        while block.size:
-            done, i = heapq.heappop(load)
-            taken, rest = np.split(block, [room[i]])
-            parts[i].append(taken)
-            room[i] -= taken.size
-            if room[i]:
-                heapq.heappush(load, (done + float(cost[block[0]]), i))
-            block = rest
-    return [np.concatenate(part) for part in parts]
-
-
 def _in_chunks(
-    work: Callable[[np.ndarray], Any],
-    cost: Float[np.ndarray, " lanes"],
-    size: int,
-    report: Callable[[int], None] = lambda _: None,
-    least: int = 1,
+    work: Callable[[np.ndarray], Any], lanes: int, size: int, report: Callable[[int], None] = lambda _: None
 ) -> tuple[np.ndarray, ...]:
-    """`work` on the numbers of lanes, chunk by chunk on all cores, in `least` chunks at least if there are enough
-    blocks of lanes; results in the order of the lanes."""
-    parts = _dealt(cost, size, least)
+    """`work` on the numbers of lanes, chunk by chunk on all cores; results in the order of the lanes."""
+    parts = np.split(np.arange(lanes), range(size, lanes, size))
     run = lambda part: [np.asarray(x)[..., : part.size] for x in work(_padded(part, size))]
     results = []
     with concurrent.futures.ThreadPoolExecutor(workers()) as pool:
@@ -165,8 +133,7 @@ def _in_chunks(
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    back = np.argsort(np.concatenate(parts))
-    return tuple(np.concatenate(column, axis=-1)[..., back] for column in zip(*results, strict=True))
+    return tuple(np.concatenate(column, axis=-1) for column in zip(*results, strict=True))
 
 
 def run_parts(
@@ -179,7 +146,7 @@ def run_parts(
     alive = np.all(np.isfinite(y0), axis=1)
     y0 = np.where(alive[:, None], y0, 0.0)
     begin = lambda lane: work(_part(speed, which, y0, lane))
-    found = _in_chunks(begin, np.ones(speed.size), chunk_size(speed.size))
+    found = _in_chunks(begin, speed.size, chunk_size(speed.size))
     each = lambda x: alive.reshape(-1, *[1] * (x.ndim - 1))
     return tuple(np.where(each(x), np.moveaxis(x, -1, 0), np.nan) for x in found)
 
@@ -246,8 +213,7 @@ def run_lanes(
 
     Lanes that go `onward`, from where another run left them, may be as far out as lanes come on their way.
 
-    Lanes run beside their neighbours at first, and soon beside those that need as many steps. Runs that name the same
-    `size` of their chunks share their programs; what a chunk has room for beyond its lanes costs next to nothing.
+    Runs that name the same `size` of their chunks share their programs.
 
     **Returns:** `Observation` of NumPy arrays with the lanes last.
     """
@@ -259,17 +225,15 @@ def run_lanes(
     which = np.zeros(lanes, int) if which is None else which
     size = chunk_size(lanes) if size is None else size
     plan = Plan(*map(int, plan))
-    first, watched = plan.discard - plan.align, plan.align + plan.block * plan.blocks
-    # How many steps each lane needs is seen after a few revolutions, and the lanes are dealt out again.
-    stages = [LOOK, first - LOOK] if first > 2 * LOOK and workers() > 1 else [first]
+    settling, watched = plan.discard - plan.align, plan.align + plan.block * plan.blocks
     lengths = Lengths(*map(jnp.asarray, (plan.align, plan.block, plan.blocks)))
     room = Room(_room(plan.keep), _room(plan.blocks), plan.exponents)
-    work, done = stated(method).work, 0.0
+    done = 0.0
 
     def report(revolutions: int) -> Callable[[int], None]:
         def add(count: int) -> None:
             nonlocal done
-            done += count * revolutions / (first + watched)
+            done += count * revolutions / (settling + watched)
             if progress is not None:
                 progress(int(done + 1e-9), lanes)
 
@@ -279,21 +243,16 @@ def run_lanes(
     outcome, level, error = np.zeros(lanes, np.int32), np.zeros(lanes, np.int32), np.zeros(lanes)
 
     def given(lane: np.ndarray) -> list[Any]:
-        """Lanes of a chunk as far as they are; of what fills it up nothing is asked."""
+        """Lanes of a chunk as far as they are; what fills it up is not run."""
         left = (np.where(lane < 0, 1, outcome[lane]), level[lane], error[lane])
         return [_part(speed, which, y, lane), *map(jnp.asarray, left)]
 
-    def cost() -> np.ndarray:
-        return np.where(outcome == 0, work[level], 1.0)
+    def begin(lane: np.ndarray) -> tuple[Any, ...]:
+        got = _settle_chunk(designs, method, jnp.asarray(settling), limit, *given(lane))
+        return *got.y, got.outcome, got.level, got.error
 
-    for revolutions in stages:
-
-        def begin(lane: np.ndarray, count: int = revolutions, limit: Array = limit) -> tuple[Any, ...]:
-            got = _settle_chunk(designs, method, jnp.asarray(count), limit, *given(lane))
-            return *got.y, got.outcome, got.level, got.error
-
-        *columns, outcome, level, error = _in_chunks(begin, cost(), size, report(revolutions), workers())
-        y, limit = np.stack(columns, axis=-1).reshape(lanes, dim), jnp.asarray(ESCAPE)
+    *columns, outcome, level, error = _in_chunks(begin, lanes, size, report(settling))
+    y = np.stack(columns, axis=-1).reshape(lanes, dim)
     follow = lambda lane: _observe_chunk(designs, method, lengths, room, *given(lane))
-    seen = Observation(*_in_chunks(follow, cost(), size, report(watched), workers()))
+    seen = Observation(*_in_chunks(follow, lanes, size, report(watched)))
     return seen._replace(strobe=seen.strobe[room.keep - plan.keep :], growth=seen.growth[: plan.blocks])
