@@ -36,7 +36,7 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
 
     try:
         place = pathlib.Path(wanted).expanduser() / _processor()
-        reason = _unfit(place)
+        reason = unfit(place)
     except (OSError, RuntimeError) as error:  # no home folder
         reason = f"{getattr(error, 'strerror', None) or error}"
         place = pathlib.Path(wanted)
@@ -49,7 +49,7 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
     return place
 
 
-def _unfit(place: pathlib.Path) -> str:
+def unfit(place: pathlib.Path) -> str:
     """Make a folder for this user alone. **Returns:** why it cannot be used, empty if it can."""
     place.mkdir(parents=True, exist_ok=True, mode=0o700)
     about = place.stat()

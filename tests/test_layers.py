@@ -14,6 +14,7 @@ LAYERS = [
     "forces",
     "models",
     "integrate",
+    "solve",
     "analysis",
     "sweeps",
     "orbits",

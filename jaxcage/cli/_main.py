@@ -80,7 +80,9 @@ def _carry_out(options: AnyOptions) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    if isinstance(options, CommonOptions) and not options.no_cache:
+    if isinstance(options, CommonOptions) and options.no_cache:
+        os.environ["JAXCAGE_CACHE"] = "off"
+    elif isinstance(options, CommonOptions):
         tell_of_kept_programs()
         keep_compiled_programs()
     command, place = next((name, place) for name, (kind, place) in COMMANDS.items() if kind is type(options))

@@ -23,6 +23,7 @@ import platformdirs
 from jaxtyping import Float
 from llvmlite.binding import orcjit
 
+from .._cache import unfit
 from .._recent import Form, split
 from ..integrate._program import Program, Sizes, program_of
 from ..models import AbstractForcedSystem, ScaledField, multiply
@@ -188,11 +189,15 @@ def _compiled(ir: str) -> bytes:
 
 
 def cache_folder() -> pathlib.Path | None:
-    """Where object code is kept; None where `JAXCAGE_CACHE=off` says that nothing is."""
+    """Where object code is kept; None where `JAXCAGE_CACHE=off` says that nothing is, or others may write there."""
     given = os.environ.get("JAXCAGE_CACHE", "")
-    if given.lower() == "off":
+    if given == "off":
         return None
-    return pathlib.Path(given or platformdirs.user_cache_dir("jaxcage")) / "native"
+    try:
+        folder = pathlib.Path(given or platformdirs.user_cache_path("jaxcage")).expanduser() / "native"
+        return None if unfit(folder) else folder
+    except (OSError, RuntimeError):  # no home folder, or one that cannot be written
+        return None
 
 
 def object_code(ir: str) -> bytes:
@@ -211,7 +216,6 @@ def object_code(ir: str) -> bytes:
     code = _compiled(ir)
     if path is not None:
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
             new = path.with_name(f"{path.name}.{os.getpid()}.{threading.get_ident()}")
             new.write_bytes(digest(code) + code)
             new.replace(path)
@@ -225,9 +229,10 @@ def _linker() -> Any:
     return orcjit.create_lljit_compiler(_machine())
 
 
-@functools.lru_cache(maxsize=64)
+@functools.cache
 def _loaded(ir: str) -> tuple[Any, Callable[..., None]]:
-    """The library of a module, which must outlive its function."""
+    """The library of a module, and its function; it is kept as long as the process, for code that is freed while it is
+    used ends that."""
     name = "march" + hashlib.sha256(ir.encode()).hexdigest()[:24]
     builder = orcjit.JITLibraryBuilder().add_object_img(object_code(ir)).add_current_process()
     library = builder.export_symbol("march").link(_linker(), name)
