@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.integrate import ControlledSteps, controlled, finer
+from jaxcage.integrate import AbstractMethod
 from jaxcage.models import CageModel, fastest_speed
+from jaxcage.solve import native, refined
 from tests import reference
 
 
@@ -76,9 +77,9 @@ def by_kind(found: Sequence[Subject]) -> dict[str, list[Subject]]:
     return {kind: group for kind, group in groups.items() if group}
 
 
-def fine() -> ControlledSteps:
+def fine() -> AbstractMethod:
     """What the default method is compared with."""
-    return finer(controlled(), TIMES)
+    return refined(native(), TIMES)
 
 
 @functools.cache

@@ -1,12 +1,9 @@
-"""Compiled programs by the form of their arguments: those that have not been used for long are dropped.
+"""Compiled programs by the form of their arguments; those that have not been used for long are dropped.
 
-A program holds memory, and some of the memory maps of which Linux gives a process 65 530; every law of a user's own
-takes a few dozen programs. JAX keeps what it has compiled as long as somebody holds the function, and `equinox` hands
-functions to JAX in a way that holds them for good. Here each form of arguments has a function of its own, of arrays
-alone, and what is compiled for it goes when it goes.
-
-JAX also keeps what it has traced on the way, thousands of functions long: some 4 MB of a user's law. That is dropped
-too, whenever as many programs have gone as are kept.
+A program holds memory and some of the 65 530 memory maps that Linux gives a process; every law of a user's own takes a
+few dozen programs. JAX keeps what it has compiled as long as its function exists, and `equinox` keeps functions for
+good. Here each form of arguments has a function of its own, which goes with its program. JAX's caches of what it has
+traced, some 4 MB of a user's law, are cleared whenever as many programs have gone as are kept.
 """
 
 import collections

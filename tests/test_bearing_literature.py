@@ -125,9 +125,10 @@ def test_gap_and_radius():
 def test_published_table_2():
     cases = jb.PUBLISHED_CASES
     assert list(cases) == ["1a", "1b", "2a", "2b", "3a", "3b"]
-    assert [c.zone_1_width_rpm for c in cases.values()] == [2900, 14900, 6400, 5200, 5750, 5750]
+    assert [c.zone_1_exit_rpm - c.zone_1_onset_rpm for c in cases.values()] == [2900, 14900, 6400, 5200, 5750, 5750]
     # Conclusion 3: the steady zone narrows as the eccentricity grows from 35 to 57 um.
-    assert (cases["2a"].steady_width_rpm, cases["2b"].steady_width_rpm) == (8500, 6800)
+    steady = lambda case: case.zone_2_onset_rpm - case.zone_1_exit_rpm
+    assert (steady(cases["2a"]), steady(cases["2b"])) == (8500, 6800)
     assert jb.published_case("2b").eccentricity_um == 57
     low, high = jb.PUBLISHED_SPEED_RANGE_RPM
     for case in cases.values():

@@ -104,12 +104,25 @@ def test_a_lane_that_fails_leaves_its_neighbours_alone():
     assert np.all(np.isfinite(found.last[[0, 3]])) and np.all(np.isnan(found.last[[1, 2]]))
 
 
-def test_a_law_with_an_unknown_operation_is_run_by_jax_and_says_so():
-    def law(tau: Any, q: Any, v: Any, speed: Any) -> Any:
-        return (-q[0] - v[0] + jax.scipy.special.i0e(q[0]) * jnp.cos(tau),)
+class Polynomial(eqx.Module):
+    """Stiffness by an array of coefficients."""
 
-    system = jc.ForcedOscillator(law, coordinates=1)
-    with pytest.warns(UserWarning, match="operation `bessel_i0e`, which has no machine code"):
+    c: jax.Array
+
+    def __call__(self, tau: Any, q: Any, v: Any, speed: Any) -> Any:
+        return (-v[0] - q[0] * (self.c[0] + self.c[1] * q[0] ** 2) + jnp.cos(tau),)
+
+
+LAWS = {
+    "bessel_i0e": lambda tau, q, v, speed: (-q[0] - v[0] + jax.scipy.special.i0e(q[0]) * jnp.cos(tau),),
+    "array": Polynomial(jnp.array([1.0, 0.1])),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_that_has_no_machine_code_is_run_by_jax_and_says_so(name: str):
+    system = jc.ForcedOscillator(LAWS[name], coordinates=1)
+    with pytest.warns(UserWarning, match=f"operation `{name}`, which has no machine code"):
         found = jc.sweep(system, 1.5, discard=20, revolutions=20, confirm=False, horizon=0)
     assert set(found.label.ravel()) == {"periodic-1"}
 

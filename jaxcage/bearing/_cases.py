@@ -27,16 +27,6 @@ class PublishedCase:
     zone_1_exit_rpm: float
     zone_2_onset_rpm: float
 
-    @property
-    def zone_1_width_rpm(self) -> float:
-        """Exit less onset of zone 1 [rpm]."""
-        return self.zone_1_exit_rpm - self.zone_1_onset_rpm
-
-    @property
-    def steady_width_rpm(self) -> float:
-        """Width of the steady zone between the two chaotic ones [rpm]."""
-        return self.zone_2_onset_rpm - self.zone_1_exit_rpm
-
 
 PUBLISHED_CASES: dict[str, PublishedCase] = {
     case.name: case

@@ -27,7 +27,7 @@ from .._cache import unfit
 from .._recent import Form, split
 from ..integrate._program import Program, Sizes, program_of
 from ..models import AbstractForcedSystem, ScaledField, multiply
-from .ir import is_variable
+from .ir import UnknownOperation, is_variable
 from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
 
 
@@ -133,6 +133,8 @@ class Numbers:
             return [jnp.asarray(x, float) for x in _pieces(self._form.filled(row), speed)[1]]
 
         traced = jax.make_jaxpr(lambda speed: of(speed, row))(1.0).jaxpr
+        if any(v.aval.shape for v in traced.outvars):
+            raise UnknownOperation("array")
         moved = set(traced.invars)
         for e in traced.eqns:
             if any(is_variable(v) and v in moved for v in e.invars):
@@ -267,7 +269,7 @@ class Engine:
     """The compiled revolutions of a system, with so many tangent vectors."""
 
     def __init__(self, system: AbstractForcedSystem, tangents: int = 0, several: bool = False, pair: str = "tsit5"):
-        """**Raises:** `UnknownOperation` for a law with an operation that has no translation."""
+        """**Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers."""
         self.numbers = Numbers(system, several)
         self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents)
         self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)

@@ -1,6 +1,5 @@
 """Lanes of a sweep in machine code: settled, observed, and their error measured."""
 
-import collections
 import functools
 import warnings
 from collections.abc import Callable
@@ -29,17 +28,13 @@ RETRIES = 3
 """How often a lane whose error is too large is run again with tolerances 16 times smaller."""
 CHUNK = 4096
 """Lanes that are run at a time; their growth in every revolution is kept until it is averaged."""
-ENGINES = 32
-"""Engines that a process keeps."""
 Report = Callable[[int], None]
-_engines: collections.OrderedDict[Any, Engine | None] = collections.OrderedDict()
+_engines: dict[Any, Engine | None] = {}
 
 
 def engine_of(system: AbstractForcedSystem, tangents: int, several: bool, pair: str) -> Engine | None:
     """The compiled code of a system, None for a law that cannot be translated; a warning names the operation once."""
-    form, row = split(system, eqx.is_inexact_array)
-    plain = [np.shape(x) for x in row]
-    key = (form, tuple(plain), tangents, several, pair)
+    key = (split(system, eqx.is_inexact_array)[0], tangents, several, pair)
     if key not in _engines:
         try:
             _engines[key] = Engine(system, tangents, several, pair)
@@ -50,9 +45,6 @@ def engine_of(system: AbstractForcedSystem, tangents: int, several: bool, pair: 
                 stacklevel=2,
             )
             _engines[key] = None
-        while len(_engines) > ENGINES:
-            _engines.popitem(last=False)
-    _engines.move_to_end(key)
     return _engines[key]
 
 
