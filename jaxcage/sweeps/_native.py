@@ -247,7 +247,8 @@ def _error(
     method: NativeSteps,
     threads: int,
 ) -> Float[np.ndarray, " some"]:
-    """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance.
+    """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance, at least the
+    tolerance; the bound protects against accidental agreement of the two.
 
     Measured from `start`, by a run of its own, or between the last of the strobe states.
     """
@@ -255,7 +256,7 @@ def _error(
     sharp = SHARPER * method.tolerance
     if start is not None:
         ends, sharper = once(start, method.tolerance, numbers), once(start, sharp, numbers)
-        return SURE * np.max(np.abs(ends - sharper), axis=1)
+        return np.maximum(SURE * np.max(np.abs(ends - sharper), axis=1), method.tolerance)
     assert strobe is not None
     pairs = strobe[:, -(CHECKED + 1) :]
     count = pairs.shape[1] - 1
@@ -264,4 +265,4 @@ def _error(
     repeated = np.repeat(numbers[0], count, axis=1), numbers[1]
     sharper = once(pairs[:, :-1].reshape(-1, pairs.shape[2]), sharp, repeated)
     apart = np.max(np.abs(sharper - pairs[:, 1:].reshape(sharper.shape)), axis=1)
-    return SURE * np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1)
+    return np.maximum(SURE * np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1), method.tolerance)
