@@ -228,7 +228,8 @@ def object_code(ir: str) -> bytes:
 
 @functools.cache
 def _linker() -> Any:
-    return orcjit.create_lljit_compiler(_machine())
+    # LLVM's older linker may put parts of a module more than 2 GB apart, which ends the process.
+    return orcjit.create_lljit_compiler(_machine(), use_jit_link=True)
 
 
 @functools.cache
