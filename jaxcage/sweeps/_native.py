@@ -247,8 +247,8 @@ def _error(
     method: NativeSteps,
     threads: int,
 ) -> Float[np.ndarray, " some"]:
-    """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance, at least the
-    tolerance; the bound protects against accidental agreement of the two.
+    """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance, and at least
+    the tolerance; the bound protects against accidental agreement of the two.
 
     Measured from `start`, by a run of its own, or between the last of the strobe states.
     """
