@@ -247,10 +247,9 @@ def _error(
     method: NativeSteps,
     threads: int,
 ) -> Float[np.ndarray, " some"]:
-    """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance, and at least
-    the tolerance; the bound protects against accidental agreement of the two.
+    """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance.
 
-    Measured from `start`, by a run of its own, or between the last of the strobe states.
+    It is at least the tolerance, which protects against accidental agreement of the two. Measured from `start`, by a run of its own, or between the last of the strobe states.
     """
     once = lambda y, tolerance, numbers: engine(numbers, y, 1, 1, tolerance, threads=threads).state
     sharp = SHARPER * method.tolerance
