@@ -249,7 +249,8 @@ def _error(
 ) -> Float[np.ndarray, " some"]:
     """Error of a revolution: three times the distance of its end from that by a hundredth of the tolerance.
 
-    It is at least the tolerance, which protects against accidental agreement of the two. Measured from `start`, by a run of its own, or between the last of the strobe states.
+    It is at least the tolerance, which protects against accidental agreement of the two. Measured from `start`, by a
+    run of its own, or between the last of the strobe states.
     """
     once = lambda y, tolerance, numbers: engine(numbers, y, 1, 1, tolerance, threads=threads).state
     sharp = SHARPER * method.tolerance
