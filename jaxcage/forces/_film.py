@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
+from .._arguments import require_above_zero, require_at_least
 from .._types import Scalar
 from ._smooth import inverse_root, smooth_norm
 
@@ -41,7 +41,8 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
 
     **Arguments:** dynamic viscosity [Pa s], land radius [m], width of one land [m], radial clearance [m].
     """
-    require_above_zero(viscosity=viscosity, radius=radius, width=width)
+    require_at_least(0, viscosity=viscosity)
+    require_above_zero(radius=radius, width=width)
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
 
 

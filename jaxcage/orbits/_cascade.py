@@ -44,12 +44,6 @@ class Cascade:
         """Values of the parameter [SI]."""
         return tuple(float(p.value) for p in self.points)
 
-    @property
-    def ratios(self) -> tuple[float, ...]:
-        """Ratios of successive distances, which tend to 4.6692."""
-        d = np.diff(self.values)
-        return tuple((d[:-1] / d[1:]).tolist())
-
     def as_edge(self, kind: str) -> Edge:
         """The chaotic edge that the limit of one over speed is."""
         return Edge(self.limit * 30 / np.pi, self.error * 30 / np.pi, kind, "period-doubling", "cascade")

@@ -28,7 +28,7 @@ PAIRS: dict[str, tuple[type[dfx.AbstractERK], int]] = {
 """Embedded explicit pairs by name, with their order."""
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.9, 0.2, 6.0
 """Step sizes change by the safety factor times what the error asks for, within these factors."""
-TANGENT_TOLERANCE = 30.0
+TANGENT_TOLERANCE = 10.0
 """Tolerance of tangent vectors relative to their length, as a multiple of that of the state."""
 NEAREST = 1e-4
 """Time to an abrupt change of the law [rad] below which steps are not shortened any further."""

@@ -43,9 +43,6 @@ WAKES = 0.1
 """Seconds between looks at threads that run."""
 
 
-# --- tracing ----------------------------------------------------------------------------------------------------------
-
-
 @dataclasses.dataclass(frozen=True)
 class _Rates:
     """Rates of a state and of tangent vectors, in units of the scale."""
@@ -164,9 +161,6 @@ def traced_field(system: AbstractForcedSystem, form: Form, wide: tuple[bool, ...
     ones = tuple(jnp.ones(()) for _ in range(n))
     abrupt = None if system.abrupt(ones, ones) is None else trace(_Abrupt(form), 2 * n)
     return Field(prelude, rates, trace(_Excursion(form), n), abrupt, n, tangents, wide)
-
-
-# --- machine code -----------------------------------------------------------------------------------------------------
 
 
 @functools.cache

@@ -20,6 +20,8 @@ from ..solve import FINISHED, NOT_FINITE, OUTSIDE, Engine, March, NativeSteps, U
 
 CHECKED = 8
 """Revolutions of each lane, the last ones whose strobe states are kept, that are run again to measure their error."""
+FURTHER = 4
+"""Revolutions beyond the end of a run by which the error of its exponents is measured."""
 SHARPER = 1e-2
 """Tolerance of the run that measures errors, as a fraction of the tolerance."""
 SURE = 3.0
@@ -216,7 +218,7 @@ def _once(
         follow(plain, settling, keep=1)
         alive = alive[(outcome[alive] == 0) & ~stuck[alive]]
     strobe = np.full((some.size, keep, dim), np.nan)
-    growth = np.full((some.size, plan.blocks, m), np.nan)
+    growth, doubt = np.full((some.size, plan.blocks, m), np.nan), np.zeros((m, some.size))
     if alive.size:
         tangents = np.broadcast_to(np.array(start_tangents(dim, m), dtype=float).reshape(m, dim), (alive.size, m, dim))
         held = max(keep, min(CHECKED + 1, aligned))
@@ -225,6 +227,7 @@ def _once(
         strobe[who] = ran.strobe[:, held - keep :]
         growth[who] = ran.growth[:, plan.align :].reshape(who.size, plan.blocks, plan.block, m).mean(axis=2)
         peak[who] = ran.peak
+        doubt[:, who] = _doubt(pushed, pick(numbers, who), ran, method, lanes.threads)
         error[who] = np.maximum(error[who], _error(plain, pick(numbers, who), None, ran.strobe, method, lanes.threads))
     lost = outcome != 0
     strobe[lost], growth[lost], state[lost] = np.nan, np.nan, np.nan
@@ -235,8 +238,19 @@ def _once(
         peak,
         outcome.astype(np.int32),
         error,
-        np.zeros((m, some.size)),
+        doubt,
     ), stuck
+
+
+def _doubt(
+    engine: Engine, numbers: Any, ran: March, method: NativeSteps, threads: int
+) -> Float[np.ndarray, "exponents some"]:
+    """Error of the exponents per revolution that comes from the steps: three times the change of the mean growth over
+    a few further revolutions by a hundredth of the tolerance."""
+    further = lambda tolerance: engine(
+        numbers, ran.state, FURTHER, 1, tolerance, tangents=ran.tangents, step=ran.step, threads=threads
+    ).growth.mean(axis=1)
+    return SURE * np.abs(further(method.tolerance) - further(SHARPER * method.tolerance)).T
 
 
 def _error(

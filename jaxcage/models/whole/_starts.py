@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..._arguments import require_above_zero
 from ..._errors import ArgumentError
 from ..._types import Scalar
 from ...bearing import line_contact_approach, load_distribution
@@ -60,7 +59,6 @@ def rolling_start(
     **Arguments:** model; shaft speed [rad/s]; which of the `CAGE_STARTS`; the speed of cage and rollers over that of
     pure rolling, with which a start below 1 slips; a place such as the `CAGE_STARTS` are, instead of one of them.
     """
-    require_above_zero(speed=speed)
     bearing, c = model.bearing, model.clearance
     omega, spin = turning * model.rolling_cage_speed(speed), turning * model.rolling_spin(speed)
     n, stiff = bearing.n_rollers, bearing.raceway_stiffness
