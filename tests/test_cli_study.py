@@ -153,7 +153,7 @@ def test_what_can_be_varied():
 def test_map_of_labels(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Curves come on top; the data hold all points."""
     line = np.full(5, jc.rpm(7000))
-    height, rest = np.linspace(4e-4, 5e-4, 5), (np.zeros((5, 4)), np.zeros((5, 4), complex), np.ones(5, bool), ())
+    height, rest = np.linspace(4e-4, 5e-4, 5), (np.zeros((5, 4)), np.zeros((5, 4), complex), np.ones(5, bool))
     edge = Curve("fold", "speed", "guidance_gap", line, height, *rest, ("range", "range"), "zone 1 onset")
     monkeypatch.setattr(_label_map, "_curves", lambda *_: ([edge], {"zone 2 onset": "a branch point"}))
     small = [*MAP, "--first", "3000", "--last", "9000", "--out", str(tmp_path)]
