@@ -725,8 +725,8 @@ def page(found: dict[str, list[Row]]) -> str:
     """All rows as Markdown."""
     rows = [r for of in found.values() for r in of]
     lines = [
-        f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass. Made by "
-        "`python tests/literature.py`.\n",
+        f"# Validation\n\n{sum(r.passed for r in rows)} of {len(rows)} comparisons pass. "
+        f"The numbers were made with jaxcage {jc.__version__} by `python tests/literature.py`.\n",
         "A tolerance is what the source supports: half a unit of the last printed digit where ours is exact, more",
         "where theirs was computed on a coarse grid or ours is a finite sample. FAILS marks a difference beyond it.",
         "A source is one that can be opened, or a second computation that shares no code with what it is held against.",
