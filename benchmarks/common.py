@@ -1,4 +1,4 @@
-"""What several benchmarks use: tables, a description of the machine, the version that made a page, compiler flags."""
+"""Functions that several benchmarks share: tables, a description of the machine, versions, compiler flags."""
 
 import datetime
 import os

@@ -93,12 +93,12 @@ BLOCKS: dict[str, tuple[str, str, Part]] = {
     "bearing-design": ("docs/whole-bearing.md", BETTER, tables("Design of", "Before and after")),
     "transcript": ("docs/transcript.md", "python -m benchmarks.transcript", printed),
 }
-"""Of each block the page, the command that makes it, and which part of its output it is."""
+"""Blocks by name: the page, the command that makes the block, and the part of its output that is shown."""
 
 
 @functools.cache
 def output(command: str) -> str:
-    """What a command prints, run once."""
+    """Run a command once in this process and return what it prints."""
     program, *words = shlex.split(command)
     words = ["-m", "jaxcage", *words] if program == "jaxcage" else words
     print(f"$ {command}", flush=True)

@@ -43,13 +43,13 @@ LEDGER = HERE / "pay.json"
 BUDGET, SHORT, TOGETHER, SEEDS = 300, 60, 10, 5
 """Designs of a search, those after which its best is shown too, designs at a time, and searches of each kind."""
 SPEEDS, DISCARD, REVOLUTIONS, LOADED = 8, 60, 30, 1
-"""Of each design in a search; the last is revolutions over which wear and peak force are read."""
+"""Speeds and revolutions of each design in a search; over the last revolutions wear and peak force are read."""
 LANE_REVOLUTIONS = SPEEDS * (DISCARD + REVOLUTIONS + LOADED)
-"""Of a design."""
+"""Lanes times revolutions that one design costs."""
 HOPELESS = 1e6
-"""What a design counts that failed [rpm]."""
+"""Value of a design that failed [rpm]."""
 PRICE = 1000.0
-"""Of wear load, peak land force and cost, as `jaxcage design` has it."""
+"""Price of wear load, peak land force and cost, as in `jaxcage design`."""
 BEARINGS = ("1b", "3a", "spindle")
 """The spindle was not looked at while the searches were made."""
 RIVALS = ("CMA-ES", "differential evolution")
@@ -106,7 +106,7 @@ class Spent(Exception):
 
 
 class Asked:
-    """What was asked of the objective in one search, and what that took."""
+    """The designs that one search has asked for, with their values and the time spent."""
 
     def __init__(self, case: Case):
         self.case, self.began = case, time.process_time()
@@ -219,7 +219,7 @@ def to_be_reached(runs: Sequence[dict[str, Any]]) -> float:
 
 
 def table(ledger: Sequence[dict[str, Any]]) -> str:
-    """What each search found in each bearing: medians of its seeds, in brackets the lowest and the highest."""
+    """The table of results: for each bearing and search the median over seeds, with the lowest and highest in brackets."""
     parts = []
     for bearing in dict.fromkeys(r["bearing"] for r in ledger):
         of = [r for r in ledger if r["bearing"] == bearing]

@@ -1,5 +1,6 @@
 """Ways of advancing the cage by revolutions, each with its ladder of settings from cheap to tight."""
 
+import abc
 import concurrent.futures
 import ctypes
 import importlib.util
@@ -23,7 +24,7 @@ from .common import FAST_MATH
 from .problem import Problem, constants, our_map
 
 
-class Rival:
+class Rival(abc.ABC):
     """A way of advancing lanes by revolutions.
 
     `settings` are steps per revolution (whole numbers), tolerances, or None for a default, from cheap to tight. With
@@ -47,9 +48,9 @@ class Rival:
         """Compile and start processes, for so many cores."""
         self.cores = cores
 
+    @abc.abstractmethod
     def on(self, problem: Problem) -> Callable[[int, Any], np.ndarray]:
         """The function (revolutions, setting) -> end states, shape (lanes, 4), for these lanes."""
-        raise NotImplementedError
 
     def close(self) -> None:
         """End the processes."""

@@ -1,4 +1,4 @@
-"""What the sections of `benchmarks.truth` look at: the six cases, random models by seed, and their sweeps."""
+"""Models that `benchmarks.truth` examines: the six cases and random models by seed, with their sweeps."""
 
 import dataclasses
 import functools
@@ -19,11 +19,11 @@ KINDS = ("cases", "narrow", "wide")
 LOWEST, HIGHEST = 300.0, 60000.0
 """Speeds of the cases and of wide models [rpm]."""
 TIMES = 3
-"""Steps are halved so often: 8 times the steps at 16^-3 of the tolerance."""
+"""Number of refinements: the tolerance is 16^-3 of the default."""
 GRID = 8
 """Speeds of each model."""
 FEW = 3
-"""Of them where it is to be quick."""
+"""Speeds of each model with `--quick`."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def by_kind(found: Sequence[Subject]) -> dict[str, list[Subject]]:
 
 
 def fine() -> AbstractMethod:
-    """What the default method is compared with."""
+    """The method with finer steps with which the default method is compared."""
     return refined(native(), TIMES)
 
 

@@ -1,4 +1,4 @@
-"""How rivals are timed, and measurements that need a process of their own: one core, peak memory.
+"""Timing of rivals, and measurements that need a process of their own: one core, peak memory.
 
 `ask` starts `python -m benchmarks.worker TASK NUMBERS` and reads the JSON line with which it ends.
 """

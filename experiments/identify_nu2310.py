@@ -45,7 +45,7 @@ chaos has closed on an orbit of up to 8 revolutions."""
 EDGES = 3
 """Published ones of each case."""
 NEEDLESS = 0.01
-"""What a needless change between calm and chaos costs, as a relative error of the edges."""
+"""Penalty for a needless change between calm and chaos, as a relative error of the edges."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,9 +57,9 @@ class Unknown:
     """Smallest value [SI]."""
     upper: float
     linear: bool = False
-    """Whether equal steps add, instead of multiply."""
+    """True if equal steps of the search add to the value, false if they multiply it."""
     parameter: str = ""
-    """What takes its value, if that has another name."""
+    """Name of the parameter that takes the value, if it has another name."""
 
     @property
     def target(self) -> str:
@@ -77,7 +77,7 @@ class Unknown:
         return float(self.lower + along if self.linear else self.lower * np.exp(along))
 
     def place(self, value: float) -> float:
-        """Where `value` [SI] lies between the bounds, or the nearest bound."""
+        """The place of `value` [SI] between the bounds, from 0 to 1; values outside are moved to the nearest bound."""
         along = value - self.lower if self.linear else np.log(value / self.lower)
         return float(np.clip(along / self.span, 0.0, 1.0))
 

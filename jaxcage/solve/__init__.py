@@ -10,5 +10,5 @@
 
 from .ir import UnknownOperation as UnknownOperation
 from .loop import FINISHED as FINISHED, NOT_FINITE as NOT_FINITE, OUTSIDE as OUTSIDE
-from .machine import Engine as Engine, March as March
+from .machine import FIRST_STEP as FIRST_STEP, Engine as Engine, March as March
 from .method import NativeSteps as NativeSteps, native as native, refined as refined

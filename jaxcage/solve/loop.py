@@ -189,16 +189,10 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
 
-def _used(*programs: Any) -> set[Any]:
-    """Variables that programs read."""
-    equations = (e for p in programs for e in p.jaxpr.eqns)
-    results = (v for p in programs for v in p.jaxpr.outvars)
-    return {v for v in (*(v for e in equations for v in e.invars), *results) if is_variable(v)}
-
-
-def _fixed(w: _Code, field: Field, rows: Layout, program: Any, first: int, used: set[Any] | None = None) -> list[Value]:
+def _fixed(w: _Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
     """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
-    used = _used(program) if used is None else used
+    read = [*(v for e in program.jaxpr.eqns for v in e.invars), *program.jaxpr.outvars]
+    used = {v for v in read if is_variable(v)}
     values, wide_row, shared = [], iter(rows["fixed"]), 0
     for v, wide in zip(program.jaxpr.invars[first:], field.wide, strict=False):
         row, at = next(wide_row) if wide else 0, shared
@@ -223,7 +217,7 @@ def _made_wide(field: Field) -> list[bool]:
 
 
 def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
-    """What follows from the fixed numbers alone."""
+    """The code that works out everything that follows from the fixed numbers alone."""
     w = _Code(width)
     results, _ = w.program(field.prelude, _fixed(w, field, rows, field.prelude, 0), "entry")
     for row, wide, v in zip(rows["made"], _made_wide(field), results, strict=True):
@@ -326,7 +320,7 @@ return:
   ret i1 %alive_next
 }}
 """
-"""Lanes that are through are stored, and lanes of the queue take their places; true if any lane is left."""
+"""This function stores lanes that have left and loads lanes of the queue in their places. It is true if any lane runs."""
 
 
 def _refill(rows: Layout, width: int) -> tuple[str, set[str]]:

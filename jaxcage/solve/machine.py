@@ -32,7 +32,7 @@ from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
 
 
 FEWEST_STEPS, MOST_STEPS = 4, 20_000.0
-"""Of a revolution; also two at least in the period of the forcing's highest harmonic."""
+"""Limits of the number of steps of a revolution; the period of the forcing's highest harmonic has two at least."""
 SMALLEST_STEP = 1e-7
 """Step below which a lane is given up [rad]."""
 FIRST_STEP = 0.05
@@ -142,7 +142,7 @@ class Numbers:
     def __call__(
         self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]
     ) -> tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]]:
-        """Those that differ from lane to lane, and the others."""
+        """The numbers that differ from lane to lane, and those that all lanes share."""
         count = len(speeds)
         room = 1 << max(3, (count - 1).bit_length())  # few sizes, as each is compiled
         pad = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - count, *x.shape[1:]))])
@@ -198,7 +198,8 @@ def cache_folder() -> pathlib.Path | None:
 
 def object_code(ir: str) -> bytes:
     """Object code of a module for this processor, from the cache if it is there and whole."""
-    about = f"{ir} {llvm.llvm_version_info} {llvm.get_host_cpu_name()} {_machine().triple}"
+    processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {_machine().triple}"
+    about = f"{ir} {llvm.llvm_version_info} {processor}"
     folder = cache_folder()
     path = folder and folder / hashlib.sha256(about.encode()).hexdigest()[:40]
     digest = lambda code: hashlib.sha256(code).digest()
@@ -228,8 +229,8 @@ def _linker() -> Any:
 
 @functools.cache
 def _loaded(ir: str) -> tuple[Any, Callable[..., None]]:
-    """The library of a module, and its function; it is kept as long as the process, for code that is freed while it is
-    used ends that."""
+    """The library of a module, and its function. Libraries are never freed: a program whose code is freed while it runs
+    ends the process."""
     name = "march" + hashlib.sha256(ir.encode()).hexdigest()[:24]
     builder = orcjit.JITLibraryBuilder().add_object_img(object_code(ir)).add_current_process()
     library = builder.export_symbol("march").link(_linker(), name)
@@ -239,7 +240,7 @@ def _loaded(ir: str) -> tuple[Any, Callable[..., None]]:
 
 
 class March(NamedTuple):
-    """What lanes did."""
+    """Results of a run of lanes."""
 
     state: Float[np.ndarray, "lanes dim"]
     """At the end, in units of the scale."""
@@ -322,15 +323,7 @@ class Engine:
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
     """`run` in threads of its own, interrupted by Ctrl-C within a moment: the flag in `queue` empties it."""
-    errors: list[BaseException] = []
-
-    def guarded() -> None:
-        try:
-            run()
-        except BaseException as error:
-            errors.append(error)
-
-    pool = [threading.Thread(target=guarded, daemon=True) for _ in range(count)]
+    pool = [threading.Thread(target=run, daemon=True) for _ in range(count)]
     try:
         for each in pool:
             each.start()
@@ -343,5 +336,3 @@ def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report:
         for each in pool:
             each.join()
         raise
-    if errors:
-        raise errors[0]

@@ -15,7 +15,7 @@ from .._recent import split
 from ..analysis import Observation, Plan, start_tangents
 from ..integrate import OUTCOMES
 from ..models import AbstractForcedSystem
-from ..solve import FINISHED, NOT_FINITE, OUTSIDE, Engine, March, NativeSteps, UnknownOperation
+from ..solve import FINISHED, FIRST_STEP, NOT_FINITE, OUTSIDE, Engine, March, NativeSteps, UnknownOperation
 
 
 CHECKED = 8
@@ -144,8 +144,11 @@ def _observe(
     limit: float,
     report: Report,
 ) -> tuple[Observation, Bool[np.ndarray, " some"]]:
-    """Observe some lanes, those with too large an error again with smaller tolerances; and which need another method:
-    their steps became too short or too many, or their error stays too large."""
+    """Observe some lanes, and those with too large an error again with smaller tolerances.
+
+    **Returns:** the observation, and the lanes that need another method, because their steps became too short or too
+    many, or because their error stays too large.
+    """
     seen = stuck = None
     todo = np.arange(some.size)
     for retry in range(RETRIES + 1):
@@ -188,7 +191,7 @@ def _once(
     assert plain is not None and pushed is not None
     numbers = pushed.numbers(lanes.speed[some], lanes.rows(some))
     pick = lambda x, who: (x[0][:, who], x[1])
-    state, step, peak = y0 / scale, np.full(some.size, 0.05), np.maximum(excursion, 0.0)
+    state, step, peak = y0 / scale, np.full(some.size, FIRST_STEP), np.maximum(excursion, 0.0)
     alive = np.flatnonzero(admitted)
 
     def follow(engine: Engine, count: int, **more: Any) -> March:
