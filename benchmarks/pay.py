@@ -219,7 +219,7 @@ def to_be_reached(runs: Sequence[dict[str, Any]]) -> float:
 
 
 def table(ledger: Sequence[dict[str, Any]]) -> str:
-    """The table of results: for each bearing and search the median over seeds, with the lowest and highest in brackets."""
+    """The table of results: medians over seeds for each bearing and search, with lowest and highest in brackets."""
     parts = []
     for bearing in dict.fromkeys(r["bearing"] for r in ledger):
         of = [r for r in ledger if r["bearing"] == bearing]

@@ -51,8 +51,7 @@ class Layout:
         return cls(rows)
 
     def __getitem__(self, name: str) -> range:
-        first, size = self.rows[name]
-        return range(first, first + size)
+        return range(self.rows[name][0], self.end(name))
 
     @property
     def total(self) -> int:
@@ -179,12 +178,8 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     """
     tableau = Tableau.named(pair)
     rows = layout_of(field, len(tableau.phase))
-    parts = [
-        _prelude(field, rows, width),
-        _rates(field, rows, width),
-        _refill(rows, width),
-        _loop(field, rows, tableau, width),
-    ]
+    made = _prelude(field, rows, width), _rates(field, rows, width)
+    parts = [*made, _refill(rows, width), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
