@@ -315,7 +315,7 @@ return:
   ret i1 %alive_next
 }}
 """
-"""This function stores lanes that have left and loads lanes of the queue in their places. It is true if any lane runs."""
+"""This function stores lanes that have left and loads lanes of the queue. Its result is true if any lane is left."""
 
 
 def _refill(rows: Layout, width: int) -> tuple[str, set[str]]:
