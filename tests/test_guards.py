@@ -148,6 +148,6 @@ def test_a_short_sweep_says_so_and_a_long_one_does_not():
         for n, blocks in ((100, 1), (400, 20))
     )
     assert np.all(long.label == "chaotic") and not np.any(long.too_short)
-    assert "more revolutions" not in str(long)
+    assert "no certain label" not in str(long)
     assert np.all(single.label == "undecided") and np.all(single.too_short)  # a single block has no error
-    assert "3 lanes need more revolutions" in str(single)
+    assert "3 lanes have no certain label" in str(single)

@@ -39,7 +39,7 @@ def test_map_of_a_system_agrees_with_a_sweep():
         assert np.mean(found.too_short[:, j][agree] == swept.too_short[agree]) > 0.9
         same, near = same + np.sum(agree), near + mine.size
     assert same >= 0.9 * near  # long chaotic lanes differ by rounding, and a few of their labels with them
-    assert np.any(found.too_short) and "labels rest on too few revolutions" in str(found)
+    assert np.any(found.too_short) and "lanes have no certain label" in str(found)
     assert found.kind.shape == (9, 8) and 0 < np.sum(found.kind == 1) < found.kind.size
     assert np.array_equal(found.top_exponent, np.max(found.largest_exponent, axis=2))
 

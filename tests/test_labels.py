@@ -159,7 +159,7 @@ def test_slow_spirals_are_not_called_quasi_periodic(revolutions: int):
     open_ = found.label == "undecided"
     assert np.array_equal(found.too_short, open_) and np.all(found.revolutions_to_decide[open_] > revolutions)
     if np.any(open_):
-        assert "lanes need more revolutions: about" in str(found)
+        assert "lanes have no certain label: about" in str(found)
 
 
 def test_the_estimate_of_revolutions_is_what_a_spiral_needs():

@@ -177,13 +177,16 @@ def revolutions_to_decide(
     """Estimate of the revolutions to be observed until an undecided lane has a label; infinite without an estimate.
 
     A strobe orbit that shrinks closes when its steps have shrunk to the tolerance. Otherwise the exponent decides: its
-    standard error falls as the square root of the number of revolutions.
+    standard error falls as the square root of the number of revolutions. A periodic orbit that takes more than eight
+    revolutions, whose exponent is negative while it does not shrink, has no label however long it is observed.
     """
     factor, error = decay(strobe / scale)
     apart = np.linalg.norm(np.diff(strobe[-LONGEST_PERIOD:] / scale, axis=0), axis=-1).max()
     tolerance = float(closing_tolerance(strobe, scale))
     if error < 1 - factor < 1 and apart > tolerance:
         return revolutions + float(np.log(tolerance / apart) / np.log(factor))
+    if exponent + 2 * standard_error < -TORUS_THRESHOLD:
+        return np.inf
     gap = exponent - CHAOS_THRESHOLD if exponent > CHAOS_THRESHOLD + TORUS_THRESHOLD else TORUS_THRESHOLD
     ratio = 2 * standard_error / gap
     return revolutions * max(ratio**2, 2.0) if np.isfinite(ratio) else np.inf

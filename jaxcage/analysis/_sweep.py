@@ -154,12 +154,20 @@ class Sweep:
 
     @property
     def revolutions_to_decide(self) -> Float[np.ndarray, "speeds starts"]:
-        """Estimate of the revolutions to be observed until each undecided lane has a label, 0 for the other lanes."""
-        needed = np.zeros(self.outcome.shape)
+        """Estimate of the revolutions to be observed until each undecided lane has a label; infinite where there is no
+        estimate, 0 for the other lanes."""
+        needed, observed = np.zeros(self.outcome.shape), max(self.revolutions, self.horizon - self.discard)
         for i, j in zip(*np.nonzero((self.label == "undecided") & (self.exponents.shape[-1] > 0)), strict=True):
-            lane = float(self.exponents[i, j, 0]), float(self.standard_error[i, j, 0]), self.revolutions
+            lane = float(self.exponents[i, j, 0]), float(self.standard_error[i, j, 0]), observed
             needed[i, j] = revolutions_to_decide(self.strobe[i, j], self.scale[i], *lane)
         return needed
+
+    @property
+    def cure(self) -> str:
+        """How undecided lanes get a label, as the end of a sentence; empty without an estimate."""
+        needed = self.revolutions_to_decide
+        some = needed[(needed > 0) & np.isfinite(needed)]
+        return f": about {np.max(some):.2g} observed revolutions would decide {some.size} of them" if some.size else ""
 
     @property
     def small(self) -> Bool[np.ndarray, "speeds starts"]:
@@ -187,9 +195,7 @@ class Sweep:
             lines.append(f"  {over:6d} lanes went beyond eps = 1, at most to {np.nanmax(self.peak):.3f}")
         short = int(np.sum(self.too_short))
         if short:
-            needed = np.max(self.revolutions_to_decide)
-            cure = f"about {needed:.2g} observed revolutions would decide" if np.isfinite(needed) and needed else ""
-            lines.append(f"  {short:6d} lanes need more revolutions" + (f": {cure}" if cure else ""))
+            lines.append(f"  {short:6d} lanes have no certain label{self.cure}")
         if small := int(np.sum(self.small)):
             lines.append(f"  {small:6d} lanes move by less than {SMALL:g} of the scale: choose a smaller `scale`")
         lines += [f"  {n:6d} lanes failed: {OUTCOMES[code]}" for code, n in sorted(codes.items())]

@@ -56,10 +56,10 @@ def tell_of_kept_programs() -> None:
         warnings.showwarning = show
 
 
-def warn_of_short(labels: int) -> None:
-    """Warn of lanes that need more revolutions for a label, if there are any."""
-    if labels:
-        say(f"Warning: {labels} lanes need more revolutions to have a label: choose more --revolutions.")
+def warn_of_short(lanes: int, cure: str = ": choose more --revolutions") -> None:
+    """Warn of lanes that have no certain label, if there are any."""
+    if lanes:
+        say(f"Warning: {lanes} lanes have no certain label{cure}.")
 
 
 def leave_at_once_when_interrupted() -> None:

@@ -53,7 +53,7 @@ def sweep_over_speed(job: Job[SweepOptions]) -> Report:
     beyond, short = int(np.sum(found.peak > 1)), int(np.sum(found.too_short))
     if beyond:
         say(f"Warning: {beyond} lanes went beyond eps = 1, where the surfaces would overlap.")
-    warn_of_short(short)
+    warn_of_short(short, found.cure)
     counts = dict(sorted(collections.Counter(found.label.ravel().tolist()).items()))
     document = report.zones_document(job.name, edges, job.published) | _extent(found)
     document |= {"labels": counts, "beyond_clearance": beyond, "too_short": short}

@@ -111,7 +111,6 @@ def layout_of(field: Field, stages: int) -> Layout:
         state=field.moving,
         step=1,
         peak=1,
-        size=1,
         steps=1,
         mark=1,
         fixed=sum(field.wide),
@@ -120,7 +119,6 @@ def layout_of(field: Field, stages: int) -> Layout:
         revolution=1,
         first_step=1,
         lane=1,
-        origin=field.dimension,
         rate=field.moving * stages,
         stage=field.moving,
         again=field.moving,
@@ -364,8 +362,6 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     begun = w.compare("ne", w.get(row["first_step"]), zero)
     for q in range(moving):
         w.put(row["rate"] + q, w.select(begun, w.get(row["rate"] + q), w.get(row["again"] + q)))
-    for q in range(n):
-        w.put(row["origin"] + q, w.select(begun, w.get(row["origin"] + q), w.get(row["state"] + q)))
     w.put(row["first_step"], one)
     w.line("br label %step")
 
@@ -435,9 +431,6 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     (far,), block = w.program(field.excursion, arguments(field.excursion, [zero, *new[:n]]), block)
     far, peak = w.widened(far), w.get(row["peak"])
     w.put(row["peak"], w.select(w.both(moves, w.compare("gt", far, peak)), far, peak))
-    away = [w.sub(new[q], w.get(row["origin"] + q)) for q in range(n)]
-    away2, extent = w.add(zero, *(w.mul(d, d) for d in away)), w.get(row["size"])
-    w.put(row["size"], w.select(w.both(moves, w.compare("gt", away2, extent)), away2, extent))
     mark = w.select(w.both(moves, w.compare("gt", far, number(2.0))), number(OUTSIDE), mark)
     refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
     finite = w.compare("lt", w.add(zero, *(w.call("fabs", c) for c in (*y, *first))), number(np.inf))
@@ -455,7 +448,6 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     state = w.all(rows["state"])
     for q in range(n):
         w.store_if(over, state[q], "%strobe", w.simple("add", place, number(q)))
-        w.put(row["origin"] + q, w.select(over, state[q], w.get(row["origin"] + q)))
     if field.tangents:
         _orthonormalise(w, field, rows, over, w.add(w.mul(lane, total), revolution))
         rates(w.get(row["phase"]), row["state"], row["again"])

@@ -249,8 +249,6 @@ class March(NamedTuple):
     """Step size to go on with [rad]."""
     peak: Float[np.ndarray, " lanes"]
     """Largest excursion."""
-    size: Float[np.ndarray, " lanes"]
-    """Largest distance from the strobe state within a revolution, in units of the scale."""
     steps: Float[np.ndarray, " lanes"]
     """Number of steps tried."""
     mark: Float[np.ndarray, " lanes"]
@@ -313,7 +311,6 @@ class Engine:
             tangents=stored[n:moving].T.reshape(lanes, self.field.tangents, n),
             step=part("step"),
             peak=part("peak"),
-            size=np.sqrt(part("size")),
             steps=part("steps"),
             mark=part("mark"),
             strobe=turned,

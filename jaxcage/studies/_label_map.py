@@ -81,7 +81,7 @@ class LabelMap:
             [
                 f"{across} x {upward} points over {self.x} and {self.y}",
                 *(f"  {n:6d} {kind}" for kind, n in zip(KINDS, counts, strict=True)),
-                *([f"  {short:6d} labels rest on too few revolutions"] if short else []),
+                *([f"  {short:6d} lanes have no certain label"] if short else []),
             ]
         )
 
