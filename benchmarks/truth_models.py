@@ -10,7 +10,7 @@ import numpy as np
 import jaxcage as jc
 from jaxcage.integrate import AbstractMethod
 from jaxcage.models import CageModel, fastest_speed
-from jaxcage.solve import native, refined
+from jaxcage.integrate import native, refined
 from tests import reference
 
 

@@ -31,6 +31,7 @@ from .integrate import (
     bearing_over_time as bearing_over_time,
     controlled as controlled,
     method as method,
+    native as native,
     ramp as ramp,
     simulate as simulate,
     simulate_bearing as simulate_bearing,
@@ -56,7 +57,6 @@ from .orbits import (
     sensitivity as sensitivity,
     synchronous_orbits as synchronous_orbits,
 )
-from .solve import native as native
 from .studies import label_map as label_map, open_study as open_study, study as study
 from .sweeps import (
     rpm as rpm,

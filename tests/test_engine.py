@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 
 import jaxcage as jc
 from jaxcage.integrate import OUTCOMES
-from jaxcage.solve import FINISHED
-from jaxcage.solve.machine import object_code
+from jaxcage.solve import FINISHED, say_once
+from jaxcage.solve.object_code import object_code
 from jaxcage.sweeps import engine_of
 
 
@@ -122,6 +122,7 @@ LAWS = {
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_that_has_no_machine_code_is_run_by_jax_and_says_so(name: str):
     system = jc.ForcedOscillator(LAWS[name], coordinates=1)
+    say_once.cache_clear()
     with pytest.warns(UserWarning, match=f"operation `{name}`, which has no machine code"):
         found = jc.sweep(system, 1.5, discard=20, revolutions=20, confirm=False, horizon=0)
     assert set(found.label.ravel()) == {"periodic-1"}

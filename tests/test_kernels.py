@@ -11,17 +11,11 @@ import pytest
 from helpers import even, raw_sweep, raw_sweeps, wide_but
 
 import jaxcage as jc
-from jaxcage.integrate import (
-    OUTCOMES,
-    compiled,
-    controlled,
-    march,
-    method,
-    revolution,
-    strobe_map,
-)
+from jaxcage._form import compiled
+from jaxcage.integrate import OUTCOMES, controlled, method, revolution, strobe_map
 from jaxcage.integrate._method import TERM
 from jaxcage.models._field import _columns
+from jaxcage.solve import march
 from jaxcage.sweeps import _engine
 
 
@@ -54,7 +48,7 @@ def heun(i, moved, watched, fixed):
 
 
 def by_march(z, count=48):
-    (x, v), (peak,) = march(heun, count, (z[0], z[1]), (0.0,), (2 * np.pi / 200, z[2]), multiple=4)
+    (x, v), (peak,) = march(heun, count, (z[0], z[1]), (0.0,), (2 * np.pi / 200, z[2]))
     return jnp.stack([x, v]), peak
 
 

@@ -13,8 +13,8 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._form import compiled
 from .._notebook import notebook_html
-from .._recent import jitted
 from ..forces import Force
 from ..integrate import Trajectory
 from ..models import FORCES, CageModel
@@ -51,7 +51,7 @@ def relative_state(
     return q[:, :2] - q[:, 2:], v[:, :2] - v[:, 2:]
 
 
-@jitted
+@compiled
 def _forces_at_one_speed(
     model: CageModel, speed: Array, tau: Float[Array, " n"], motion: Float[Array, "n 4"]
 ) -> Histories:
@@ -60,7 +60,7 @@ def _forces_at_one_speed(
     return forces(tau, motion)
 
 
-@jitted
+@compiled
 def _forces(
     model: CageModel,
     speed: Float[Array, " n"],

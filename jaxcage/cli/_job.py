@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
-from ..integrate import AbstractMethod, FixedSteps, method
+from ..integrate import AbstractMethod, FixedSteps, method, native
 from ..io import (
     BearingFile,
     Unknown,
@@ -33,7 +33,6 @@ from ..models import FASTEST, BearingModel, CageModel, case, fastest_speed, whol
 from ..models.whole import WHOLE_BEARINGS
 from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
-from ..solve import native
 from ._console import Say, progress, say
 from ._options import WHOLE_COMMANDS, AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag

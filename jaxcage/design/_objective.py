@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError, InputError
+from .._form import compiled
 from .._parameters import parameter_paths, parameters, replace
-from .._recent import jitted
 from .._sobol import sobol
 from .._types import Scalar
 from ..models import AbstractForcedSystem, BearingModel
@@ -195,14 +195,14 @@ def _of_place(function: Callable, system: Any, bounds: Sequence[Any]) -> Callabl
     return at
 
 
-@jitted
+@compiled
 def _value_and_slope(function: Callable, system: Any, bounds: Any, places: Array) -> tuple[Array, Array]:
     f = _of_place(function, system, bounds)  # forward mode: few parameters vary, and orbits are simulated
     slope, value = jax.vmap(jax.jacfwd(lambda p: (f(p),) * 2, has_aux=True))(places)
     return value, slope
 
 
-@jitted
+@compiled
 def _values(function: Callable, system: Any, bounds: Any, places: Array) -> Array:
     return jax.vmap(_of_place(function, system, bounds))(places)
 

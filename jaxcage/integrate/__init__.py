@@ -7,9 +7,8 @@
 | `_newmark`     | the paper's Newmark-beta as a diffrax solver                                       |
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
 | `_controlled`  | as many steps as a revolution needs, and its error                                 |
-| `_march`       | many steps of a scalar function as a primitive: lanes, tangents, one compiled loop |
-| `_program`     | a scalar function traced: its elementary operations                                |
-| `_kernel`      | a step of a method, or one of its stages, as such a function                       |
+| `_native`      | machine code with error control: the method of sweeps                              |
+| `_kernel`      | a step of a method as a scalar function                                            |
 | `_strobe`      | the strobe map that everything uses                                                |
 | `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |
 | `_simulate`    | time histories, speed ramps                                                        |
@@ -51,7 +50,6 @@ from ._controlled import (
 )
 from ._explicit import ClassicalRK4 as ClassicalRK4
 from ._implicit import implicit_step as implicit_step
-from ._march import compiled as compiled, march as march, march_with_tangents as march_with_tangents
 from ._method import (
     REVOLUTION as REVOLUTION,
     AbstractMethod as AbstractMethod,
@@ -61,6 +59,7 @@ from ._method import (
     Stretch as Stretch,
     method as method,
 )
+from ._native import NativeSteps as NativeSteps, native as native, refined as refined
 from ._newmark import NewmarkBeta as NewmarkBeta
 from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
 from ._revolution import BLOCK as BLOCK, pushed as pushed, revolution as revolution

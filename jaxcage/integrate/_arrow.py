@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from .._types import Scalar
 from ..forces._phase import cos_sin
 from ..models.whole import BearingAtSpeed, Bodies, Passed, Rollers
-from ._march import lanewise
+from ..solve import lanewise
 
 
 OF_ROLLER, PASSED = len(Rollers._fields), len(Passed._fields)

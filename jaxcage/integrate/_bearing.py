@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
-from .._recent import jitted
+from .._form import compiled
 from .._types import Scalar
 from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
 from ._bearing_blocks import FIRST, LONGEST, SHORTEST, STALLED, TURN, slowness
@@ -83,14 +83,14 @@ class BearingRun:
         return float(np.max(self.peaks[:, PEAKS.index(name)]))
 
 
-@jitted
+@compiled
 def _begun(model: BearingModel, speed: Scalar, state: BearingState, step: Scalar) -> Lanes:
     """Two lanes of the same: one runs by steps of the tolerance, the other by about half as many."""
     states = jax.tree.map(lambda x: jnp.stack([jnp.asarray(x, dtype=float)] * 2, axis=-1), state)
     return begin(model.at_speed(speed), states, step)
 
 
-@jitted
+@compiled
 def _run(
     model: BearingModel,
     speed: Scalar,
@@ -125,7 +125,7 @@ def _run(
     return jax.lax.scan(part, lanes, spans)
 
 
-@jitted
+@compiled
 def _stiff(model: BearingModel, speed: Scalar, lanes: Lanes) -> Array:
     """Whether implicit steps pay from here on."""
     here, scale = jax.tree.map(lambda x: x[..., 0], lanes.state), state_scale(model, speed)

@@ -11,11 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._form import compiled
 from .._types import Scalar
 from ..models.whole import BearingAtSpeed, BearingState
+from ..solve import lanewise
 from ._bearing_step import INTEGRATED, Moving, Point, first_point, kept, law_of, step
 from ._lanes import FAR, LEAST, MOST, NOT_FINITE, OUTSIDE, SAFETY, TOO_MANY
-from ._march import compiled, lanewise
 from ._results import INACCURATE
 
 

@@ -1,7 +1,7 @@
 """A step of the whole bearing for many lanes, with a tangent vector: few kernels, each a loop along rollers and lanes.
 
 A stage is one kernel over all rollers of all lanes (the forces on a roller, and what it passes on), sums over the
-rollers, and one kernel over the lanes (cage and inner ring). Kernels are those of `_march`: XLA by itself cuts the
+rollers, and one kernel over the lanes (cage and inner ring). XLA by itself cuts the
 stage into a hundred loops. However many rollers there are, the program is the same.
 
 Numbers of rollers are arrays of rollers times lanes, lanes last, laid out as one axis.
@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ..forces._phase import cos_sin
 from ..models.whole import LEDGER, MEANS, MOVING, BearingAtSpeed, Bodies, Passed, Rollers
-from ._march import lanewise, with_tangents
+from ..solve import lanewise, with_tangents
 
 
 Row = tuple[Array, ...]

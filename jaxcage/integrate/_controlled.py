@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
@@ -68,8 +67,6 @@ class ControlledSteps(AbstractMethod):
     """Infinite where the last level is to be taken whatever its error, which is stated all the same."""
     turn: Float[Array, ""]
     """Largest difference that the level before may make to the leading tangent vector, relative to its length."""
-    multiple: int = eqx.field(static=True)
-    """What all step counts are multiples of."""
 
     def advance(
         self,
@@ -122,11 +119,11 @@ def run_level(
     """One part by the i-th of `levels`, with as many times the steps of the ladder's first level as in a revolution."""
     if isinstance(levels, AdaptiveSteps):
         return lambda y: levels.advance(*pieces, y, phase, parts)
-    steps, multiple = jnp.asarray(levels.steps)[i], method.multiple
+    steps = jnp.asarray(levels.steps)[i]
     if not (isinstance(parts, int) and parts == 1):
         unit = jnp.asarray(method.ladder[0].steps)[0] if isinstance(method.ladder[0], FixedSteps) else 1
-        steps, multiple = -(-(-(-unit // parts) * steps) // unit) * parts, 1
-    return lambda y: run_steps(levels.solver, steps, pieces, y, phase, parts, multiple)
+        steps = -(-(-(-unit // parts) * steps) // unit) * parts
+    return lambda y: run_steps(levels.solver, steps, pieces, y, phase, parts)
 
 
 def nowhere(y: Any, tangents: Any) -> Moved:
@@ -215,16 +212,14 @@ def stated(method: AbstractMethod) -> ControlledSteps:
         return _ladder([(method.solver, [-(-method.steps // 2), method.steps])], math.inf)
     assert isinstance(method, AdaptiveSteps)
     unbounded, ladder = jnp.asarray(math.inf), (_with_tolerances(method, 16.0), method)
-    return ControlledSteps(ladder, unbounded, unbounded, 1)
+    return ControlledSteps(ladder, unbounded, unbounded)
 
 
 def _ladder(levels: Sequence[tuple[Any, Sequence[Any]]], tolerance: float) -> ControlledSteps:
     """Of solvers with their step counts."""
-    counts = [steps for _, each in levels for steps in each]
-    multiple = math.gcd(*counts, 4) if all(isinstance(c, int) for c in counts) else 1
     fixed = tuple(FixedSteps(solver, jnp.asarray(each, jnp.int32)) for solver, each in levels)
     turn = TURN if math.isfinite(tolerance) else math.inf
-    return ControlledSteps(fixed, jnp.asarray(float(tolerance)), jnp.asarray(turn), multiple)
+    return ControlledSteps(fixed, jnp.asarray(float(tolerance)), jnp.asarray(turn))
 
 
 def _with_tolerances(method: AdaptiveSteps, times: float) -> AdaptiveSteps:
@@ -243,7 +238,7 @@ def finer(method: AbstractMethod, times: int = 1) -> ControlledSteps:
     steps, error = 1 << times, 16.0**-times
     each = lambda r: FixedSteps(r.solver, steps * r.steps) if isinstance(r, FixedSteps) else _with_tolerances(r, error)
     turn = math.sqrt(error) * rough.turn
-    return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance, turn, rough.multiple)
+    return ControlledSteps(tuple(map(each, rough.ladder)), error * rough.tolerance, turn)
 
 
 def controlled(error: float = DEFAULT_ERROR, ladder: Sequence[tuple[str, int]] = DEFAULT_LADDER) -> ControlledSteps:

@@ -4,12 +4,10 @@ The estimate h/6 (k_4 - f(y_1)) is that of the embedded third-order method with 
 stage is the first of the next step.
 """
 
-import functools
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import diffrax as dfx
-import jax.numpy as jnp
 import numpy as np
 
 from .._types import Scalar, State
@@ -59,34 +57,3 @@ def explicit_step(
     for c, row in zip(tableau.c, tableau.a_lower[:-1], strict=False):
         stages.append(field(t0 + float(c) * h, combine(y0, row, stages, h)))
     return combine(y0, tableau.b_sol, stages, h), h
-
-
-class Stages(NamedTuple):
-    """A method's coefficients in the order in which a loop over its stages uses them, a number for each stage.
-
-    A stage adds to the state at the end of the step and to the arguments of the stages behind it: of these `ahead` ones
-    differ from the state at the beginning.
-    """
-
-    phase: tuple[float, ...]
-    ahead: tuple[tuple[float, ...], ...]
-    """Weights of each stage in the argument of the stage 1, 2, ... places behind it."""
-    weight: tuple[float, ...]
-
-    @classmethod
-    def of(cls, tableau: dfx.ButcherTableau) -> "Stages":
-        """Of a method whose last stage is the first of the next step."""
-        rows = ((), *tableau.a_lower)[:-1]
-        n = len(rows)
-        weight = lambda i, j: float(rows[i][j]) if i < n else 0.0
-        furthest = max(i - j for i, row in enumerate(rows) for j, a in enumerate(row) if a != 0.0)
-        ahead = tuple(tuple(weight(j + d, j) for j in range(n)) for d in range(1, furthest + 1))
-        each = lambda x: tuple(map(float, x))[:n]
-        phase = (0.0, *each(tableau.c))[:n]
-        return cls(phase, ahead, each(tableau.b_sol))
-
-
-def chosen(row: tuple[float, ...], i: Scalar) -> Scalar:
-    """The i-th of a row of numbers, by arithmetic on scalars alone."""
-    place = lambda found, k: jnp.where(i == float(k), row[k], found)
-    return functools.reduce(place, range(1, len(row)), jnp.asarray(row[0]))

@@ -15,9 +15,9 @@ from jaxtyping import Array, Float, Int
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
+from ..solve import with_tangents
 from ._explicit import ClassicalRK4
 from ._kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
-from ._march import with_tangents
 from ._newmark import NewmarkBeta
 from ._results import RESULTS, outcome_code
 from ._rosenbrock import Rodas3, Rodas4
@@ -125,18 +125,13 @@ def run_steps(
     y: State,
     phase: Scalar,
     parts: Int[Array, ""] | int,
-    multiple: int = 1,
 ) -> Stretch:
-    """One `parts`-th of a revolution of so many equal steps, in a single lane.
-
-    `multiple` is what a number of steps that is an array is known to be a multiple of.
-    """
+    """One `parts`-th of a revolution of so many equal steps, in a single lane."""
     if isinstance(steps, int) and isinstance(parts, int):
         if steps % parts:
             raise ArgumentError("parts", said=f"must divide the {steps} steps per revolution, but it is {parts}.")
-        multiple = math.gcd(steps // parts, 4)
     if can_be_kernel(solver):
-        y, peak, result, _ = steps_through(solver, steps, pieces, y, phase=phase, parts=parts, multiple=multiple)
+        y, peak, result, _ = steps_through(solver, steps, pieces, y, phase=phase, parts=parts)
         return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
     return _by_solver(solver, steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float), pieces, y, phase)
 

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Bool, Float, Int
 
-from .._recent import split
+from .._form import split
 from .._types import Scalar, State
 from ..models import ESCAPE
 from ._controlled import ControlledSteps, Levels, climb, nowhere, run_level

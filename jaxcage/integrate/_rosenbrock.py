@@ -93,7 +93,7 @@ def rosenbrock_step(
     """One step from y0 at phase t0, of the size that is told from the rate at its beginning.
 
     `settle` is told what had better be worked out in full before it is used: `computed_once` where the step is left to
-    XLA's fusions, nothing where it is one kernel.
+    XLA's fusions, nothing where it is machine code.
 
     **Returns:** the new state, the error estimate of the embedded method, dy/dtau at the beginning of the step, and the
     step.

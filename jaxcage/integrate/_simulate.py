@@ -12,8 +12,8 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._form import compiled
 from .._notebook import notebook_html
-from .._recent import jitted
 from .._types import Scalar, State
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._controlled import ControlledSteps, controlled, stated
@@ -60,7 +60,7 @@ class Trajectory:
     _repr_html_ = notebook_html
 
 
-@jitted
+@compiled
 def _run(
     system: AbstractForcedSystem,
     method: ControlledSteps,

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
-from ..integrate import compiled
+from .._form import compiled
 from ..sweeps import cores
 from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, SETTLED, Counts, by_steps

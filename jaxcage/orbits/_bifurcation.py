@@ -12,8 +12,9 @@ from jaxtyping import Array, Float, Int
 from .._arguments import require_at_least, shown, wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._form import compiled
 from .._types import Scalar
-from ..integrate import AbstractMethod, compiled
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
 from ._arclength import Corrected, Steps
 from ._branch import follow_both_ways

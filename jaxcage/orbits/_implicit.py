@@ -26,8 +26,9 @@ from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int
 
+from .._form import compiled
 from .._types import Scalar
-from ..integrate import StrobeMap, compiled
+from ..integrate import StrobeMap
 from ._problem import OrbitProblem, Prepared, frozen
 from ._steps import GIVEN_UP, Counts, by_steps
 

@@ -13,9 +13,10 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._form import compiled
 from .._notebook import notebook_html
 from .._types import Scalar, State
-from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, compiled, strobe_map
+from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ._implicit import AbstractEquations, as_root, settled
 from ._problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem

@@ -18,10 +18,11 @@ import numpy as np
 
 from .._arguments import require_at_least
 from .._checks import require_x64
+from .._form import compiled
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..analysis import Sweep
-from ..integrate import AbstractMethod, compiled, strobe_map
+from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take

@@ -24,9 +24,10 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._form import compiled
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..integrate import AbstractMethod, compiled
+from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate

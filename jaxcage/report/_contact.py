@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._recent import jitted
+from .._form import compiled
 from .._types import Scalar
 from ..integrate import AbstractMethod, method as make_method, strobe_map
 from ..models import CageModel
@@ -20,7 +20,7 @@ STEPS = 4096
 """Steps at which an excursion is looked for."""
 
 
-@jitted
+@compiled
 def _largest_eps(
     model: CageModel, speed: Scalar, state: Float[Array, " dim"], method: AbstractMethod
 ) -> Float[Array, ""]:

@@ -1,14 +1,23 @@
 """Integration of many lanes in machine code: the law traced in JAX, the loop over steps in LLVM.
 
-| module   | responsibility                                                              |
-|----------|-----------------------------------------------------------------------------|
-| `ir`     | a traced scalar function as LLVM IR on vectors of lanes                     |
-| `loop`   | the integration loop: step control, strobe states, growth of tangents       |
-| `machine`| tracing a system, compiling, keeping and calling its code                   |
-| `method` | the method of sweeps, and what serves where machine code does not           |
+| module       | responsibility                                                                   |
+|--------------|----------------------------------------------------------------------------------|
+| `program`    | a scalar function traced: its elementary operations                              |
+| `ir`         | such a function as LLVM IR on vectors of lanes                                   |
+| `object_code`| compiling, keeping and loading LLVM IR                                           |
+| `loop`       | the integration loop: step control, strobe states, growth of tangents            |
+| `machine`    | tracing a system for that loop, and calling it                                   |
+| `call`       | machine code that JAX's programs call                                            |
+| `steps`      | equal steps inside JAX's programs: lanes, tangents, derivatives of any order     |
 """
 
-from .ir import UnknownOperation as UnknownOperation
-from .loop import FINISHED as FINISHED, NOT_FINITE as NOT_FINITE, OUTSIDE as OUTSIDE
+from .ir import UnknownOperation as UnknownOperation, say_once as say_once
+from .loop import FINISHED as FINISHED, NOT_FINITE as NOT_FINITE, OUTSIDE as OUTSIDE, PAIRS as PAIRS
 from .machine import FIRST_STEP as FIRST_STEP, Engine as Engine, March as March
-from .method import NativeSteps as NativeSteps, native as native, refined as refined
+from .program import Numbers as Numbers
+from .steps import (
+    lanewise as lanewise,
+    march as march,
+    march_with_tangents as march_with_tangents,
+    with_tangents as with_tangents,
+)

@@ -7,6 +7,7 @@ say, is skipped while no cage of the vector touches its land.
 
 import functools
 import struct
+import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -44,6 +45,16 @@ Path = tuple[tuple[Any, int], ...]
 
 class UnknownOperation(Exception):
     """A traced function uses an operation that has no translation; the argument is its name."""
+
+
+@functools.cache
+def say_once(operation: str) -> None:
+    """Warn of an operation that has no translation."""
+    warnings.warn(
+        f"The law uses the operation `{operation}`, which has no machine code here: JAX's own loop is taken instead, "
+        "which is slower.",
+        stacklevel=3,
+    )
 
 
 def is_variable(atom: Any) -> bool:

@@ -1,15 +1,10 @@
-"""Machine code of a system: traced in JAX, written as LLVM IR, compiled with llvmlite and kept on disk.
+"""Machine code of a system: traced in JAX, written as LLVM IR, compiled, and called with lanes.
 
-The code runs whole revolutions of many lanes (`loop`). It is kept in the user's cache folder, under a key made of the
-IR, the processor and the version of LLVM; an entry that is damaged is compiled again.
+The code runs whole revolutions of many lanes (`loop`).
 """
 
 import ctypes
 import dataclasses
-import functools
-import hashlib
-import os
-import pathlib
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -17,18 +12,15 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import llvmlite.binding as llvm
 import numpy as np
-import platformdirs
 from jaxtyping import Float
-from llvmlite.binding import orcjit
 
-from .._cache import unfit
-from .._recent import Form, split
-from ..integrate._program import Program, Sizes, program_of
+from .._form import Form, split
 from ..models import AbstractForcedSystem, ScaledField, multiply
 from .ir import UnknownOperation, is_variable
 from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
+from .object_code import function
+from .program import Program, Sizes, program_of
 
 
 FEWEST_STEPS, MOST_STEPS = 4, 20_000.0
@@ -163,82 +155,6 @@ def traced_field(system: AbstractForcedSystem, form: Form, wide: tuple[bool, ...
     return Field(prelude, rates, trace(_Excursion(form), n), abrupt, n, tangents, wide)
 
 
-@functools.cache
-def _machine() -> Any:
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    features, target = llvm.get_host_cpu_features().flatten(), llvm.Target.from_default_triple()
-    return target.create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=3, reloc="pic", codemodel="small", jit=True
-    )
-
-
-def _compiled(ir: str) -> bytes:
-    """Object code of a module."""
-    module = llvm.parse_assembly(ir)
-    module.verify()
-    tuning = llvm.create_pipeline_tuning_options(speed_level=2)
-    tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_interleaving = tuning.loop_unrolling = False
-    builder = llvm.create_pass_builder(_machine(), tuning)
-    builder.getModulePassManager().run(module, builder)
-    return _machine().emit_object(module)
-
-
-def cache_folder() -> pathlib.Path | None:
-    """Where object code is kept; None where `JAXCAGE_CACHE=off` says that nothing is, or others may write there."""
-    given = os.environ.get("JAXCAGE_CACHE", "")
-    if given == "off":
-        return None
-    try:
-        folder = pathlib.Path(given or platformdirs.user_cache_path("jaxcage")).expanduser() / "native"
-        return None if unfit(folder) else folder
-    except (OSError, RuntimeError):  # no home folder, or one that cannot be written
-        return None
-
-
-def object_code(ir: str) -> bytes:
-    """Object code of a module for this processor, from the cache if it is there and whole."""
-    processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {_machine().triple}"
-    about = f"{ir} {llvm.llvm_version_info} {processor}"
-    folder = cache_folder()
-    path = folder and folder / hashlib.sha256(about.encode()).hexdigest()[:40]
-    digest = lambda code: hashlib.sha256(code).digest()
-    if path is not None:
-        try:
-            kept = path.read_bytes()
-            if digest(kept[32:]) == kept[:32]:
-                return kept[32:]
-        except OSError:
-            pass
-    code = _compiled(ir)
-    if path is not None:
-        try:
-            new = path.with_name(f"{path.name}.{os.getpid()}.{threading.get_ident()}")
-            new.write_bytes(digest(code) + code)
-            new.replace(path)
-        except OSError:
-            pass  # a folder that cannot be written costs time, no result
-    return code
-
-
-@functools.cache
-def _linker() -> Any:
-    # LLVM's older linker may put parts of a module more than 2 GB apart, which ends the process.
-    return orcjit.create_lljit_compiler(_machine(), use_jit_link=True)
-
-
-@functools.cache
-def _loaded(ir: str) -> tuple[Any, Callable[..., None]]:
-    """The library of a module, and its function. Libraries are never freed: a program whose code is freed while it runs
-    ends the process."""
-    name = "march" + hashlib.sha256(ir.encode()).hexdigest()[:24]
-    builder = orcjit.JITLibraryBuilder().add_object_img(object_code(ir)).add_current_process()
-    library = builder.export_symbol("march").link(_linker(), name)
-    whole, place = ctypes.c_int64, ctypes.c_void_p
-    kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
-    return library, kind(library["march"])
-
-
 class March(NamedTuple):
     """Results of a run of lanes."""
 
@@ -268,7 +184,9 @@ class Engine:
         self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents)
         self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
         self.rows: Layout = layout_of(self.field, len(Tableau.named(pair).phase))
-        self._library, self._march = _loaded(march_ir(self.field, pair, WIDTH))
+        whole, place = ctypes.c_int64, ctypes.c_void_p
+        kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
+        self._march = kind(function(march_ir(self.field, pair, WIDTH), "march"))
 
     def __call__(
         self,

@@ -12,9 +12,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
+from .._form import compiled
 from .._glossary import component_names, quantity
 from .._parameters import replace
-from .._recent import jitted
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
 from ..integrate import OUTCOMES, AbstractMethod
@@ -218,7 +218,7 @@ def _filled(x: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([x, np.repeat(x[-1:], size - x.shape[0], axis=0)])
 
 
-@jitted
+@compiled
 def _start_and_scale(
     designs: AbstractForcedSystem, speed: Float[Array, " lanes"], start: Int[Array, " lanes"]
 ) -> tuple[Float[Array, "lanes dim"], Float[Array, "lanes dim"]]:

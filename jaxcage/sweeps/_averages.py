@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
-from ..integrate import REVOLUTION, AbstractMethod, compiled, controlled
+from .._form import compiled
+from ..integrate import REVOLUTION, AbstractMethod, controlled
 from ..models import AbstractForcedSystem
 from ._engine import Designs, Part, over_lanes, run_parts
 

@@ -8,9 +8,8 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._types import State
 from ..analysis import Sweep
-from ..integrate import AbstractMethod
+from ..integrate import AbstractMethod, native
 from ..models import AbstractForcedSystem
-from ..solve import native
 from ._engine import Progress, run_lanes
 from ._speed import assemble, checked_speeds, initial_states, make_plan, settings_of
 

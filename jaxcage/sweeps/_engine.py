@@ -17,11 +17,11 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._errors import ArgumentError
+from .._form import compiled
 from .._types import State
 from ..analysis import Lane, Lengths, Observation, Plan, Room, observe, settle
-from ..integrate import AbstractMethod, StrobeMap, compiled, stated, strobe_map
+from ..integrate import AbstractMethod, NativeSteps, StrobeMap, stated, strobe_map
 from ..models import ESCAPE, AbstractForcedSystem
-from ..solve import NativeSteps
 from ._native import Lanes, observe_native
 
 

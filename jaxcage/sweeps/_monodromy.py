@@ -8,7 +8,8 @@ from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod, compiled, controlled, revolution
+from .._form import compiled
+from ..integrate import AbstractMethod, controlled, revolution
 from ..models import AbstractForcedSystem
 from ._engine import Designs, Part, over_lanes, run_parts
 

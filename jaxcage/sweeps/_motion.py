@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Array, Complex, Float, Int
 
 from .._checks import require_x64
+from .._form import compiled
 from ..analysis import OrderSpectrum, Sweep, dominant_orders
-from ..integrate import AbstractMethod, compiled, controlled
+from ..integrate import AbstractMethod, controlled
 from ..models import AbstractForcedSystem, CageModel
 from ._engine import Designs, Part, over_lanes, run_parts
 

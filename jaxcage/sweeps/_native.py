@@ -1,7 +1,6 @@
 """Lanes of a sweep in machine code: settled, observed, and their error measured."""
 
 import functools
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -11,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from .._recent import split
+from .._form import split
 from ..analysis import Observation, Plan, start_tangents
-from ..integrate import OUTCOMES
+from ..integrate import OUTCOMES, NativeSteps
 from ..models import AbstractForcedSystem
-from ..solve import FINISHED, FIRST_STEP, NOT_FINITE, OUTSIDE, Engine, March, NativeSteps, UnknownOperation
+from ..solve import FINISHED, FIRST_STEP, NOT_FINITE, OUTSIDE, Engine, March, UnknownOperation, say_once
 
 
 CHECKED = 8
@@ -41,11 +40,7 @@ def engine_of(system: AbstractForcedSystem, tangents: int, several: bool, pair: 
         try:
             _engines[key] = Engine(system, tangents, several, pair)
         except UnknownOperation as operation:
-            warnings.warn(
-                f"The law uses the operation `{operation}`, which has no machine code here: sweeps take JAX's instead, "
-                "which is slower.",
-                stacklevel=2,
-            )
+            say_once(str(operation))
             _engines[key] = None
     return _engines[key]
 

@@ -16,12 +16,11 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least, wrong
 from .._checks import require_x64
 from .._errors import ArgumentError
-from .._recent import jitted
+from .._form import compiled
 from .._types import State
 from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
-from ..integrate import AbstractMethod
+from ..integrate import AbstractMethod, native, refined
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
-from ..solve import native, refined
 from ._confirm import Labelled, confirm as confirm_lanes, doubtful
 from ._engine import Progress, chunk_size, run_lanes
 from ._lasting import follow
@@ -340,12 +339,12 @@ def initial_states(
     return np.broadcast_to(np.stack(rows), (speed.size, len(rows), system.dimension)).copy()
 
 
-@jitted
+@compiled
 def _scales(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds dim"]:
     return jax.vmap(lambda s: jnp.stack([jnp.asarray(c) for c in system.scale(s)]))(speed)
 
 
-@jitted
+@compiled
 def _own_starts(system: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds starts dim"]:
     row = lambda y: jnp.stack([jnp.asarray(c) for c in y])
     return jax.vmap(lambda s: jnp.stack([row(y) for y in system.starts(s)]))(speed)

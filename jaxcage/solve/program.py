@@ -2,8 +2,6 @@
 
 import dataclasses
 import functools
-import gc
-import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -54,23 +52,6 @@ class Program(NamedTuple):
 
     def __call__(self, *x: Any) -> list[Any]:
         return eval_jaxpr(self.jaxpr, self.consts, *x)
-
-
-def undisturbed(f: Callable[..., Any]) -> Callable[..., Any]:
-    """`f` without Python's garbage collection meanwhile, which walks through all that is being traced again and again:
-    nearly half of the time that tracing takes."""
-
-    @functools.wraps(f)
-    def run(*args: Any, **kwargs: Any) -> Any:
-        collects = gc.isenabled()
-        gc.disable()
-        try:
-            return f(*args, **kwargs)
-        finally:
-            if collects:
-                gc.enable()
-
-    return run
 
 
 def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
@@ -141,37 +122,3 @@ def _needed(equations: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
             kept.append(e)
             reached |= _variables(e.invars)
     return kept[::-1]
-
-
-def _at_once(equations: Sequence[Any], late: set[Any]) -> list[Any]:
-    """The equations in another order: what follows from `late` arguments as soon as the rest that it needs is known.
-
-    Differentiation puts all tangents behind all values; cut there, a thousand numbers go from one kernel to the next.
-    """
-    place: dict[Any, int] = dict.fromkeys(late, 0)
-    for k, e in enumerate(equations):
-        after = [place[v] for v in _read(e) if v in place]
-        tangent = any(v in late for v in _read(e))
-        late |= set(e.outvars) if tangent else set()
-        place.update(dict.fromkeys(e.outvars, max(after) if tangent else k))
-    return sorted(equations, key=lambda e: place[e.outvars[0]])
-
-
-def pieces(program: Program, largest: int, late: Sequence[bool] = ()) -> list[Any]:
-    """A program in parts of at most so many operations: what one part makes and a later one reads is a result of it.
-
-    `late` is which of its arguments behind the first are tangents.
-    """
-    jaxpr, parts = program.jaxpr, []
-    count = max(1, -(-len(jaxpr.eqns) // largest))
-    if count > 1:
-        jaxpr = jaxpr.replace(eqns=_at_once(jaxpr.eqns, set(itertools.compress(jaxpr.invars[1:], late))))
-    cuts = [len(jaxpr.eqns) * k // count for k in range(count + 1)]
-    for first, last in itertools.pairwise(cuts):
-        part, rest = jaxpr.eqns[first:last], jaxpr.eqns[last:]
-        made, later = ({v for e in part for v in e.outvars}, _variables(jaxpr.outvars).union(*map(_read, rest)))
-        read = set().union(*map(_read, part)) - made - set(jaxpr.constvars)
-        in_order = lambda rows, some: list(dict.fromkeys(v for row in rows for v in row if v in some))
-        given = in_order([jaxpr.invars, *(e.outvars for e in jaxpr.eqns[:first])], read)
-        parts.append(jaxpr.replace(eqns=part, invars=given, outvars=in_order([e.outvars for e in part], later)))
-    return parts

@@ -6,9 +6,10 @@ from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
 from .._types import Scalar, State
-from ..integrate import DEFAULT_ERROR, AbstractMethod, ControlledSteps, Stretch, controlled, finer
 from ..models import AbstractField, AbstractForcedSystem
-from .loop import PAIRS
+from ..solve import PAIRS
+from ._controlled import DEFAULT_ERROR, ControlledSteps, controlled, finer
+from ._method import AbstractMethod, Stretch
 
 
 DEFAULT_TOLERANCE = 1e-6

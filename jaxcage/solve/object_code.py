@@ -1,0 +1,94 @@
+"""Object code of LLVM IR, compiled with llvmlite, kept on disk and loaded.
+
+It is kept in the user's cache folder, under a key made of the IR, the processor and the version of LLVM; an entry that
+is damaged is compiled again.
+"""
+
+import functools
+import hashlib
+import os
+import pathlib
+import threading
+from typing import Any
+
+import llvmlite.binding as llvm
+import platformdirs
+from llvmlite.binding import orcjit
+
+from .._cache import unfit
+
+
+@functools.cache
+def _machine() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features, target = llvm.get_host_cpu_features().flatten(), llvm.Target.from_default_triple()
+    return target.create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=3, reloc="pic", codemodel="small", jit=True
+    )
+
+
+def _compiled(ir: str) -> bytes:
+    """Object code of a module."""
+    module = llvm.parse_assembly(ir)
+    module.verify()
+    tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+    tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_interleaving = tuning.loop_unrolling = False
+    builder = llvm.create_pass_builder(_machine(), tuning)
+    builder.getModulePassManager().run(module, builder)
+    return _machine().emit_object(module)
+
+
+def cache_folder() -> pathlib.Path | None:
+    """Where object code is kept; None where `JAXCAGE_CACHE=off` says that nothing is, or others may write there."""
+    given = os.environ.get("JAXCAGE_CACHE", "")
+    if given == "off":
+        return None
+    try:
+        folder = pathlib.Path(given or platformdirs.user_cache_path("jaxcage")).expanduser() / "native"
+        return None if unfit(folder) else folder
+    except (OSError, RuntimeError):  # no home folder, or one that cannot be written
+        return None
+
+
+def object_code(ir: str) -> bytes:
+    """Object code of a module for this processor, from the cache if it is there and whole."""
+    processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()} {_machine().triple}"
+    about = f"{ir} {llvm.llvm_version_info} {processor}"
+    folder = cache_folder()
+    path = folder and folder / hashlib.sha256(about.encode()).hexdigest()[:40]
+    digest = lambda code: hashlib.sha256(code).digest()
+    if path is not None:
+        try:
+            kept = path.read_bytes()
+            if digest(kept[32:]) == kept[:32]:
+                return kept[32:]
+        except OSError:
+            pass
+    code = _compiled(ir)
+    if path is not None:
+        try:
+            new = path.with_name(f"{path.name}.{os.getpid()}.{threading.get_ident()}")
+            new.write_bytes(digest(code) + code)
+            new.replace(path)
+        except OSError:
+            pass  # a folder that cannot be written costs time, no result
+    return code
+
+
+@functools.cache
+def _linker() -> Any:
+    # LLVM's older linker may put parts of a module more than 2 GB apart, which ends the process.
+    return orcjit.create_lljit_compiler(_machine(), use_jit_link=True)
+
+
+@functools.cache
+def _loaded(ir: str, name: str) -> Any:
+    builder = orcjit.JITLibraryBuilder().add_object_img(object_code(ir)).add_current_process()
+    return builder.export_symbol(name).link(_linker(), name + hashlib.sha256(ir.encode()).hexdigest()[:24])
+
+
+def function(ir: str, name: str) -> int:
+    """Address of a function of a module. Code is never freed: a program whose code is freed while it runs ends the
+    process."""
+    return _loaded(ir, name)[name]

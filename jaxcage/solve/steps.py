@@ -1,0 +1,511 @@
+"""Many steps of one scalar function as a JAX primitive: plain code in, one loop of machine code over lanes out.
+
+A step is written for a single lane, on scalars. What surrounds it decides what becomes of it:
+- `jax.vmap` makes lanes of it, and numbers that are the same in every lane stay scalars;
+- `jax.jvp` and `jax.jacfwd` put tangent vectors into the step, to any order; several directions share its values;
+- on a CPU it is machine code (`ir`) that JAX's program calls (`call`): a few microseconds, and no compilation by XLA;
+  elsewhere, and for a step with an operation that has no translation, it is the same loop inside JAX.
+
+Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits._implicit.by_columns`).
+"""
+
+import dataclasses
+import functools
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.extend as jex
+import jax.numpy as jnp
+from jax.core import Tracer
+from jax.interpreters import ad, batching, mlir
+from jaxtyping import Array, Int
+
+from .call import UnknownInterface, handler_ir, registered
+from .ir import UnknownOperation, Value, Writer, number, say_once
+from .program import CONTROL_FLOW, Numbers, Sizes, Step, program_of
+
+
+WIDTH = 8
+"""Lanes of a vector, at most."""
+DIRECTIONS = 8
+"""Directions that share the values of a step; more are lanes of their own."""
+
+
+class How(NamedTuple):
+    """What a march is of."""
+
+    step: Any
+    sizes: Sizes
+
+
+def march(
+    step: Step,
+    count: Int[Array, ""] | int,
+    moved: Sequence[Any],
+    watched: Sequence[Any] = (),
+    fixed: Sequence[Any] = (),
+) -> tuple[Numbers, Numbers]:
+    """`count` steps one after the other.
+
+    **Arguments:** the step; how many (an array: one program serves all counts); what is moved; what is watched; what
+    stays the same.
+
+    **Returns:** what was moved and what was watched.
+    """
+    sizes = Sizes(len(moved), len(watched), len(fixed))
+    if not is_elementary(step, sizes, fixed):
+        return _plain(step, count, tuple(moved), tuple(watched), tuple(fixed))
+    numbers = [jnp.asarray(x, dtype=float) for x in (*moved, *watched, *fixed)]
+    out = march_p.bind(jnp.asarray(count, jnp.int32), *numbers, how=How(step, sizes))
+    return sizes._replace(fixed=0).split(out)[:2]
+
+
+def march_with_tangents(
+    step: Step,
+    count: Int[Array, ""] | int,
+    moved: Sequence[Any],
+    watched: Sequence[Any],
+    fixed: Sequence[Any],
+    tangents: Sequence[Sequence[Any]],
+    fixed_tangents: Sequence[Sequence[Any]] = (),
+) -> tuple[Numbers, Numbers, tuple[Numbers, ...]]:
+    """`march`, and what it does to tangent vectors.
+
+    **Arguments:** as for `march`; tangent vectors of what is moved; for each of them those of the fixed numbers, None
+    where there is none, by default none at all.
+
+    **Returns:** what was moved, what was watched, the tangent vectors of what was moved.
+    """
+    if not tangents:
+        return *march(step, count, moved, watched, fixed), ()
+    sizes = Sizes(len(moved), len(watched), len(fixed))
+    along = list(fixed_tangents) or [(None,) * len(fixed)] * len(tangents)
+    known = tuple(tuple(x is not None for x in row) for row in along)
+    several = Tangent(step, sizes, known)
+    if _share(several) and is_elementary(step, sizes, fixed):
+        pushed, drifts = [x for t in tangents for x in t], [x for row in along for x in row if x is not None]
+        y, seen = march(several, count, (*moved, *pushed), watched, (*fixed, *drifts))
+        return y[: sizes.moved], seen, tuple(_rows(y[sizes.moved :], sizes.moved))
+
+    filled = [tuple(jnp.zeros_like(x) if d is None else d for x, d in zip(fixed, row, strict=True)) for row in along]
+    go = lambda start: march(step, count, start[0], watched, start[1])
+    pushed = list(zip(map(tuple, tangents), filled, strict=True))
+    y, after, seen = with_tangents(go, (tuple(moved), tuple(fixed)), pushed)
+    return y, seen, after
+
+
+def with_tangents(move: Callable[[Any], Any], start: Any, tangents: Sequence[Any]) -> tuple[Any, tuple[Any, ...], Any]:
+    """`move(start)`, which is where that leads and what is seen on the way, differentiated along each of the tangents.
+
+    **Returns:** where it leads, the tangents there, what is seen.
+    """
+    if not tangents:
+        end, seen = move(start)
+        return end, (), seen
+    along = lambda tangent: jax.jvp(move, (start,), (tangent,), has_aux=True)
+    if len(tangents) == 1:
+        end, after, seen = along(tangents[0])
+        return end, (after,), seen
+    stacked = jax.tree.map(lambda *x: jnp.stack(x), *tangents)
+    end, after, seen = jax.vmap(along, out_axes=(None, 0, None))(stacked)
+    return end, tuple(jax.tree.map(lambda x: x[i], after) for i in range(len(tangents))), seen
+
+
+def _rows(numbers: Sequence[Any], size: int) -> Iterator[Numbers]:
+    return (tuple(numbers[i : i + size]) for i in range(0, len(numbers), size))
+
+
+@dataclasses.dataclass(frozen=True)
+class Tangent:
+    """A step with tangent vectors: moved (y, T_1, T_2, ...), fixed (x, the known tangents of x in each direction)."""
+
+    step: Step
+    sizes: Sizes
+    known: tuple[tuple[bool, ...], ...]
+    """For each direction, which of the fixed numbers have a tangent."""
+
+    @property
+    def whole(self) -> Sizes:
+        """Sizes with the tangents counted in."""
+        moved, watched, fixed = self.sizes
+        return Sizes(moved * (1 + len(self.known)), watched, fixed + sum(map(sum, self.known)))
+
+    def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
+        y, *tangents = _rows(moved, self.sizes.moved)
+        x, drifts = fixed[: self.sizes.fixed], iter(fixed[self.sizes.fixed :])
+        step = program_of(self.step, self.sizes, rules=True)
+
+        @functools.cache
+        def linear(known: tuple[bool, ...]) -> Any:
+            """Value, linear map and what is watched, with derivatives by y and the known ones of x."""
+
+            def go(y: Numbers, some: Numbers) -> tuple[Numbers, Numbers]:
+                given = iter(some)
+                new = step(i, *y, *watched, *(next(given) if k else c for c, k in zip(x, known, strict=True)))
+                return tuple(new[: len(y)]), tuple(new[len(y) :])
+
+            return jax.linearize(go, y, tuple(c for c, k in zip(x, known) if k), has_aux=True)
+
+        out: list[Any] = []
+        for tangent, known in zip(tangents, self.known, strict=True):
+            out += linear(known)[1](tangent, tuple(next(drifts) for k in known if k))
+        value, _, seen = linear(self.known[0])
+        return (*value, *out), seen
+
+
+@dataclasses.dataclass(frozen=True)
+class Limited:
+    """A step of lanes that stop after their own counts, the first fixed number."""
+
+    step: Step
+
+    def __call__(self, i: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
+        count, *rest = fixed
+        new, seen = self.step(i, moved, watched, tuple(rest))
+        keep = lambda a, b: tuple(jnp.where(i < count, x, y) for x, y in zip(a, b, strict=True))
+        return keep(new, moved), keep(seen, watched)
+
+
+def _limited(step: Any) -> Any:
+    """The step that stops after a count of its own, tangents outside."""
+    if not isinstance(step, Tangent):
+        return Limited(step)
+    known = tuple((False, *row) for row in step.known)
+    return Tangent(_limited(step.step), _one_more(step.sizes), known)
+
+
+def _one_more(sizes: Sizes) -> Sizes:
+    return sizes._replace(fixed=sizes.fixed + 1)
+
+
+def _share(tangent: Tangent) -> bool:
+    """Whether all directions of a step are computed together: of higher derivatives one is enough for a program."""
+    return not isinstance(tangent.step, Tangent) and len(tangent.known) <= DIRECTIONS
+
+
+def is_elementary(step: Step, sizes: Sizes, fixed: Sequence[Any]) -> bool:
+    """Whether `step` is made of elementary operations on scalars alone."""
+    if any(jnp.ndim(x) for x in fixed):
+        return False
+    if isinstance(step, Tangent):
+        return is_elementary(step.step, step.sizes, ())
+    program = program_of(step, sizes)
+    caught = any(isinstance(c, Tracer) for c in program.consts)
+    scalar = lambda e: not any(v.aval.shape for v in (*e.invars, *e.outvars))
+    return not caught and all(e.primitive.name not in CONTROL_FLOW and scalar(e) for e in program.jaxpr.eqns)
+
+
+# --- loops ---------------------------------------------------------------------------------------------------------
+
+
+def _plain(step: Step, count: Any, moved: Numbers, watched: Numbers, fixed: Numbers) -> tuple[Numbers, Numbers]:
+    """The loop inside JAX."""
+
+    def body(i: Array, carry: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
+        moved, watched = step(i.astype(float), *carry, fixed)
+        return tuple(moved), tuple(jax.lax.stop_gradient(x) for x in watched)
+
+    return jax.lax.fori_loop(0, count, body, (moved, tuple(jax.lax.stop_gradient(x) for x in watched)))
+
+
+def _inside_jax(count: Array, *numbers: Array, how: How) -> list[Array]:
+    """The march where there is no machine code."""
+
+    def lane(*numbers: Array) -> list[Array]:
+        out = _plain(how.step, count, *how.sizes.split(numbers))
+        return [*out[0], *out[1]]
+
+    return _in_lanes(lane, numbers)
+
+
+def _in_lanes(f: Callable[..., Sequence[Array]], numbers: Sequence[Array]) -> list[Array]:
+    """f of the numbers of each lane; those that all lanes share are scalars."""
+    for _ in range(max(len(x.shape) for x in numbers)):
+        f = jax.vmap(f, in_axes=tuple(0 if x.shape else None for x in numbers))
+    return list(f(*numbers))
+
+
+def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
+    """The march as a call of machine code: a loop over vectors of lanes around one over steps."""
+    shape = max((x.shape for x in numbers), key=len)
+    lanes, moving = math.prod(shape), how.sizes.moved + how.sizes.watched
+    wide = tuple(bool(x.shape) for x in numbers[moving:])
+    width = min(WIDTH, 1 << (lanes.bit_length() - 1)) if lanes else 1
+    found = code_of(how.step, how.sizes, wide, width)
+    if found is None:
+        return _inside_jax(count, *numbers, how=how)
+    name, read = found
+    row = [jnp.broadcast_to(x, shape).reshape(lanes) for x in numbers[:moving]]
+    given = [numbers[moving + k].reshape((lanes,) if wide[k] else ()) for k in read]
+    call = jax.ffi.ffi_call(name, [jax.ShapeDtypeStruct((lanes,), float)] * moving)
+    return [x.reshape(shape) for x in call(jnp.stack([count, jnp.int32(lanes)]), *row, *given)]
+
+
+@functools.lru_cache(maxsize=256)
+def code_of(
+    step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int, once: int = 0
+) -> tuple[str, tuple[int, ...]] | None:
+    """The name by which XLA knows the machine code of a step, and which of the fixed numbers it reads; None where there
+    is no such code, which a warning says. `once` is the number of results of a step that moves nothing and is taken
+    once."""
+    begun = sizes.moved + sizes.watched
+    moving = begun or once
+    program = program_of(step, sizes)
+    read = tuple(i - 1 - begun for i in program.needed if i > begun)
+    try:
+        ir = loop_ir(program, moving, [(k, wide[k]) for k in read], width, not begun)
+        ir = f"{ir}\n{handler_ir(1 + begun + len(read), moving)}"
+    except (UnknownOperation, UnknownInterface) as unknown:
+        say_once(str(unknown))
+        return None
+    name = "jaxcage_" + hashlib.sha256(ir.encode()).hexdigest()[:24]
+    registered(ir, name)
+    return name, read
+
+
+def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int, once: bool) -> str:
+    """`march(inputs, outputs)`: the loop over steps of a program (number of the step, numbers) -> the first `moving`.
+
+    Inputs are a pair of counts, of steps and of lanes; the numbers that move, if the program is not taken `once`; and
+    the others that are `read`, each with its place behind those and whether lanes have one each. There are `width`
+    lanes at least: the last vector of them overlaps the one before it.
+    """
+    begins = 0 if once else moving
+    w = Writer(width)
+    pointer = lambda base, k: w.let(
+        f"load ptr, ptr {w.let(f'getelementptr ptr, ptr {base}, i64 {k}', 'ptr', False).text}", "ptr", False
+    )
+    vector = w.type("double", True)
+    count_at = pointer("%in", 0)
+    lanes_at = w.let(f"getelementptr i32, ptr {count_at.text}, i64 1", "ptr", False)
+    count, lanes = (w.let(f"load i32, ptr {x.text}", "i32", False) for x in (count_at, lanes_at))
+    count, lanes = (w.convert("sext", x, "i64") for x in (count, lanes))
+    inputs = [pointer("%in", 1 + k) for k in range(begins + len(read))]
+    outputs = [pointer("%out", k) for k in range(moving)]
+    shared = {
+        k: w.let(f"load double, ptr {inputs[begins + j].text}", "double", False)
+        for j, (k, wide) in enumerate(read)
+        if not wide
+    }
+    last = w.simple("sub", lanes, Value(str(width), "i64", False))
+    w.line("br label %vector")
+    w.line("vector:")
+    w.line("%from = phi i64 [ 0, %entry ], [ %from_next, %store ]")
+    start = w.call("smin", Value("%from", "i64", False), last)
+    at = lambda base: w.let(f"getelementptr double, ptr {base.text}, i64 {start.text}", "ptr", False)
+    load = lambda base: w.let(f"load {vector}, ptr {at(base).text}, align 8", "double", True)
+    begun = [load(x) for x in inputs[:begins]]
+    own = {k: load(inputs[begins + j]) for j, (k, wide) in enumerate(read) if wide}
+    w.line(f"%some = icmp sgt i64 {count.text}, 0")
+    w.line("br label %step" if once else "br i1 %some, label %step, label %store")
+    before = w.taken()
+
+    state = [Value(f"%s{k}", "double", True) for k in range(begins)]
+    step_number = w.convert("sitofp", Value("%i", "i64", False), "double")
+    fixed = [shared.get(k, own.get(k, number(0.0))) for k in range(len(program.jaxpr.invars) - 1 - begins)]
+    results, latch = w.program(program, [step_number, *state, *fixed], "step")
+    results = [w.widened(x) for x in results]
+    body = w.taken()
+    phis = "\n".join(
+        f"  {s.text} = phi {vector} [ {b.text}, %vector ], [ {r.text}, %{latch} ]"
+        for s, b, r in zip(state, begun, results, strict=not once)
+    )
+    early = lambda k: "" if once else f"[ {begun[k].text}, %vector ], "
+    ends = "\n".join(f"  %e{k} = phi {vector} {early(k)}[ {r.text}, %{latch} ]" for k, r in enumerate(results))
+    for k, x in enumerate(outputs):
+        w.line(f"store {vector} %e{k}, ptr {at(x).text}, align 8")
+    after = w.taken()
+    text = f"""define internal void @march(ptr %in, ptr %out) noinline {{
+entry:
+{before}
+step:
+  %i = phi i64 [ 0, %vector ], [ %i_next, %{latch} ]
+{phis}
+{body}
+  %i_next = add i64 %i, 1
+  %more = icmp slt i64 %i_next, {count.text}
+  br i1 %more, label %step, label %store
+store:
+{ends}
+{after}
+  %from_next = add i64 %from, {width}
+  %rest = icmp slt i64 %from_next, {lanes.text}
+  br i1 %rest, label %vector, label %return
+return:
+  ret void
+}}"""
+    return "\n".join([text, *sorted(w.declarations), '!0 = !{!"branch_weights", i32 1, i32 30}'])
+
+
+# --- the primitive -------------------------------------------------------------------------------------------------
+
+march_p = jex.core.Primitive("march")
+march_p.multiple_results = True
+
+
+@functools.lru_cache(maxsize=256)
+def _alone(how: How) -> Callable[..., Any]:
+    return jax.jit(functools.partial(march_p.bind, how=how))
+
+
+def _abstract(count: Any, *numbers: Any, how: How) -> list[Any]:
+    del count
+    like = max(numbers, key=lambda x: len(x.shape))
+    return [like] * (how.sizes.moved + how.sizes.watched)
+
+
+def _batch(args: Sequence[Any], dims: Sequence[Any], *, how: How) -> Any:
+    mapped = [d is not None for d in dims]
+    size = next(x.shape[d] for x, d, m in zip(args, dims, mapped, strict=True) if m)
+    args = [jnp.moveaxis(x, d, 0) if m else x for x, d, m in zip(args, dims, mapped, strict=True)]
+    results = how.sizes.moved + how.sizes.watched
+    if mapped[0]:  # lanes with counts of their own
+        count, *numbers = args
+        args = [jnp.max(count), *numbers[:results], count.astype(float), *numbers[results:]]
+        mapped = [False, *mapped[1 : 1 + results], True, *mapped[1 + results :]]
+        how = How(_limited(how.step), _one_more(how.sizes))
+    if isinstance(how.step, Tangent):
+        moved, watched, fixed = how.sizes.split(mapped[1:])
+        inner = how.step.sizes
+        if not any((*moved[: inner.moved], *watched, *fixed[: inner.fixed])):
+            return _directions(args, mapped, size, how)
+    return _lanes(args, mapped, size, how), [0] * results
+
+
+def _lanes(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
+    """All numbers that are mapped, moved or in lanes already as lanes of one shape, the new axis first."""
+    count, *numbers = args
+    return march_p.bind(count, *_spread(numbers, mapped[1:], size), how=how)
+
+
+def _spread(numbers: Sequence[Any], mapped: Sequence[bool], size: int) -> list[Any]:
+    """Numbers as lanes of one shape, the new axis first; those that all lanes share stay scalars."""
+    shape = max((x.shape[m:] for x, m in zip(numbers, mapped, strict=True)), key=len)
+
+    def spread(x: Any, m: bool) -> Any:
+        if not m and not x.shape:
+            return x
+        x = x if m else x[None]
+        return jnp.broadcast_to(x.reshape(x.shape + (1,) * (1 + len(shape) - x.ndim)), (size, *shape))
+
+    return [spread(x, m) for x, m in zip(numbers, mapped, strict=True)]
+
+
+def _directions(args: Sequence[Any], mapped: Sequence[bool], size: int, how: How) -> Any:
+    """Tangents alone are mapped: values are computed once, and stay as they are."""
+    count, *numbers = args
+    step, sizes = how.step, how.sizes
+    inner, old = step.sizes, len(step.known)
+    moved, watched, fixed = sizes.split(numbers)
+    moved_mapped, _, fixed_mapped = sizes.split(mapped[1:])
+    y, x = moved[: inner.moved], fixed[: inner.fixed]
+    several = dataclasses.replace(step, known=step.known * size)
+    if not _share(several):
+        out = _lanes(args, mapped, size, how)
+        once = lambda row: [x[0] for x in row]  # values are the same in every lane
+        out = [*once(out[: inner.moved]), *out[inner.moved : sizes.moved], *once(out[sizes.moved :])]
+    else:
+        slices = lambda k, row, flags: [v[k] if m else v for v, m in zip(row, flags, strict=True)]
+        tangents = [v for k in range(size) for v in slices(k, moved[inner.moved :], moved_mapped[inner.moved :])]
+        drifts = [v for k in range(size) for v in slices(k, fixed[inner.fixed :], fixed_mapped[inner.fixed :])]
+        shared = How(several, several.whole)
+        got = march_p.bind(count, *y, *tangents, *watched, *x, *drifts, how=shared)
+        width = inner.moved * old
+        each = [got[inner.moved + k * width : inner.moved + (k + 1) * width] for k in range(size)]
+        stacked = [jnp.stack(c) for c in zip(*each, strict=True)]
+        out = [*got[: inner.moved], *stacked, *got[several.whole.moved :]]
+    axes = [None] * inner.moved + [0] * (sizes.moved - inner.moved)
+    return out, [*axes, *[None] * sizes.watched]
+
+
+def _jvp(primals: Sequence[Any], tangents: Sequence[Any], *, how: How) -> Any:
+    count, *numbers = primals
+    step, sizes = how
+    moved, watched, fixed = sizes.split(numbers)
+    moved_dot, _, fixed_dot = sizes.split(tangents[1:])
+    known = tuple(not isinstance(d, ad.Zero) for d in fixed_dot)
+    pushed = [ad.instantiate_zeros(d) for d in moved_dot]
+    along = Tangent(step, sizes, (known,))
+    drifts = [d for d, k in zip(fixed_dot, known, strict=True) if k]
+    out = march_p.bind(count, *moved, *pushed, *watched, *fixed, *drifts, how=How(along, along.whole))
+    values, slopes, seen = out[: sizes.moved], out[sizes.moved : 2 * sizes.moved], out[2 * sizes.moved :]
+    none = [ad.Zero(jax.typeof(x).to_tangent_aval()) for x in seen]
+    return [*values, *seen], [*slopes, *none]
+
+
+march_p.def_impl(lambda *args, how: _alone(how)(*args))
+march_p.def_abstract_eval(_abstract)
+batching.primitive_batchers[march_p] = _batch
+ad.primitive_jvps[march_p] = _jvp
+mlir.register_lowering(march_p, mlir.lower_fun(_inside_jax, multiple_results=True))
+mlir.register_lowering(march_p, mlir.lower_fun(_on_cpu, multiple_results=True), platform="cpu")
+
+
+# --- functions of every lane ---------------------------------------------------------------------------------------
+
+each_p = jex.core.Primitive("each")
+each_p.multiple_results = True
+
+
+def lanewise(
+    f: Callable[[Numbers, Numbers], Sequence[Any]], results: int, shared: Sequence[Array], lanes: Sequence[Array]
+) -> tuple[Array, ...]:
+    """The results of f(shared, lane) in every lane: shared scalars, arrays of one axis."""
+    few = len(shared)
+    return tuple(each_p.bind(*shared, *lanes, f=lambda *x: f(x[:few], x[few:]), results=results))
+
+
+def _each_abstract(*numbers: Any, f: Any, results: int) -> list[Any]:
+    return [max(numbers, key=lambda x: len(x.shape))] * results
+
+
+def _each_inside_jax(*numbers: Array, f: Any, results: int) -> list[Array]:
+    shape = max((x.shape for x in numbers), key=len)
+    return [jnp.broadcast_to(x, shape) for x in _in_lanes(f, numbers)]
+
+
+def _each_on_cpu(*numbers: Array, f: Any, results: int) -> list[Array]:
+    shape = max((x.shape for x in numbers), key=len)
+    lanes = math.prod(shape)
+    step = lambda i, moved, watched, fixed: (f(*fixed), ())
+    sizes, wide = Sizes(0, 0, len(numbers)), tuple(bool(x.shape) for x in numbers)
+    found = code_of(step, sizes, wide, min(WIDTH, 1 << (lanes.bit_length() - 1)), results)
+    if found is None:
+        return _each_inside_jax(*numbers, f=f, results=results)
+    name, read = found
+    given = [numbers[k].reshape((lanes,) if wide[k] else ()) for k in read]
+    call = jax.ffi.ffi_call(name, [jax.ShapeDtypeStruct((lanes,), float)] * results)
+    return [x.reshape(shape) for x in call(jnp.array([1, lanes], jnp.int32), *given)]
+
+
+def _each_batch(args: Sequence[Any], dims: Sequence[Any], *, f: Any, results: int) -> Any:
+    mapped = [d is not None for d in dims]
+    size = next(x.shape[d] for x, d, m in zip(args, dims, mapped, strict=True) if m)
+    args = [jnp.moveaxis(x, d, 0) if m else x for x, d, m in zip(args, dims, mapped, strict=True)]
+    return each_p.bind(*_spread(args, mapped, size), f=f, results=results), [0] * results
+
+
+def _each_jvp(primals: Sequence[Any], tangents: Sequence[Any], *, f: Any, results: int) -> Any:
+    known = [not isinstance(d, ad.Zero) for d in tangents]
+    n = len(primals)
+
+    def along(*x: Any) -> list[Any]:
+        dots = iter(x[n:])
+        moved = [next(dots) if k else jnp.zeros_like(c) for c, k in zip(x[:n], known, strict=True)]
+        values, slopes = jax.jvp(lambda *y: tuple(map(jnp.asarray, f(*y))), tuple(x[:n]), tuple(moved))
+        return [*values, *slopes]
+
+    # A number that all lanes share may change by lanes, and the other way round.
+    out = each_p.bind(*primals, *(d for d, k in zip(tangents, known, strict=True) if k), f=along, results=2 * results)
+    return out[:results], out[results:]
+
+
+each_p.def_impl(lambda *args, f, results: jax.jit(functools.partial(each_p.bind, f=f, results=results))(*args))
+each_p.def_abstract_eval(_each_abstract)
+batching.primitive_batchers[each_p] = _each_batch
+ad.primitive_jvps[each_p] = _each_jvp
+mlir.register_lowering(each_p, mlir.lower_fun(_each_inside_jax, multiple_results=True))
+mlir.register_lowering(each_p, mlir.lower_fun(_each_on_cpu, multiple_results=True), platform="cpu")
