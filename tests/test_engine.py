@@ -29,6 +29,8 @@ def march(system: Any, speed: np.ndarray, y: np.ndarray, revolutions: int, toler
 
 
 OPERATIONS = {
+    "cubes": lambda x, z: jnp.cbrt(x) + jnp.cbrt(-z) + jnp.log2(2 + x * x),
+    "slopes": lambda x, z: jax.grad(lambda a: jnp.tanh(a) * jnp.tan(0.3 * a))(x + z),
     "arithmetic": lambda x, z: (x + z) * (x - 2 * z) / (1 + z * z),
     "roots": lambda x, z: jnp.sqrt(1 + x * x) + jax.lax.rsqrt(2 + z * z) + jnp.hypot(x, z),
     "powers": lambda x, z: x**3 + (1 + z * z) ** -2 + (1 + x * x) ** (10 / 9),

@@ -75,8 +75,9 @@ NEAR = {
 def test_branches_that_cross_and_branches_that_nearly_do(name):
     (terms, x), points = NEAR[name]
     branch = followed(Curve(jnp.array(0.5), jnp.array(terms)), x, 0.5)
-    assert [p.kind for p in branch.special] == [kind for kind, _ in points]
-    for found, (_, place) in zip(branch.special, points, strict=True):
+    special = sorted(branch.special, key=lambda p: p.kind)  # two at one place are met in either order
+    assert [p.kind for p in special] == [kind for kind, _ in points]
+    for found, (_, place) in zip(special, points, strict=True):
         assert found.status == "converged" and abs(found.value - place) <= found.error + 1e-8
     assert branch.ended == ("range", "range") and branch.value.size < 100
     if name == "lines that pass":

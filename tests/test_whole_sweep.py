@@ -11,13 +11,7 @@ from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
 from jaxcage.analysis import around, bearing_history
-from jaxcage.integrate import (
-    OUTCOMES,
-    SAMPLES,
-    BearingLanes,
-    begin_lanes,
-    run_block,
-)
+from jaxcage.integrate import SAMPLES, SPACING, STALLED, limits_of
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
 from jaxcage.plotting import (
     bearing_figure,
@@ -26,32 +20,34 @@ from jaxcage.plotting import (
     bearings_beside,
     over_shaft_speed,
 )
+from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, WATCHED, Bearings
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
 
 
-def lanes_of(model, states, direction=None):
-    """Laws, magnitudes and lanes of one bearing from several states at one speed."""
-    count = len(states)
-    last = lambda *x: jnp.stack([jnp.asarray(y) for y in x], axis=-1)
+def lanes_of(model, states):
+    """Lanes of one bearing at one speed, and its states in units of the scale."""
     scale = state_scale(model, jnp.asarray(SPEED))
-    scale = jax.tree.map(lambda x: jnp.stack([x] * count, axis=-1), scale._replace(rollers=scale.rollers[:, 0]))
-    at = jax.tree.map(lambda x: jnp.asarray(x, dtype=float), model.at_speed(jnp.asarray(SPEED)))
-    if direction is not None:
-        direction = jax.tree.map(lambda x: jnp.stack([x] * count, axis=-1), direction)
-    return at, scale, begin_lanes(at, scale, jax.tree.map(last, *states), direction)
+    scale = scale._replace(rollers=scale.rollers[:, 0])
+    scale = jax.tree.map(lambda x: np.stack([x] * len(states), axis=-1), scale)
+    at = model.at_speed(jnp.asarray(SPEED))
+    slowest = np.full(len(states), STALLED * abs(float(at.rolling_cage_speed)))
+    bearings = Bearings(at, scale, slowest, over_angle=True)
+    return bearings, bearings.packed(np.arange(len(states)), jax.tree.map(lambda *x: np.stack(x), *states))
+
+
+def run_samples(bearings, y, samples, tolerance, direction=None):
+    """The lanes from sample to sample."""
+    tangents = None if direction is None else np.tile(direction, (len(y), 1))
+    options = dict(tangents=tangents, step=1e-4)
+    return bearings.run(np.arange(len(y)), y, SPACING, samples, samples, tolerance, limits_of(1.0), **options)
 
 
 def in_units(model, state):
-    """A state over its magnitudes, in one row."""
+    """A state over its magnitudes, in one row as the engine has it."""
     unit = state_scale(model, jnp.asarray(SPEED))
-    return np.concatenate([np.ravel(state.rollers / unit.rollers), state.bodies / unit.bodies])
-
-
-def end_of(lanes: BearingLanes, which: int, rollers: int) -> BearingState:
-    of = [x.reshape(rollers, -1)[:, which] for x in lanes.point.y.rollers]
-    return BearingState(jnp.stack(of), jnp.stack([x[which] for x in lanes.point.y.bodies]), jnp.zeros(2))
+    return np.concatenate([np.ravel((state.rollers / unit.rollers).T), state.bodies / unit.bodies])
 
 
 @pytest.fixture(scope="module")
@@ -62,45 +58,56 @@ def start():
 
 def along():
     """A direction of tangent vectors, in units of the state."""
-    numbers = np.random.default_rng(1)
-    return BearingState(jnp.asarray(numbers.normal(size=(5, 13))), jnp.asarray(numbers.normal(size=9)), jnp.zeros(2))
+    return np.random.default_rng(1).normal(size=5 * 13 + 9)
 
 
 @pytest.mark.wide
 def test_a_lane_is_a_simulation(start):
     """From one state over an eighth of a revolution, both by tight steps."""
     model = bearing()
-    at, scale, lanes = lanes_of(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)], along())
-    after, block = run_block(at, scale, lanes, jnp.asarray(2), jnp.asarray(1e-7))
+    bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)])
+    ran = run_samples(bearings, y, 2, 1e-7, along())
     run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-7)
     k = 2 * 32 // SAMPLES
     expected = BearingState(jnp.asarray(run.rollers[k]), jnp.asarray(run.bodies[k]), jnp.zeros(2))
-    assert np.all(np.asarray(after.outcome) == 0) and run.outcome == "successful"
+    assert np.all(ran.mark == FINISHED) and run.outcome == "successful"
     moved = np.abs(in_units(model, expected) - in_units(model, start)).max()
-    apart = np.abs(in_units(model, end_of(after, 0, 13)) - in_units(model, expected)).max()
+    apart = np.abs(ran.state[0, :74] - in_units(model, expected)).max()
     assert apart < 1e-5 < 1e-2 < moved
-    assert float(after.angle[0]) == pytest.approx(float(run.angle[k]), abs=1e-12)
-    gathered = np.asarray(block.integrals)[:, 0]
-    assert gathered[0] == pytest.approx(run.time[k] - run.time[0], rel=1e-8)
-    np.testing.assert_allclose(gathered[1:-1], run.integrals[k] - run.integrals[0], rtol=2e-3, atol=1e-9)
-    np.testing.assert_allclose(np.asarray(block.peaks)[0, 0], run.peaks[:k, 0].max(), rtol=1e-3)
-    place = np.asarray(block.place)[:2, :, 0]
-    np.testing.assert_allclose(place, run.bodies[k // 2 : k + 1 : k // 2, :2] / float(model.clearance), atol=1e-6)
+    _, _, clock, integrals = bearings.unpacked([0], ran.state[:1])
+    assert clock[0, 0] == pytest.approx(float(run.angle[k]), abs=1e-12)
+    assert clock[0, 1] == pytest.approx(run.time[k], rel=1e-8)
+    np.testing.assert_allclose(integrals[0, :-1], run.integrals[k] - run.integrals[0], rtol=1e-6, atol=1e-9)
+    largest = ran.strobe[0, :, -len(WATCHED) :].max(axis=0)
+    assert largest[WATCHED.index("pocket_force")] == pytest.approx(run.peaks[:k, 0].max(), rel=1e-3)
+    _, bodies, *_ = bearings.unpacked([0], ran.strobe[:1, :, : -len(WATCHED)])
+    np.testing.assert_allclose(bodies[0, :, :2], run.bodies[k // 2 : k + 1 : k // 2, :2], atol=1e-6 * model.clearance)
+
+
+@pytest.mark.wide
+def test_rates_in_machine_code_are_those_of_the_model(start):
+    """A step so short that it is the rate: beside the field that JAX evaluates."""
+    model, h = bearing(), 1e-7
+    bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1)])
+    found = bearings.run([0, 1], y, h, 1, 1, 1e-3, limits_of(1.0), step=h).state[:, :74]
+    rates = [model.at_speed(jnp.asarray(SPEED))(s) for s in (start, rolling_start(model, SPEED, 1))]
+    for row, before, rate in zip(found, y, rates, strict=True):
+        expected = in_units(model, rate.state) / abs(float(rate.state.clock[0]))
+        np.testing.assert_allclose((row - before[:74]) / h, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
 
 
 @pytest.mark.wide
 def test_growth_is_that_of_the_distance_of_two_runs(start):
     """Over an eighth of a revolution, the logarithm of the tangent's length against runs a little apart."""
-    model, direction = bearing(), along()
-    unit, little = state_scale(model, jnp.asarray(SPEED)), 1e-7
-    aside = lambda k: jax.tree.map(lambda x, d, u: jnp.asarray(x) + k * little * d * u, start, direction, unit)
-    at, scale, lanes = lanes_of(model, [start, aside(1), aside(-1)], direction)
-    after, block = run_block(at, scale, lanes, jnp.asarray(2), jnp.asarray(1e-9))
-    rows = [in_units(model, end_of(after, k, 13)) for k in (1, 2)]
-    whole = np.concatenate([np.ravel(direction.rollers), direction.bodies])
-    expected = np.log(np.linalg.norm(rows[0] - rows[1]) / (2 * little * np.linalg.norm(whole)))
+    model, direction, little = bearing(), along(), 1e-7
+    bearings, y = lanes_of(model, [start] * 3)
+    y[1, :74] += little * direction
+    y[2, :74] -= little * direction
+    ran = run_samples(bearings, y, 2, 1e-9, direction)
+    apart = np.linalg.norm(ran.state[1, :74] - ran.state[2, :74])
+    expected = np.log(apart / (2 * little * np.linalg.norm(direction)))
     assert abs(expected) > 0.1
-    assert float(block.growth[0]) == pytest.approx(expected, abs=2e-3)
+    assert ran.growth[0].sum() - np.log(np.linalg.norm(direction)) == pytest.approx(expected, abs=2e-3)
 
 
 @pytest.mark.wide
@@ -109,14 +116,13 @@ def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     model = bearing()
     stalled = rolling_start(model, SPEED, turning=0.01)
     broken = start._replace(rollers=start.rollers.at[1, 4].set(jnp.nan))
-    found = []
-    for others in ((stalled, broken), (start, start)):
-        at, scale, lanes = lanes_of(model, [start, *others], along())
-        found.append(run_block(at, scale, lanes, jnp.asarray(1), jnp.asarray(1e-5)))
-    (after, block), (alone, block_alone) = found
-    assert [OUTCOMES[k] for k in np.asarray(after.outcome)] == ["successful", "outside", "not_finite"]
-    np.testing.assert_array_equal(in_units(model, end_of(after, 0, 13)), in_units(model, end_of(alone, 0, 13)))
-    assert float(block.growth[0]) == float(block_alone.growth[0]) and np.isfinite(float(block.growth[0]))
+    ran, alone = (
+        run_samples(*lanes_of(model, [start, *others]), 1, 1e-5, along())
+        for others in ((stalled, broken), (start, start))
+    )
+    assert list(ran.mark) == [FINISHED, OUTSIDE, NOT_FINITE]
+    np.testing.assert_array_equal(ran.state[0], alone.state[0])
+    assert ran.growth[0] == alone.growth[0] and np.isfinite(ran.growth[0])
 
 
 @pytest.mark.wide
@@ -134,12 +140,12 @@ def test_rollers_have_no_names():
     start, turn = rolling_start(model, SPEED, 1), 2 * np.pi / 13
     renamed = lambda state: state._replace(rollers=jnp.roll(state.rollers, -1, axis=1))
     rolled = renamed(start)._replace(clock=start.clock + jnp.asarray([turn, 0.0]))
-    at, scale, lanes = lanes_of(model, [start, rolled, start], along())
-    after, block = run_block(at, scale, lanes, jnp.asarray(1), jnp.asarray(1e-6))
-    one, other = end_of(after, 0, 13), end_of(after, 1, 13)
-    assert np.abs(in_units(model, renamed(one)) - in_units(model, other)).max() < 1e-8
-    assert np.abs(in_units(model, one) - in_units(model, other)).max() > 1e-3
-    np.testing.assert_allclose(np.asarray(block.peaks)[:, 0], np.asarray(block.peaks)[:, 1], rtol=1e-6)
+    ran = run_samples(*lanes_of(model, [start, rolled, start]), 1, 1e-6, along())
+    one, other = (row[:74].copy() for row in ran.state[:2])
+    moved = np.concatenate([np.roll(one[:65].reshape(13, 5), -1, axis=0).ravel(), one[65:]])
+    assert np.abs(moved - other).max() < 1e-8
+    assert np.abs(one - other).max() > 1e-3
+    np.testing.assert_allclose(ran.strobe[0, 0, -len(WATCHED) :], ran.strobe[1, 0, -len(WATCHED) :], rtol=1e-6)
 
 
 @pytest.mark.wide

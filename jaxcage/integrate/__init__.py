@@ -16,6 +16,7 @@
 | `_arrow`       | the whole bearing's Jacobian, and its solution                                     |
 | `_implicit`    | an implicit step of the whole bearing                                              |
 | `_bearing`     | time histories of the whole bearing                                                |
+| `_bearing_pace`| how far it is followed before it is compared with the same by longer steps         |
 | `_results`     | how an integration ended                                                           |
 """
 
@@ -26,20 +27,14 @@ from ._bearing import (
     bearing_over_time as bearing_over_time,
     simulate_bearing as simulate_bearing,
 )
-from ._bearing_blocks import (
-    LONGEST_BLOCK as LONGEST_BLOCK,
+from ._bearing_pace import (
     SAMPLES as SAMPLES,
     SPACING as SPACING,
-    WITH_TANGENT as WITH_TANGENT,
-    BearingLanes as BearingLanes,
-    bearing_states as bearing_states,
-    begin_lanes as begin_lanes,
+    STALLED as STALLED,
     comparable as comparable,
-    lanes_apart as lanes_apart,
-    run_block as run_block,
+    limits_of as limits_of,
     slowness as slowness,
 )
-from ._bearing_step import FOLLOWED as FOLLOWED, INTEGRATED as INTEGRATED
 from ._controlled import (
     DEFAULT_ERROR as DEFAULT_ERROR,
     SURE as SURE,

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,8 +13,28 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._types import Scalar
-from ..models.whole import LEDGER, MEANS, PEAKS, BearingModel, BearingState, rolling_start, state_scale
-from ._bearing_blocks import FIRST, LONGEST, SHORTEST, STALLED, TURN, slowness
+from ..models.whole import (
+    LEDGER,
+    MEANS,
+    PEAKS,
+    BearingAtSpeed,
+    BearingModel,
+    BearingState,
+    rolling_start,
+    state_scale,
+)
+from ..solve import (
+    FINISHED,
+    INTEGRATED,
+    NOT_FINITE,
+    OUTSIDE,
+    TOO_MANY,
+    WATCHED,
+    BearingLimits,
+    Bearings,
+    March,
+)
+from ._bearing_pace import FIRST, LONGEST, SHORTEST, STALLED, TURN, slowness
 from ._implicit import film_rate
 from ._lanes import By, Controls, Lanes, advance, begin
 from ._results import INACCURATE, OUTCOMES
@@ -35,7 +56,13 @@ takes as long as three or four explicit ones."""
 CHOICES = 16
 """In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
-"""A tolerance so many times smaller makes steps of fourth order about half as long."""
+"""A tolerance so many times larger makes steps of fourth order about twice as long."""
+COARSER = 32.0
+"""The same for the pair of fifth order in machine code."""
+MOST_STEPS_OF_ALL = 200_000.0
+"""From sample to sample."""
+ENDS = {OUTSIDE: "outside", NOT_FINITE: "not_finite", TOO_MANY: "max_steps_reached"}
+"""Outcomes of runs in machine code that do not come to their end; of other marks `inaccurate`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,8 +87,6 @@ class BearingRun:
     """How far the state at a sample moves if it is reached from the one before it by about half as many steps, in units
     of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples. Of slow shafts, where
     motions diverge from sample to sample, the same from place to place between them."""
-    estimate: float
-    """Sum of the embedded error estimates of the steps between two samples, or places, the largest of them."""
     steps: float
     """Mean number of steps of a revolution (or of the whole stretch of time)."""
     implicit_share: float
@@ -120,16 +145,27 @@ def _run(
         after = advance(at, scale, fresh, jnp.where(failed, 0.0, span), controls, by, implicit)
         apart = jax.tree.map(lambda x, s: jnp.max(jnp.abs(x[..., 0] - x[..., 1]) / s), after.state, scale)
         error = jnp.maximum(apart.rollers, apart.bodies)
-        return after, (after.packed[:, 0], after.peaks[:, 0], error, after.error[0], after.steps[0])
+        return after, (after.packed[:, 0], after.peaks[:, 0], error, after.steps[0])
 
     return jax.lax.scan(part, lanes, spans)
 
 
 @compiled
-def _stiff(model: BearingModel, speed: Scalar, lanes: Lanes) -> Array:
+def _film_is_stiff(model: BearingModel, speed: Scalar, state: BearingState) -> Array:
     """Whether implicit steps pay from here on."""
-    here, scale = jax.tree.map(lambda x: x[..., 0], lanes.state), state_scale(model, speed)
-    return film_rate(model.at_speed(speed), here) > STIFF * jnp.max(scale.rollers[3] / scale.rollers[2])
+    scale = state_scale(model, speed)
+    return film_rate(model.at_speed(speed), state) > STIFF * jnp.max(scale.rollers[3] / scale.rollers[2])
+
+
+_rolling = compiled(rolling_start)
+
+
+@compiled
+def _laws(model: BearingModel, speed: Scalar) -> tuple[BearingAtSpeed, BearingState]:
+    """The laws at a speed, and the magnitudes of the state: of one roller, and with an axis of one lane."""
+    scale = state_scale(model, speed)
+    scale = scale._replace(rollers=scale.rollers[:, 0])
+    return model.at_speed(speed), jax.tree.map(lambda x: x[..., None], scale)
 
 
 def simulate_bearing(
@@ -174,7 +210,7 @@ def simulate_bearing(
             f"rad/s, but with the outer ring at {float(model.outer_speed):.6g} rad/s {value:.6g} rad/s of the shaft "
             f"make it {rolling:.3g} rad/s: `bearing_over_time` follows it over time.",
         )
-    state = rolling_start(model, value) if start is None else start
+    state = _rolling(model, jnp.asarray(value)) if start is None else start
     parts = _parts(model, value, samples)
     places = samples * parts
     span = np.full(places * (discard + revolutions), TURN / places)
@@ -240,23 +276,24 @@ def _recorded(
     implicit: bool | None,
 ) -> BearingRun:
     """The run, and its last revolution again."""
-    omega, bounds = jnp.asarray(speed), tuple(map(jnp.asarray, limits))
-    lanes = _begun(model, omega, state, bounds[0])
-    parts, first = [], np.asarray(lanes.packed).T[:1]
     if model.ring.ring_motion == "quasi_static":
         if implicit:
             raise ArgumentError("implicit", said="must be False or None for a quasi-static inner ring, but is True.")
-        implicit = False
+        course: Any = _InJax(model, speed, state, limits, tolerance, by)
+    else:
+        course = _Native(model, speed, state, limits, tolerance, by)
+    parts, first, stiff = [], course.numbers[None], []
     pieces = np.split(spans, len(spans) // samples * (CHOICES if samples % CHOICES == 0 else 1))
-    stiff = []
     for piece in pieces:
-        stiff.append(bool(_stiff(model, omega, lanes)) if implicit is None else implicit)
-        lanes, found = _run(model, omega, lanes, jnp.asarray(piece), bounds, jnp.asarray(tolerance), by, stiff[-1])
-        parts.append(tuple(map(np.asarray, found)))
-    numbers, peaks, errors, estimates, steps = (np.concatenate(part) for part in zip(*parts, strict=True))
+        stiff.append(course.is_stiff() if implicit is None else implicit)
+        if stiff[-1] and isinstance(course, _Native):
+            course = _InJax(model, speed, course.state, limits, tolerance, by, course.numbers, course.outcome)
+        if not stiff[-1] and isinstance(course, _InJax) and model.ring.ring_motion != "quasi_static":
+            course = _Native(model, speed, course.state, limits, tolerance, by, course.numbers, course.outcome)
+        parts.append(course.go(piece, stiff[-1]))
+    numbers, peaks, errors, steps = (np.concatenate(part) for part in zip(*parts, strict=True))
     numbers = np.concatenate([first, numbers])[discard * samples :]
-    error = float(errors.max())
-    code = int(lanes.outcome[0])
+    error, code = float(errors.max()), course.outcome
     if code == 0 and not error <= allowed:
         code = INACCURATE
     heavy = float(model.load + model.ring.ring_mass * model.gravity)
@@ -272,7 +309,137 @@ def _recorded(
         peaks=peaks[discard * samples :],
         outcome=OUTCOMES[code],
         error=error,
-        estimate=float(estimates.max()),
         steps=float(steps.sum() * samples / len(spans)),
         implicit_share=float(np.mean(stiff)),
     )
+
+
+Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""State and integrals at the end of each span, peaks in it, its error, its steps."""
+
+
+class _Native:
+    """A run in machine code, by explicit steps."""
+
+    def __init__(
+        self,
+        model: BearingModel,
+        speed: float,
+        state: BearingState,
+        limits: tuple[float, float, float],
+        tolerance: float,
+        by: By,
+        numbers: np.ndarray | None = None,
+        outcome: int = 0,
+    ):
+        at, scale = _laws(model, jnp.asarray(speed))
+        slowest = abs(float(at.rolling_cage_speed)) * (STALLED if by == "angle" else 0.0)
+        self.outcome, self._tolerance, self._limits = outcome, tolerance, BearingLimits(*limits, MOST_STEPS_OF_ALL)
+        self._bearings = Bearings(at, scale, np.array([slowest]), over_angle=by == "angle")
+        self._about = model, jnp.asarray(speed)
+        row = jax.tree.map(lambda x: np.asarray(x, dtype=float)[None], state)
+        self._y, self._step = self._bearings.packed([0], row), limits[0]
+        if numbers is not None:
+            self._y[0, -len(INTEGRATED) : -1] = numbers[-len(INTEGRATED) + 1 :]
+        self.numbers = self._numbers(self._y)[0]
+
+    def _numbers(self, y: np.ndarray) -> np.ndarray:
+        """State and integrals in SI units, as `packed` has them."""
+        rollers, bodies, clock, integrals = self._bearings.unpacked(np.zeros(len(y), int), y)
+        return np.concatenate([rollers.reshape(len(y), -1), bodies, clock, integrals[:, :-1]], axis=1)
+
+    @property
+    def state(self) -> BearingState:
+        """Where it is now."""
+        n = self.numbers.size - len(LEDGER) - len(MEANS)
+        parts = self.numbers[: n - 11].reshape(5, -1), self.numbers[n - 11 : n - 2], self.numbers[n - 2 : n]
+        return BearingState(*map(jnp.asarray, parts))
+
+    def is_stiff(self) -> bool:
+        """Whether implicit steps pay from here on."""
+        return self.outcome == 0 and bool(_film_is_stiff(*self._about, self.state))
+
+    def go(self, spans: np.ndarray, implicit: bool) -> Found:
+        """One span after the other."""
+        count, watched, self._begin = len(spans), len(WATCHED), self._y
+        strobe = np.full((count, self._y.shape[1] + watched), np.nan)
+        steps, begun = np.zeros(count), 0
+        even = bool(np.allclose(spans, spans[0], rtol=1e-9, atol=0))
+        while begun < count and self.outcome == 0:
+            some = count if even else 1
+            ran = self._run(self._y, spans[begun], some, self._tolerance, self._step)
+            strobe[begun : begun + some], steps[begun : begun + some] = ran.strobe[0], ran.steps[0] / some
+            self._y, self._step, begun = ran.state, float(ran.step[0]), begun + some
+            self.outcome = OUTCOMES.index(ENDS.get(ran.mark[0], "inaccurate")) if ran.mark[0] != FINISHED else 0
+        y, peaks = strobe[:, :-watched], strobe[:, -watched:]
+        error = self._apart(y, spans)
+        numbers = self._numbers(y)
+        self.numbers = numbers[-1] if self.outcome == 0 else np.full_like(numbers[-1], np.nan)
+        seen = dict(zip(WATCHED, peaks.T, strict=True))
+        none = np.zeros(count)
+        return numbers, np.stack([seen.get(name, none) for name in PEAKS], axis=1), error, steps
+
+    def _run(self, y: np.ndarray, span: Any, strobes: int, tolerance: float, step: Any, width: int = 1) -> March:
+        lanes = np.zeros(len(y), int)
+        return self._bearings.run(lanes, y, span, strobes, strobes, tolerance, self._limits, step=step, width=width)
+
+    def _apart(self, ends: np.ndarray, spans: np.ndarray) -> np.ndarray:
+        """How far each span ends from the same by longer steps, in units of the scale."""
+        dim = self._bearings.units.shape[1]
+        begins = np.concatenate([self._begin, ends[:-1]])
+        whole = np.flatnonzero(np.all(np.isfinite(ends), axis=1))
+        error = np.zeros(len(spans))
+        if whole.size:
+            rough = self._run(begins[whole], spans[whole], 1, COARSER * self._tolerance, self._step, width=8)
+            error[whole] = np.max(np.abs(rough.state - ends[whole])[:, :dim], axis=1)
+        return error
+
+
+class _InJax:
+    """A run inside JAX: by implicit steps, or with a quasi-static ring, which moves with all rollers."""
+
+    def __init__(
+        self,
+        model: BearingModel,
+        speed: float,
+        state: BearingState,
+        limits: tuple[float, float, float],
+        tolerance: float,
+        by: By,
+        numbers: np.ndarray | None = None,
+        outcome: int = 0,
+    ):
+        self._about, self._by = (model, jnp.asarray(speed)), by
+        self._limits, self._tolerance = tuple(map(jnp.asarray, limits)), jnp.asarray(tolerance)
+        self._lanes = _begun(*self._about, state, self._limits[0])
+        if numbers is not None:
+            integrals = len(LEDGER) + len(MEANS)
+            packed = self._lanes.packed.at[-integrals:].set(jnp.asarray(numbers[-integrals:])[:, None])
+            self._lanes = self._lanes._replace(packed=packed, outcome=jnp.full_like(self._lanes.outcome, outcome))
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """State and integrals, as `packed` has them."""
+        return np.asarray(self._lanes.packed)[:, 0]
+
+    @property
+    def state(self) -> BearingState:
+        """Where it is now."""
+        return jax.tree.map(lambda x: x[..., 0], self._lanes.state)
+
+    @property
+    def outcome(self) -> int:
+        """Its place in `OUTCOMES`."""
+        return int(self._lanes.outcome[0])
+
+    def is_stiff(self) -> bool:
+        """Whether implicit steps pay from here on."""
+        model, _ = self._about
+        return model.ring.ring_motion != "quasi_static" and bool(_film_is_stiff(*self._about, self.state))
+
+    def go(self, spans: np.ndarray, implicit: bool) -> Found:
+        """One span after the other."""
+        given = self._lanes, jnp.asarray(spans), self._limits, self._tolerance, self._by, implicit
+        self._lanes, found = _run(*self._about, *given)
+        numbers, peaks, error, steps = map(np.asarray, found)
+        return numbers, peaks, error, steps

@@ -7,12 +7,25 @@
 | `object_code`| compiling, keeping and loading LLVM IR                                           |
 | `loop`       | the integration loop: step control, strobe states, growth of tangents            |
 | `machine`    | tracing a system for that loop, and calling it                                   |
+| `bearing`    | the whole bearing for that loop: a loop over its rollers                         |
 | `call`       | machine code that JAX's programs call                                            |
 | `steps`      | equal steps inside JAX's programs: lanes, tangents, derivatives of any order     |
 """
 
+from .bearing import (
+    INTEGRATED as INTEGRATED,
+    WATCHED as WATCHED,
+    BearingLimits as BearingLimits,
+    Bearings as Bearings,
+)
 from .ir import UnknownOperation as UnknownOperation, say_once as say_once
-from .loop import FINISHED as FINISHED, NOT_FINITE as NOT_FINITE, OUTSIDE as OUTSIDE, PAIRS as PAIRS
+from .loop import (
+    FINISHED as FINISHED,
+    NOT_FINITE as NOT_FINITE,
+    OUTSIDE as OUTSIDE,
+    PAIRS as PAIRS,
+    TOO_MANY as TOO_MANY,
+)
 from .machine import FIRST_STEP as FIRST_STEP, Engine as Engine, March as March
 from .program import Numbers as Numbers
 from .steps import (

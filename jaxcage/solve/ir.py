@@ -32,7 +32,22 @@ BITWISE = {
     "shift_right_logical": "lshr",
     "shift_right_arithmetic": "ashr",
 }
-SAME_NAME = ("sqrt", "floor", "ceil", "exp", "exp2", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2")
+SAME_NAME = (
+    "sqrt",
+    "floor",
+    "ceil",
+    "exp",
+    "exp2",
+    "log",
+    "log2",
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+)
 INTRINSICS = {
     **{name: name for name in (*SAME_NAME, "sinh", "cosh", "tanh", "pow", "copysign")},
     "abs": "fabs",
@@ -277,6 +292,11 @@ class Writer:
             return self.power(x[0], e.params["y"])
         if name == "square":
             return self.mul(x[0], x[0])
+        if name == "one_minus_square":
+            return self.mul(self.add(number(1.0), x[0]), self.sub(number(1.0), x[0]))
+        if name == "cbrt":
+            root = self.call("pow", self.call("fabs", *x), number(1 / 3))
+            return self.call("copysign", root, x[0])
         if name == "rsqrt":
             return self.div(number(1.0), self.call("sqrt", *x))
         if name == "log1p":  # W. Kahan's form, exact where 1 + x is rounded

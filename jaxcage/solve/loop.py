@@ -9,7 +9,7 @@ does depends neither on its neighbours nor on the number of threads.
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import diffrax as dfx
@@ -28,13 +28,15 @@ PAIRS: dict[str, tuple[type[dfx.AbstractERK], int]] = {
 """Embedded explicit pairs by name, with their order."""
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.9, 0.2, 6.0
 """Step sizes change by the safety factor times what the error asks for, within these factors."""
+WRITTEN_OUT = 48
+"""Rows up to which the code of a loop over them is written out."""
 TANGENT_TOLERANCE = 10.0
 """Tolerance of tangent vectors relative to their length, as a multiple of that of the state."""
 NEAREST = 1e-4
 """Time to an abrupt change of the law [rad] below which steps are not shortened any further."""
-FINISHED, OUTSIDE, NOT_FINITE, STUCK = 1.0, 2.0, 3.0, 4.0
+FINISHED, OUTSIDE, NOT_FINITE, STUCK, TOO_MANY = 1.0, 2.0, 3.0, 4.0, 5.0
 """Marks of lanes that leave: all revolutions done; far outside what the model holds for; step size below the smallest
-one because the state is not finite, or because the error cannot be met; also too many steps in a revolution."""
+one because the state is not finite, or because the error cannot be met; too many steps in a revolution."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,14 +84,16 @@ class Tableau(NamedTuple):
 
 
 class Field(NamedTuple):
-    """The programs of a system, traced."""
+    """The programs of a system, traced, and what the loop is to do with their numbers."""
 
     prelude: Any
     """fixed numbers -> what the rates need of them."""
     rates: Any
-    """phase, state and tangents, fixed numbers, results of the prelude -> rates."""
-    excursion: Any
-    """phase, state, fixed numbers -> excursion."""
+    """phase, state and tangents, fixed numbers, results of the prelude -> rates; or what writes the code of rates
+    itself (`Rollers`)."""
+    excursion: Any | None
+    """phase, state, fixed numbers -> excursion; None where the code of rates stores what is watched behind the rates,
+    the excursion first."""
     abrupt: Any | None
     """phase, state, rates, fixed numbers -> distance from an abrupt change of the law and speed towards it; None where
     the law has none."""
@@ -97,11 +101,32 @@ class Field(NamedTuple):
     tangents: int
     wide: tuple[bool, ...]
     """Which of the fixed numbers differ from lane to lane."""
+    beside: int = 0
+    """Numbers that are integrated beside the state, behind the tangents: their errors do not control the steps."""
+    watched: int = 1
+    """Numbers whose largest values are kept; where there are more than the excursion, from one strobe to the next."""
+    own_turn: bool = False
+    """Whether the first fixed number is how far a lane goes from strobe to strobe, instead of a revolution."""
+    relative: bool = True
+    """Whether errors are measured relative to the state and to one, or in units of the scale alone."""
+    careful: bool = True
+    """Whether the errors of tangent vectors control the steps too."""
 
     @property
     def moving(self) -> int:
         """Numbers that are integrated."""
-        return self.dimension * (1 + self.tangents)
+        return self.dimension * (1 + self.tangents) + self.beside
+
+    @property
+    def span(self) -> int:
+        """Numbers that the code of rates stores."""
+        return self.moving + (0 if self.excursion is not None else self.watched)
+
+    @property
+    def recorded(self) -> int:
+        """Numbers of a strobe state: the state and, where there are any, what is integrated beside it and the largest
+        of what is watched."""
+        return self.dimension + (self.beside + self.watched if self.excursion is None else 0)
 
 
 def layout_of(field: Field, stages: int) -> Layout:
@@ -110,7 +135,7 @@ def layout_of(field: Field, stages: int) -> Layout:
     return Layout.of(
         state=field.moving,
         step=1,
-        peak=1,
+        peak=field.watched,
         steps=1,
         mark=1,
         fixed=sum(field.wide),
@@ -119,28 +144,74 @@ def layout_of(field: Field, stages: int) -> Layout:
         revolution=1,
         first_step=1,
         lane=1,
-        rate=field.moving * stages,
+        rate=field.span * stages,
         stage=field.moving,
-        again=field.moving,
-        made=len(field.prelude.jaxpr.outvars),
+        again=field.span,
+        made=len(field.prelude.jaxpr.outvars) if field.prelude else 0,
     )
 
 
-class _Code(Writer):
-    """A writer of code that keeps vectors in rows of memory."""
+class Code(Writer):
+    """A writer of code that keeps vectors in rows of memory. A row is a number, or a value within a loop over rows."""
 
-    def at(self, row: int, base: str = "%memory") -> Value:
-        return self.let(f"getelementptr i8, ptr {base}, i64 {row * self.width * 8}", "ptr", False)
+    block = "entry"
+    """The block that is being written."""
 
-    def get(self, row: int, wide: bool = True, base: str = "%memory") -> Value:
+    def line(self, text: str) -> None:
+        super().line(text)
+        if text.endswith(":"):
+            self.block = text[:-1]
+
+    def at(self, row: int | Value, base: str = "%memory") -> Value:
+        if isinstance(row, Value):
+            offset = self.simple("mul", row, Value(str(self.width * 8), "i64", False)).text
+        else:
+            offset = str(row * self.width * 8)
+        return self.let(f"getelementptr i8, ptr {base}, i64 {offset}", "ptr", False)
+
+    def get(self, row: int | Value, wide: bool = True, base: str = "%memory") -> Value:
         return self.let(f"load {self.type('double', wide)}, ptr {self.at(row, base).text}", "double", wide)
 
-    def put(self, row: int, v: Value, wide: bool = True, base: str = "%memory") -> None:
+    def put(self, row: int | Value, v: Value, wide: bool = True, base: str = "%memory") -> None:
         v = self.widened(v) if wide else v
         self.line(f"store {self.typed(v)}, ptr {self.at(row, base).text}")
 
     def all(self, rows: Sequence[int]) -> list[Value]:
         return [self.get(r) for r in rows]
+
+    def over(
+        self, count: int, begin: Sequence[Value], body: Callable[[Callable[[int], int | Value], list[Value]], Any]
+    ) -> list[Value]:
+        """What `body` makes of `begin`, row after row: written out if they are few, else as a loop.
+
+        `body(row, values)` returns new values; `row(k)` is the row of its number behind the k-th.
+        """
+        values = [self.widened(v) for v in begin]
+        if count <= WRITTEN_OUT:
+            for q in range(count):
+                values = list(body(lambda k, q=q: k + q, values) or ())
+            return values
+        self.names += 1
+        before, loop, done = self.block, f"loop{self.names}", f"done{self.names}"
+        place = Value(f"%row{self.names}", "i64", False)
+        inside = [Value(f"{place.text}_{k}", "double", True) for k in range(len(values))]
+        outer, self.lines = self.lines, []
+        self.block = loop
+        new = list(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside) or ())
+        assert self.block == loop
+        lines, self.lines = self.lines, outer
+        vector = self.type("double", True)
+        self.line(f"br label %{loop}")
+        self.line(f"{loop}:")
+        self.line(f"{place.text} = phi i64 [ 0, %{before} ], [ {place.text}_next, %{loop} ]")
+        for old, start, after in zip(inside, values, new, strict=True):
+            self.line(f"{old.text} = phi {vector} [ {start.text}, %{before} ], [ {after.text}, %{loop} ]")
+        self.lines += lines
+        self.line(f"{place.text}_next = add i64 {place.text}, 1")
+        self.line(f"{place.text}_more = icmp slt i64 {place.text}_next, {count}")
+        self.line(f"br i1 {place.text}_more, label %{loop}, label %{done}")
+        self.line(f"{done}:")
+        return new
 
     def shared(self, k: int) -> Value:
         """A fixed number that is the same in all lanes."""
@@ -171,18 +242,19 @@ def march_ir(field: Field, pair: str, width: int) -> str:
 
     `march(queue, lanes, revolutions, keep, settings, shared, loaded, stored, strobe, growth)`: queue holds the next
     lane and a flag that stops; settings are tolerance, largest step, smallest step, most steps of a revolution; loaded
-    and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep, dimension),
+    and stored have a row of all lanes for each of the first rows of `layout_of`; strobe is (lanes, keep, recorded),
     written in a ring; growth is (lanes, revolutions, tangents), squared lengths.
     """
     tableau = Tableau.named(pair)
     rows = layout_of(field, len(tableau.phase))
-    made = _prelude(field, rows, width), _rates(field, rows, width)
-    parts = [*made, _refill(rows, width), _loop(field, rows, tableau, width)]
+    made = [_prelude(field, rows, width)] if field.prelude else []
+    rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
+    parts = [*made, rates, _refill(rows, width), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
 
-def _fixed(w: _Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
+def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
     """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
     read = [*(v for e in program.jaxpr.eqns for v in e.invars), *program.jaxpr.outvars]
     used = {v for v in read if is_variable(v)}
@@ -194,7 +266,7 @@ def _fixed(w: _Code, field: Field, rows: Layout, program: Any, first: int) -> li
     return values
 
 
-def _made(w: _Code, field: Field, rows: Layout) -> list[Value]:
+def _made(w: Code, field: Field, rows: Layout) -> list[Value]:
     """Results of the prelude."""
     return [w.get(row, wide) for row, wide in zip(rows["made"], _made_wide(field), strict=True)]
 
@@ -211,8 +283,8 @@ def _made_wide(field: Field) -> list[bool]:
 
 def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     """The code that works out everything that follows from the fixed numbers alone."""
-    w = _Code(width)
-    results, _ = w.program(field.prelude, _fixed(w, field, rows, field.prelude, 0), "entry")
+    w = Code(width)
+    results, _ = w.program(field.prelude, fixed_numbers(w, field, rows, field.prelude, 0), "entry")
     for row, wide, v in zip(rows["made"], _made_wide(field), results, strict=True):
         w.put(row, v, wide)
     head = "define internal void @prelude(ptr noalias %memory, ptr noalias %shared) noinline {\nentry:\n"
@@ -221,10 +293,10 @@ def _prelude(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
 
 def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     """Rates of state and tangents at `place`, stored at `out`."""
-    w = _Code(width)
+    w = Code(width)
     moved = [w.get(j, base="%place") for j in range(field.moving)]
     arguments = [Value("%phase", "double", True), *moved]
-    fixed = _fixed(w, field, rows, field.rates, len(arguments))
+    fixed = fixed_numbers(w, field, rows, field.rates, len(arguments))
     results, _ = w.program(field.rates, [*arguments, *fixed, *_made(w, field, rows)], "entry")
     for j, v in enumerate(results):
         w.put(j, v, base="%out")
@@ -329,10 +401,11 @@ def _refill(rows: Layout, width: int) -> tuple[str, set[str]]:
 
 def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str, set[str]]:
     """Steps of a vector of lanes, one after the other, with their control."""
-    w = _Code(width)
-    n, moving, stages = field.dimension, field.moving, len(tableau.phase)
-    one, zero, turn = number(1.0), number(0.0), number(REVOLUTION)
+    w = Code(width)
+    n, moving, stages, span = field.dimension, field.moving, len(tableau.phase), field.span
+    one, zero = number(1.0), number(0.0)
     row = {name: rows[name][0] for name in rows.rows if len(rows[name]) > 0}
+    at_stage = lambda i: row["rate"] + i * span
     vector = w.type("double", True)
     rates = lambda phase, place, out: w.line(
         f"call void @rates({w.typed(w.widened(phase))}, ptr {w.at(place).text}, ptr %memory, ptr %shared, "
@@ -357,52 +430,59 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w.line("%alive = call i1 @refill(ptr %memory, ptr %queue, i64 %lanes, ptr %loaded, ptr %stored)")
     w.line("br i1 %alive, label %begin, label %return")
     w.line("begin:")
-    w.line("call void @prelude(ptr %memory, ptr %shared)")
+    if field.prelude:
+        w.line("call void @prelude(ptr %memory, ptr %shared)")
     rates(w.get(row["phase"]), row["state"], row["again"])
     begun = w.compare("ne", w.get(row["first_step"]), zero)
-    for q in range(moving):
-        w.put(row["rate"] + q, w.select(begun, w.get(row["rate"] + q), w.get(row["again"] + q)))
+
+    def keep_rate(at: Any, _: Any) -> None:
+        w.put(at(at_stage(0)), w.select(begun, w.get(at(at_stage(0))), w.get(at(row["again"]))))
+
+    w.over(moving, (), keep_rate)
     w.put(row["first_step"], one)
     w.line("br label %step")
 
     w.line("step:")
-    block = "step"
     phase, h, lane, mark = (w.get(row[x]) for x in ("phase", "step", "lane", "mark"))
-    y = w.all(rows["state"])
+    turn = w.get(row["fixed"]) if field.own_turn else number(REVOLUTION)
     runs = w.both(w.compare("ge", lane, zero), w.compare("eq", mark, zero))
-    first = w.all(rows["rate"][:moving])
-    arguments = lambda program, leading: [*leading, *_fixed(w, field, rows, program, len(leading))]
+    arguments = lambda program, leading: [*leading, *fixed_numbers(w, field, rows, program, len(leading))]
     limited = h
     if field.abrupt is not None:
-        (distance, speed), block = w.program(field.abrupt, arguments(field.abrupt, [phase, *y[:n], *first[:n]]), block)
+        near = w.all([*range(row["state"], row["state"] + n), *range(row["rate"], row["rate"] + n)])
+        (distance, speed), w.block = w.program(field.abrupt, arguments(field.abrupt, [phase, *near]), w.block)
         time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
         limited = w.smaller(w.widened(time), h)
     left = w.sub(turn, phase)
     ends = w.compare("ge", w.mul(limited, number(1.0001)), left)
     halves = w.compare("gt", w.mul(limited, number(2.0)), left)
     step = w.select(ends, left, w.select(halves, w.mul(left, number(0.5)), limited))
-    k = [first]
-    new = y
     for i in range(1, stages):
         scaled = [(w.mul(step, number(a)), j) for j, a in enumerate(tableau.stages[i]) if a != 0.0]
-        new = []
-        for q in range(moving):
-            v = w.add(y[q], *(w.mul(a, k[j][q]) for a, j in scaled))
-            w.put(row["stage"] + q, v)
-            new.append(v)
-        rates(w.add(phase, w.mul(step, number(tableau.phase[i]))), row["stage"], row["rate"] + i * moving)
-        k.append([w.get(row["rate"] + i * moving + q) for q in range(moving)])
+
+        def argument(at: Any, _: Any, scaled: Any = scaled) -> None:
+            terms = (w.mul(a, w.get(at(at_stage(j)))) for a, j in scaled)
+            w.put(at(row["stage"]), w.add(w.get(at(row["state"])), *terms))
+
+        w.over(moving, (), argument)
+        rates(w.add(phase, w.mul(step, number(tableau.phase[i]))), row["stage"], at_stage(i))
     terms = [(w.mul(step, number(e)), j) for j, e in enumerate(tableau.error) if e != 0.0]
-    estimate = lambda q: w.add(*(w.mul(e, k[j][q]) for e, j in terms))
-    size = lambda q: w.add(one, w.larger(w.call("fabs", y[q]), w.call("fabs", new[q])))
-    error = zero
-    for q in range(n):
-        relative = w.div(estimate(q), w.mul(size(q), tolerance))
-        error = w.call("maximum", w.widened(error), w.mul(relative, relative))
-    for first_of in range(n, moving, n):
-        part = range(first_of, first_of + n)
-        length = w.add(number(1e-300), *(w.mul(new[q], new[q]) for q in part))
-        wrong = w.add(zero, *(w.mul(e, e) for e in map(estimate, part)))
+    estimate = lambda at, first: w.add(*(w.mul(e, w.get(at(first + at_stage(j)))) for e, j in terms))
+
+    def worst(at: Any, error: list[Value]) -> list[Value]:
+        sizes = (w.call("fabs", w.get(at(row[x]))) for x in ("state", "stage"))
+        unit = w.mul(w.add(one, w.larger(*sizes)), tolerance) if field.relative else tolerance
+        relative = w.div(estimate(at, 0), unit)
+        return [w.call("maximum", error[0], w.mul(relative, relative))]
+
+    (error,) = w.over(n, [zero], worst)
+    for first_of in range(n, n * (1 + field.tangents), n) if field.careful else ():
+
+        def sums(at: Any, old: list[Value], first_of: int = first_of) -> list[Value]:
+            new, wrong = w.get(at(row["stage"] + first_of)), estimate(at, first_of)
+            return [w.add(old[0], w.mul(new, new)), w.add(old[1], w.mul(wrong, wrong))]
+
+        length, wrong = w.over(n, [number(1e-300), zero], sums)
         allowed = w.mul(tolerance, number(TANGENT_TOLERANCE))
         error = w.call("maximum", error, w.div(wrong, w.mul(length, w.mul(allowed, allowed))))
     error = w.larger(w.smaller(error, number(1e12)), number(1e-12))  # a NaN becomes the largest error
@@ -425,18 +505,28 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w.put(row["phase"], w.select(over, zero, w.select(moves, w.add(phase, step), phase)))
     taken = w.add(w.get(row["steps"]), w.select(runs, one, zero))
     w.put(row["steps"], taken)
-    for q in range(moving):
-        w.put(row["state"] + q, w.select(moves, new[q], y[q]))
-        w.put(row["rate"] + q, w.select(moves, k[-1][q], first[q]))
-    (far,), block = w.program(field.excursion, arguments(field.excursion, [zero, *new[:n]]), block)
-    far, peak = w.widened(far), w.get(row["peak"])
-    w.put(row["peak"], w.select(w.both(moves, w.compare("gt", far, peak)), far, peak))
-    mark = w.select(w.both(moves, w.compare("gt", far, number(2.0))), number(OUTSIDE), mark)
+
+    def accept(at: Any, size: list[Value]) -> list[Value]:
+        old, first = w.get(at(row["state"])), w.get(at(at_stage(0)))
+        w.put(at(row["state"]), w.select(moves, w.get(at(row["stage"])), old))
+        w.put(at(at_stage(0)), w.select(moves, w.get(at(at_stage(stages - 1))), first))
+        return [w.add(size[0], w.call("fabs", old), w.call("fabs", first))]
+
+    (size,) = w.over(moving, [zero], accept)
+    if field.excursion is not None:
+        new = w.all(range(row["stage"], row["stage"] + n))
+        watched, w.block = w.program(field.excursion, arguments(field.excursion, [zero, *new]), w.block)
+    else:
+        watched = [w.get(at_stage(stages - 1) + moving + k) for k in range(field.watched)]
+    for k, x in enumerate(map(w.widened, watched)):
+        peak = w.get(row["peak"] + k)
+        w.put(row["peak"] + k, w.select(w.both(moves, w.compare("gt", x, peak)), x, peak))
+    mark = w.select(w.both(moves, w.compare("gt", w.widened(watched[0]), number(2.0))), number(OUTSIDE), mark)
     refused = w.both(runs, w.negated(fine), w.compare("lt", proposed, smallest))
-    finite = w.compare("lt", w.add(zero, *(w.call("fabs", c) for c in (*y, *first))), number(np.inf))
+    finite = w.compare("lt", size, number(np.inf))
     mark = w.select(refused, w.select(finite, number(STUCK), number(NOT_FINITE)), mark)
     mark = w.select(
-        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(STUCK), mark
+        w.both(runs, w.compare("gt", taken, w.mul(most, w.add(w.get(row["revolution"]), one)))), number(TOO_MANY), mark
     )
     w.put(row["mark"], mark)
     w.line(f"br i1 {w.any(over).text}, label %over, label %check")
@@ -444,15 +534,30 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     w.line("over:")
     revolution = w.get(row["revolution"])
     ring = w.sub(revolution, w.mul(kept, w.call("floor", w.div(w.add(revolution, number(0.5)), kept))))
-    place = w.convert("fptosi", w.mul(w.add(w.mul(lane, kept), ring), number(float(n))), "i64")
-    state = w.all(rows["state"])
-    for q in range(n):
-        w.store_if(over, state[q], "%strobe", w.simple("add", place, number(q)))
+    recorded = number(float(field.recorded))
+    place = w.convert("fptosi", w.mul(w.add(w.mul(lane, kept), ring), recorded), "i64")
+    first_beside, done = row["state"] + moving - field.beside, 0
+    parts = [(row["state"], n), (first_beside, field.beside), (row["peak"], field.watched)]
+    for first, count in parts if field.excursion is None else parts[:1]:
+
+        def record(at: Any, _: Any, first: int = first, done: int = done) -> None:
+            behind = at(done)
+            behind = behind if isinstance(behind, Value) else Value(str(behind), "i64", False)
+            w.store_if(over, w.get(at(first)), "%strobe", w.simple("add", place, behind))
+
+        w.over(count, (), record)
+        done += count
+    if field.excursion is None:
+        for k, x in enumerate(watched):
+            w.put(row["peak"] + k, w.select(over, x, w.get(row["peak"] + k)))
     if field.tangents:
         _orthonormalise(w, field, rows, over, w.add(w.mul(lane, total), revolution))
         rates(w.get(row["phase"]), row["state"], row["again"])
-        for q in range(moving):
-            w.put(row["rate"] + q, w.select(over, w.get(row["again"] + q), w.get(row["rate"] + q)))
+
+        def renew(at: Any, _: Any) -> None:
+            w.put(at(at_stage(0)), w.select(over, w.get(at(row["again"])), w.get(at(at_stage(0)))))
+
+        w.over(moving, (), renew)
     revolution = w.select(over, w.add(revolution, one), revolution)
     w.put(row["revolution"], revolution)
     finished = w.both(over, w.compare("ge", revolution, total), w.compare("eq", mark, zero))
@@ -469,24 +574,31 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     return head + w.taken() + "\nreturn:\n  ret void\n}\n", w.declarations
 
 
-def _orthonormalise(w: _Code, field: Field, rows: Layout, over: Value, revolution: Value) -> None:
+def _orthonormalise(w: Code, field: Field, rows: Layout, over: Value, revolution: Value) -> None:
     """Gram and Schmidt's method on the tangent vectors of lanes whose revolution is over; each vector is projected
     twice, which keeps them orthogonal to rounding. Squared lengths go to `growth`."""
     n, first = field.dimension, rows["state"][0]
     place = w.convert("fptosi", w.mul(revolution, number(float(field.tangents))), "i64")
-    dot = lambda a, b: w.add(*(w.mul(x, z) for x, z in zip(a, b, strict=True)))
-    done: list[list[Value]] = []
+
+    def dot(a: int, b: int) -> Value:
+        """Of the vectors whose first rows these are."""
+        product = lambda at, sums: [w.add(sums[0], w.mul(w.get(at(a)), w.get(at(b))))]
+        return w.over(n, [number(0.0)], product)[0]
+
     for i in range(field.tangents):
-        at = range(first + n * (i + 1), first + n * (i + 2))
-        u = old = w.all(at)
-        for _ in range(2):
-            for v in done:
-                along = dot(u, v)
-                u = [w.sub(x, w.mul(along, z)) for x, z in zip(u, v, strict=True)]
-        length2 = dot(u, u)
-        w.store_if(over, length2, "%growth", w.simple("add", place, number(i)))
-        inverse = w.div(number(1.0), w.call("sqrt", length2))
-        u = [w.mul(x, inverse) for x in u]
-        for q, x, before in zip(at, u, old, strict=True):
-            w.put(q, w.select(over, x, before))
-        done.append(u)
+        mine = first + n * (i + 1)
+        for earlier in [first + n * (j + 1) for j in range(i)] * 2:
+            along = w.select(over, dot(mine, earlier), number(0.0))
+
+            def project(at: Any, _: Any, mine: int = mine, earlier: int = earlier, along: Value = along) -> None:
+                w.put(at(mine), w.sub(w.get(at(mine)), w.mul(along, w.get(at(earlier)))))
+
+            w.over(n, (), project)
+        length2 = dot(mine, mine)
+        w.store_if(over, length2, "%growth", w.simple("add", place, Value(str(i), "i64", False)))
+        inverse = w.select(over, w.div(number(1.0), w.call("sqrt", length2)), number(1.0))
+
+        def normalise(at: Any, _: Any, mine: int = mine, inverse: Value = inverse) -> None:
+            w.put(at(mine), w.mul(w.get(at(mine)), inverse))
+
+        w.over(n, (), normalise)

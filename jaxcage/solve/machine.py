@@ -175,6 +175,68 @@ class March(NamedTuple):
     """Logarithm of the growth of each tangent vector in each revolution."""
 
 
+class Runner:
+    """The compiled loop of a field, called with lanes."""
+
+    def __init__(self, field: Field, pair: str, width: int = WIDTH):
+        self.field, self._width = field, width
+        self.rows: Layout = layout_of(field, len(Tableau.named(pair).phase))
+        whole, place = ctypes.c_int64, ctypes.c_void_p
+        kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
+        self._march = kind(function(march_ir(field, pair, width), "march"))
+
+    def __call__(
+        self,
+        numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
+        state: Float[np.ndarray, "lanes numbers"],
+        strobes: int,
+        keep: int,
+        settings: Float[np.ndarray, " 4"],
+        tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
+        step: Float[np.ndarray, " lanes"] | float = FIRST_STEP,
+        threads: int = 1,
+        report: Callable[[int], None] = lambda done: None,
+    ) -> March:
+        """Run lanes from states in units of their scales, with what is integrated beside them behind.
+
+        `settings` are tolerance, longest and shortest step, and most steps from strobe to strobe.
+        """
+        lanes, field, rows = len(state), self.field, self.rows
+        n, moving = field.dimension, field.moving
+        loaded = np.zeros((rows.end("fixed"), lanes))
+        loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
+        if field.tangents:
+            assert tangents is not None
+            loaded[n : moving - field.beside] = tangents.reshape(lanes, -1).T
+        loaded[rows["step"][0]] = step
+        loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
+        wide, shared = numbers
+        loaded[rows.end("mark") :] = wide
+        stored = np.zeros((rows.end("mark"), lanes))
+        strobe = np.full((lanes, keep, field.recorded), np.nan)
+        growth = np.full((lanes, strobes, field.tangents), np.nan)
+        queue = np.zeros(2, dtype=np.int64)
+        arrays = (queue, np.asarray(settings, dtype=float), np.append(shared, 0.0), loaded, stored, strobe, growth)
+        at = [x.ctypes.data for x in arrays]
+        run = lambda: self._march(at[0], lanes, strobes, keep, *at[1:])
+        _run_threads(run, min(threads, -(-lanes // self._width)), queue, lambda: report(min(int(queue[0]), lanes)))
+        part = lambda name: stored[rows[name][0]]
+        turned = np.roll(strobe, -(strobes % keep), axis=1) if strobes > keep else strobe
+        with np.errstate(divide="ignore"):
+            grown = 0.5 * np.log(growth)
+        end = np.concatenate([stored[:n], stored[moving - field.beside : moving]])
+        return March(
+            state=end.T.copy(),
+            tangents=stored[n : moving - field.beside].T.reshape(lanes, field.tangents, n),
+            step=part("step"),
+            peak=part("peak"),
+            steps=part("steps"),
+            mark=part("mark"),
+            strobe=turned,
+            growth=grown,
+        )
+
+
 class Engine:
     """The compiled revolutions of a system, with so many tangent vectors."""
 
@@ -183,10 +245,7 @@ class Engine:
         self.numbers = Numbers(system, several)
         self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents)
         self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
-        self.rows: Layout = layout_of(self.field, len(Tableau.named(pair).phase))
-        whole, place = ctypes.c_int64, ctypes.c_void_p
-        kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
-        self._march = kind(function(march_ir(self.field, pair, WIDTH), "march"))
+        self._run = Runner(self.field, pair)
 
     def __call__(
         self,
@@ -195,45 +254,11 @@ class Engine:
         revolutions: int,
         keep: int,
         tolerance: float,
-        tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
-        step: Float[np.ndarray, " lanes"] | float = FIRST_STEP,
-        threads: int = 1,
-        report: Callable[[int], None] = lambda done: None,
+        **more: Any,
     ) -> March:
-        """Run lanes from states in units of their scales."""
-        lanes, n = state.shape
-        moving, rows = self.field.moving, self.rows
-        loaded = np.zeros((rows.end("fixed"), lanes))
-        loaded[:n] = state.T
-        if self.field.tangents:
-            assert tangents is not None
-            loaded[n:moving] = tangents.reshape(lanes, -1).T
-        loaded[rows["step"][0]] = step
-        wide, shared = numbers
-        loaded[rows.end("mark") :] = wide
-        stored = np.zeros((rows.end("mark"), lanes))
-        strobe = np.full((lanes, keep, n), np.nan)
-        growth = np.full((lanes, revolutions, self.field.tangents), np.nan)
+        """Run lanes from states in units of their scales; the rest as for `Runner`."""
         settings = np.array([tolerance, self._largest, SMALLEST_STEP, MOST_STEPS])
-        queue = np.zeros(2, dtype=np.int64)
-        arrays = (queue, settings, np.append(shared, 0.0), loaded, stored, strobe, growth)
-        at = [x.ctypes.data for x in arrays]
-        run = lambda: self._march(at[0], lanes, revolutions, keep, *at[1:])
-        _run_threads(run, min(threads, -(-lanes // WIDTH)), queue, lambda: report(min(int(queue[0]), lanes)))
-        part = lambda name: stored[rows[name][0]]
-        turned = np.roll(strobe, -(revolutions % keep), axis=1) if revolutions > keep else strobe
-        with np.errstate(divide="ignore"):
-            grown = 0.5 * np.log(growth)
-        return March(
-            state=stored[:n].T.copy(),
-            tangents=stored[n:moving].T.reshape(lanes, self.field.tangents, n),
-            step=part("step"),
-            peak=part("peak"),
-            steps=part("steps"),
-            mark=part("mark"),
-            strobe=turned,
-            growth=grown,
-        )
+        return self._run(numbers, state, revolutions, keep, settings, **more)
 
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:

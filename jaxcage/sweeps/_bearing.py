@@ -1,8 +1,5 @@
 """Sweeps of the whole bearing over shaft speeds, from several starts and for several designs."""
 
-import concurrent.futures
-import functools
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -10,46 +7,32 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import BearingRecord, BearingSweep, summed_up
-from ..integrate import (
-    FOLLOWED,
-    INTEGRATED,
-    LONGEST_BLOCK,
-    OUTCOMES,
-    SAMPLES,
-    SPACING,
-    WITH_TANGENT,
-    BearingLanes,
-    bearing_states,
-    begin_lanes,
-    comparable,
-    lanes_apart,
-    run_block,
-    slowness,
-)
+from ..integrate import OUTCOMES, SAMPLES, SPACING, STALLED, comparable, limits_of, slowness
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
-from ._engine import Progress, alike, cores, workers
+from ..solve import FINISHED, INTEGRATED, NOT_FINITE, OUTSIDE, TOO_MANY, WATCHED, Bearings, March
+from ._engine import Progress, alike, cores
 from ._speed import checked_speeds, require_lengths, versions
 
 
-CHUNKS = (8, 16, 32, 48, 64, 80, 96)
-"""Lanes per call: few sizes, as each is compiled."""
-CALL = 12
-"""What a call costs beside its lanes, in lanes."""
+CHUNK = 512
+"""Lanes that are run at a time: their states at every sample of a block are kept until it is over."""
+ENDS = {OUTSIDE: "outside", NOT_FINITE: "not_finite", TOO_MANY: "max_steps_reached"}
+"""Outcomes of lanes that do not come to their end; of other marks `dt_min_reached`."""
 PER_HOUR = 1e9 * 3600
 """mm^3 an hour in 1 m^3 a second."""
 LEAD = 10
 """Revolutions in which a tangent vector turns to the direction of fastest growth, before its growth counts."""
 EXPONENT = 80
 """Revolutions over which the exponent is followed, if there are as many: the others take half the time."""
-COARSER = 16.0
-"""A tolerance so many times larger makes steps of fourth order about twice as long."""
+COARSER = 32.0
+"""A tolerance so many times larger makes steps of fifth order about twice as long."""
 Starts = int | Sequence[BearingState] | Sequence[CagePlace]
 """How many of the model's own, or states, or places of the cage such as `CAGE_STARTS`."""
 
@@ -91,7 +74,8 @@ def sweep_bearing(
 
     **Returns:** `BearingSweep`. A lane that fails is NaN with an outcome, and its neighbours go on: `outside` if the
     cage comes nearly to rest (below 5 % of the speed of pure rolling) or leaves its land, `max_steps_reached` if it
-    needs more than 20,000 steps a revolution (of slow shafts as many times more as more periods go to one).
+    needs more than 5,000 steps from sample to sample (of slow shafts as many times more as more periods go to one),
+    `dt_min_reached` if its steps become too short.
 
     **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, impossible counts or a
     quasi-static ring; `RuntimeError` without double precision.
@@ -133,22 +117,16 @@ def sweep_bearings(
     require_bearings(models, starts, discard, revolutions, blocks, exponents)
     table = _Table(models, speed, starts)
     lanes, block = table.which.size, revolutions // blocks
-    size = min(CHUNKS, key=lambda size: (-(-lanes // (size * cores())) * (size + CALL), size))
-    chunks = np.split(np.argsort(table.lane_speed, kind="stable"), range(size, lanes, size))
-    counted = _counted(progress, lanes, discard + revolutions)
+    done = _counted(progress, lanes, discard + revolutions)
     require_at_least(1, exponent_revolutions=exponent_revolutions)
     followed = min(blocks, max(2, -(-exponent_revolutions // block))) if exponents else 0
-
-    def run(chunk: np.ndarray) -> dict[str, Any]:
-        padded = np.concatenate([chunk, np.repeat(chunk[-1:], size - chunk.size)])
-        done = functools.partial(counted, chunk.size)
-        found = _followed(*table.taken(padded), discard, [block] * blocks, followed, tolerance, done)
-        return jax.tree.map(lambda x: x[: chunk.size], found)
-
-    with concurrent.futures.ThreadPoolExecutor(workers()) as pool:
-        parts = list(pool.map(run, chunks))  # an exception cancels what has not begun
-    back = np.argsort(np.concatenate(chunks))
-    found = jax.tree.map(lambda *x: np.concatenate(x)[back], *parts)
+    parts = [
+        _followed(
+            *table.taken(np.arange(i, min(i + CHUNK, lanes))), discard, [block] * blocks, followed, tolerance, done
+        )
+        for i in range(0, lanes, CHUNK)
+    ]
+    found = jax.tree.map(lambda *x: np.concatenate(x), *parts)
     found["outcome"] = np.where(
         (found["outcome"] == 0) & ~(found["error"] <= allowed), OUTCOMES.index("inaccurate"), found["outcome"]
     )
@@ -204,16 +182,15 @@ def require_bearings(
             )
 
 
-def _counted(progress: Progress | None, lanes: int, revolutions: int) -> Callable[[int, int], None]:
-    """To be called with how many of the lanes have gone on by how many samples; it tells them as lanes done."""
-    whole, done, lock = lanes * revolutions * SAMPLES, 0, threading.Lock()
+def _counted(progress: Progress | None, lanes: int, revolutions: int) -> Callable[[int], None]:
+    """To be called with how many samples lanes have gone on by, all together; it tells them as lanes done."""
+    whole, done = lanes * revolutions * SAMPLES, 0
 
-    def add(some: int, samples: int) -> None:
+    def add(samples: int) -> None:
         nonlocal done
-        with lock:
-            done += some * samples
-            if progress is not None:
-                progress(lanes * done // whole, lanes)
+        done += samples
+        if progress is not None:
+            progress(min(lanes * done // whole, lanes), lanes)
 
     return add
 
@@ -259,27 +236,73 @@ class _Table:
         self.begin = jax.tree.map(lambda *x: np.concatenate(x), *states)
 
     def taken(self, lanes: np.ndarray) -> tuple[BearingAtSpeed, BearingState, BearingState]:
-        """Of some lanes, lanes last."""
+        """Laws and magnitudes of some lanes, lanes last; states, lanes first."""
         which, at_speed = self.which[lanes], self.at_speed[lanes]
         leaves, tree = jax.tree.flatten(self.at)
         leaves = [x[which, at_speed] if mine else x[0, 0] for x, mine in zip(leaves, self.own, strict=True)]
-        last = lambda x: jnp.asarray(np.moveaxis(x, 0, -1))
-        scale = jax.tree.map(lambda x: last(x[which, at_speed]), self.scale)
-        begin = jax.tree.map(lambda x: last(x[lanes]), self.begin)
-        return jax.tree.unflatten(tree, [jnp.asarray(x, dtype=float) for x in leaves]), scale, begin
+        scale = jax.tree.map(lambda x: np.moveaxis(x[which, at_speed], 0, -1), self.scale)
+        begin = jax.tree.map(lambda x: np.asarray(x[lanes]), self.begin)
+        return jax.tree.unflatten(tree, [np.asarray(x, dtype=float) for x in leaves]), scale, begin
 
 
-def _direction(begin: BearingState) -> BearingState:
-    """A tangent vector in no special direction, the same in every lane."""
-    numbers = np.random.default_rng(0)
-    each = lambda x: jnp.asarray(np.broadcast_to(numbers.normal(size=x.shape[:-1])[..., None], x.shape).copy())
-    return jax.tree.map(each, begin)
+class _Course:
+    """Lanes on their way: their states in units of the scale, and how those ended that could not go on."""
 
+    def __init__(self, at: BearingAtSpeed, scale: BearingState, begin: BearingState, tolerance: float):
+        count = begin.bodies.shape[0]
+        every = np.arange(count)
+        rolling = np.broadcast_to(np.asarray(at.rolling_cage_speed, dtype=float), count)
+        self.slow = np.broadcast_to(np.asarray(slowness(at, scale)), count)
+        self.bearings = Bearings(at, scale, STALLED * np.abs(rolling), over_angle=True, threads=cores())
+        self.state, self.limits = self.bearings.packed(every, begin), limits_of(self.slow)
+        self.tolerance, self.step = tolerance, np.full(count, self.limits.first)
+        self.outcome, self.tangents = np.zeros(count, dtype=np.int32), None
+        self.numbers = self.bearings.units.shape[1]
 
-def _in_parts(revolutions: int, longest: int) -> list[int]:
-    """Stretches of so many samples and a rest."""
-    whole, rest = divmod(revolutions * SAMPLES, longest)
-    return [longest] * whole + [rest] * (rest > 0)
+    def aim(self) -> None:
+        """Give every lane a tangent vector in no special direction, the same in all of them."""
+        direction = np.random.default_rng(0).normal(size=self.numbers)
+        self.tangents = np.tile(direction, (len(self.state), 1))
+
+    @property
+    def alive(self) -> Int[np.ndarray, " some"]:
+        """Lanes that go on."""
+        return np.flatnonzero(self.outcome == 0)
+
+    def go(self, strobes: int, keep: int, done: Callable[[int], None]) -> March | None:
+        """All lanes that can over so many samples; None where there are none."""
+        some, count = self.alive, 0
+        if not some.size:
+            return None
+
+        def tell(lanes: int) -> None:
+            nonlocal count
+            done((lanes - count) * strobes)
+            count = lanes
+
+        given = None if self.tangents is None else self.tangents[some]
+        ran = self.bearings.run(
+            some, self.state[some], SPACING, strobes, keep, self.tolerance, self.limits,
+            step=self.step[some], tangents=given, report=tell,
+        )  # fmt: skip
+        self.state[some], self.step[some] = ran.state, ran.step
+        if self.tangents is not None:
+            self.tangents[some] = ran.tangents[:, 0]
+        lost = ran.mark != FINISHED
+        codes = [OUTCOMES.index(ENDS.get(mark, "dt_min_reached")) for mark in ran.mark[lost]]
+        self.outcome[some[lost]] = codes
+        return ran
+
+    def apart(self) -> Float[np.ndarray, " lanes"]:
+        """How far a stretch from here ends from the same by longer steps, in units of the scale; 0 of lost lanes."""
+        some, error = self.alive, np.zeros(len(self.state))
+        if some.size:
+            stretch = comparable(self.slow)[some]
+            once = lambda tolerance: self.bearings.run(
+                some, self.state[some], stretch, 1, 1, tolerance, self.limits, step=self.step[some]
+            ).state[:, : self.numbers]
+            error[some] = np.max(np.abs(once(self.tolerance) - once(COARSER * self.tolerance)), axis=1)
+        return error
 
 
 def _followed(
@@ -296,71 +319,51 @@ def _followed(
 
     Tangent vectors are followed over so many of the last blocks, and for `LEAD` revolutions before.
     """
-    tight, loose = jnp.asarray(tolerance), jnp.asarray(COARSER * tolerance)
+    course = _Course(at, scale, begin, tolerance)
+    lanes, dim = len(course.state), course.numbers
     first = len(blocks) - followed
     early = max(0, first - -(-LEAD // blocks[0])) if followed else len(blocks)
-    direction = _direction(begin) if followed else None
     lead = min(discard, LEAD) if early == 0 else 0
-    spacing = jnp.full((begin.bodies.shape[-1],), SPACING)
-    compared, slow = comparable(at, scale), float(jnp.max(slowness(at, scale)))
-    freely, tangent = LONGEST_BLOCK * SAMPLES, max(1, int(WITH_TANGENT * SAMPLES / slow**2))
-    go = lambda lanes, samples, spacing=spacing: run_block(at, scale, lanes, jnp.asarray(samples), tight, spacing)
-    at_once = early == 0 and lead == discard
-    lanes = begin_lanes(at, scale, begin, direction if at_once else None)
-    for count in _in_parts(discard - lead, freely):
-        lanes, _ = go(lanes, count)
-        done(count)
-    if early == 0 and not at_once:
-        lanes = _with_direction(at, scale, lanes, direction)
-    for count in _in_parts(lead, tangent):
-        lanes, _ = go(lanes, count)
-        done(count)
-
+    if discard > lead:
+        course.go((discard - lead) * SAMPLES, 1, done)
+    if early == 0:
+        course.aim()
+    if lead:
+        course.go(lead * SAMPLES, 1, done)
+    per_clearance = np.broadcast_to(np.asarray(at.guide.land.per_clearance, dtype=float), lanes)
     integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
     for i, block in enumerate(blocks):
         if 0 < early == i:
-            lanes = _with_direction(at, scale, lanes, direction)
-        trial, _ = run_block(at, scale, lanes, jnp.asarray(1), loose, compared)
-        lanes, found = go(lanes, 1, compared)
-        errors.append(np.asarray(lanes_apart(scale, trial.point, lanes.point)))
-        gathered = [jax.tree.map(np.asarray, found)]
-        if slow > 1:  # on to the first sample
-            lanes, found = go(lanes, 1, spacing - compared)
-            gathered.append(jax.tree.map(np.asarray, found))
-        places.append(gathered[-1].place[:1])
-        *counts, last = _in_parts(block, tangent if i >= early else freely)
-        for count in (*counts, last - 1) if last > 1 else counts:
-            lanes, found = go(lanes, count)
-            gathered.append(jax.tree.map(np.asarray, found))
-            places.append(gathered[-1].place[:count])
-        integrals.append(sum(part.integrals for part in gathered))
+            course.aim()
+        errors.append(course.apart())
+        some, before, samples = course.alive, course.state[:, dim + 1 :].copy(), block * SAMPLES
+        ran = course.go(samples, samples, done)
+        place, peak = np.full((lanes, samples, 2), np.nan), np.full((lanes, len(WATCHED)), np.nan)
+        growth, tried = np.full(lanes, np.nan), np.full(lanes, np.nan)
+        if ran is not None:
+            _, bodies, *_ = course.bearings.unpacked(some, ran.strobe[..., : -len(WATCHED)])
+            centre = bodies[..., :2] - bodies[..., 5:7] if at.inner_guided else bodies[..., :2]
+            place[some] = centre * per_clearance[some, None, None]
+            peak[some] = np.max(ran.strobe[..., -len(WATCHED) :], axis=1)
+            growth[some] = ran.growth.sum(axis=(1, 2)) if course.tangents is not None else 0.0
+            tried[some] = ran.steps
+        integrals.append((course.state[:, dim + 1 :] - before).T)
         if i >= first:
-            growths.append(sum(part.growth for part in gathered))
-        peaks.append(np.max([part.peaks for part in gathered], axis=0))
-        steps.append(sum(part.steps for part in gathered))
-        done(block * SAMPLES)
-    rollers, bodies = bearing_states(lanes)
+            growths.append(growth)
+        places.append(place)
+        peaks.append(peak[:, 1:].T)
+        steps.append(tried)
+    rollers, bodies, clock, _ = course.bearings.unpacked(np.arange(lanes), course.state)
     total = np.stack(integrals, axis=-1)  # quantities, lanes, blocks
     return {
         "integrals": dict(zip(("time", *INTEGRATED), total, strict=True)),
-        "peaks": dict(zip(FOLLOWED, np.stack(peaks, axis=-1), strict=True)),
-        "growth": np.stack(growths, axis=-1) if growths else np.zeros((lanes.angle.size, 1)),
-        "place": np.moveaxis(np.concatenate(places), -1, 0),
+        "peaks": dict(zip(WATCHED[1:], np.stack(peaks, axis=-1), strict=True)),
+        "growth": np.stack(growths, axis=-1) if growths else np.zeros((lanes, 1)),
+        "place": np.concatenate(places, axis=1),
         "error": np.max(errors, axis=0),
         "steps": np.sum(steps, axis=0) / sum(blocks),
-        "outcome": np.asarray(lanes.outcome),
+        "outcome": course.outcome,
         "rollers": rollers,
         "bodies": bodies,
-        "angle": np.asarray(lanes.angle),
+        "angle": clock[:, 0],
     }
-
-
-def _with_direction(
-    at: BearingAtSpeed, scale: BearingState, lanes: BearingLanes, direction: BearingState | None
-) -> BearingLanes:
-    """The same lanes with tangent vectors."""
-    rollers, bodies = bearing_states(lanes)
-    last = lambda x: jnp.asarray(np.moveaxis(x, 0, -1))
-    clock = jnp.stack([lanes.angle, jnp.zeros_like(lanes.angle)])
-    again = begin_lanes(at, scale, BearingState(last(rollers), last(bodies), clock), direction)
-    return again._replace(step=lanes.step, outcome=lanes.outcome)

@@ -1,0 +1,48 @@
+"""How far and by which steps the whole bearing is followed before it is compared with the same by longer steps."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..models.whole import BearingAtSpeed, BearingState
+from ..solve import BearingLimits
+
+
+TURN = 2 * np.pi
+SAMPLES = 16
+"""Of a revolution of the cage."""
+SPACING = TURN / SAMPLES
+FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
+"""First, longest and shortest step [rad] of the cage's angle."""
+PERIODS, COMPARED = 50, 10
+"""Of a loaded roller's vibration on its raceway. A shaft is slow if more of them than the first go from sample to
+sample, for NU2310 one below 4000 rpm: only so many as the second are then compared with the same by longer steps. What
+rollers do to their bars depends little on the speed: neighbouring motions diverge over time, not over revolutions."""
+SLOWEST = 1000.0
+"""At most so many times as many periods count."""
+MOST_STEPS = 5_000
+"""From sample to sample, in the mean: a lane that needs more has failed. As many times more as the shaft is slow."""
+STALLED = 0.05
+"""Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
+
+
+def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, "*lanes"]:
+    """How many times as many periods of a roller go from sample to sample as in a shaft that is not slow: at least 1.
+
+    **Arguments:** laws, each number a scalar or of lanes; magnitudes of the state, of one roller each.
+    """
+    period = TURN * scale.rollers[2] / scale.rollers[3]
+    turned = PERIODS * period * jnp.abs(jnp.asarray(at.rolling_cage_speed))
+    return jnp.clip(SPACING / turned, 1.0, SLOWEST)
+
+
+def comparable(slow: Float[np.ndarray, "*lanes"]) -> Float[np.ndarray, "*lanes"]:
+    """How far each lane goes before it is compared with the same by longer steps [rad]: to the next sample, or less."""
+    return np.where(slow > 1, COMPARED / PERIODS * SPACING / slow, SPACING)
+
+
+def limits_of(slow: Any) -> BearingLimits:
+    """Limits of steps over the cage's angle."""
+    return BearingLimits(FIRST, LONGEST, SHORTEST, MOST_STEPS * float(np.max(slow)))
