@@ -29,7 +29,6 @@ from .integrate import (
     BearingRun as BearingRun,
     Trajectory as Trajectory,
     bearing_over_time as bearing_over_time,
-    controlled as controlled,
     method as method,
     native as native,
     ramp as ramp,

@@ -198,7 +198,7 @@ def test_code_of_ones_own_needs_a_name_and_a_version(tmp_path: Path, system: Any
 
 
 def test_what_the_package_has_needs_neither():
-    for method in (jc.controlled(), jc.method("kvaerno5", steps=64)):
+    for method in (jc.native(), jc.method("kvaerno5", steps=64)):
         assert study_of(system=jc.case("1a"), method=method).own_code is None
     assert BearingStudy(jc.whole_bearing("nu2310"), STUDY.plan, 1, 2, 1, 0, 1e-4).own_code is None
 

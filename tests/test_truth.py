@@ -30,9 +30,7 @@ def assert_closes(model, sweep, i, j):
     period = int(sweep.label[i, j].partition("-")[2])
     field = reference.field(model, float(sweep.speed[i]))
     back = reference.revolutions(field, sweep.last[i, j], period).strobe[-1]
-    np.testing.assert_allclose(
-        back / field.scale, sweep.last[i, j] / field.scale, rtol=0, atol=float(jc.controlled().tolerance)
-    )
+    np.testing.assert_allclose(back / field.scale, sweep.last[i, j] / field.scale, rtol=0, atol=jc.native().allowed)
 
 
 @pytest.mark.wide
@@ -86,7 +84,7 @@ def test_errors_of_successful_lanes_are_stated_and_within_the_tolerance(wide):
         model = jc.replace(MODEL, **{n: jc.parameters(drawn)[n] for n in same})
         found = jc.sweep(model, reference.random_speeds(seed, 3, wide, fastest_speed(model)), **SHORT)
         error = found.error[~found.failed]
-        assert np.all(error > 0) and np.all(error <= float(jc.controlled().tolerance))
+        assert np.all(error > 0) and np.all(error <= jc.native().allowed)
         assert np.all(np.isnan(found.last[found.failed])) and np.all(found.label[found.failed] != "chaotic")
         finished += error.size
     assert finished >= 18

@@ -2,7 +2,7 @@
 
 | module          | responsibility                                                                       |
 |-----------------|--------------------------------------------------------------------------------------|
-| `_observe`      | kernel of every sweep: strobe states and Lyapunov exponents of a batch of lanes      |
+| `_observe`      | plan of a sweep, and what it sees of a lane                                    |
 | `_sweep`        | the result of a sweep                                                                |
 | `_labels`       | periodic, chaotic, quasi-periodic, undecided or failed                               |
 | `_zones`        | zones and both kinds of edge                                                         |
@@ -87,16 +87,7 @@ from ._measures import (
     relative_state as relative_state,
     winding as winding,
 )
-from ._observe import (
-    Lane as Lane,
-    Lengths as Lengths,
-    Observation as Observation,
-    Plan as Plan,
-    Room as Room,
-    observe as observe,
-    settle as settle,
-    start_tangents as start_tangents,
-)
+from ._observe import Observation as Observation, Plan as Plan, start_tangents as start_tangents
 from ._spectra import (
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,

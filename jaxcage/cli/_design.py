@@ -171,7 +171,7 @@ def _objective(
 
 def _loads(model: CageModel, swept: Sweep) -> dict[str, float]:
     """Means over the speeds that were checked, and the least film of all, by steps at 1/16 of the usual error."""
-    found = land_loads(model, swept, DEFAULT_ERROR / 16)
+    found = land_loads(model, swept, native(error=DEFAULT_ERROR / 16))
     means = {key: float(np.nanmean(found[what])) for key, what in LOADS.items()}
     return means | {"least_film_um": 1e6 * float(np.nanmin(found["least film"]))}
 

@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from ..analysis import Sweep
+from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..sweeps import averages
 from ._chaos import ChaosMeasure
@@ -90,13 +91,15 @@ def negligible_load(model: CageModel, what: str, speed: float) -> float:
     return weight if MEASURES[what] == "N" else 0.01 * weight * speed * float(model.land_radius)
 
 
-def land_loads(model: CageModel, found: Sweep, error: float | None = None) -> dict[str, Float[np.ndarray, " speeds"]]:
+def land_loads(
+    model: CageModel, found: Sweep, method: AbstractMethod | None = None
+) -> dict[str, Float[np.ndarray, " speeds"]]:
     """What `MEASURES` names at each speed of a sweep, the mean of its starts, and their `least film` [m], the smallest
     distance of cage and rib, 0 where they touch; over revolutions that begin where the sweep ended.
 
-    **Arguments:** model and its sweep; error of a revolution, by default that of `jaxcage.controlled`.
+    **Arguments:** model and its sweep; integration method, by default `jaxcage.native()`.
     """
-    return {name: rows[0] for name, rows in _loads([model], found.speed, found.last[None], error=error).items()}
+    return {name: rows[0] for name, rows in _loads([model], found.speed, found.last[None], method=method).items()}
 
 
 def _loads(
@@ -104,13 +107,13 @@ def _loads(
     speeds: Float[np.ndarray, " speeds"],
     last: Float[np.ndarray, "k speeds starts dim"],
     revolutions: int = 4,
-    error: float | None = None,
+    method: AbstractMethod | None = None,
 ) -> dict[str, Float[np.ndarray, "k speeds"]]:
     starts = last.shape[2]
     which = np.repeat(np.arange(len(models)), speeds.size * starts)
     speed = np.tile(np.repeat(speeds, starts), len(models))
     states = last.reshape(-1, last.shape[-1])
-    mean, largest = averages(models, speed, states, which, land_force, revolutions, error)
+    mean, largest = averages(models, speed, states, which, land_force, revolutions, method)
     radius, clearance = np.array([(float(m.land_radius), float(m.clearance)) for m in models])[which].T
 
     def mean_of_starts(found: np.ndarray) -> np.ndarray:

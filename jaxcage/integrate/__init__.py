@@ -6,11 +6,12 @@
 | `_explicit`    | the classical Runge-Kutta method as a diffrax solver; stages of explicit methods   |
 | `_newmark`     | the paper's Newmark-beta as a diffrax solver                                       |
 | `_method`      | solver plus step choice (fixed per revolution, or adaptive), by name               |
-| `_controlled`  | as many steps as a revolution needs, and its error                                 |
 | `_native`      | machine code with error control: the method of sweeps                              |
 | `_kernel`      | a step of a method as a scalar function                                            |
 | `_strobe`      | the strobe map that everything uses                                                |
-| `_revolution`  | a revolution with tangent vectors, each lane by as many steps as it needs          |
+| `_revolution`  | a revolution with tangent vectors along which the field changes too                |
+| `_engine`      | lanes, and what runs them                                                          |
+| `_in_jax`      | the strobe map of many lanes inside JAX                                            |
 | `_simulate`    | time histories, speed ramps                                                        |
 | `_lanes`       | the whole bearing over a stretch of angle or time, many lanes at once              |
 | `_arrow`       | the whole bearing's Jacobian, and its solution                                     |
@@ -35,16 +36,18 @@ from ._bearing_pace import (
     limits_of as limits_of,
     slowness as slowness,
 )
-from ._controlled import (
-    DEFAULT_ERROR as DEFAULT_ERROR,
+from ._engine import (
+    RETRIES as RETRIES,
     SURE as SURE,
-    ControlledSteps as ControlledSteps,
-    controlled as controlled,
-    finer as finer,
-    stated as stated,
+    Lanes as Lanes,
+    alike as alike,
+    cores as cores,
+    engine_of as engine_of,
+    histories as histories,
 )
 from ._explicit import ClassicalRK4 as ClassicalRK4
 from ._implicit import implicit_step as implicit_step
+from ._in_jax import EngineInJax as EngineInJax
 from ._method import (
     REVOLUTION as REVOLUTION,
     AbstractMethod as AbstractMethod,
@@ -54,21 +57,16 @@ from ._method import (
     Stretch as Stretch,
     method as method,
 )
-from ._native import NativeSteps as NativeSteps, native as native, refined as refined
+from ._native import DEFAULT_ERROR as DEFAULT_ERROR, IMPLICIT as IMPLICIT, NativeSteps as NativeSteps, native as native
 from ._newmark import NewmarkBeta as NewmarkBeta
-from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, outcome_code as outcome_code
-from ._revolution import BLOCK as BLOCK, pushed as pushed, revolution as revolution
-from ._rosenbrock import (
-    RODAS4 as RODAS4,
-    Rodas3 as Rodas3,
-    Rodas4 as Rodas4,
-    rosenbrock_step as rosenbrock_step,
-)
+from ._results import OUTCOMES as OUTCOMES, RESULTS as RESULTS, codes_of as codes_of, outcome_code as outcome_code
+from ._revolution import pushed as pushed
+from ._rosenbrock import Rodas3 as Rodas3, Rodas4 as Rodas4
 from ._simulate import Trajectory as Trajectory, ramp as ramp, simulate as simulate
 from ._strobe import StrobeMap as StrobeMap, strobe_map as strobe_map
 
 
 check_layer(
     globals(),
-    "controlled method ramp simulate strobe_map",
+    "method native ramp simulate strobe_map",
 )

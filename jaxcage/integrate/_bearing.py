@@ -23,21 +23,11 @@ from ..models.whole import (
     rolling_start,
     state_scale,
 )
-from ..solve import (
-    FINISHED,
-    INTEGRATED,
-    NOT_FINITE,
-    OUTSIDE,
-    TOO_MANY,
-    WATCHED,
-    BearingLimits,
-    Bearings,
-    March,
-)
+from ..solve import INTEGRATED, STUCK, WATCHED, BearingLimits, Bearings, March
 from ._bearing_pace import FIRST, LONGEST, SHORTEST, STALLED, TURN, slowness
 from ._implicit import film_rate
 from ._lanes import By, Controls, Lanes, advance, begin
-from ._results import INACCURATE, OUTCOMES
+from ._results import INACCURATE, OUTCOMES, codes_of
 from ._simulate import require_counts
 
 
@@ -61,8 +51,6 @@ COARSER = 32.0
 """The same for the pair of fifth order in machine code."""
 MOST_STEPS_OF_ALL = 200_000.0
 """From sample to sample."""
-ENDS = {OUTSIDE: "outside", NOT_FINITE: "not_finite", TOO_MANY: "max_steps_reached"}
-"""Outcomes of runs in machine code that do not come to their end; of other marks `inaccurate`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -370,7 +358,7 @@ class _Native:
             ran = self._run(self._y, spans[begun], some, self._tolerance, self._step)
             strobe[begun : begun + some], steps[begun : begun + some] = ran.strobe[0], ran.steps[0] / some
             self._y, self._step, begun = ran.state, float(ran.step[0]), begun + some
-            self.outcome = OUTCOMES.index(ENDS.get(ran.mark[0], "inaccurate")) if ran.mark[0] != FINISHED else 0
+            self.outcome = INACCURATE if ran.mark[0] == STUCK else int(codes_of(ran.mark)[0])
         y, peaks = strobe[:, :-watched], strobe[:, -watched:]
         error = self._apart(y, spans)
         numbers = self._numbers(y)

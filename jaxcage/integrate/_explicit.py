@@ -12,6 +12,7 @@ import numpy as np
 
 from .._types import Scalar, State
 from ..models import AbstractField
+from ..solve import combine
 
 
 class ClassicalRK4(dfx.AbstractERK):
@@ -35,12 +36,6 @@ class ClassicalRK4(dfx.AbstractERK):
     def order(self, terms: Any) -> int:
         del terms
         return 4
-
-
-def combine(base: State, weights: Any, stages: list[State], factor: Scalar = 1.0) -> State:
-    """base + factor * sum of weights times stages, leaving out what is multiplied by zero."""
-    used = [(float(w), u) for w, u in zip(weights, stages, strict=False) if w != 0.0]
-    return tuple(b + factor * sum(w * u[i] for w, u in used) if used else b for i, b in enumerate(base))
 
 
 def explicit_step(

@@ -17,8 +17,8 @@ from jaxtyping import Array
 
 from .._types import Scalar
 from ..models.whole import PEAKS, BearingAtSpeed, BearingState, Bodies, Rates
+from ..solve import RODAS4
 from ._arrow import Parts, arrow, factors
-from ._rosenbrock import RODAS4
 
 
 STAGES = len(RODAS4.m)

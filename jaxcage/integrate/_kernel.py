@@ -17,10 +17,10 @@ import jax.numpy as jnp
 from .._form import Form, split
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
-from ..solve import Numbers, march_with_tangents
+from ..solve import Numbers, march_with_tangents, rosenbrock_step
 from ._explicit import explicit_step
 from ._newmark import NewmarkBeta
-from ._rosenbrock import AbstractRosenbrock, rosenbrock_step
+from ._rosenbrock import AbstractRosenbrock
 
 
 REVOLUTION = 2 * math.pi

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
 from .._types import Scalar, State
@@ -23,8 +23,10 @@ from ._results import RESULTS, outcome_code
 from ._rosenbrock import Rodas3, Rodas4
 
 
-WATCHED = 1024
-"""Phases of a revolution of adaptive steps at which the largest excursion is looked for."""
+FIRST_STEPS = 64
+"""The first of adaptive steps is a revolution over so many."""
+SHARPER = 1e-2
+"""Tolerance of the run that measures errors, as a fraction of the tolerance."""
 
 
 class Stretch(NamedTuple):
@@ -33,8 +35,6 @@ class Stretch(NamedTuple):
     y: State
     peak: Scalar
     result: RESULTS
-    error: Scalar = math.nan
-    """How far the end moves with half as many steps, in units of the system's scale; NaN where that was not tried."""
 
 
 Tangents = tuple[State, ...]
@@ -48,12 +48,6 @@ class Moved(NamedTuple):
     peak: Scalar
     """Largest excursion on the way."""
     outcome: Int[Array, "*lanes"]
-    level: Int[Array, "*lanes"]
-    """Which of the method's step counts is worth trying next."""
-    error: Float[Array, "*lanes"]
-    """How far off the end would be with half as many steps, in units of the scale; NaN where that was not tried."""
-    half: Tangents
-    """The tangent vectors with half as many steps; none where that was not tried."""
 
 
 def moved_by(advance: Callable[[Any], Stretch], start: Any, tangents: Sequence[Any]) -> Moved:
@@ -61,10 +55,10 @@ def moved_by(advance: Callable[[Any], Stretch], start: Any, tangents: Sequence[A
 
     def move(start: Any) -> tuple[State, tuple[Any, ...]]:
         stretch = advance(start)
-        return stretch.y, (jnp.asarray(stretch.peak), outcome_code(stretch.result), jnp.asarray(stretch.error))
+        return stretch.y, (jnp.asarray(stretch.peak, dtype=float), outcome_code(stretch.result))
 
-    y, after, (peak, code, error) = with_tangents(move, start, tangents)
-    return Moved(y, after, peak, code, jnp.zeros((), jnp.int32), error, ())
+    y, after, (peak, code) = with_tangents(move, start, tangents)
+    return Moved(y, after, peak, code)
 
 
 def _evaluate(tau: Any, y: Any, field: Any) -> State:
@@ -90,9 +84,23 @@ class AbstractMethod(eqx.Module):
     """How to integrate a field over a part of a revolution."""
 
     @property
+    def allowed(self) -> float:
+        """Largest measured error of a revolution that is accepted, in units of the scale."""
+        return math.inf
+
+    @property
     def in_jax(self) -> "AbstractMethod":
         """The method that stands for this one inside JAX's programs."""
         return self
+
+    @property
+    @abc.abstractmethod
+    def reference(self) -> "AbstractMethod":
+        """The method beside which the error of this one is measured."""
+
+    @abc.abstractmethod
+    def finer(self, times: int = 1) -> "AbstractMethod":
+        """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
 
     @abc.abstractmethod
     def advance(
@@ -173,6 +181,14 @@ class FixedSteps(AbstractMethod):
         if isinstance(self.steps, int) and self.steps < 1:
             raise ArgumentError("steps", said=f"must be at least 1 per revolution, but {self.steps} was given.")
 
+    @property
+    def reference(self) -> "FixedSteps":
+        return self.finer()
+
+    def finer(self, times: int = 1) -> "FixedSteps":
+        """With twice the steps, `times` over."""
+        return FixedSteps(self.solver, self.steps << times)
+
     def advance(
         self,
         field: AbstractField,
@@ -186,12 +202,30 @@ class FixedSteps(AbstractMethod):
 
 
 class AdaptiveSteps(AbstractMethod):
-    """Steps chosen by an error estimate relative to the state and to the system's own scale."""
+    """Steps chosen by an error estimate relative to the state and to the system's own scale, as diffrax makes them.
+
+    The largest excursion is that of the ends of revolutions, or of their parts."""
 
     solver: dfx.AbstractAdaptiveSolver
     rtol: float = eqx.field(static=True, default=1e-6)
     atol: float = eqx.field(static=True, default=1e-6)
     max_steps: int = eqx.field(static=True, default=100_000)
+
+    @property
+    def tolerance(self) -> float:
+        """What no error is measured below."""
+        return self.atol
+
+    @property
+    def reference(self) -> "AdaptiveSteps":
+        return self._with(SHARPER)
+
+    def finer(self, times: int = 1) -> "AdaptiveSteps":
+        """With tolerances 16 times smaller, `times` over."""
+        return self._with(16.0**-times)
+
+    def _with(self, factor: float) -> "AdaptiveSteps":
+        return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
     def advance(
         self,
@@ -202,16 +236,15 @@ class AdaptiveSteps(AbstractMethod):
         phase: Scalar,
         parts: Int[Array, ""] | int,
     ) -> Stretch:
-        watched = max(WATCHED // int(parts), 1)
+        length = REVOLUTION / jnp.asarray(parts, dtype=float)
         solution = dfx.diffeqsolve(
             _term(self.solver),
             self.solver,
             t0=phase,
-            t1=phase + REVOLUTION / parts,
-            dt0=REVOLUTION / 512,
+            t1=phase + length,
+            dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
             y0=divide(y, scale),
             args=ScaledField(field, scale),
-            saveat=dfx.SaveAt(t1=True, ts=phase + jnp.linspace(0.0, REVOLUTION / parts, watched + 1)[1:-1]),
             stepsize_controller=dfx.PIDController(rtol=self.rtol, atol=self.atol, pcoeff=0.3, icoeff=0.4),
             adjoint=dfx.ForwardMode(),
             max_steps=self.max_steps,
@@ -219,8 +252,7 @@ class AdaptiveSteps(AbstractMethod):
         )
         assert solution.ys is not None
         y = multiply(tuple(c[-1] for c in solution.ys), scale)
-        excursions = jax.vmap(lambda z: jnp.asarray(system.excursion(multiply(z, scale))))(solution.ys)
-        excursion = jax.lax.stop_gradient(jnp.max(excursions))
+        excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
         return Stretch(y, excursion, result_at(solution.result, y, excursion, ESCAPE))
 
 

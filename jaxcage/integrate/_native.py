@@ -1,19 +1,23 @@
-"""The default method of sweeps: machine code with error control, and what replaces it where it does not serve."""
+"""The default method: machine code with error control."""
 
+import diffrax as dfx
 import equinox as eqx
-import jax
 from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem
 from ..solve import PAIRS
-from ._controlled import DEFAULT_ERROR, ControlledSteps, controlled, finer
-from ._method import AbstractMethod, Stretch
+from ._method import SHARPER, AbstractMethod, AdaptiveSteps, Stretch
+from ._rosenbrock import Rodas4
 
 
 DEFAULT_TOLERANCE = 1e-6
+DEFAULT_ERROR = 3e-3
+"""Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
 DEFAULT_PAIR = "tsit5"
+IMPLICIT = "rodas4"
+"""Method of lanes that take too many or too short steps by an explicit one."""
 FINER = 16.0
 """Factor between the tolerances of a run and of the one that confirms it."""
 
@@ -21,8 +25,7 @@ FINER = 16.0
 class NativeSteps(AbstractMethod):
     """Whole revolutions in machine code, by an embedded explicit pair with a step size of its own for each lane.
 
-    Sweeps use it. Where a law cannot be translated, where lanes need an implicit method, and for all that is not a
-    sweep, the method `instead` serves.
+    Within JAX's programs, and for a law that cannot be translated, Tsitouras' method in diffrax stands for it.
     """
 
     tolerance: float = eqx.field(static=True)
@@ -30,11 +33,24 @@ class NativeSteps(AbstractMethod):
     error: float = eqx.field(static=True)
     """Largest measured error of a revolution, in units of the scale."""
     pair: str = eqx.field(static=True)
-    instead: ControlledSteps
 
     @property
-    def in_jax(self) -> AbstractMethod:
-        return self.instead
+    def allowed(self) -> float:
+        return self.error
+
+    @property
+    def in_jax(self) -> AdaptiveSteps:
+        solver = Rodas4() if self.pair == IMPLICIT else dfx.Tsit5()
+        return AdaptiveSteps(solver, self.tolerance, self.tolerance)
+
+    @property
+    def reference(self) -> "NativeSteps":
+        return NativeSteps(SHARPER * self.tolerance, self.error, self.pair)
+
+    @property
+    def implicit(self) -> "NativeSteps":
+        """The same by the implicit method, for stiff laws."""
+        return NativeSteps(self.tolerance, self.error, IMPLICIT)
 
     def advance(
         self,
@@ -45,12 +61,12 @@ class NativeSteps(AbstractMethod):
         phase: Scalar,
         parts: Int[Array, ""] | int,
     ) -> Stretch:
-        return self.instead.advance(field, system, scale, y, phase, parts)
+        return self.in_jax.advance(field, system, scale, y, phase, parts)
 
-    def finer(self, times: int) -> "NativeSteps":
+    def finer(self, times: int = 1) -> "NativeSteps":
         """The same with tolerances 16 times smaller, `times` over."""
         factor = FINER**-times
-        return NativeSteps(factor * self.tolerance, factor * self.error, self.pair, finer(self.instead, times))
+        return NativeSteps(factor * self.tolerance, factor * self.error, self.pair)
 
     def __str__(self) -> str:
         return (
@@ -62,13 +78,12 @@ class NativeSteps(AbstractMethod):
 def native(
     tolerance: float = DEFAULT_TOLERANCE, error: float = DEFAULT_ERROR, pair: str = DEFAULT_PAIR
 ) -> AbstractMethod:
-    """Machine code for sweeps, compiled from the traced law.
+    """Machine code, compiled from the traced law.
 
     **Arguments:** largest estimated error of a step, relative to the state and to the system's scale; largest measured
-    error of a revolution in units of the scale, beyond which a lane is run again with smaller tolerances; embedded
-    pair, one of `tsit5`, `dopri5`, `bosh3`, `dopri8`.
-
-    **Returns:** the method; `controlled(error)` on a machine whose JAX does not run on a CPU.
+    error of a revolution in units of the scale, beyond which a lane is run again with smaller tolerances; method, an
+    embedded explicit pair (`tsit5`, `dopri5`, `bosh3`, `dopri8`) or the L-stable `rodas4`, which lanes take by
+    themselves that an explicit one serves badly.
 
     **Raises:** `ValueError` for numbers that are not positive, and an unknown pair.
     """
@@ -78,10 +93,4 @@ def native(
         raise ArgumentError("error", said=f"must be positive, but {error} was given.")
     if pair not in PAIRS:
         raise ArgumentError("pair", said=f"must be one of {', '.join(PAIRS)}, but '{pair}' was given.")
-    instead = controlled(error)
-    return NativeSteps(tolerance, error, pair, instead) if jax.default_backend() == "cpu" else instead
-
-
-def refined(method: AbstractMethod, times: int = 1) -> AbstractMethod:
-    """`method` with steps at most half as long, `times` over, for what it is to be confirmed by."""
-    return method.finer(times) if isinstance(method, NativeSteps) else finer(method, times)
+    return NativeSteps(tolerance, error, pair)

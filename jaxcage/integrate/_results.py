@@ -4,7 +4,10 @@ from typing import Any
 
 import diffrax as dfx
 import jax.numpy as jnp
-from jaxtyping import Array, Int
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from ..solve import DIVERGED, FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
 
 
 class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
@@ -33,6 +36,24 @@ OUTCOMES = (
     "inaccurate",
 )
 """Names of outcomes in the order of the integer codes that sweeps store."""
+
+
+MARKS = {
+    "successful": FINISHED,
+    "outside": OUTSIDE,
+    "not_finite": NOT_FINITE,
+    "dt_min_reached": STUCK,
+    "max_steps_reached": TOO_MANY,
+    "nonlinear_divergence": DIVERGED,
+    "other": DIVERGED,
+}
+"""The mark with which the integration loop says so."""
+_OUTCOME = {mark: OUTCOMES.index(name) for name, mark in list(MARKS.items())[:6]}
+
+
+def codes_of(marks: Float[np.ndarray, " lanes"]) -> Int[np.ndarray, " lanes"]:
+    """Places in `OUTCOMES` of what the integration loop marked lanes with."""
+    return np.array([_OUTCOME[mark] for mark in marks], dtype=np.int32)
 
 
 INACCURATE = OUTCOMES.index("inaccurate")

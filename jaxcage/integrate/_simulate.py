@@ -2,24 +2,28 @@
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from .._arguments import require_at_least, shown
 from .._checks import require_x64
 from .._errors import ArgumentError
-from .._form import compiled
 from .._notebook import notebook_html
 from .._types import Scalar, State
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
-from ._controlled import ControlledSteps, controlled, stated
+from ..solve import FIRST_STEP
+from ._engine import CHUNK, RETRIES, SURE, Lanes, cores
 from ._method import REVOLUTION, AbstractMethod, FixedSteps
-from ._results import INACCURATE, OUTCOMES, outcome_code
-from ._strobe import strobe_map
+from ._native import IMPLICIT, NativeSteps, native
+from ._results import INACCURATE, OUTCOMES, codes_of
+
+
+TOLERANCE = 1e-8
+"""Of time histories, if nothing else is asked for: what is lost in one sample grows from there to the next."""
+SERVED_BADLY = [OUTCOMES.index(name) for name in ("dt_min_reached", "max_steps_reached")]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +46,7 @@ class Trajectory:
     """`successful`, or the name of what went wrong."""
     error: float = math.nan
     """Largest error of a revolution, in units of the system's scale (for a cage: clearances): how far the ends of its
-    parts move, in all, with half as many steps. NaN for a trajectory that no integration has made."""
+    parts move, in all, by a method that is more exact. NaN for a trajectory that no integration has made."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " n"]:
@@ -60,39 +64,6 @@ class Trajectory:
     _repr_html_ = notebook_html
 
 
-@compiled
-def _run(
-    system: AbstractForcedSystem,
-    method: ControlledSteps,
-    speeds: Float[Array, " revolutions"],
-    rises: Float[Array, " revolutions"],
-    y0: State,
-    samples: int,
-) -> tuple[Float[Array, "revolutions samples dim"], Float[Array, " revolutions"], Float[Array, " revolutions"], Array]:
-    """Whole revolutions one after the other; within one the speed rises by one of `rises`, in `samples` steps."""
-
-    def part(carry: tuple, i: Array, first: Array, rise: Array) -> tuple[tuple, Array]:
-        y, peak, error, outcome = carry
-        strobe = strobe_map(system, first + rise * (i.astype(float) + 0.5) / samples, method)
-        stretch = strobe.part(y, i, samples)
-        error = error + stretch.error
-        now = outcome_code(stretch.result)
-        code = jnp.where(outcome == 0, jnp.where((now == 0) & (error > method.tolerance), INACCURATE, now), outcome)
-        y1 = tuple(jnp.where(code == 0, c, jnp.nan) for c in stretch.y)
-        return (y1, jnp.maximum(peak, stretch.peak), error, code), jnp.stack(y)
-
-    def revolution(carry: tuple, speeds: tuple[Array, Array]) -> tuple[tuple, tuple[Array, ...]]:
-        carry = (carry[0], jnp.asarray(system.excursion(carry[0]), dtype=float), jnp.zeros(()), carry[3])
-        carry, states = jax.lax.scan(lambda c, i: part(c, i, *speeds), carry, jnp.arange(samples))
-        return carry, (states, *carry[1:3])
-
-    admitted = outcome_code(strobe_map(system, speeds[0], method).admit(y0))
-    y0 = tuple(jnp.where(admitted == 0, c, jnp.nan) for c in y0)
-    start = (y0, jnp.zeros(()), jnp.zeros(()), admitted)
-    (*_, code), (states, peaks, errors) = jax.lax.scan(revolution, start, (speeds, rises))
-    return states, peaks, errors, code
-
-
 def _start(system: AbstractForcedSystem, speed: float, start: State | None) -> State:
     y0 = system.starts(jnp.asarray(speed))[0] if start is None else start
     if len(y0) != system.dimension:
@@ -108,24 +79,81 @@ def require_counts(revolutions: int, samples: int, discard: int) -> None:
     require_at_least(0, discard=discard)
 
 
-def _method(method: AbstractMethod | None, samples: int) -> ControlledSteps:
+def _require_divides(method: AbstractMethod, samples: int) -> None:
+    """**Raises:** `ValueError` for samples that equal steps do not meet."""
     if isinstance(method, FixedSteps) and method.steps % samples:
         raise ArgumentError(
             "samples", said=f"must divide the {method.steps} steps per revolution of the method, but is {samples}."
         )
-    return stated(controlled() if method is None else method)
 
 
-def _trajectory(ran: tuple[Array, ...], speeds: np.ndarray, rise: float, samples: int, discard: int) -> Trajectory:
-    states, peaks, errors, code = ran
+class _Ran(NamedTuple):
+    """Whole revolutions by one method."""
+
+    states: Float[np.ndarray, "1+samples dim"]
+    """[SI]; NaN after a failure."""
+    peaks: Float[np.ndarray, " revolutions"]
+    errors: Float[np.ndarray, " revolutions"]
+    code: int
+
+
+def _run(lanes: Lanes, start: np.ndarray, samples: int, method: AbstractMethod) -> _Ran:
+    """The lanes one after the other, each over one sample of a revolution at its own speed."""
+    n, speed = lanes.speed.size, lanes.speed
+    every, begin = np.arange(n), np.arange(n) % samples
+    engine = lanes.engine(0, method, samples)
+    numbers = engine.numbers(speed, lanes.rows(every))
+    scale, (excursion, *_) = lanes.begin(every, np.broadcast_to(start, (n, start.size)))
+    y, peaks = np.full((n + 1, start.size), np.nan), np.full(-(-n // samples), np.nan)
+    y[0], code = start, 0 if excursion <= 1 else OUTCOMES.index("outside")
+    step, done = np.array([FIRST_STEP]), 0
+    while done < n and code == 0:  # of a speed that does not change a revolution at a time
+        some = samples if speed[min(done + samples, n) - 1] == speed[done] and done + samples <= n else 1
+        at = engine.picked(numbers, every[done : done + 1])
+        ran = engine(at, y[done : done + 1] / scale[done], some, some, method, step=step, begin=begin[done : done + 1])
+        y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(codes_of(ran.mark)[0])
+        k, step = done // samples, ran.step if ran.step[0] else step
+        peaks[k], done = np.nanmax([peaks[k], ran.peak[0], excursion if done == 0 else -np.inf]), done + some
+    if code != 0:
+        y[0] = y[0] if done else np.nan
+    whole = np.flatnonzero(np.all(np.isfinite(y[1:]), axis=1))
+    apart = np.zeros(n)
+    for some in np.split(whole, range(CHUNK, whole.size, CHUNK)) if whole.size else ():
+        at, starts = engine.picked(numbers, some), y[some] / scale[some]
+        again = engine(at, starts, 1, 1, method.reference, threads=cores(), begin=begin[some]).state
+        apart[some] = SURE * np.max(np.abs(again - y[some + 1] / scale[some]), axis=1)
+    least = getattr(method, "tolerance", 0.0)
+    errors = np.maximum(np.pad(apart, (0, -n % samples)).reshape(-1, samples).sum(axis=1), least)
+    return _Ran(y, peaks, errors, code)
+
+
+def _tried(lanes: Lanes, start: np.ndarray, samples: int, method: AbstractMethod) -> _Ran:
+    """The run by the method, or by a finer one where its error is too large, or an implicit one where that serves."""
+    again = [method.finer(k) for k in range(1, RETRIES + 1)] if math.isfinite(method.allowed) else []
+    if isinstance(method, NativeSteps) and method.pair != IMPLICIT:
+        again += [method.implicit, *(method.implicit.finer(k) for k in range(1, RETRIES + 1))]
+    served = lambda ran: ran.code not in SERVED_BADLY and not np.any(ran.errors > method.allowed)
+    first = ran = _run(lanes, start, samples, method)
+    while not served(ran) and again:
+        ran = _run(lanes, start, samples, again.pop(0))
+    return ran if served(ran) else first
+
+
+def _trajectory(ran: _Ran, speeds: np.ndarray, rise: float, samples: int, discard: int, allowed: float) -> Trajectory:
     grid = np.arange(samples) / samples
     speed = (speeds[:, None] + rise * grid).ravel()[discard * samples :]
     tau = REVOLUTION * (np.arange(speeds.size)[:, None] + grid).ravel()[discard * samples :]
     step = REVOLUTION / samples
     time = np.concatenate([[0.0], np.cumsum(step / (speed[:-1] + 0.5 * rise / samples))])
-    state = np.asarray(states).reshape(-1, states.shape[-1])[discard * samples :]
-    peak = float(np.max(np.asarray(peaks)[discard:]))
-    return Trajectory(time, tau, state, speed, samples, peak, OUTCOMES[int(code)], float(np.max(errors)))
+    state, code = ran.states[:-1].copy(), ran.code
+    if np.any(bad := ran.errors > allowed):
+        state[int(np.argmax(bad)) * samples + 1 :] = np.nan
+        code = code or INACCURATE
+    peak = float(np.nanmax(ran.peaks[discard:], initial=-np.inf))
+    peak = peak if np.isfinite(peak) else math.nan
+    return Trajectory(
+        time, tau, state[discard * samples :], speed, samples, peak, OUTCOMES[code], float(ran.errors.max())
+    )
 
 
 def simulate(
@@ -142,7 +170,7 @@ def simulate(
 
     **Arguments:** system; speed [rad/s]; revolutions recorded and discarded before; samples per revolution (they must
     divide the steps per revolution of a method with fixed steps); initial state, by default the system's first start;
-    integration method, by default `jaxcage.controlled()`.
+    integration method, by default `jaxcage.native(1e-8)`.
 
     **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on and says why in `outcome`.
 
@@ -180,9 +208,13 @@ def ramp(
     low, high = float(first), float(last)
     require_speeds(system, (low, high))
     require_counts(revolutions, samples, discard)
-    chosen = _method(method, samples)
+    chosen = native(TOLERANCE) if method is None else method
+    _require_divides(chosen, samples)
     rise = (high - low) / revolutions
-    speeds = low + rise * np.maximum(np.arange(-discard, revolutions), 0)
-    rises = np.where(np.arange(-discard, revolutions) < 0, 0.0, rise)
-    ran = _run(system, chosen, jnp.asarray(speeds), jnp.asarray(rises), _start(system, low, start), samples)
-    return _trajectory(ran, speeds, rise, samples, discard)
+    numbers = np.arange(-discard, revolutions)
+    rises = np.where(numbers < 0, 0.0, rise)
+    first_of = low + rise * np.maximum(numbers, 0)
+    speeds = (first_of[:, None] + rises[:, None] * ((np.arange(samples) + 0.5) / samples)).ravel()
+    start_at = np.array([float(c) for c in _start(system, low, start)])
+    ran = _tried(Lanes.of([system], speeds), start_at, samples, chosen)
+    return _trajectory(ran, first_of, rise, samples, discard, chosen.allowed)

@@ -12,8 +12,7 @@ from jaxtyping import Array, Int
 from .._checks import require_x64
 from .._types import Scalar, State
 from ..models import AbstractField, AbstractForcedSystem, require_speeds
-from ._controlled import controlled
-from ._method import REVOLUTION, AbstractMethod, Stretch, result_at
+from ._method import DEFAULT_SOLVER, DEFAULT_STEPS, REVOLUTION, AbstractMethod, Stretch, make_fixed, result_at
 from ._results import RESULTS
 
 
@@ -42,10 +41,11 @@ class StrobeMap(eqx.Module):
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
     """The strobe map of `system` at `speed` [rad/s].
 
-    **Arguments:** system; speed; integration method, by default `jaxcage.controlled()`.
+    **Arguments:** system; speed; integration method, by default the classical
+    Runge-Kutta method with 1024 steps, shortened where the law changes abruptly.
     """
     require_x64()
     require_speeds(system, speed)
-    chosen = controlled() if method is None else method
+    chosen = make_fixed(DEFAULT_SOLVER, DEFAULT_STEPS) if method is None else method
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)

@@ -27,9 +27,8 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..integrate import AbstractMethod
+from ..integrate import AbstractMethod, cores
 from ..models import AbstractForcedSystem, require_speeds
-from ..sweeps import cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import expansion, numbers_around, numbers_of

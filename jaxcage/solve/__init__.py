@@ -8,6 +8,7 @@
 | `loop`       | the integration loop: step control, strobe states, growth of tangents            |
 | `machine`    | tracing a system for that loop, and calling it                                   |
 | `bearing`    | the whole bearing for that loop: a loop over its rollers                         |
+| `rosenbrock` | a step of an implicit method, for stiff laws                                     |
 | `call`       | machine code that JAX's programs call                                            |
 | `steps`      | equal steps inside JAX's programs: lanes, tangents, derivatives of any order     |
 """
@@ -20,14 +21,23 @@ from .bearing import (
 )
 from .ir import UnknownOperation as UnknownOperation, say_once as say_once
 from .loop import (
+    DIVERGED as DIVERGED,
     FINISHED as FINISHED,
     NOT_FINITE as NOT_FINITE,
     OUTSIDE as OUTSIDE,
     PAIRS as PAIRS,
+    STUCK as STUCK,
     TOO_MANY as TOO_MANY,
 )
 from .machine import FIRST_STEP as FIRST_STEP, Engine as Engine, March as March
 from .program import Numbers as Numbers
+from .rosenbrock import (
+    RODAS3 as RODAS3,
+    RODAS4 as RODAS4,
+    RosenbrockTableau as RosenbrockTableau,
+    combine as combine,
+    rosenbrock_step as rosenbrock_step,
+)
 from .steps import (
     lanewise as lanewise,
     march as march,

@@ -19,13 +19,14 @@ from .ir import Value, Writer, is_variable, number
 
 
 REVOLUTION = 2 * math.pi
-PAIRS: dict[str, tuple[type[dfx.AbstractERK], int]] = {
+PAIRS: dict[str, tuple[type[dfx.AbstractERK] | None, int]] = {
     "tsit5": (dfx.Tsit5, 5),
     "dopri5": (dfx.Dopri5, 5),
     "bosh3": (dfx.Bosh3, 3),
     "dopri8": (dfx.Dopri8, 8),
+    "rodas4": (None, 4),
 }
-"""Embedded explicit pairs by name, with their order."""
+"""Embedded explicit pairs by name, with their order; and an implicit method."""
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.9, 0.2, 6.0
 """Step sizes change by the safety factor times what the error asks for, within these factors."""
 WRITTEN_OUT = 48
@@ -34,9 +35,10 @@ TANGENT_TOLERANCE = 10.0
 """Tolerance of tangent vectors relative to their length, as a multiple of that of the state."""
 NEAREST = 1e-4
 """Time to an abrupt change of the law [rad] below which steps are not shortened any further."""
-FINISHED, OUTSIDE, NOT_FINITE, STUCK, TOO_MANY = 1.0, 2.0, 3.0, 4.0, 5.0
+FINISHED, OUTSIDE, NOT_FINITE, STUCK, TOO_MANY, DIVERGED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 """Marks of lanes that leave: all revolutions done; far outside what the model holds for; step size below the smallest
-one because the state is not finite, or because the error cannot be met; too many steps in a revolution."""
+one because the state is not finite, or because the error cannot be met; too many steps in a revolution; an iteration
+that did not converge, which this loop has none of."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,9 +74,16 @@ class Tableau(NamedTuple):
     error: list[float]
     order: int
 
+    @property
+    def implicit(self) -> bool:
+        """Whether a step is one program of its own (`Field.step`)."""
+        return not self.error
+
     @classmethod
     def named(cls, name: str) -> "Tableau":
         solver, order = PAIRS[name]
+        if solver is None:
+            return cls([0.0, 1.0], [], [], order)
         t: Any = solver.tableau
         floats = lambda row: [float(x) for x in row]
         phase, stages, error = [0.0, *floats(t.c)], [[], *map(floats, t.a_lower)], floats(t.b_error)
@@ -101,10 +110,15 @@ class Field(NamedTuple):
     tangents: int
     wide: tuple[bool, ...]
     """Which of the fixed numbers differ from lane to lane."""
+    step: Any | None = None
+    """phase, length of the step, state and tangents, fixed numbers -> the same at its end, and their estimated errors;
+    for an implicit method."""
     beside: int = 0
     """Numbers that are integrated beside the state, behind the tangents: their errors do not control the steps."""
     watched: int = 1
     """Numbers whose largest values are kept; where there are more than the excursion, from one strobe to the next."""
+    phased: bool = False
+    """Whether a lane's phase at a strobe follows from their number, and from the second fixed number."""
     own_turn: bool = False
     """Whether the first fixed number is how far a lane goes from strobe to strobe, instead of a revolution."""
     relative: bool = True
@@ -249,7 +263,8 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     rows = layout_of(field, len(tableau.phase))
     made = [_prelude(field, rows, width)] if field.prelude else []
     rates = field.rates.code(field, rows, width) if hasattr(field.rates, "code") else _rates(field, rows, width)
-    parts = [*made, rates, _refill(rows, width), _loop(field, rows, tableau, width)]
+    implicit = [_implicit(field, rows, width)] if tableau.implicit else []
+    parts = [*made, rates, *implicit, _refill(rows, width), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
 
@@ -303,6 +318,27 @@ def _rates(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
     head = (
         f"define internal void @rates({w.type('double', True)} %phase, ptr noalias %place, ptr noalias %memory, "
         "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
+    )
+    return head + w.taken() + "\n  ret void\n}\n", w.declarations
+
+
+def _implicit(field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+    """A step of an implicit method from the state in memory: where it leads to `stage`, its errors to `again`."""
+    w = Code(width)
+    assert field.step is not None
+    moved = w.all(rows["state"])
+    arguments = [Value("%phase", "double", True), Value("%step", "double", True), *moved]
+    results, _ = w.program(
+        field.step, [*arguments, *fixed_numbers(w, field, rows, field.step, len(arguments))], "entry"
+    )
+    for j, v in enumerate(results[: field.moving]):
+        w.put(rows["stage"][0] + j, v)
+    for j, v in enumerate(results[field.moving :]):
+        w.put(rows["again"][0] + j, v)
+    vector = w.type("double", True)
+    head = (
+        f"define internal void @implicit({vector} %phase, {vector} %step, ptr noalias %memory, ptr noalias %shared) "
+        "noinline {\nentry:\n"
     )
     return head + w.taken() + "\n  ret void\n}\n", w.declarations
 
@@ -407,10 +443,21 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     row = {name: rows[name][0] for name in rows.rows if len(rows[name]) > 0}
     at_stage = lambda i: row["rate"] + i * span
     vector = w.type("double", True)
-    rates = lambda phase, place, out: w.line(
-        f"call void @rates({w.typed(w.widened(phase))}, ptr {w.at(place).text}, ptr %memory, ptr %shared, "
-        f"ptr {w.at(out).text})"
-    )
+
+    def since_zero(phase: Value) -> Value:
+        """The phase of the law; that of the loop begins anew at each strobe."""
+        if not field.phased:
+            return phase
+        turn, k = w.get(row["fixed"]), w.add(w.get(row["fixed"] + 1), w.get(row["revolution"]))
+        half = w.mul(w.add(k, number(0.5)), w.mul(turn, number(1 / REVOLUTION)))
+        begun = w.sub(w.mul(turn, k), w.mul(w.call("floor", half), number(REVOLUTION)))
+        return w.add(begun, phase)
+
+    def rates(phase: Value, place: int, out: int) -> None:
+        phase = w.widened(since_zero(phase))
+        at = w.at(place).text, w.at(out).text
+        w.line(f"call void @rates({w.typed(phase)}, ptr {at[0]}, ptr %memory, ptr %shared, ptr {at[1]})")
+
     w.line(f"%memory = alloca {vector}, i64 {rows.total}, align {max(64, width * 8)}")
     size = rows.total * width * 8
     w.line(f"call void @llvm.memset.p0.i64(ptr align 8 %memory, i8 0, i64 {size}, i1 false)")
@@ -450,14 +497,20 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     limited = h
     if field.abrupt is not None:
         near = w.all([*range(row["state"], row["state"] + n), *range(row["rate"], row["rate"] + n)])
-        (distance, speed), w.block = w.program(field.abrupt, arguments(field.abrupt, [phase, *near]), w.block)
+        (distance, speed), w.block = w.program(
+            field.abrupt, arguments(field.abrupt, [since_zero(phase), *near]), w.block
+        )
         time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
         limited = w.smaller(w.widened(time), h)
     left = w.sub(turn, phase)
     ends = w.compare("ge", w.mul(limited, number(1.0001)), left)
     halves = w.compare("gt", w.mul(limited, number(2.0)), left)
     step = w.select(ends, left, w.select(halves, w.mul(left, number(0.5)), limited))
-    for i in range(1, stages):
+    if tableau.implicit:
+        at = w.typed(w.widened(since_zero(phase))), w.typed(w.widened(step))
+        w.line(f"call void @implicit({at[0]}, {at[1]}, ptr %memory, ptr %shared)")
+        rates(w.add(phase, step), row["stage"], at_stage(1))
+    for i in () if tableau.implicit else range(1, stages):
         scaled = [(w.mul(step, number(a)), j) for j, a in enumerate(tableau.stages[i]) if a != 0.0]
 
         def argument(at: Any, _: Any, scaled: Any = scaled) -> None:
@@ -467,7 +520,12 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
         w.over(moving, (), argument)
         rates(w.add(phase, w.mul(step, number(tableau.phase[i]))), row["stage"], at_stage(i))
     terms = [(w.mul(step, number(e)), j) for j, e in enumerate(tableau.error) if e != 0.0]
-    estimate = lambda at, first: w.add(*(w.mul(e, w.get(at(first + at_stage(j)))) for e, j in terms))
+
+    def estimate(at: Any, first: int) -> Value:
+        """Error of a number by its place among those that are integrated."""
+        if tableau.implicit:
+            return w.get(at(first + row["again"]))
+        return w.add(*(w.mul(e, w.get(at(first + at_stage(j)))) for e, j in terms))
 
     def worst(at: Any, error: list[Value]) -> list[Value]:
         sizes = (w.call("fabs", w.get(at(row[x]))) for x in ("state", "stage"))
@@ -550,16 +608,17 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     if field.excursion is None:
         for k, x in enumerate(watched):
             w.put(row["peak"] + k, w.select(over, x, w.get(row["peak"] + k)))
+    place = w.add(w.mul(lane, total), revolution)
+    revolution = w.select(over, w.add(revolution, one), revolution)
+    w.put(row["revolution"], revolution)
     if field.tangents:
-        _orthonormalise(w, field, rows, over, w.add(w.mul(lane, total), revolution))
+        _orthonormalise(w, field, rows, over, place)
         rates(w.get(row["phase"]), row["state"], row["again"])
 
         def renew(at: Any, _: Any) -> None:
             w.put(at(at_stage(0)), w.select(over, w.get(at(row["again"])), w.get(at(at_stage(0)))))
 
         w.over(moving, (), renew)
-    revolution = w.select(over, w.add(revolution, one), revolution)
-    w.put(row["revolution"], revolution)
     finished = w.both(over, w.compare("ge", revolution, total), w.compare("eq", mark, zero))
     w.put(row["mark"], w.select(finished, number(FINISHED), mark))
     w.line("br label %check")

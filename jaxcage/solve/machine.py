@@ -21,6 +21,7 @@ from .ir import UnknownOperation, is_variable
 from .loop import REVOLUTION, Field, Layout, Tableau, layout_of, march_ir
 from .object_code import function
 from .program import Program, Sizes, program_of
+from .rosenbrock import RODAS4, rosenbrock_step
 
 
 FEWEST_STEPS, MOST_STEPS = 4, 20_000.0
@@ -42,9 +43,11 @@ class _Rates:
     form: Form
     dimension: int
     tangents: int
+    skip: int
+    """Fixed numbers that are not the law's."""
 
     def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        field, _, scale = self.form.filled(fixed)
+        field, _, scale = self.form.filled(fixed[self.skip :])
         n = self.dimension
         go = lambda y: tuple(jnp.asarray(c, float) for c in ScaledField(field, scale)(phase, y))
         if not self.tangents:
@@ -54,13 +57,39 @@ class _Rates:
 
 
 @dataclasses.dataclass(frozen=True)
+class _Step:
+    """A step of the Rosenbrock method and its estimated error, in units of the scale: moved are its length, the state
+    and tangent vectors."""
+
+    form: Form
+    dimension: int
+    tangents: int
+    skip: int
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        field, _, scale = self.form.filled(fixed[self.skip :])
+        n, (h, *rest) = self.dimension, moved
+
+        def go(y: Any) -> Any:
+            y1, error, *_ = rosenbrock_step(RODAS4, ScaledField(field, scale), phase, lambda _: h, y)
+            return tuple(jnp.asarray(c, float) for c in (*y1, *error))
+
+        y = tuple(rest[:n])
+        values = go(y)
+        pushed = [jax.jvp(go, (y,), (tuple(rest[i : i + n]),))[1] for i in range(n, len(rest), n)]
+        ends = (*values[:n], *(c for each in pushed for c in each[:n]))
+        return (*ends, *values[n:], *(c for each in pushed for c in each[n:])), ()
+
+
+@dataclasses.dataclass(frozen=True)
 class _Excursion:
     """How far a state, in units of the scale, is towards the edge of what the model holds for."""
 
     form: Form
+    skip: int
 
     def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        _, system, scale = self.form.filled(fixed)
+        _, system, scale = self.form.filled(fixed[self.skip :])
         return (system.excursion(multiply(moved, scale)),), ()
 
 
@@ -69,9 +98,10 @@ class _Abrupt:
     """Distance of a state from an abrupt change of the law, and the speed with which it comes there."""
 
     form: Form
+    skip: int
 
     def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
-        _, system, scale = self.form.filled(fixed)
+        _, system, scale = self.form.filled(fixed[self.skip :])
         n = len(moved) // 2
         return system.abrupt(multiply(moved[:n], scale), multiply(moved[n:], scale)), ()
 
@@ -145,14 +175,31 @@ class Numbers:
         return np.array(wide).reshape(len(wide), count), np.array(shared, dtype=float)
 
 
-def traced_field(system: AbstractForcedSystem, form: Form, wide: tuple[bool, ...], tangents: int) -> Field:
-    """The programs of a system."""
-    n = system.dimension
+SAMPLED = 2
+"""Fixed numbers of a field with several strobe states to a revolution: the angle between two, and which is the first.
+"""
+
+
+def traced_field(
+    system: AbstractForcedSystem,
+    form: Form,
+    wide: tuple[bool, ...],
+    tangents: int,
+    sampled: bool = False,
+    implicit: bool = False,
+) -> Field:
+    """The programs of a system, with a strobe state for each revolution or, if it is `sampled`, several."""
+    n, skip = system.dimension, SAMPLED * sampled
+    wide = (True,) * skip + wide
     trace = lambda step, moving: program_of(step, Sizes(moving, 0, len(wide)))
-    prelude, rates = _hoisted(trace(_Rates(form, n, tangents), n * (1 + tangents)), n * (1 + tangents))
+    prelude, rates = _hoisted(trace(_Rates(form, n, tangents, skip), n * (1 + tangents)), n * (1 + tangents))
     ones = tuple(jnp.ones(()) for _ in range(n))
-    abrupt = None if system.abrupt(ones, ones) is None else trace(_Abrupt(form), 2 * n)
-    return Field(prelude, rates, trace(_Excursion(form), n), abrupt, n, tangents, wide)
+    abrupt = None if system.abrupt(ones, ones) is None else trace(_Abrupt(form, skip), 2 * n)
+    step = trace(_Step(form, n, tangents, skip), 1 + n * (1 + tangents)) if implicit else None
+    return Field(
+        prelude, rates, trace(_Excursion(form, skip), n), abrupt, n, tangents, wide, step=step, own_turn=sampled,
+        phased=sampled,
+    )  # fmt: skip
 
 
 class March(NamedTuple):
@@ -240,25 +287,50 @@ class Runner:
 class Engine:
     """The compiled revolutions of a system, with so many tangent vectors."""
 
-    def __init__(self, system: AbstractForcedSystem, tangents: int = 0, several: bool = False, pair: str = "tsit5"):
-        """**Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers."""
-        self.numbers = Numbers(system, several)
-        self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents)
+    def __init__(
+        self,
+        system: AbstractForcedSystem,
+        tangents: int = 0,
+        several: bool = False,
+        pair: str = "tsit5",
+        samples: int = 1,
+    ):
+        """`samples` is the number of strobe states of a revolution.
+
+        **Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers.
+        """
+        self.numbers, self._samples = Numbers(system, several), samples
+        implicit = Tableau.named(pair).implicit
+        self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents, samples > 1, implicit)
         self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
         self._run = Runner(self.field, pair)
+
+    @staticmethod
+    def picked(numbers: Any, lanes: Any) -> Any:
+        """The numbers of some lanes."""
+        return numbers[0][:, lanes], numbers[1]
 
     def __call__(
         self,
         numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
         state: Float[np.ndarray, "lanes dim"],
-        revolutions: int,
+        strobes: int,
         keep: int,
-        tolerance: float,
+        method: Any,
+        begin: Any = 0,
         **more: Any,
     ) -> March:
-        """Run lanes from states in units of their scales; the rest as for `Runner`."""
-        settings = np.array([tolerance, self._largest, SMALLEST_STEP, MOST_STEPS])
-        return self._run(numbers, state, revolutions, keep, settings, **more)
+        """Run lanes from states in units of their scales.
+
+        **Arguments:** numbers of the lanes; states; strobe states to run to, and to keep; a method with a tolerance;
+        which sample of a revolution the first state is, of all lanes or of each; the rest as for `Runner`.
+        """
+        settings = np.array([method.tolerance, self._largest, SMALLEST_STEP, MOST_STEPS])
+        if self._samples > 1:
+            own = np.empty((SAMPLED, len(state)))
+            own[0], own[1] = REVOLUTION / self._samples, begin
+            numbers = np.concatenate([own, numbers[0]]), numbers[1]
+        return self._run(numbers, state, strobes, keep, settings, **more)
 
 
 def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:

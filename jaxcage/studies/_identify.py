@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
-from ..integrate import AbstractMethod
+from ..integrate import AbstractMethod, native
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
 from ..sweeps import Progress, motions
@@ -167,7 +167,7 @@ def misses(
     rpm = np.unique([m.cage_rpm for m in measured])
     found = run_draws(models, rpm * np.pi / 30, method, progress)
     needed = any(m.quantity in ("orbit size", "whirl frequency") for m in measured)
-    moved = motions(models, found, error=ERROR) if needed else []
+    moved = motions(models, found, method=native(error=ERROR)) if needed else []
     columns = []
     for m in measured:
         i = int(np.argmin(np.abs(rpm - m.cage_rpm)))

@@ -17,10 +17,10 @@ from .._glossary import component_names, quantity
 from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
-from ..integrate import OUTCOMES, AbstractMethod
+from ..integrate import OUTCOMES, AbstractMethod, Lanes
 from ..models import AbstractForcedSystem, CageModel
 from ..orbits import pick
-from ..sweeps import Designs, Progress, make_plan, run_lanes, settings_of
+from ..sweeps import Progress, make_plan, run_lanes, settings_of
 from ._plan import Plan, Values
 from ._stored import SPEED, AbstractStudy, Results, Variable
 
@@ -157,16 +157,8 @@ class Study(AbstractStudy):
         speed = full.pop(SPEED)
         designs = eqx.filter_vmap(lambda own: with_values(self.system, own), axis_size=self.plan.lanes)(full)
         begin, scale = _start_and_scale(designs, speed, jnp.asarray(_filled(start, self.plan.lanes)))
-        run = min(max(FEW if count <= FEW else SOME, count), self.plan.lanes)
-        lanes = np.minimum(np.arange(run), count - 1)
-        seen = run_lanes(
-            Designs(designs, self.plan.lanes),
-            self.method,
-            self._watch,
-            np.asarray(speed)[lanes],
-            np.asarray(begin)[lanes],
-            which=lanes,
-        )
+        chosen = Lanes(designs, max(self.plan.lanes, 2), np.arange(count), np.asarray(speed)[:count])
+        seen = run_lanes(chosen, self.method, self._watch, np.asarray(begin)[:count])
         return self._labelled(
             Observation(*(np.moveaxis(np.asarray(x), -1, 0)[:count] for x in seen)), np.asarray(scale)[:count]
         )

@@ -2,7 +2,7 @@
 
 | module     | responsibility                                     |
 |------------|----------------------------------------------------|
-| `_engine`  | lanes in chunks, on all cores                      |
+| `_lanes`   | lanes of a sweep: settled, observed, their error   |
 | `_speed`   | sweeps over speed from several starts              |
 | `_bearing` | sweeps of the whole bearing over shaft speed         |
 | `_bearing_ramp` | the whole bearing run up and down again     |
@@ -26,10 +26,9 @@ from ._bearing_ramp import (
     bearing_up_down as bearing_up_down,
 )
 from ._carried import run_up_down as run_up_down
-from ._engine import Designs as Designs, Progress as Progress, cores as cores, run_lanes as run_lanes
+from ._lanes import Progress as Progress, run_lanes as run_lanes
 from ._monodromy import monodromy as monodromy
 from ._motion import Motion as Motion, motions as motions
-from ._native import engine_of as engine_of
 from ._ramps import (
     Ramped as Ramped,
     RampUpDown as RampUpDown,

@@ -13,18 +13,27 @@ from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import BearingRecord, BearingSweep, summed_up
-from ..integrate import OUTCOMES, SAMPLES, SPACING, STALLED, comparable, limits_of, slowness
+from ..integrate import (
+    OUTCOMES,
+    SAMPLES,
+    SPACING,
+    STALLED,
+    alike,
+    codes_of,
+    comparable,
+    cores,
+    limits_of,
+    slowness,
+)
 from ..models import BearingModel, BearingState, rolling_start
 from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
-from ..solve import FINISHED, INTEGRATED, NOT_FINITE, OUTSIDE, TOO_MANY, WATCHED, Bearings, March
-from ._engine import Progress, alike, cores
+from ..solve import INTEGRATED, WATCHED, Bearings, March
+from ._lanes import Progress
 from ._speed import checked_speeds, require_lengths, versions
 
 
 CHUNK = 512
 """Lanes that are run at a time: their states at every sample of a block are kept until it is over."""
-ENDS = {OUTSIDE: "outside", NOT_FINITE: "not_finite", TOO_MANY: "max_steps_reached"}
-"""Outcomes of lanes that do not come to their end; of other marks `dt_min_reached`."""
 PER_HOUR = 1e9 * 3600
 """mm^3 an hour in 1 m^3 a second."""
 LEAD = 10
@@ -288,9 +297,7 @@ class _Course:
         self.state[some], self.step[some] = ran.state, ran.step
         if self.tangents is not None:
             self.tangents[some] = ran.tangents[:, 0]
-        lost = ran.mark != FINISHED
-        codes = [OUTCOMES.index(ENDS.get(mark, "dt_min_reached")) for mark in ran.mark[lost]]
-        self.outcome[some[lost]] = codes
+        self.outcome[some] = codes_of(ran.mark)
         return ran
 
     def apart(self) -> Float[np.ndarray, " lanes"]:

@@ -8,9 +8,9 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._types import State
 from ..analysis import Sweep
-from ..integrate import AbstractMethod, native
+from ..integrate import AbstractMethod, Lanes, native
 from ..models import AbstractForcedSystem
-from ._engine import Progress, run_lanes
+from ._lanes import Progress, run_lanes
 from ._speed import assemble, checked_speeds, initial_states, make_plan, settings_of
 
 
@@ -58,7 +58,7 @@ def run_up_down(
     for n in range(speed.size):  # one lane goes up, one comes down
         place = np.array([n, speed.size - 1 - n])
         state = fresh[place] if state is None else np.where(np.isfinite(state), state, fresh[place])
-        seen.append(run_lanes(system, chosen, plan, speed[place], state))
+        seen.append(run_lanes(Lanes.of([system], speed[place]), chosen, plan, state))
         state = np.asarray(seen[-1].last).T
         if progress is not None:
             progress(n + 1, speed.size)

@@ -1,27 +1,15 @@
-"""Monodromy matrices of many lanes at once: the strobe map and its derivative, by the kernels of the sweeps."""
+"""Monodromy matrices of many lanes at once: the strobe map and its derivative, by the engine of the sweeps."""
 
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
 from .._errors import ArgumentError
-from .._form import compiled
-from ..integrate import AbstractMethod, controlled, revolution
+from ..integrate import AbstractMethod, Lanes, cores, native
 from ..models import AbstractForcedSystem
-from ._engine import Designs, Part, over_lanes, run_parts
-
-
-@compiled
-def _monodromy_chunk(designs: Designs, method: AbstractMethod, part: Part) -> tuple[Array, ...]:
-    def one(lane: Part) -> tuple[Array, ...]:
-        basis = tuple(tuple(jnp.asarray(float(i == j)) for j in range(len(lane.y))) for i in range(len(lane.y)))
-        moved = revolution(designs.strobe(method, lane), lane.y, basis, jnp.zeros((), jnp.int32))
-        return jnp.stack(moved.y), jnp.stack([jnp.stack(t) for t in moved.tangents], axis=1), moved.outcome
-
-    return over_lanes(one, part)
+from ..solve import FINISHED
 
 
 def monodromy(
@@ -35,7 +23,7 @@ def monodromy(
     """One revolution from each state, and the derivative of where it ends with respect to where it began.
 
     **Arguments:** system, or several of one structure; speed of each lane [rad/s]; its state at phase 0, in SI units;
-    with several systems, the place of each lane's; integration method, by default `jaxcage.controlled()`.
+    with several systems, the place of each lane's; integration method, by default `jaxcage.native()`.
 
     **Returns:** states after the revolution and the matrices, in SI units; NaN where the revolution failed.
 
@@ -51,7 +39,17 @@ def monodromy(
             f"shape {state.shape}.",
         )
     place = np.zeros(speed.size, int) if which is None else np.asarray(which, int)
-    designs, chosen = Designs.of(systems), controlled() if method is None else method
-    image, matrix, outcome = run_parts(lambda part: _monodromy_chunk(designs, chosen, part), speed, place, state)
-    ok = (outcome == 0)[:, None]
-    return np.where(ok, image, np.nan), np.where(ok[..., None], matrix, np.nan)
+    lanes, chosen, dim = Lanes.of(systems, speed, place), native() if method is None else method, state.shape[1]
+    alive = np.flatnonzero(np.all(np.isfinite(state), axis=1))
+    image, matrix = np.full_like(state, np.nan), np.full((*state.shape, dim), np.nan)
+    if alive.size:
+        scale, _ = lanes.begin(alive, state[alive])
+        engine, each = lanes.engine(1, chosen), np.repeat(alive, dim)  # a lane for each column
+        numbers = engine.numbers(speed[each], lanes.rows(each))
+        begun, along = np.repeat(state[alive] / scale, dim, axis=0), np.tile(np.eye(dim), (alive.size, 1))
+        ran = engine(numbers, begun, 1, 1, chosen, tangents=along[:, None], threads=cores())
+        columns = (np.exp(ran.growth[:, 0]) * ran.tangents[:, 0]).reshape(-1, dim, dim)
+        ok = np.all((ran.mark == FINISHED).reshape(-1, dim), axis=1)
+        image[alive[ok]] = (ran.state.reshape(-1, dim, dim)[:, 0] * scale)[ok]
+        matrix[alive[ok]] = (np.swapaxes(columns, 1, 2) * scale[:, :, None] / scale[:, None, :])[ok]
+    return image, matrix

@@ -2,19 +2,13 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float, Int
+from jaxtyping import Complex, Float
 
-from .._checks import require_x64
-from .._form import compiled
 from ..analysis import OrderSpectrum, Sweep, dominant_orders
-from ..integrate import AbstractMethod, controlled
-from ..models import AbstractForcedSystem, CageModel
-from ._engine import Designs, Part, over_lanes, run_parts
+from ..integrate import AbstractMethod, Lanes, histories, native
+from ..models import CageModel
 
 
 SAMPLES = 32
@@ -22,45 +16,6 @@ SAMPLES = 32
 small, that of one at the fourth order up to 8 %."""
 REVOLUTIONS = 32
 """Revolutions read: orders are told apart by 1/32, and interpolated between."""
-
-
-@compiled
-def _samples_chunk(designs: Designs, method: AbstractMethod, revolutions: Any, part: Part) -> tuple[Array, Array]:
-    def one(lane: Part) -> tuple[Array, Array]:
-        strobe = designs.strobe(method, lane)
-
-        def step(carry: tuple, i: Array) -> tuple[tuple, Array]:
-            y, error = carry
-            moved = strobe.part(y, i % SAMPLES, SAMPLES)
-            return (moved.y, error + moved.error), jnp.stack(y)
-
-        start = (lane.y, jnp.zeros(()))
-        (_, error), seen = jax.lax.scan(step, start, jnp.arange(revolutions.shape[0] * SAMPLES))
-        return seen, error / revolutions.shape[0]
-
-    return over_lanes(one, part)
-
-
-def samples(
-    systems: Sequence[AbstractForcedSystem],
-    speeds: Float[np.ndarray, " lanes"],
-    states: Float[np.ndarray, "lanes dim"],
-    which: Int[np.ndarray, " lanes"],
-    revolutions: int = REVOLUTIONS,
-    error: float | None = None,
-) -> Float[np.ndarray, "lanes samples dim"]:
-    """States at 32 phases of each of some revolutions from given states, in every lane.
-
-    **Arguments:** systems of one structure; speed [rad/s], state at phase 0 [SI] and system of each lane; revolutions;
-    error of a revolution, by default that of `jaxcage.controlled`.
-
-    **Returns:** states [SI]; NaN where a lane is not known to the error.
-    """
-    require_x64()
-    method = controlled() if error is None else controlled(error)
-    begin = lambda part: _samples_chunk(Designs.of(systems), method, jnp.zeros(revolutions), part)
-    seen, off = run_parts(begin, speeds, which, states)
-    return np.where((off <= float(method.tolerance))[:, None, None], seen, np.nan)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,13 +41,14 @@ def motions(
     found: Sequence[Sweep],
     *,
     revolutions: int = REVOLUTIONS,
-    error: float | None = None,
+    method: AbstractMethod | None = None,
 ) -> list[Motion]:
     """The motion after each of some sweeps, over revolutions that begin where it ended.
 
     **Arguments:** models that differ in their numbers only, and the sweep of each over the same speeds; revolutions;
-    error of a revolution, by default that of `jaxcage.controlled`.
+    integration method, by default `jaxcage.native()`. A lane that is not known to its error is NaN.
     """
+    chosen = native() if method is None else method
     last = np.stack([swept.last for swept in found])
     count, speeds, starts, dim = last.shape
     speed = np.concatenate([np.repeat(swept.speed, starts) for swept in found])
@@ -101,7 +57,9 @@ def motions(
     state = np.empty((label.size, revolutions * SAMPLES, dim))
     for lanes, read in ((label == "periodic-1", 1), (label != "periodic-1", revolutions)):
         if np.any(lanes):  # of what repeats itself every revolution one tells all
-            seen = samples(models, speed[lanes], last.reshape(-1, dim)[lanes], which[lanes], read, error)
+            some = Lanes.of(models, speed[lanes], which[lanes])
+            seen, off = histories(some, last.reshape(-1, dim)[lanes], SAMPLES, read, chosen)
+            seen = np.where((off <= chosen.allowed)[:, None, None], seen, np.nan)
             state[lanes] = np.tile(seen, (1, revolutions // read, 1))
     q = state[..., :2] if dim == 4 else state[..., :2] - state[..., 2:4]
     across = np.ptp(q, axis=1)

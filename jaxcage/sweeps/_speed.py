@@ -19,10 +19,10 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._types import State
 from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
-from ..integrate import AbstractMethod, native, refined
+from ..integrate import AbstractMethod, Lanes, native
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
 from ._confirm import Labelled, confirm as confirm_lanes, doubtful
-from ._engine import Progress, chunk_size, run_lanes
+from ._lanes import Progress, run_lanes
 from ._lasting import follow
 
 
@@ -181,13 +181,12 @@ def sweep_designs(
     shape = y0.shape[1:3]
     each = shape[0] * shape[1]
     which = np.repeat(np.arange(len(systems)), each)
-    lane_speed = np.repeat(speed.ravel(), shape[1])
-    lane_start = y0.reshape(-1, dim)
-    how, size = settings_of(chosen), chunk_size(which.size)  # one for all that follows: else each compiles its own
+    lanes = Lanes.of(systems, np.repeat(speed.ravel(), shape[1]), which)
+    lane_start, how = y0.reshape(-1, dim), settings_of(chosen)
 
     def run(plan: Plan, lane: np.ndarray, method: AbstractMethod = chosen, y: np.ndarray | None = None) -> Observation:
         begin = lane_start[lane] if y is None else y
-        return run_lanes(systems, method, plan, lane_speed[lane], begin, progress, which[lane], y is not None, size)
+        return run_lanes(lanes.at(lane), method, plan, begin, progress, onward=y is not None)
 
     def each_system(seen: Observation) -> list[Sweep]:
         parts = [Observation(*(x[..., i * each : (i + 1) * each] for x in seen)) for i in range(len(systems))]
@@ -206,7 +205,7 @@ def sweep_designs(
         labelled = _labelled(found)
 
         def again(lanes: np.ndarray, times: int) -> Labelled:
-            _put(seen, lanes, run(plan, lanes, refined(chosen, times)))
+            _put(seen, lanes, run(plan, lanes, chosen.finer(times)))
             return _labelled(each_system(seen)).at(lanes)
 
         wanted = doubtful(labelled.label.reshape(len(systems), *shape))

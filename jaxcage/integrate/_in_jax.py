@@ -1,0 +1,123 @@
+"""The strobe map of many lanes inside JAX: what serves for every method that is not machine code."""
+
+import concurrent.futures
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from .._form import Form, compiled, split
+from ..models import AbstractForcedSystem, divide, multiply
+from ..solve import March
+from ._method import AbstractMethod, moved_by
+from ._results import MARKS, OUTCOMES
+from ._strobe import strobe_map
+
+
+UNIT, MOST = 8, 256
+"""Lanes of a call are a multiple of the first, up to the second: each size is compiled by itself."""
+
+
+@compiled
+def _strobe(
+    form: Form,
+    several: bool,
+    method: AbstractMethod,
+    own: Sequence[Array],
+    shared: Sequence[Array],
+    y: Float[Array, "lanes dim"],
+    tangents: Float[Array, "lanes tangents dim"],
+    i: Int[Array, " lanes"],
+    parts: int,
+) -> tuple[Array, Array, Array, Array]:
+    """Lanes over the i-th of so many parts of a revolution, in units of their scales."""
+
+    def lane(own: Sequence[Array], y: Array, tangents: Array, i: Array) -> tuple[Array, Array, Array, Array]:
+        speed, *numbers = own
+        system = form.filled(numbers if several else shared)
+        strobe = strobe_map(system, speed, method)
+        state = lambda row: multiply(tuple(row), strobe.scale)
+        moved = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
+        row = lambda z: jnp.stack(divide(z, strobe.scale))
+        after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
+        return row(moved.y), after, moved.peak, moved.outcome
+
+    return jax.vmap(lane)(list(own), y, tangents, i)
+
+
+class EngineInJax:
+    """The revolutions of a system inside JAX, with so many tangent vectors; called as the engine in machine code is."""
+
+    def __init__(self, system: AbstractForcedSystem, tangents: int, several: bool, samples: int = 1):
+        """`samples` is the number of strobe states of a revolution."""
+        self._form, _ = split(system, eqx.is_inexact_array)
+        self._several, self._tangents, self._samples = several, tangents, samples
+
+    def numbers(self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]) -> Any:
+        """What lanes have of their own, and what all share."""
+        own = [np.asarray(speeds), *(map(np.asarray, rows) if self._several else ())]
+        return own, [] if self._several else [jnp.asarray(x) for x in rows]
+
+    @staticmethod
+    def picked(numbers: Any, lanes: Int[np.ndarray, " some"]) -> Any:
+        """The numbers of some lanes."""
+        return [x[lanes] for x in numbers[0]], numbers[1]
+
+    def __call__(
+        self,
+        numbers: Any,
+        state: Float[np.ndarray, "lanes dim"],
+        strobes: int,
+        keep: int,
+        method: AbstractMethod,
+        tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
+        step: Any = None,
+        threads: int = 1,
+        report: Callable[[int], None] = lambda done: None,
+        begin: Any = 0,
+    ) -> March:
+        """Run lanes from states in units of their scales, beginning with the `begin`-th sample of a revolution, the
+        same for all of them or each its own."""
+        own, shared = numbers
+        lanes, dim = state.shape
+        chosen, y, m = method.in_jax, state.copy(), self._tangents
+        t = np.zeros((lanes, 0, dim)) if tangents is None else tangents.copy()
+        strobe, growth = np.full((lanes, keep, dim), np.nan), np.full((lanes, strobes, m), np.nan)
+        peak, mark = np.zeros(lanes), np.zeros(lanes)
+        size = min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
+
+        first = np.broadcast_to(np.asarray(begin, dtype=int), lanes)
+
+        def chunk(some: Int[np.ndarray, " some"], k: int) -> list[np.ndarray]:
+            filled = np.concatenate([some, np.repeat(some[-1:], size - some.size)])
+            given = [jnp.asarray(x[filled]) for x in own], shared, jnp.asarray(y[filled]), jnp.asarray(t[filled])
+            i = jnp.asarray((first[filled] + k) % self._samples)
+            out = _strobe(self._form, self._several, chosen, *given, i, self._samples)
+            return [np.asarray(x)[: some.size] for x in out]
+
+        with concurrent.futures.ThreadPoolExecutor(threads) as pool:
+            for k in range(strobes):
+                alive = np.flatnonzero(mark == 0)
+                if not alive.size:
+                    break
+                parts = np.split(alive, range(size, alive.size, size))
+                found = list(pool.map(lambda some, k=k: chunk(some, k), parts))
+                y1, t1, peaks, codes = (np.concatenate(x) for x in zip(*found, strict=True))
+                lost = codes != 0
+                mark[alive[lost]] = [MARKS[OUTCOMES[code]] for code in codes[lost]]
+                peak[alive] = np.maximum(peak[alive], peaks)
+                alive, y1, t1 = alive[~lost], y1[~lost], t1[~lost]
+                y[alive], strobe[alive, k % keep] = y1, y1
+                if m and alive.size:
+                    q, r = np.linalg.qr(np.swapaxes(t1, 1, 2))
+                    with np.errstate(divide="ignore"):
+                        growth[alive, k] = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)))
+                    t[alive] = np.swapaxes(q, 1, 2)
+                report(int(lanes * (k + 1) / strobes))
+        mark[mark == 0] = MARKS["successful"]
+        turned = np.roll(strobe, -(strobes % keep), axis=1) if strobes > keep else strobe
+        return March(y, t, np.zeros(lanes), peak, np.zeros(lanes), mark, turned, growth)
