@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.integrate import AbstractMethod
+from jaxcage.integrate import AbstractMethod, native
 from jaxcage.models import CageModel, fastest_speed
-from jaxcage.integrate import native, refined
 from tests import reference
 
 

@@ -29,7 +29,6 @@ from scipy.stats import qmc
 import jaxcage as jc
 from jaxcage.analysis import CHAOS_THRESHOLD
 from jaxcage.bearing import PUBLISHED_CASES, PublishedCase
-from jaxcage.integrate import controlled, finer
 from jaxcage.report import LASTING, compare_edges, wide_zones
 
 
@@ -249,7 +248,7 @@ class Search:
 
 def check(models: dict[str, jc.CageModel], ledger: Ledger, values: dict[str, float], steps: int, horizon: int) -> None:
     """Edges of lasting chaos and its wide zones with these values, at 100 rpm, from three starts."""
-    method = finer(controlled(), steps.bit_length() - 1) if steps > 1 else None
+    method = jc.native().finer(steps.bit_length() - 1) if steps > 1 else None
     errors = []
     for name, case in models.items():
         model = with_values(case, ledger.unknowns, values)

@@ -45,7 +45,8 @@ def keep_compiled_programs(folder: str | os.PathLike[str] | None = None) -> path
         warnings.warn(said, RuntimeWarning, stacklevel=2)
         return None
     jax.config.update("jax_compilation_cache_dir", str(place))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     return place
 
 

@@ -12,10 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES
-from jaxcage.solve import FINISHED, say_once
+from jaxcage.integrate import OUTCOMES, engine_of
+from jaxcage.solve import FINISHED, Engine, say_once
 from jaxcage.solve.object_code import object_code
-from jaxcage.sweeps import engine_of
 
 
 def rows_of(system: Any) -> list[Any]:
@@ -23,9 +22,10 @@ def rows_of(system: Any) -> list[Any]:
 
 
 def march(system: Any, speed: np.ndarray, y: np.ndarray, revolutions: int, tolerance: float = 1e-8, **more: Any) -> Any:
-    engine = engine_of(system, 0, False, more.pop("pair", "tsit5"))
-    assert engine is not None
-    return engine(engine.numbers(speed, rows_of(system)), y, revolutions, revolutions, tolerance, **more)
+    method = jc.native(tolerance, pair=more.pop("pair", "tsit5"))
+    engine = engine_of(system, 0, False, method)
+    assert isinstance(engine, Engine)
+    return engine(engine.numbers(speed, rows_of(system)), y, revolutions, revolutions, method, **more)
 
 
 OPERATIONS = {

@@ -12,7 +12,7 @@ import pytest
 from helpers import wide_but
 
 from jaxcage.analysis import Plan
-from jaxcage.integrate import OUTCOMES, method
+from jaxcage.integrate import OUTCOMES, Lanes, method
 from jaxcage.models import ForcedOscillator, case
 from jaxcage.sweeps import run_lanes, sweep
 
@@ -81,10 +81,10 @@ def test_absurd_speed_fails_alone(place):
     plan = Plan(discard=12, block=4, blocks=4, keep=8, exponents=1)
     speeds = RPM * np.array([9000.0, 12000.0, 15000.0, 18000.0, 20000.0, 24000.0])
     states = np.broadcast_to(OTHER, (6, 4)).copy()
-    healthy = run_lanes(MODEL, METHOD, plan, speeds, states)
+    healthy = run_lanes(Lanes.of([MODEL], speeds), METHOD, plan, states)
     absurd = speeds.copy()
     absurd[place] = 1e9 * RPM
-    mixed = run_lanes(MODEL, METHOD, plan, absurd, states)
+    mixed = run_lanes(Lanes.of([MODEL], absurd), METHOD, plan, states)
     others = [i for i in range(6) if i != place]
     for now, then in zip(mixed, healthy, strict=True):
         kept = np.ascontiguousarray(now[..., others]), np.ascontiguousarray(then[..., others])
@@ -152,6 +152,7 @@ def test_summary_counts_failures_apart():
 def test_a_lane_goes_on_from_beyond_the_clearance_circle_where_none_may_start():
     """A soft land lets a cage pass eps = 1 on its way: no start, but no failure where another run has left it."""
     outside = np.array([[1.005 * C, 0.0, 0.0, 0.0]])
-    ends = [run_lanes(MODEL, METHOD, Plan(0, 2, 1, 1, 1), SPEEDS[:1], outside, onward=on) for on in (False, True)]
+    lanes, plan = Lanes.of([MODEL], SPEEDS[:1]), Plan(0, 2, 1, 1, 1)
+    ends = [run_lanes(lanes, METHOD, plan, outside, onward=on) for on in (False, True)]
     assert [OUTCOMES[int(end.outcome[0])] for end in ends] == ["outside", "successful"]
     assert np.all(np.isfinite(ends[1].last)) and ends[1].peak[0] >= 1.005

@@ -17,10 +17,10 @@ from jaxcage.integrate import (
     Rodas3,
     Rodas4,
     method,
-    rosenbrock_step,
     strobe_map,
 )
 from jaxcage.models import FirstOrderField, ForcedOscillator, ForcedSystem, case
+from jaxcage.solve import rosenbrock_step
 
 
 def stacked(state):

@@ -66,7 +66,7 @@ from ._statics import (
     roller_angles as roller_angles,
     static_cage_displacement as static_cage_displacement,
 )
-from ._validate import is_concrete as is_concrete
+from ._validate import checked_before as checked_before, is_concrete as is_concrete
 
 
 check_layer(

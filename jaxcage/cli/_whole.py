@@ -82,7 +82,7 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     document = {
         **at.document,
         **chosen(options, "revolutions discard"),
-        **chosen(run, "outcome error estimate steps implicit_share"),
+        **chosen(run, "outcome error steps implicit_share"),
         **dataclasses.asdict(found.measures),
         "pocket_force_distribution_N": pocket_force_distribution(history),
         "around": {"angle_deg": np.degrees(places.pop("angle")), **places},

@@ -47,8 +47,10 @@ CHOICES = 16
 """In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
 """A tolerance so many times larger makes steps of fourth order about twice as long."""
-COARSER = 32.0
-"""The same for the pair of fifth order in machine code."""
+FINER = 1 / 32
+"""A tolerance so many times as large makes steps in machine code, of fifth order, about half as long."""
+SURE = 3.0
+"""The stated error of steps in machine code, as a multiple of the difference to shorter ones."""
 MOST_STEPS_OF_ALL = 200_000.0
 """From sample to sample."""
 
@@ -72,8 +74,8 @@ class BearingRun:
     outcome: str
     """`successful`, or the name of what went wrong."""
     error: float
-    """How far the state at a sample moves if it is reached from the one before it by about half as many steps, in units
-    of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples. Of slow shafts, where
+    """Three times how far the state at a sample moves if it is reached from the one before it by about twice the steps
+    (of a run inside JAX how far, by about half as many), in units of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples. Of slow shafts, where
     motions diverge from sample to sample, the same from place to place between them."""
     steps: float
     """Mean number of steps of a revolution (or of the whole stretch of time)."""
@@ -176,7 +178,7 @@ def simulate_bearing(
     where a slow shaft's thick oil makes the cage stiff (not for a quasi-static ring, which moves with all rollers).
 
     **Returns:** `BearingRun`. Steps are as short as the tolerance requires. From sample to sample the run is made a
-    second time with about half as many steps: one that moves by more than `allowed`, or whose steps cannot be short
+    second time with about twice the steps: one that is off by more than `allowed`, or whose steps cannot be short
     enough, is `inaccurate`. Rollers that rattle in their pockets make neighbouring motions diverge within a revolution
     or two: longer stretches cannot be compared. Of slow shafts (NU2310 below 4000 rpm) it is made from place to place
     between samples, two periods of a loaded roller's vibration apart. A cage that comes to rest, or leaves its land,
@@ -372,14 +374,14 @@ class _Native:
         return self._bearings.run(lanes, y, span, strobes, strobes, tolerance, self._limits, step=step, width=width)
 
     def _apart(self, ends: np.ndarray, spans: np.ndarray) -> np.ndarray:
-        """How far each span ends from the same by longer steps, in units of the scale."""
+        """Error of each span, from the same by shorter steps, in units of the scale."""
         dim = self._bearings.units.shape[1]
         begins = np.concatenate([self._begin, ends[:-1]])
         whole = np.flatnonzero(np.all(np.isfinite(ends), axis=1))
         error = np.zeros(len(spans))
         if whole.size:
-            rough = self._run(begins[whole], spans[whole], 1, COARSER * self._tolerance, self._step, width=8)
-            error[whole] = np.max(np.abs(rough.state - ends[whole])[:, :dim], axis=1)
+            sharp = self._run(begins[whole], spans[whole], 1, FINER * self._tolerance, self._step, width=8)
+            error[whole] = SURE * np.max(np.abs(sharp.state - ends[whole])[:, :dim], axis=1)
         return error
 
 

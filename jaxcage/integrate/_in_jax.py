@@ -119,5 +119,5 @@ class EngineInJax:
                     t[alive] = np.swapaxes(q, 1, 2)
                 report(int(lanes * (k + 1) / strobes))
         mark[mark == 0] = MARKS["successful"]
-        turned = np.roll(strobe, -(strobes % keep), axis=1) if strobes > keep else strobe
+        turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
         return March(y, t, np.zeros(lanes), peak, np.zeros(lanes), mark, turned, growth)

@@ -113,9 +113,10 @@ def _run(lanes: Lanes, start: np.ndarray, samples: int, method: AbstractMethod) 
         ran = engine(at, y[done : done + 1] / scale[done], some, some, method, step=step, begin=begin[done : done + 1])
         y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(codes_of(ran.mark)[0])
         k, step = done // samples, ran.step if ran.step[0] else step
-        peaks[k], done = np.nanmax([peaks[k], ran.peak[0], excursion if done == 0 else -np.inf]), done + some
-    if code != 0:
-        y[0] = y[0] if done else np.nan
+        peaks[k], done = np.nanmax([peaks[k], ran.peak[0]]), done + some
+    if done == 0:
+        y[0] = np.nan  # it may not start there
+    peaks = np.maximum(peaks, lanes.begin(every[::samples], y[:-1:samples])[1])
     whole = np.flatnonzero(np.all(np.isfinite(y[1:]), axis=1))
     apart = np.zeros(n)
     for some in np.split(whole, range(CHUNK, whole.size, CHUNK)) if whole.size else ():

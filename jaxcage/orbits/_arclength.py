@@ -192,13 +192,19 @@ def correct(
     return points._replace(error=error, over=over, moved=far)
 
 
-def settle_on(curves: Curves, at: np.ndarray, normal: np.ndarray, steps: int = 0) -> Corrected:
-    """Points of many curves on planes across them, by as many steps as each needs, which are at least `steps`."""
+def settle_on(
+    curves: Curves, at: np.ndarray, normal: np.ndarray, steps: int = 0, likely: np.ndarray | None = None
+) -> Corrected:
+    """Points of many curves on planes across them, by as many steps as each needs, which are at least `steps`.
+
+    Where the first number of steps finds nothing, more are tried only for points that are `likely`, by default all.
+    """
     first = int(curves.counts.first if curves.chooses else curves.counts.last)
     count = np.full(at.shape[0], max(steps, first))
+    likely = np.ones(len(at), dtype=bool) if likely is None else likely
     found = correct(curves, at, normal, count, measured=True)
     while curves.chooses:
-        given_up = ~found.converged & (found.steps >= GIVEN_UP)
+        given_up = ~found.converged & ((found.steps >= GIVEN_UP) | ~likely)
         again = np.flatnonzero(~(found.over <= LOOSE) & ~given_up & (found.steps < int(curves.counts.last)))
         if not again.size:
             break

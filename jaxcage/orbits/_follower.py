@@ -101,12 +101,13 @@ def make_follower(
     return Follower(problem, counts, given, lower, upper)
 
 
-def seeds(follower: Follower, starts: Sequence[Start]) -> Corrected:
-    """Orbits near (state, value of the parameter), the parameter kept, the lanes first."""
+def seeds(follower: Follower, starts: Sequence[Start], likely: np.ndarray | None = None) -> Corrected:
+    """Orbits near (state, value of the parameter), the parameter kept, the lanes first; for those that are not `likely`
+    only few steps are tried."""
     u = np.array([[*(s / np.asarray(follower.problem.scale)), p / follower.unit] for s, p in starts])
     normal = np.zeros_like(u)
     normal[:, -1] = 1.0
-    return settle_on(follower.curves(len(u)), u, normal)
+    return settle_on(follower.curves(len(u)), u, normal, likely=likely)
 
 
 def stable_steps(follower: Follower, start: Start) -> Follower:

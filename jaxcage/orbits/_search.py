@@ -287,6 +287,11 @@ class _Settled(NamedTuple):
     """Whether the simulation had come near it, before Newton's method."""
 
 
+NEARLY = 0.1
+"""A simulation that moves by less in its last revolution, in units of the scale, is on its way to an orbit: another one
+is chaotic, and Newton's method is not tried from it again and again."""
+
+
 def _met(settled: Sweep) -> list[list[int]]:
     """Speed and start of the simulations that ran to their end, though some may be still on the way to an orbit."""
     return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
@@ -299,7 +304,9 @@ def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Se
     if not met:
         return []
     follower = follower.around(met[0][1])
-    points = seeds(follower, met)
+    moved = settled.strobe[..., -1, :] - settled.strobe[..., -2, :] if settled.strobe.shape[2] > 1 else 0.0
+    near = np.max(np.abs(moved / settled.scale[:, None]), axis=-1) < NEARLY
+    points = seeds(follower, met, np.array([near[i, j] for i, j in lanes]))
     good = points.converged.copy()
     good[good] = follower.unstable(take(points, good)) == 0
     states = points.u[:, :-1] * np.asarray(follower.problem.scale)

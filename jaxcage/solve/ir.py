@@ -6,6 +6,7 @@ say, is skipped while no cage of the vector touches its land.
 """
 
 import functools
+import heapq
 import struct
 import warnings
 from collections.abc import Sequence
@@ -87,8 +88,8 @@ def branches(equations: Sequence[Any], results: Sequence[Any]) -> dict[Any, Path
                 always = e.primitive.name != "select_n" or k == 0 or any(m is e.invars[0] for m, _ in own)
                 needed = own if always else (*own, (e.invars[0], k - 1))
                 path[v] = _common(path[v], needed) if v in path else needed
-    kinds = {path[e.outvars[0]] for e in equations}
-    for p in sorted({p[:n] for p in kinds for n in range(1, len(p) + 1)}, key=len, reverse=True):
+    kinds = dict.fromkeys(path[e.outvars[0]] for e in equations)  # in their order: code must be the same every time
+    for p in sorted(dict.fromkeys(p[:n] for p in kinds for n in range(1, len(p) + 1)), key=len, reverse=True):
         inside = [e for e in equations if path[e.outvars[0]][: len(p)] == p]
         if sum(COST.get(e.primitive.name, 1) for e in inside) < WORTH_A_BRANCH:
             path.update({e.outvars[0]: p[:-1] for e in inside})
@@ -103,20 +104,30 @@ def _common(a: Path, b: Path) -> Path:
 
 def in_groups(equations: Sequence[Any], path: dict[Any, Path]) -> list[tuple[Path, list[Any]]]:
     """The equations in groups of one path each, as few as possible; what is always needed comes first."""
-    waiting, missing = list(equations), {v for e in equations for v in e.outvars}
+    made = {v: i for i, e in enumerate(equations) for v in e.outvars}
+    paths = [path[e.outvars[0]] for e in equations]
+    waits, readers = [0] * len(equations), [[] for _ in equations]
+    ready: dict[Path, list[int]] = {p: [] for p in sorted(dict.fromkeys(paths), key=len)}
+    for i, e in enumerate(equations):
+        before = {made[v] for v in (*e.invars, *(m for m, _ in paths[i])) if is_variable(v) and v in made}
+        waits[i] = len(before)
+        for j in before:
+            readers[j].append(i)
+        if not before:
+            ready[paths[i]].append(i)
     groups: list[tuple[Path, list[Any]]] = []
-    while waiting:
-        for p in sorted({path[e.outvars[0]] for e in waiting}, key=len):
-            taken, left = [], []
-            for e in waiting:
-                reads = (v for v in (*e.invars, *(m for m, _ in p)) if is_variable(v))
-                ready = path[e.outvars[0]] == p and not any(v in missing for v in reads)
-                (taken if ready else left).append(e)
-                missing.difference_update(e.outvars if ready else ())
-            if taken:
-                groups.append((p, taken))
-                waiting = left
-                break
+    while any(ready.values()):
+        p = next(p for p, rows in ready.items() if rows)
+        heapq.heapify(ready[p])
+        taken: list[int] = []
+        while ready[p]:
+            i = heapq.heappop(ready[p])
+            taken.append(i)
+            for j in readers[i]:
+                waits[j] -= 1
+                if waits[j] == 0:
+                    heapq.heappush(ready[paths[j]], j)
+        groups.append((p, [equations[i] for i in taken]))
     return groups
 
 

@@ -24,9 +24,10 @@ from .program import Program, Sizes, program_of
 from .rosenbrock import RODAS4, rosenbrock_step
 
 
-FEWEST_STEPS, MOST_STEPS = 4, 20_000.0
-"""Limits of the number of steps of a revolution; the period of the forcing's highest harmonic has two at least."""
-SMALLEST_STEP = 1e-7
+FEWEST_STEPS, MOST_STEPS, MOST_AT = 4, 20_000.0, 1e-6
+"""Limits of the number of steps of a revolution; the period of the forcing's highest harmonic has two at least. The
+second is for tolerances from the third on; smaller ones take more steps."""
+SMALLEST_STEP = 1e-10
 """Step below which a lane is given up [rad]."""
 FIRST_STEP = 0.05
 """Step that is tried first [rad]."""
@@ -268,7 +269,7 @@ class Runner:
         run = lambda: self._march(at[0], lanes, strobes, keep, *at[1:])
         _run_threads(run, min(threads, -(-lanes // self._width)), queue, lambda: report(min(int(queue[0]), lanes)))
         part = lambda name: stored[rows[name][0]]
-        turned = np.roll(strobe, -(strobes % keep), axis=1) if strobes > keep else strobe
+        turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
         with np.errstate(divide="ignore"):
             grown = 0.5 * np.log(growth)
         end = np.concatenate([stored[:n], stored[moving - field.beside : moving]])
@@ -300,7 +301,7 @@ class Engine:
         **Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers.
         """
         self.numbers, self._samples = Numbers(system, several), samples
-        implicit = Tableau.named(pair).implicit
+        implicit, self._order = Tableau.named(pair).implicit, Tableau.named(pair).order
         self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents, samples > 1, implicit)
         self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
         self._run = Runner(self.field, pair)
@@ -325,7 +326,8 @@ class Engine:
         **Arguments:** numbers of the lanes; states; strobe states to run to, and to keep; a method with a tolerance;
         which sample of a revolution the first state is, of all lanes or of each; the rest as for `Runner`.
         """
-        settings = np.array([method.tolerance, self._largest, SMALLEST_STEP, MOST_STEPS])
+        most = MOST_STEPS * max(1.0, MOST_AT / method.tolerance) ** (1 / self._order)
+        settings = np.array([method.tolerance, self._largest, SMALLEST_STEP, most])
         if self._samples > 1:
             own = np.empty((SAMPLED, len(state)))
             own[0], own[1] = REVOLUTION / self._samples, begin

@@ -40,8 +40,10 @@ LEAD = 10
 """Revolutions in which a tangent vector turns to the direction of fastest growth, before its growth counts."""
 EXPONENT = 80
 """Revolutions over which the exponent is followed, if there are as many: the others take half the time."""
-COARSER = 32.0
-"""A tolerance so many times larger makes steps of fifth order about twice as long."""
+FINER = 1 / 32
+"""A tolerance so many times as large makes steps of fifth order about half as long."""
+SURE = 3.0
+"""The stated error, as a multiple of the difference to the run by shorter steps."""
 Starts = int | Sequence[BearingState] | Sequence[CagePlace]
 """How many of the model's own, or states, or places of the cage such as `CAGE_STARTS`."""
 
@@ -75,8 +77,8 @@ def sweep_bearing(
         are, in whole blocks (two or more).
     - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
     - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution, of slow shafts a shorter
-        one, is run a second time with about half the steps; a lane in which that moves the state by more is
-        `inaccurate`. Slow is a shaft with which that stretch would be more than 50 periods of a loaded roller's
+        one, is run a second time with about twice the steps; a lane in which three times what that moves the state by is
+        more is `inaccurate`. Slow is a shaft with which that stretch would be more than 50 periods of a loaded roller's
         vibration on its raceway (NU2310 below 4000 rpm): it is 10 of them then, as neighbouring motions diverge over
         time, not over revolutions.
     - `progress`: called with lanes done and lanes in all.
@@ -301,14 +303,14 @@ class _Course:
         return ran
 
     def apart(self) -> Float[np.ndarray, " lanes"]:
-        """How far a stretch from here ends from the same by longer steps, in units of the scale; 0 of lost lanes."""
+        """Error of a stretch from here, from the same by shorter steps, in units of the scale; 0 of lost lanes."""
         some, error = self.alive, np.zeros(len(self.state))
         if some.size:
             stretch = comparable(self.slow)[some]
             once = lambda tolerance: self.bearings.run(
                 some, self.state[some], stretch, 1, 1, tolerance, self.limits, step=self.step[some]
             ).state[:, : self.numbers]
-            error[some] = np.max(np.abs(once(self.tolerance) - once(COARSER * self.tolerance)), axis=1)
+            error[some] = SURE * np.max(np.abs(once(self.tolerance) - once(FINER * self.tolerance)), axis=1)
         return error
 
 

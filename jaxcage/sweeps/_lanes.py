@@ -126,7 +126,7 @@ def _once(
     keep, m = plan.keep, plan.exponents
     plain, pushed = lanes.engine(0, method), lanes.engine(m, method)
     numbers = pushed.numbers(lanes.speed[some], lanes.rows(some))
-    state, step, peak = y0 / scale, np.full(some.size, FIRST_STEP), np.maximum(excursion, 0.0)
+    state, step, peak = y0 / scale, np.full(some.size, FIRST_STEP), np.full(some.size, np.nan)
     alive = np.flatnonzero(admitted)
 
     def follow(engine: Engine | EngineInJax, count: int, **more: Any) -> March:
@@ -158,11 +158,11 @@ def _once(
     if alive.size:
         tangents = np.broadcast_to(start_tangents(dim, m), (alive.size, m, dim))
         held = max(keep, min(CHECKED + 1, aligned))
-        who = alive
+        who, (_, begun) = alive, lanes.begin(some[alive], state[alive] * scale[alive])
         ran = follow(pushed, aligned, keep=held, tangents=tangents)
         strobe[who] = ran.strobe[:, held - keep :]
         growth[who] = ran.growth[:, plan.align :].reshape(who.size, plan.blocks, plan.block, m).mean(axis=2)
-        peak[who] = ran.peak
+        peak[who] = np.maximum(ran.peak, begun)
         doubt[:, who] = _doubt(pushed, pushed.picked(numbers, who), ran, method)
         error[who] = np.maximum(error[who], _error(plain, plain.picked(numbers, who), None, ran.strobe, method))
     lost = outcome != 0
