@@ -78,7 +78,7 @@ def by_kind(found: Sequence[Subject]) -> dict[str, list[Subject]]:
 
 def fine() -> AbstractMethod:
     """The method with finer steps with which the default method is compared."""
-    return refined(native(), TIMES)
+    return native().finer(TIMES)
 
 
 @functools.cache

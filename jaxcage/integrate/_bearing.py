@@ -40,9 +40,9 @@ SHORT = 2
 """Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
 MOST_PARTS = 1000
 """From sample to sample."""
-STIFF = 20.0
+STIFF = 1000.0
 """Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. One
-takes as long as three or four explicit ones."""
+takes as long as some eighty explicit ones in machine code (0.4 ms)."""
 CHOICES = 16
 """In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
@@ -75,8 +75,9 @@ class BearingRun:
     """`successful`, or the name of what went wrong."""
     error: float
     """Three times how far the state at a sample moves if it is reached from the one before it by about twice the steps
-    (of a run inside JAX how far, by about half as many), in units of `jaxcage.models.whole.state_scale`: the largest of all parts of the state and all samples. Of slow shafts, where
-    motions diverge from sample to sample, the same from place to place between them."""
+    (of a run inside JAX how far, by about half as many), in units of `jaxcage.models.whole.state_scale`: the largest of
+    all parts of the state and all samples. Of slow shafts, where motions diverge from sample to sample, the same from
+    place to place between them."""
     steps: float
     """Mean number of steps of a revolution (or of the whole stretch of time)."""
     implicit_share: float

@@ -77,7 +77,7 @@ def sweep_bearing(
         are, in whole blocks (two or more).
     - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
     - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution, of slow shafts a shorter
-        one, is run a second time with about twice the steps; a lane in which three times what that moves the state by is
+        one, is run a second time with about twice the steps; a lane that three times the difference says is off by
         more is `inaccurate`. Slow is a shaft with which that stretch would be more than 50 periods of a loaded roller's
         vibration on its raceway (NU2310 below 4000 rpm): it is 10 of them then, as neighbouring motions diverge over
         time, not over revolutions.
