@@ -4,6 +4,7 @@ import abc
 import concurrent.futures
 import ctypes
 import importlib.util
+import math
 import multiprocessing
 import pathlib
 import shutil
@@ -56,11 +57,15 @@ class Rival(abc.ABC):
         """End the processes."""
 
 
+NATIVE = "machine code, "
+PAIRS = ("tsit5", "dopri5", "bosh3", "dopri8", "rodas4")
+TOLERANCES = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7)
+
+
 class Jaxcage(Rival):
     """The library itself, through `jaxcage.sweep` without exponents.
 
-    The solver `controlled` is the library's own control of the steps in each revolution, its setting the error; a
-    whole number is the fixed number of Runge-Kutta steps that stands for its answer without any error.
+    A solver `machine code, NAME` is one of `jaxcage.native`, its setting the tolerance.
     """
 
     def __init__(self, name: str, solver: str, settings: tuple[Any, ...], tight: Any):
@@ -71,8 +76,8 @@ class Jaxcage(Rival):
         """The library's method; None for its default."""
         if setting is None:
             return None
-        if self.solver == "controlled":
-            return jc.controlled(setting) if isinstance(setting, float) else jc.method("rk4", steps=setting)
+        if self.solver.startswith(NATIVE):
+            return jc.native(setting, error=math.inf, pair=self.solver.removeprefix(NATIVE))
         return jc.method(self.solver, **{"steps" if isinstance(setting, int) else "tolerance": setting})
 
     def on(self, problem: Problem) -> Callable[[int, Any], np.ndarray]:
@@ -221,8 +226,8 @@ class Compiled(Rival):
 def all_rivals() -> list[Rival]:
     """For the full run."""
     return [
-        Jaxcage("default", "controlled", (None,), None),
-        Jaxcage("controlled", "controlled", (3e-2, 1e-2, 3e-3, 1e-3), 8192),
+        Jaxcage("default", NATIVE, (None,), None),
+        *[Jaxcage(f"{NATIVE}{name}", f"{NATIVE}{name}", TOLERANCES, 1e-10) for name in PAIRS],
         Jaxcage("rk4", "rk4", (256, 384, 512), 8192),
         Jaxcage("rodas4", "rodas4", (256, 320, 448), 8192),
         Jaxcage("rodas3", "rodas3", (512, 768), 16384),
@@ -242,8 +247,8 @@ def all_rivals() -> list[Rival]:
 def few_rivals() -> list[Rival]:
     """For `--quick`."""
     return [
-        Jaxcage("default", "controlled", (None,), None),
-        Jaxcage("rk4", "rk4", (384,), 8192),
+        Jaxcage("default", NATIVE, (None,), None),
+        Jaxcage(f"{NATIVE}tsit5", f"{NATIVE}tsit5", (1e-5, 1e-6), 1e-10),
         Diffrax("Tsit5", (1e-5, 5e-6, 3e-6), 1e-10, 512, 4),
         SciPy("LSODA", (1e-6,), 1e-12, 128, 4),
         Compiled("rodas4", (256, 448)),

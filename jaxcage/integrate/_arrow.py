@@ -5,7 +5,6 @@ column of blocks that join it to the bodies, and a block of the bodies: with the
 small system, and the cost grows with the number of rollers, not with its cube.
 """
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -73,7 +72,7 @@ def arrow(at: BearingAtSpeed, y: Parts, over_angle: bool) -> Arrow:
     cage's angle, counted in its sense, or else over time. Beside the state, time and then what `LEDGER` and `MEANS`
     name are integrated.
 
-    Each direction is a lane of a kernel: XLA by itself works out a contact again for every number that hangs on it.
+    Each direction is a lane of machine code: XLA by itself works out a contact again for every number that hangs on it.
     """
     n, ways = at.n_rollers, OF_ROLLER + OF_BODIES
     each = lambda x: jnp.repeat(x, ways)
@@ -114,20 +113,8 @@ def _changes(
         values, changes = jax.jvp(lambda *y: f(at, standing_here, y), take(given), along)
         return [*values, *changes]
 
-    found = _in_lanes(kernel, 2 * results, laws, [way.astype(float), *standing, *given])
+    found = lanewise(kernel, 2 * results, laws, [way.astype(float), *standing, *given])
     return list(found[:results]), list(found[results:])
-
-
-@functools.partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _in_lanes(kernel: Callable[..., list[Any]], results: int, shared: list[Array], lanes: list[Array]) -> list[Array]:
-    """`lanewise` with derivatives."""
-    return list(lanewise(kernel, results, shared, lanes))
-
-
-@_in_lanes.defjvp
-def _changing(kernel: Callable[..., list[Any]], _: int, primals: tuple, tangents: tuple) -> tuple[list, list]:
-    """The same without a kernel, as kernels have no derivatives."""
-    return jax.jvp(jax.vmap(kernel, (None, 0)), primals, tangents)
 
 
 def _of_roller(over_angle: bool) -> Law:

@@ -366,7 +366,7 @@ class _Native:
         error = self._apart(y, spans)
         numbers = self._numbers(y)
         self.numbers = numbers[-1] if self.outcome == 0 else np.full_like(numbers[-1], np.nan)
-        seen = dict(zip(WATCHED, peaks.T, strict=True))
+        seen: dict[str, np.ndarray] = dict(zip(WATCHED, peaks.T, strict=True))
         none = np.zeros(count)
         return numbers, np.stack([seen.get(name, none) for name in PEAKS], axis=1), error, steps
 

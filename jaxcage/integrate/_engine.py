@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from .._errors import ArgumentError
 from .._form import split
 from ..models import AbstractForcedSystem
-from ..solve import Engine, UnknownOperation, say_once
+from ..solve import Engine, UnknownOperation, room_for, say_once
 from ._in_jax import EngineInJax
 from ._method import AbstractMethod
 from ._native import NativeSteps
@@ -77,6 +77,8 @@ class Lanes:
         self.form, rows = split(jax.tree.map(number, designs), eqx.is_inexact_array)
         self.several, self.which, self.speed = count > 1, which, speed
         self._rows = [np.asarray(x) for x in rows]
+        self._every, self._place = (which, speed), np.arange(speed.size)
+        self._numbers: dict[type, Any] = {}
 
     @classmethod
     def of(
@@ -95,7 +97,7 @@ class Lanes:
     def at(self, some: Int[np.ndarray, " some"]) -> "Lanes":
         """Some of the lanes."""
         few = copy.copy(self)
-        few.which, few.speed = self.which[some], self.speed[some]
+        few.which, few.speed, few._place = self.which[some], self.speed[some], self._place[some]
         return few
 
     @property
@@ -107,6 +109,14 @@ class Lanes:
         """Numbers of the designs of some lanes, or those that all have."""
         return [x[self.which[lanes]] for x in self._rows] if self.several else self._rows
 
+    def numbers(self, engine: Engine | EngineInJax, some: Int[np.ndarray, " some"]) -> Any:
+        """What the engine needs to know of some lanes; it is worked out once for all of them."""
+        if type(engine) not in self._numbers:
+            which, speed = self._every
+            rows = [x[which] for x in self._rows] if self.several else self._rows
+            self._numbers[type(engine)] = engine.numbers(speed, rows)
+        return engine.picked(self._numbers[type(engine)], self._place[some])
+
     def engine(self, tangents: int, method: AbstractMethod, samples: int = 1) -> Engine | EngineInJax:
         """What runs these lanes with so many tangent vectors."""
         return engine_of(self.system, tangents, self.several, method, samples)
@@ -116,7 +126,7 @@ class Lanes:
     ) -> tuple[Float[np.ndarray, "some dim"], Float[np.ndarray, " some"]]:
         """Scale of each of some lanes, and excursion of its state."""
         count = some.size
-        room = 1 << max(3, (count - 1).bit_length())
+        room = room_for(count)
         filled = np.concatenate([some, np.broadcast_to(some[-1:], room - count)])
         states = np.concatenate([y, np.broadcast_to(y[-1:], (room - count, y.shape[1]))])
         scale, excursion = _scales(self.form, self.several)(self.speed[filled], self.rows(filled), states)
@@ -152,7 +162,7 @@ def histories(
             continue
         scale, _ = lanes.begin(some, y0[some])
         engine = lanes.engine(0, method, samples)
-        numbers = engine.numbers(lanes.speed[some], lanes.rows(some))
+        numbers = lanes.numbers(engine, some)
         ran = engine(numbers, y0[some] / scale, total, total, method, threads=cores())
         states = np.concatenate([(y0[some] / scale)[:, None], ran.strobe], axis=1)
         error[some] = sampled_error(engine, numbers, states, samples, method).max(axis=1)

@@ -44,7 +44,7 @@ def _strobe(
         moved = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
         row = lambda z: jnp.stack(divide(z, strobe.scale))
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
-        return row(moved.y), after, moved.peak, moved.outcome
+        return row(moved.y), after, jnp.asarray(moved.peak), moved.outcome
 
     return jax.vmap(lane)(list(own), y, tangents, i)
 

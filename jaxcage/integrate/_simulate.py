@@ -102,7 +102,7 @@ def _run(lanes: Lanes, start: np.ndarray, samples: int, method: AbstractMethod) 
     n, speed = lanes.speed.size, lanes.speed
     every, begin = np.arange(n), np.arange(n) % samples
     engine = lanes.engine(0, method, samples)
-    numbers = engine.numbers(speed, lanes.rows(every))
+    numbers = lanes.numbers(engine, every)
     scale, (excursion, *_) = lanes.begin(every, np.broadcast_to(start, (n, start.size)))
     y, peaks = np.full((n + 1, start.size), np.nan), np.full(-(-n // samples), np.nan)
     y[0], code = start, 0 if excursion <= 1 else OUTCOMES.index("outside")

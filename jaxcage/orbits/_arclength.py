@@ -25,9 +25,9 @@ from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, SETTLED, Counts, by_steps
 
 
-LANES, FEW = (8, 32), 40
-"""Lanes per call: two programs for any number of curves; the second where there are more than a few lanes, so that one
-branch needs the first alone. Up to eight lanes cost what one does: they share the processor's instructions."""
+LANES = 8
+"""Lanes per call, one program for any number of curves. Up to eight lanes cost what one does: they share the
+processor's instructions."""
 FOLLOWING, OF_A_STEP = 1e-6, 1e-5
 """Newton's last step while following, in the unknowns' units, and over the step's length where that is less: points are
 then good to about its square."""
@@ -166,7 +166,7 @@ def correct(
     chunks = []
     for count in np.unique(steps):  # lanes by as many steps run together
         mine = np.flatnonzero(steps == count)
-        size = LANES[mine.size > FEW]
+        size = LANES
         chunks += [mine[np.minimum(np.arange(i, i + size), mine.size - 1)] for i in range(0, mine.size, size)]
 
     def part(k: np.ndarray) -> Corrected:

@@ -29,7 +29,7 @@ from .loop import (
     STUCK as STUCK,
     TOO_MANY as TOO_MANY,
 )
-from .machine import FIRST_STEP as FIRST_STEP, Engine as Engine, March as March
+from .machine import FIRST_STEP as FIRST_STEP, Engine as Engine, March as March, room_for as room_for
 from .program import Numbers as Numbers
 from .rosenbrock import (
     RODAS3 as RODAS3,

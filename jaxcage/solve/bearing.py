@@ -117,7 +117,7 @@ def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: 
 class RollersCode(NamedTuple):
     """What writes the rates of a bearing."""
 
-    count: int
+    rollers: int
     roller: Program
     bodies: Program
     angle: Program
@@ -126,7 +126,7 @@ class RollersCode(NamedTuple):
     def code(self, field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
         """The function `rates`: of state, tangents and what is integrated beside at `place`, stored at `out`."""
         w = Code(width)
-        z, size, tangents = self.count, field.dimension, field.tangents
+        z, size, tangents = self.rollers, field.dimension, field.tangents
         load = lambda first, count: [w.get(first + k, base="%place") for k in range(count)]
         own = [load(z * OF_ROLLER + size * t, OF_BODIES) for t in range(1 + tangents)]
         phase = w.get(size * (1 + tangents), base="%place")

@@ -200,10 +200,11 @@ class Code(Writer):
 
         `body(row, values)` returns new values; `row(k)` is the row of its number behind the k-th.
         """
+        rest = lambda new: [] if new is None else list[Value](new)
         values = [self.widened(v) for v in begin]
         if count <= WRITTEN_OUT:
             for q in range(count):
-                values = list(body(lambda k, q=q: k + q, values) or ())
+                values = rest(body(lambda k, q=q: k + q, values))
             return values
         self.names += 1
         before, loop, done = self.block, f"loop{self.names}", f"done{self.names}"
@@ -211,7 +212,7 @@ class Code(Writer):
         inside = [Value(f"{place.text}_{k}", "double", True) for k in range(len(values))]
         outer, self.lines = self.lines, []
         self.block = loop
-        new = list(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside) or ())
+        new = rest(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside))
         assert self.block == loop
         lines, self.lines = self.lines, outer
         vector = self.type("double", True)

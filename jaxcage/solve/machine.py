@@ -141,6 +141,11 @@ def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
     return split((system.at_speed(speed), system, system.scale(speed)), eqx.is_inexact_array)
 
 
+def room_for(lanes: int) -> int:
+    """A number of lanes at least as large, one of few, as each is compiled: 8, 64, 512, ..."""
+    return 8 ** max(1, -(-(lanes - 1).bit_length() // 3))
+
+
 class Numbers:
     """The numbers of a field, as they follow from a system's and a speed."""
 
@@ -167,7 +172,7 @@ class Numbers:
     ) -> tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]]:
         """The numbers that differ from lane to lane, and those that all lanes share."""
         count = len(speeds)
-        room = 1 << max(3, (count - 1).bit_length())  # few sizes, as each is compiled
+        room = room_for(count)
         pad = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - count, *x.shape[1:]))])
         filled = [pad(np.asarray(x)) for x in rows] if self.several else list(rows)
         found = [np.asarray(x) for x in self._over(pad(speeds), filled)]

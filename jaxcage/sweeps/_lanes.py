@@ -125,7 +125,7 @@ def _once(
     settling, aligned = plan.discard - plan.align, plan.align + revolutions
     keep, m = plan.keep, plan.exponents
     plain, pushed = lanes.engine(0, method), lanes.engine(m, method)
-    numbers = pushed.numbers(lanes.speed[some], lanes.rows(some))
+    numbers = lanes.numbers(pushed, some)
     state, step, peak = y0 / scale, np.full(some.size, FIRST_STEP), np.full(some.size, np.nan)
     alive = np.flatnonzero(admitted)
 

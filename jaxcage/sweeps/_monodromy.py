@@ -45,7 +45,7 @@ def monodromy(
     if alive.size:
         scale, _ = lanes.begin(alive, state[alive])
         engine, each = lanes.engine(1, chosen), np.repeat(alive, dim)  # a lane for each column
-        numbers = engine.numbers(speed[each], lanes.rows(each))
+        numbers = lanes.numbers(engine, each)
         begun, along = np.repeat(state[alive] / scale, dim, axis=0), np.tile(np.eye(dim), (alive.size, 1))
         ran = engine(numbers, begun, 1, 1, chosen, tangents=along[:, None], threads=cores())
         columns = (np.exp(ran.growth[:, 0]) * ran.tangents[:, 0]).reshape(-1, dim, dim)
