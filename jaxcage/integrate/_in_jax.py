@@ -49,6 +49,24 @@ def _strobe(
     return jax.vmap(lane)(list(own), y, tangents, i)
 
 
+def _orthonormalised(
+    tangents: Float[np.ndarray, "lanes tangents dim"],
+) -> tuple[Float[np.ndarray, "lanes tangents dim"], Float[np.ndarray, "lanes tangents"]]:
+    """Gram and Schmidt's method, each vector projected twice, and the logarithms of the lengths that are left: of a
+    vector that has turned into those before it, of the rounding."""
+    done, lengths = np.zeros_like(tangents), np.zeros(tangents.shape[:2])
+    for i in range(tangents.shape[1]):
+        u = tangents[:, i]
+        least = np.finfo(float).eps * np.linalg.norm(u, axis=1) + np.finfo(float).tiny
+        for j in [*range(i)] * 2:
+            u = u - np.sum(u * done[:, j], axis=1, keepdims=True) * done[:, j]
+        lengths[:, i] = np.linalg.norm(u, axis=1)
+        lost = lengths[:, i] == 0
+        u, lengths[lost, i] = np.where(lost[:, None], least[:, None], u), least[lost]
+        done[:, i] = u / np.linalg.norm(u, axis=1, keepdims=True)
+    return done, np.log(lengths)
+
+
 class EngineInJax:
     """The revolutions of a system inside JAX, with so many tangent vectors; called as the engine in machine code is."""
 
@@ -113,10 +131,7 @@ class EngineInJax:
                 alive, y1, t1 = alive[~lost], y1[~lost], t1[~lost]
                 y[alive], strobe[alive, k % keep] = y1, y1
                 if m and alive.size:
-                    q, r = np.linalg.qr(np.swapaxes(t1, 1, 2))
-                    with np.errstate(divide="ignore"):
-                        growth[alive, k] = np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)))
-                    t[alive] = np.swapaxes(q, 1, 2)
+                    t[alive], growth[alive, k] = _orthonormalised(t1)
                 report(int(lanes * (k + 1) / strobes))
         mark[mark == 0] = MARKS["successful"]
         turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
