@@ -359,7 +359,9 @@ def chaotic_starts():
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rk4", steps=128))
     s = raw_sweep(ueda(13.3), 1.0, starts=starts, **length)
     shares = coexisting(s.label[0])
-    assert set(shares) == {"chaotic", "periodic-1"} and 0.3 < shares["chaotic"].share < 0.6
+    # By so few steps the error of a chaotic exponent may be large: such a lane is undecided.
+    assert {"chaotic", "periodic-1"} <= set(shares) <= {"chaotic", "periodic-1", "undecided"}
+    assert 0.3 < shares["chaotic"].share < 0.6 and np.mean(s.label[0] == "undecided") < 0.02
     return [tuple(map(float, y)) for y in s.last[0][s.label[0] == "chaotic"][:80]]
 
 

@@ -66,8 +66,8 @@ def test_a_lane_is_a_simulation(start):
     """From one state over an eighth of a revolution, both by tight steps."""
     model = bearing()
     bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)])
-    ran = run_samples(bearings, y, 2, 1e-7, along())
-    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-7)
+    ran = run_samples(bearings, y, 2, 1e-9, along())
+    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-9)
     k = 2 * 32 // SAMPLES
     expected = BearingState(jnp.asarray(run.rollers[k]), jnp.asarray(run.bodies[k]), jnp.zeros(2))
     assert np.all(ran.mark == FINISHED) and run.outcome == "successful"
