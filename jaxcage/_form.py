@@ -18,7 +18,7 @@ class Form(NamedTuple):
 
     tree: Any
     rest: tuple[Any, ...]
-    """What is no array, with its kind: 1 is not True."""
+    """Each leaf that is no array stands here with its type, since 1 equals True."""
 
     def filled(self, arrays: Sequence[Any]) -> Any:
         """The tree with these arrays."""

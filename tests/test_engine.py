@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES, engine_of
+from jaxcage.integrate import OUTCOMES, Lanes, engine_of, histories
 from jaxcage.solve import FINISHED, Engine, say_once
 from jaxcage.solve.object_code import object_code
 
@@ -128,6 +128,14 @@ def test_a_law_that_has_no_machine_code_is_run_by_jax_and_says_so(name: str):
     with pytest.warns(UserWarning, match=f"operation `{name}`, which has no machine code"):
         found = jc.sweep(system, 1.5, discard=20, revolutions=20, confirm=False, horizon=0)
     assert set(found.label.ravel()) == {"periodic-1"}
+
+
+def test_histories_are_run_again_until_their_error_is_allowed():
+    model, speeds = jc.case("1a"), jc.rpm(9000, 15000, 3)
+    starts = np.array([[float(c) for c in model.starts(jnp.asarray(v))[0]] for v in speeds])
+    lanes, rough = Lanes.of([model], speeds), jc.native(1e-3)
+    (_, first), (states, error) = (histories(lanes, starts, 8, 2, method) for method in (rough, jc.native(1e-3, 1e-4)))
+    assert np.any(first > 1e-4) and np.all(error <= 1e-4) and np.all(np.isfinite(states))
 
 
 def test_damaged_code_is_compiled_again(tmp_path: Any, monkeypatch: pytest.MonkeyPatch):

@@ -1,4 +1,4 @@
-"""What every sweep sees of a lane, one speed, start and design."""
+"""A sweep sees the same of every lane, which is one design at one speed from one start."""
 
 from typing import NamedTuple
 

@@ -17,7 +17,7 @@
 | `_arrow`       | the whole bearing's Jacobian, and its solution                                     |
 | `_implicit`    | an implicit step of the whole bearing                                              |
 | `_bearing`     | time histories of the whole bearing                                                |
-| `_bearing_pace`| how far it is followed before it is compared with the same by longer steps         |
+| `_bearing_pace`| limits of its steps, and the stretch over which two runs are compared             |
 | `_results`     | how an integration ended                                                           |
 """
 

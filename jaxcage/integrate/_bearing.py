@@ -40,9 +40,9 @@ SHORT = 2
 """Periods of a loaded roller's vibration on its raceway: of slow shafts, parts no longer than these are compared."""
 MOST_PARTS = 1000
 """From sample to sample."""
-STIFF = 1000.0
-"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. One
-takes as long as some eighty explicit ones in machine code (0.4 ms)."""
+STIFF = 600.0
+"""Steps are implicit where the film damps the cage at so many times the rate of a loaded roller on its raceway. An
+implicit step takes as long as some thirty explicit ones in machine code (0.4 ms; 12 us)."""
 CHOICES = 16
 """In a revolution: so often it is asked whether steps are to be implicit, of as many samples or a multiple."""
 HALF = 16.0
@@ -143,7 +143,7 @@ def _run(
 
 @compiled
 def _film_is_stiff(model: BearingModel, speed: Scalar, state: BearingState) -> Array:
-    """Whether implicit steps pay from here on."""
+    """True if implicit steps pay from here on."""
     scale = state_scale(model, speed)
     return film_rate(model.at_speed(speed), state) > STIFF * jnp.max(scale.rollers[3] / scale.rollers[2])
 
@@ -341,13 +341,13 @@ class _Native:
 
     @property
     def state(self) -> BearingState:
-        """Where it is now."""
+        """The state that the run has reached."""
         n = self.numbers.size - len(LEDGER) - len(MEANS)
         parts = self.numbers[: n - 11].reshape(5, -1), self.numbers[n - 11 : n - 2], self.numbers[n - 2 : n]
         return BearingState(*map(jnp.asarray, parts))
 
     def is_stiff(self) -> bool:
-        """Whether implicit steps pay from here on."""
+        """True if implicit steps pay from here on."""
         return self.outcome == 0 and bool(_film_is_stiff(*self._about, self.state))
 
     def go(self, spans: np.ndarray, implicit: bool) -> Found:
@@ -415,7 +415,7 @@ class _InJax:
 
     @property
     def state(self) -> BearingState:
-        """Where it is now."""
+        """The state that the run has reached."""
         return jax.tree.map(lambda x: x[..., 0], self._lanes.state)
 
     @property
@@ -424,7 +424,7 @@ class _InJax:
         return int(self._lanes.outcome[0])
 
     def is_stiff(self) -> bool:
-        """Whether implicit steps pay from here on."""
+        """True if implicit steps pay from here on."""
         model, _ = self._about
         return model.ring.ring_motion != "quasi_static" and bool(_film_is_stiff(*self._about, self.state))
 

@@ -1,4 +1,4 @@
-"""How far and by which steps the whole bearing is followed before it is compared with the same by longer steps."""
+"""The pace of the whole bearing: limits of its steps, and the stretch over which two runs can be compared."""
 
 from typing import Any
 
@@ -12,16 +12,17 @@ from ..solve import BearingLimits
 
 TURN = 2 * np.pi
 SAMPLES = 16
-"""Of a revolution of the cage."""
+"""The motion is recorded at so many samples in a revolution of the cage."""
 SPACING = TURN / SAMPLES
 FIRST, LONGEST, SHORTEST = TURN / 20_000, TURN / 200, TURN / 4e6
 """First, longest and shortest step [rad] of the cage's angle."""
 PERIODS, COMPARED = 50, 10
-"""Of a loaded roller's vibration on its raceway. A shaft is slow if more of them than the first go from sample to
-sample, for NU2310 one below 4000 rpm: only so many as the second are then compared with the same by longer steps. What
-rollers do to their bars depends little on the speed: neighbouring motions diverge over time, not over revolutions."""
+"""A shaft is slow if more than the first number of periods of a loaded roller's vibration on its raceway pass from
+sample to sample (NU2310 below 4000 rpm). Two runs are then compared over the second number of periods only: what
+rollers do to their bars depends little on the speed, and neighbouring motions diverge over time, not over revolutions.
+"""
 SLOWEST = 1000.0
-"""At most so many times as many periods count."""
+"""The slowness of a shaft is cut off here."""
 MOST_STEPS = 5_000
 """From sample to sample, in the mean: a lane that needs more has failed. As many times more as the shaft is slow."""
 STALLED = 0.05
@@ -29,7 +30,7 @@ STALLED = 0.05
 
 
 def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, "*lanes"]:
-    """How many times as many periods of a roller go from sample to sample as in a shaft that is not slow: at least 1.
+    """The slowness of a shaft is the number of a roller's periods from sample to sample over `PERIODS`, at least 1.
 
     **Arguments:** laws, each number a scalar or of lanes; magnitudes of the state, of one roller each.
     """
@@ -39,7 +40,7 @@ def slowness(at: BearingAtSpeed, scale: BearingState) -> Float[Array, "*lanes"]:
 
 
 def comparable(slow: Float[np.ndarray, "*lanes"]) -> Float[np.ndarray, "*lanes"]:
-    """How far each lane goes before it is compared with the same by longer steps [rad]: to the next sample, or less."""
+    """Each lane is compared with a run by shorter steps over this angle [rad]: to the next sample, or less."""
     return np.where(slow > 1, COMPARED / PERIODS * SPACING / slow, SPACING)
 
 

@@ -24,7 +24,7 @@ from ._native import NativeSteps
 SURE = 3.0
 """The stated error, as a multiple of the difference of two runs."""
 RETRIES = 3
-"""How often a lane whose error is too large is run again with tolerances 16 times smaller."""
+"""A lane whose error is too large is run again at most so many times, each with a tolerance 16 times smaller."""
 CHUNK = 4096
 """Lanes that are run at a time, where a strobe state is kept of each sample."""
 _engines: dict[Any, Engine | EngineInJax] = {}
@@ -33,7 +33,7 @@ _engines: dict[Any, Engine | EngineInJax] = {}
 def engine_of(
     system: AbstractForcedSystem, tangents: int, several: bool, method: AbstractMethod, samples: int = 1
 ) -> Engine | EngineInJax:
-    """What runs a system by a method; a warning names the operation of a law that has no machine code, once."""
+    """The engine that runs a system by a method is made once. A warning names an operation without machine code."""
     pair = method.pair if isinstance(method, NativeSteps) else None
     key = (split(system, eqx.is_inexact_array)[0], tangents, several, pair, samples)
     if key not in _engines and pair is not None:
@@ -110,7 +110,7 @@ class Lanes:
         return [x[self.which[lanes]] for x in self._rows] if self.several else self._rows
 
     def numbers(self, engine: Engine | EngineInJax, some: Int[np.ndarray, " some"]) -> Any:
-        """What the engine needs to know of some lanes; it is worked out once for all of them."""
+        """The numbers of some lanes as the engine takes them; they are worked out once for all lanes."""
         if type(engine) not in self._numbers:
             which, speed = self._every
             rows = [x[which] for x in self._rows] if self.several else self._rows
@@ -152,7 +152,21 @@ def histories(
     method: AbstractMethod,
 ) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
     """States of lanes at so many phases of each of some revolutions, the first where they begin, in SI units; and the
-    largest error of a revolution [scale]. NaN where one begins nowhere, or fails."""
+    largest error of a revolution [scale]. NaN where one begins nowhere, or fails. A lane whose error is larger than the
+    method allows is run again with finer steps."""
+    seen, error = _histories(lanes, y0, samples, revolutions, method)
+    for retry in range(1, RETRIES + 1):
+        todo = np.flatnonzero(error > method.allowed)
+        if not todo.size:
+            break
+        seen[todo], error[todo] = _histories(lanes.at(todo), y0[todo], samples, revolutions, method.finer(retry))
+    return seen, error
+
+
+def _histories(
+    lanes: Lanes, y0: Float[np.ndarray, "lanes dim"], samples: int, revolutions: int, method: AbstractMethod
+) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
+    """The same by one method."""
     count, total = lanes.speed.size, samples * revolutions
     seen, error = np.full((count, total, y0.shape[1]), np.nan), np.full(count, np.nan)
     for first in range(0, count, CHUNK // samples + 1):

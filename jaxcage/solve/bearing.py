@@ -262,11 +262,11 @@ class Bearings:
         speed of the cage below which its angle is no measure of progress; what is integrated over; threads."""
         number = lambda x: np.asarray(x, dtype=float)
         at, scale = jax.tree.map(number, (at, scale))
-        self.count, self.scale, self.over_angle, self.threads = slowest.size, scale, over_angle, threads
+        self.over_angle, self.threads = over_angle, threads
         self.rollers = at.n_rollers
         self.units = np.concatenate([np.tile(scale.rollers.T, (1, self.rollers)), scale.bodies.T], axis=1)
         tree = (
-            np.zeros(self.count),
+            np.zeros(slowest.size),
             at,
             scale._replace(rollers=tuple(scale.rollers), bodies=tuple(scale.bodies)),
             slowest,
