@@ -109,7 +109,7 @@ def gallery(notebook: pathlib.Path) -> tuple[str, dict[str, bytes]]:
 
 def outputs() -> str:
     """The glossary of outputs."""
-    from jaxcage._glossary import GLOSSARY
+    from jaxcage.quantities import GLOSSARY
 
     rows = (f"| `{q.name}` | {q.symbol} | {q.unit} | {q.shown_unit} | {q.text} |" for q in GLOSSARY.values())
     return "\n".join(["| name | symbol | SI unit | shown in | meaning |", "|---|---|---|---|---|", *rows])

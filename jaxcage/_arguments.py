@@ -157,7 +157,7 @@ def _is_traced(value: Any) -> bool:
 
 def is_array_type(kind: Any) -> bool:
     """Whether an annotation is one of jaxtyping's."""
-    return getattr(kind, "dtypes", None) is not None
+    return getattr(kind, "dim_str", None) is not None
 
 
 def is_plain_class(kind: Any) -> bool:

@@ -18,7 +18,7 @@ from .._types import Scalar
 from ..integrate import BearingRun
 from ..models.whole import BearingModel, BearingState
 from ._bearing_measures import from_land, samples_of
-from ._spectra import OrderSpectrum, Peak, dominant_orders, spectrum_of
+from .spectra import OrderSpectrum, Peak, dominant_orders, spectrum_of
 
 
 SHARES = (0.5, 0.9, 0.99, 0.999)

@@ -11,7 +11,6 @@
 | `_tables`       | tables as CSV or Excel                                                    |
 | `_speeds`       | cage speed or shaft speed                                                 |
 | `_template`     | a commented TOML file to start from                                       |
-| `_dataset`      | `Sweep` and `BearingSweep` to labelled data set and zarr, a `Sweep` back  |
 | `_csv`          | time histories, strobe points and branches as CSV                         |
 | `_files`        | whole files or none; is a folder writable                                 |
 """
@@ -34,15 +33,6 @@ from ._csv import (
     strobe_columns as strobe_columns,
     trajectory_columns as trajectory_columns,
     write_columns as write_columns,
-)
-from ._dataset import (
-    bearing_dataset as bearing_dataset,
-    load_sweep as load_sweep,
-    open_sweep as open_sweep,
-    save_bearing_sweep as save_bearing_sweep,
-    save_sweep as save_sweep,
-    stored_configuration as stored_configuration,
-    to_dataset as to_dataset,
 )
 from ._files import (
     check_writable as check_writable,

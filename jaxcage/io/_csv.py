@@ -2,15 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from jaxtyping import Float, Shaped
 
-from .._glossary import component_names, quantity
-from ..analysis import Sweep
+from ..quantities import component_names, quantity
 from ..integrate import Trajectory
-from ..orbits import Branch
 from ._files import read_bytes, replacing
+
+
+if TYPE_CHECKING:
+    from ..orbits import Branch
 
 
 LARGEST_TABLE = 4_000_000_000
@@ -50,20 +54,15 @@ def trajectory_columns(
     return {name: np.asarray(column) for name, column in columns.items()}
 
 
-def strobe_columns(found: Sweep) -> dict[str, Shaped[np.ndarray, " points"]]:
-    """Strobe points of all starts of a sweep at its first speed, in SI units."""
-    _, starts, keep, dimension = found.strobe.shape
-    states = found.strobe[0].reshape(-1, dimension)
-    first = found.discard + found.revolutions - keep + 1
-    columns = {
-        "start": np.repeat(np.arange(1, starts + 1), keep),
-        "revolution": np.tile(np.arange(first, first + keep), starts),
-    }
-    names = component_names(dimension)
-    return columns | {f"{name} [{quantity(name).unit}]": states[:, i] for i, name in enumerate(names)}
+def strobe_columns(found: xr.Dataset) -> dict[str, Shaped[np.ndarray, " points"]]:
+    """Strobe points of all lanes of a sweep at its first speed, in SI units."""
+    states = found["strobe"].isel(speed=0).stack(point=("start", "revolution")).transpose("point", "component")
+    columns = {"start": states["start"].values + 1, "revolution": states["revolution"].values}
+    names = found["component"].values.tolist()
+    return columns | {f"{name} [{quantity(name).unit}]": states.values[:, i] for i, name in enumerate(names)}
 
 
-def branch_columns(branches: Sequence[Branch]) -> dict[str, Shaped[np.ndarray, " orbits"]]:
+def branch_columns(branches: Sequence["Branch"]) -> dict[str, Shaped[np.ndarray, " orbits"]]:
     """All orbits of branches over speed: which branch, speed, state and multipliers."""
     count = branches[0].state.shape[1]
     joined = lambda rows: np.concatenate([np.asarray(row) for row in rows])

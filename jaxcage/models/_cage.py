@@ -14,6 +14,7 @@ from .._errors import ArgumentError
 from .._parameters import parameter, reading, require_readings, with_numbers
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
+from ..quantities import component_names
 from ..forces import (
     AbstractForce,
     ElasticRib,
@@ -105,6 +106,19 @@ class CageModel(AbstractForcedSystem):
     @property
     def dimension(self) -> int:
         return 4 if isinstance(self.rib, RigidRib) else 8
+
+    speed_text = "cage speed"
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        return component_names(self.dimension)
+
+    def other_speed(self, speed: Scalar) -> tuple[str, Scalar]:
+        return "shaft speed", self.bearing.shaft_speed(speed)
+
+    def centre(self, y: State) -> tuple[Scalar, Scalar]:
+        x, dy = (y[0], y[1]) if isinstance(self.rib, RigidRib) else (y[0] - y[2], y[1] - y[3])
+        return x / self.clearance, dy / self.clearance
 
     @property
     def clearance(self) -> Array:

@@ -6,8 +6,8 @@ Everything above this layer (integration, analysis, design) works on `AbstractFo
 
 import abc
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,6 +17,7 @@ from jaxtyping import Array
 from .._arguments import checked, require_at_least, shown
 from .._errors import ArgumentError
 from .._types import Scalar, State
+from ..quantities import Quantity
 from ._field import AbstractField, FirstOrderField, SecondOrderField
 from ._user_law import components, require_repeats
 
@@ -52,6 +53,45 @@ class AbstractForcedSystem(eqx.Module):
         as here, where the law has no such place.
         """
         return None
+
+    run_defaults: ClassVar[Mapping[str, Any]] = {}
+    """Settings of a run (`jaxcage.lanes.Run`) that suit the model better than the general ones."""
+    speed_text: ClassVar[str] = "speed"
+    """Words for the model's speed."""
+    quantities: ClassVar[tuple[Quantity, ...]] = ()
+    """Quantities that the model reports of a run, from averages of `beside` and `watched`."""
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """Names of what is integrated over time beside the state."""
+        return ()
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Names of the largest values that are recorded, the excursion first."""
+        return ("excursion",)
+
+    @property
+    def samples(self) -> int:
+        """Strobe states per revolution that a sweep records."""
+        return 1
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the state components."""
+        return tuple(f"y{i}" for i in range(self.dimension))
+
+    def other_speed(self, speed: Scalar) -> tuple[str, Scalar] | None:
+        """Words for a speed that goes with the model's, and its value [rad/s]: a cage's shaft speed."""
+        return None
+
+    def centre(self, y: State) -> tuple[Scalar, Scalar]:
+        """Centre of the cage from that of its land, over the clearance, of models that have one."""
+        raise NotImplementedError
+
+    def reference(self, speed: Scalar) -> dict[str, Scalar]:
+        """Numbers by name that the quantities refer to, such as the cage speed in pure rolling."""
+        return {}
 
     @abc.abstractmethod
     def at_speed(self, speed: Scalar) -> AbstractField:

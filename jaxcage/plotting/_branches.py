@@ -10,7 +10,7 @@ from matplotlib.transforms import offset_copy
 from scipy.optimize import isotonic_regression
 
 from .._errors import ArgumentError
-from .._glossary import component_names, quantity
+from ..quantities import component_names, quantity
 from ..analysis import Sweep
 from ..orbits import Branch, Point
 from ._orbit_diagram import label_speed, orbit_diagram

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from .._glossary import quantity
+from ..quantities import quantity
 from ..analysis import Sweep, Zones
 from ._marks import shade_zones
 from ._orbit_diagram import exponent_strip, label_speed, legend_below, orbit_diagram

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from .._glossary import quantity
+from ..quantities import quantity
 from ..integrate import Trajectory
 from ._style import (
     BLACK,

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
-from .._glossary import component_names, quantity
+from ..quantities import component_names, quantity
 from ..analysis import CHAOS_THRESHOLD, Sweep, Zones
 from ..bearing import PublishedCase
 from ._marks import mark_published, shade_zones

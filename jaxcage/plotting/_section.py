@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
-from .._glossary import component_names, quantity
+from ..quantities import component_names, quantity
 from ._style import (
     BLUE,
     GREEN,

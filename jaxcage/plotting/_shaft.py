@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 from matplotlib.transforms import offset_copy
 
-from .._glossary import quantity
+from ..quantities import quantity
 from ._style import GREY
 
 

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from .._errors import ArgumentError
-from .._glossary import quantity
+from ..quantities import quantity
 from ..orbits import Curve
 from ._branches import mark_of, runs
 from ._elasticities import readable

@@ -5,7 +5,7 @@ of the paper's fig. 5.
 import numpy as np
 from matplotlib.axes import Axes
 
-from .._glossary import quantity
+from ..quantities import quantity
 from ..bearing import LoadDistribution
 from ..forces import ImpactHistory
 from ._style import BLUE, GREY, VERMILION, axes_or_new, shown

@@ -21,7 +21,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 
-from .._glossary import quantity
+from ..quantities import quantity
 
 
 # Okabe and Ito's palette.

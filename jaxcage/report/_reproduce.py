@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from .._glossary import quantity
+from ..quantities import quantity
 from .._parameters import replace
 from ..analysis import Sweep, Zone, Zones, zones
 from ..bearing import PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM, PublishedCase, load_distribution

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._errors import ArgumentError, InputError
-from .._glossary import quantity
+from ..quantities import quantity
 from .._parameters import parameter_info
 from ..io import sync
 from ._plan import SAMPLE

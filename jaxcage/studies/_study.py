@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._form import compiled
-from .._glossary import component_names, quantity
+from ..quantities import component_names, quantity
 from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg

@@ -190,3 +190,44 @@ def revolutions_to_decide(
     gap = exponent - CHAOS_THRESHOLD if exponent > CHAOS_THRESHOLD + TORUS_THRESHOLD else TORUS_THRESHOLD
     ratio = 2 * standard_error / gap
     return revolutions * max(ratio**2, 2.0) if np.isfinite(ratio) else np.inf
+
+
+CIRCULAR, REPEATING = 0.1, 0.1
+"""Variation of the eccentricity relative to its mean below which a whirling centre is `circular`; distance in
+clearances, between places a revolution apart, below which the motion is `locally_periodic`."""
+MOTIONS = ("circular", "locally_periodic", "disordered")
+
+
+def motion_label(place: Float[np.ndarray, "n 2"], samples: int) -> str:
+    """Name of the motion of a cage's centre, after those that the literature of cage stability uses.
+
+    `circular`: the centre goes round at least once in ten revolutions of the cage, and its eccentricity varies
+    (standard deviation over mean) by less than `CIRCULAR`. `locally_periodic`: not so, but after a revolution the
+    centre is, in the mean over all samples, within `REPEATING` clearances of its place before. `disordered`: neither.
+
+    **Arguments:** place over clearance, at equal angles of the cage; samples per revolution.
+    """
+    if not np.all(np.isfinite(place)):
+        return "failed"
+    eps = np.hypot(*place.T)
+    turns = abs(np.diff(np.unwrap(np.arctan2(place[:, 1], place[:, 0]))).sum()) / (2 * np.pi)
+    revolutions = (len(place) - 1) / samples
+    if turns >= max(1.0, revolutions / 10) and np.std(eps) < CIRCULAR * np.mean(eps):
+        return "circular"
+    if len(place) <= samples:
+        return "disordered"
+    away = np.hypot(*(place[samples:] - place[:-samples]).T)
+    return "locally_periodic" if np.mean(away) < REPEATING else "disordered"
+
+
+LABELS = (
+    "failed",
+    *(f"periodic-{k}" for k in range(1, LONGEST_PERIOD + 1)),
+    "chaotic",
+    "quasi-periodic",
+    "undecided",
+    "inaccurate",
+    "transient",
+    *MOTIONS,
+)
+"""Labels in the order of the codes by which they are stored."""

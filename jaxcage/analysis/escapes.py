@@ -1,6 +1,6 @@
-"""When lanes left chaos for good, from their growth in blocks of revolutions and how they end.
+"""Times at which lanes left chaos for good, from their growth in blocks of revolutions and how they end.
 
-Escape times of a batch of lanes are what `_transients` estimates a mean life from.
+`survival` estimates a mean life from the escape times of a batch of lanes.
 
 Limits. A lane that leaves one chaotic set for another has not escaped here, and one in a laminar phase at its very end
 may seem to have. Weak chaos needs long blocks.
@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from .._errors import ArgumentError
-from ._labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period, scatter
+from .labels import CHAOS_THRESHOLD, TORUS_THRESHOLD, closing_period, scatter
 
 
 CONFIRM = 8
@@ -66,7 +66,7 @@ def escape_times(
     be told from calm. So a lane escapes after the last block that is not calm, and only if it is calm at the end by its
     label too, and in the last `confirm` blocks. A chaotic lane of which a share p of the blocks dips passes for escaped
     with a probability of p**confirm at most; `confirm` must be chosen so that this times the number of lanes is small.
-    `dips` tells p. Where it comes near 1, chaos is too weak for the blocks, and lanes seem calm long before they are.
+    Where p comes near 1, chaos is too weak for the blocks, and lanes seem calm long before they are.
 
     What happens in those last blocks is not judged: the time to which lanes are followed, the horizon, ends before
     them. A lane that escapes later was still chaotic at the horizon.
@@ -95,22 +95,3 @@ def escape_times(
     escaped = calm_end & (last <= blocks - confirm)
     times = np.where(escaped, last * float(block), np.inf)
     return np.where(lost, np.nan, times), (blocks - confirm) * block
-
-
-def dips(
-    growth: Float[np.ndarray, "lanes blocks"],
-    times: Float[np.ndarray, " lanes"],
-    horizon: float | int,
-    block: int,
-    threshold: float | int | None = None,
-) -> float:
-    """Share of the blocks before the horizon, and before their lanes escaped, that look calm all the same.
-
-    **Arguments:** growth, block and threshold as for `escape_times`, times and horizon as it returns them.
-
-    **Returns:** the share; NaN where no lane was chaotic.
-    """
-    start = np.arange(growth.shape[1]) * block
-    chaotic = (start < times[:, None]) & (start < horizon)  # false for NaN
-    below = growth <= (calm_threshold(block) if threshold is None else threshold)
-    return float(np.mean(below[chaotic])) if np.any(chaotic) else math.nan

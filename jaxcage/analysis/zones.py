@@ -12,11 +12,12 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from jaxtyping import Bool, Float
 
 from .._notebook import notebook_html
-from ._labels import CHAOS_THRESHOLD
-from ._sweep import Sweep
+from .labels import CHAOS_THRESHOLD
+from .sweep import chaotic_share, failed, lasting, resolution_rpm, restless, survival_at
 
 
 CLOSE_BELOW_RPM, CLOSE_BELOW = 500.0, 0.05
@@ -96,7 +97,7 @@ class Zone:
 
 @dataclasses.dataclass(frozen=True)
 class Zones:
-    """What a sweep says about its speed range, at the resolution of its grid."""
+    """Zones in the speed range of a sweep, at the resolution of its speeds."""
 
     zones: tuple[Zone, ...]
     """Zones of chaos that lasts, ascending."""
@@ -178,36 +179,36 @@ def _first(mask: Bool[np.ndarray, " speeds"], index: int, step: int) -> int:
     return index
 
 
-def _zones(sweep: Sweep, at: _Speeds, spans: Sequence[tuple[int, int]], kind: str) -> tuple[Zone, ...]:
-    followed = kind != "synchronous" and sweep.escape is not None
+def _zones(found: xr.Dataset, at: _Speeds, spans: Sequence[tuple[int, int]], kind: str) -> tuple[Zone, ...]:
+    followed = kind != "synchronous" and "escape" in found
     edges = kind if kind != "synchronous" else "synchronous-loss"
-    restless = sweep.restless
+    rpm, chaotic = found["rpm"].values, restless(found)
     return tuple(
         Zone(
             kind,
-            _edge(sweep.rpm, at, a, -1, edges),
-            _edge(sweep.rpm, at, b, 1, edges),
+            _edge(rpm, at, a, -1, edges),
+            _edge(rpm, at, b, 1, edges),
             float(np.nanmean(at.share[a : b + 1])),
-            _life(sweep, restless, a, b) if followed else None,
+            _life(found, chaotic, a, b) if followed else None,
         )
         for a, b in spans
     )
 
 
-def _life(sweep: Sweep, restless: np.ndarray, first: int, last: int) -> tuple[MeanLife, MeanLife]:
+def _life(found: xr.Dataset, chaotic: np.ndarray, first: int, last: int) -> tuple[MeanLife, MeanLife]:
     """Shortest and longest mean life at the speeds of a zone at which there is chaos."""
-    at = {float(sweep.rpm[i]): sweep.survival(i) for i in range(first, last + 1) if restless[i]}
+    at = {float(found["rpm"][i]): survival_at(found, i) for i in range(first, last + 1) if chaotic[i]}
     lives = [MeanLife(s.mean_life if s.escapes else s.lower_bound, rpm, not s.escapes) for rpm, s in at.items()]
     shortest = min(lives, key=lambda life: (life.bound, life.revolutions))
     longest = max(lives, key=lambda life: life.revolutions)
     return shortest, longest._replace(bound=any(life.bound for life in lives))
 
 
-def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:
+def zones(sweep: xr.Dataset, close_below_rpm: float | None = None) -> Zones:
     """Chaotic zones of a sweep, and the stretches in which the synchronous orbit was met.
 
-    A speed counts as chaotic if any start is and, where lanes were followed to a horizon, if the mean life of its chaos
-    is beyond that; else as transient. Where no start is chaotic but some failed or were inaccurate, nothing is known:
+    A speed counts as chaotic if any lane is and, where lanes were followed to a horizon, if the mean life of its chaos
+    is beyond that; else as transient. Where no lane is chaotic but some failed or were inaccurate, nothing is known:
     such speeds are neither in a zone nor outside, and an edge next to them is as uncertain as their gap is wide.
 
     **Arguments:** a sweep with at least one exponent; width of the windows to be closed [rpm], by default 500 rpm
@@ -216,32 +217,88 @@ def zones(sweep: Sweep, close_below_rpm: float | None = None) -> Zones:
     **Returns:** `Zones`. Edges lie half way between neighbouring speeds, with the spacing as uncertainty, or the
     distance to the first speed on either side at which the interval of the mean life (95 %) leaves the horizon out.
     """
-    label = sweep.label
-    close_below_rpm = closing_width(sweep.rpm) if close_below_rpm is None else close_below_rpm
-    lasting = sweep.lasting
-    restless = sweep.restless
-    sound = np.all(~sweep.failed, axis=1)
-    synchronous = np.asarray(np.any(label == "periodic-1", axis=1))
-    share_1 = np.mean(label == "periodic-1", axis=1)
-    chaos = _Speeds(restless | sound, _undecided(sweep, restless), sweep.chaotic_share)
-    between = lambda chaotic: close_windows(sweep.rpm, chaotic, close_below_rpm)
+    rpm, label = sweep["rpm"].values, sweep["label"].values
+    close_below_rpm = closing_width(rpm) if close_below_rpm is None else close_below_rpm
+    lasts, chaotic, sound = lasting(sweep), restless(sweep), np.all(~failed(sweep), axis=1)
+    synchronous = np.any(label == "periodic-1", axis=1)
+    met = _Speeds(synchronous | sound, np.zeros_like(sound), np.mean(label == "periodic-1", axis=1))
+    chaos = _Speeds(chaotic | sound, _undecided(sweep, chaotic), chaotic_share(sweep))
     return Zones(
-        _zones(sweep, chaos, between(lasting), "chaotic"),
-        _zones(sweep, _Speeds(synchronous | sound, np.zeros_like(sound), share_1), runs(synchronous), "synchronous"),
-        sweep.resolution_rpm,
+        _zones(sweep, chaos, close_windows(rpm, lasts, close_below_rpm), "chaotic"),
+        _zones(sweep, met, runs(synchronous), "synchronous"),
+        resolution_rpm(sweep),
         close_below_rpm,
-        _zones(sweep, chaos, runs(restless & ~lasting), "transient"),
-        sweep.horizon,
+        _zones(sweep, chaos, runs(chaotic & ~lasts), "transient"),
+        sweep.attrs["horizon"],
     )
 
 
-def _undecided(sweep: Sweep, restless: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
+def _undecided(found: xr.Dataset, chaotic: Bool[np.ndarray, " speeds"]) -> Bool[np.ndarray, " speeds"]:
     """Speeds at which lanes left chaos after a mean life that may be on either side of the horizon, and calm speeds
     with a lane that is undecided and may be chaotic within two standard errors."""
-    open_ = (sweep.label == "undecided") & (sweep.exponents + 2 * sweep.standard_error > CHAOS_THRESHOLD)[..., 0]
-    undecided = ~restless & np.any(open_, axis=1)
-    if sweep.escape is not None:
-        for i in np.flatnonzero(restless).tolist():
-            lives = sweep.survival(i)
-            undecided[i] = lives.escapes > 0 and lives.interval[0] < sweep.horizon <= lives.interval[1]
+    highest = (found["exponents"] + 2 * found["standard_error"]).values
+    open_ = (found["label"].values == "undecided") & (highest > CHAOS_THRESHOLD)[..., 0]
+    undecided = ~chaotic & np.any(open_, axis=1)
+    if "escape" in found:
+        for i in np.flatnonzero(chaotic).tolist():
+            lives = survival_at(found, i)
+            undecided[i] = lives.escapes > 0 and lives.interval[0] < found.attrs["horizon"] <= lives.interval[1]
     return undecided
+
+
+SURE = 2.0
+"""Standard errors by which an exponent must be above zero to be called positive."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Stretch:
+    """Neighbouring speeds of a sweep at which the lanes have the same labels."""
+
+    labels: tuple[str, ...]
+    """Labels of the lanes: several where the initial state decides; `failed` where no lane came to its end."""
+    chaotic: bool
+    """True if the largest exponent, in the mean over lanes, is above 0 by more than two standard errors."""
+    low_rpm: float
+    """Halfway between the last speed outside and the first inside, or the first speed of the sweep."""
+    high_rpm: float
+    speeds: int
+    exponent: float
+    """Mean over all lanes of the stretch."""
+    exponent_error: float
+
+
+def stretches(sweep: xr.Dataset) -> tuple[Stretch, ...]:
+    """Stretches of speed with the same labels and an exponent that is positive throughout or nowhere, ascending.
+
+    Their ends are known to half the distance of the speeds of the sweep.
+    """
+    rpm, label = sweep["rpm"].values, sweep["label"].values
+    kinds = [_kind(sweep, label, i) for i in range(rpm.size)]
+    ends = [0, *(i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]), len(kinds)]
+    between = lambda i: float(rpm[i - 1] + rpm[i]) / 2
+    return tuple(
+        Stretch(
+            *kinds[first],
+            between(first) if first else float(rpm[0]),
+            between(end) if end < len(kinds) else float(rpm[-1]),
+            end - first,
+            *_exponent(sweep, slice(first, end)),
+        )
+        for first, end in zip(ends[:-1], ends[1:], strict=True)
+    )
+
+
+def _kind(sweep: xr.Dataset, label: np.ndarray, i: int) -> tuple[tuple[str, ...], bool]:
+    """Labels at a speed, and True if it is chaotic."""
+    labels = set(label[i].tolist())
+    exponent, error = _exponent(sweep, slice(i, i + 1))
+    return tuple(sorted(labels - {"failed"} or labels)), bool(exponent > SURE * error)
+
+
+def _exponent(sweep: xr.Dataset, speeds: slice) -> tuple[float, float]:
+    """Mean over all blocks of some speeds, and its standard error; NaN without any."""
+    blocks = sweep["block_growth"].values[speeds][..., :1]
+    known = blocks[np.isfinite(blocks)]
+    if known.size < 2:
+        return float("nan"), float("nan")
+    return float(known.mean()), float(known.std(ddof=1) / np.sqrt(known.size))

@@ -18,7 +18,6 @@ from .._notebook import notebook_html
 from ..forces import Force
 from ..integrate import Trajectory
 from ..models import FORCES, CageModel
-from ._bearing_measures import measure
 
 
 BATCH = 256
@@ -26,6 +25,11 @@ BATCH = 256
 
 Histories = dict[str, tuple[Array, Array, Array]]
 """(F_x, F_y, moment) of each force at every sample."""
+
+def measure(unit: str, text: str) -> Any:
+    """A field with its unit and words."""
+    return dataclasses.field(metadata={"unit": unit, "text": text})
+
 
 STILL = 1e-9
 """A centre that moves by less than this part of the clearance, or per radian, stands still."""

@@ -19,14 +19,12 @@ it is the same, or as random, early and late. Lanes must be independent: starts 
 errors.
 """
 
-import collections
 import dataclasses
 import math
-from typing import NamedTuple
 
 import numpy as np
 import scipy.special
-from jaxtyping import Float, Shaped
+from jaxtyping import Float
 
 from .._errors import ArgumentError
 from .._notebook import notebook_html
@@ -34,9 +32,6 @@ from .._notebook import notebook_html
 
 FEW = 10
 """With fewer escapes an interval is given instead of a standard error."""
-THREE_SIGMA = 0.0027
-RESOLVED = (0.01, 0.99)
-"""Share of lanes left between which a mean life is measured and not merely bounded."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,7 +164,7 @@ def survival(
 
     Lanes that failed, or are calm at t0, are left out. Those that escape after the horizon, or never, are censored at
     the time to which they were followed. Lanes that start off the chaotic set need a t0 of several e-foldings of their
-    approach to it; `when_t0_doubles` tells whether it was long enough.
+    approach to it.
 
     **Arguments:**
 
@@ -201,113 +196,6 @@ def survival(
         horizon=float(horizon),
         block=float(block),
     )
-
-
-class Comparison(NamedTuple):
-    """Two estimates of an escape rate side by side."""
-
-    first: Survival
-    second: Survival
-    p_value: float
-    """Probability of counts at least as unequal under one and the same rate."""
-
-    @property
-    def agree(self) -> bool:
-        """Whether the rates are equal within three standard errors: a p-value of at least 0.0027."""
-        return self.p_value >= THREE_SIGMA
-
-    @property
-    def resolved(self) -> bool:
-        """Whether between 1 and 99 % of the lanes are left in both, so that the rates are measured and not bounded."""
-        return all(RESOLVED[0] <= s.remaining <= RESOLVED[1] for s in (self.first, self.second))
-
-    def __str__(self) -> str:
-        verdict = f"{'agree' if self.agree else 'differ'} (p = {self.p_value:.2g})"
-        unknown = "cannot be compared: no lane was chaotic in one of them"
-        return f"{self.first}\n{self.second}\nescape rates {unknown if math.isnan(self.p_value) else verdict}"
-
-    _repr_html_ = notebook_html
-
-
-def same_rate(first: Survival, second: Survival) -> float:
-    """p-value of the test that two runs have one escape rate, exact also where nothing escaped.
-
-    Given n escapes in all, those of the first are hypergeometric among the blocks at risk (Fisher's exact test); where
-    escapes are known exactly they are Poisson counts, and binomial with its share of the time at risk (J. Przyborowski
-    and H. Wilenski, Biometrika 31 (1940) 313). For two kinds of block the latter, good where the blocks are short.
-    """
-    n = first.escapes + second.escapes
-    if not first.chaotic or not second.chaotic:
-        return math.nan
-    if not n:
-        return 1.0
-    if first.block and first.block == second.block:
-        table = [[s.escapes, round(s.survived / s.block)] for s in (first, second)]
-        from scipy.stats import fisher_exact  # takes half a second to load
-
-        return float(fisher_exact(table)[1])  # pyright: ignore[reportArgumentType]
-    share = first.exposure / (first.exposure + second.exposure)
-    from scipy.stats import binomtest  # takes half a second to load
-
-    return float(binomtest(first.escapes, n, share).pvalue)
-
-
-def compare(first: Survival, second: Survival) -> Comparison:
-    """Whether two runs, such as those with two step counts, have the same escape rate.
-
-    Where nothing is known, for want of lanes that were chaotic at t0 in one, they do not agree.
-    """
-    return Comparison(first, second, same_rate(first, second))
-
-
-def when_t0_doubles(
-    times: Float[np.ndarray, " lanes"], horizon: float | int, *, t0: float | int, block: float | int = 0
-) -> Comparison:
-    """The mean life with t0 and with 2 t0, and whether they agree within their errors.
-
-    The two share what happens after 2 t0 and so much of their errors. What differs is what happens from t0 to 2 t0: the
-    rate in that time is tested against the rate after it. A rate that falls means lanes not yet on the chaotic set, or
-    lanes of which only some escape.
-
-    **Arguments:** as for `survival`, 2 t0 before the horizon.
-    """
-    estimates = [survival(times, horizon, t0=t, block=block) for t in (t0, 2 * t0)]
-    early = survival(times, 2 * t0, t0=t0, block=block)
-    return Comparison(estimates[0], estimates[1], same_rate(early, estimates[1]))
-
-
-class Share(NamedTuple):
-    """Share of the starts that end alike."""
-
-    number: int
-    lanes: int
-    interval: tuple[float, float]
-    """Interval of 95 % (E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209)."""
-
-    @property
-    def share(self) -> float:
-        """Number of starts that end here, of all that finished."""
-        return self.number / self.lanes
-
-    def __str__(self) -> str:
-        low, high = self.interval
-        return f"{self.share:.1%} of starts ({low:.1%} to {high:.1%})"
-
-
-def coexisting(ends: Shaped[np.ndarray, " lanes"]) -> dict[str, Share]:
-    """Share of the starts on each attractor, the most frequent first; lanes that failed or are inaccurate are left out.
-
-    **Arguments:** the name of each lane's end: labels, or finer names where several orbits have one label.
-    """
-    counts = collections.Counter(str(end) for end in ends.tolist() if end not in ("failed", "inaccurate"))
-    lanes = sum(counts.values())
-    shares = {}
-    for end, count in counts.most_common():
-        from scipy.stats import binomtest  # takes half a second to load
-
-        low, high = binomtest(count, lanes).proportion_ci(method="wilson")
-        shares[end] = Share(count, lanes, (float(low), float(high)))
-    return shares
 
 
 def _inverse(x: float) -> float:

@@ -1,0 +1,207 @@
+"""The data set of a run: lanes over the axes of their plan, with units, words and provenance; stored by zarr.
+
+Variables, over the axes of the plan (`speed` and `start` of a sweep) and what stands in brackets:
+
+| variable | contents |
+|---|---|
+| `label`, `outcome` | what a lane does, and how its integration ended, in words; codes with their meanings on disk |
+| `exponents`, `standard_error` (exponent) | Lyapunov exponents per revolution |
+| `block_growth` (growth_block, exponent), `doubt` (exponent) | what they are computed from: means of blocks, error of steps |
+| `peak`, `error`, `steps` | largest excursion, largest error of a revolution [scale], steps of a revolution |
+| `last`, `scale` (component) | state at the end, magnitude of each component |
+| `strobe` (revolution, component) | the last strobe states, where revolutions repeat |
+| `escape` | revolutions after which a lane is calm, where lanes were followed to a horizon |
+| quantities of the model, and `NAME_blocks` (block) | means and largest values, and those of each block |
+"""
+
+import dataclasses
+import functools
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Float, Shaped
+
+from .._errors import InputError
+from ..analysis import LABELS, scatter
+from ..integrate import OUTCOMES, AbstractMethod
+from ..models import AbstractForcedSystem
+from ..quantities import Quantity, averaged, quantity
+from .confirm import Confirmation
+from .observe import Observation, over_lanes
+from .plan import SPEED, Plan
+from .settings import Run
+
+
+CODES: dict[str, tuple[str, ...]] = {"label": LABELS, "outcome": OUTCOMES}
+"""Variables that hold words, and the words in the order of their codes on disk; code -1 is a lane still to be run."""
+PENDING = "pending"
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """All that is known of the lanes of a plan after their run."""
+
+    plan: Plan
+    run: Run
+    seen: Observation
+    scale: Float[np.ndarray, "lanes dim"]
+    label: Shaped[np.ndarray, " lanes"]
+    escape: Float[np.ndarray, " lanes"] | None = None
+    horizon: int = 0
+    confirmed: tuple[Confirmation, ...] = ()
+
+
+def exponent_error(seen: Observation) -> Float[np.ndarray, "lanes exponents"]:
+    """Standard error of the exponents: scatter of the blocks, and the error of the steps."""
+    return np.hypot(scatter(seen.growth, axis=1), seen.doubt)
+
+
+def dataset(found: Found) -> xr.Dataset:
+    """The lanes as a data set."""
+    plan, run, seen, model = found.plan, found.run, found.seen, found.plan.model
+    last = run.discard + run.revolutions
+    label = found.label.copy()
+    if found.escape is not None:
+        label[(label == "chaotic") & np.isfinite(found.escape)] = "transient"
+    values: dict[str, tuple[tuple[str, ...], np.ndarray]] = {
+        "label": ((), label),
+        "outcome": ((), np.array(OUTCOMES)[seen.outcome]),
+        "exponents": (("exponent",), seen.growth.mean(axis=1)),
+        "standard_error": (("exponent",), exponent_error(seen)),
+        "block_growth": (("growth_block", "exponent"), seen.growth),
+        "doubt": (("exponent",), seen.doubt),
+        "peak": ((), seen.peak),
+        "error": ((), seen.error),
+        "steps": ((), seen.steps),
+        "last": (("component",), seen.last),
+        "scale": (("component",), found.scale),
+    }
+    if not model.beside:
+        values["strobe"] = ("revolution", "component"), seen.strobe
+    if found.escape is not None:
+        values["escape"] = (), found.escape
+    about = {name: quantity("exponent" if name == "exponents" else name) for name in values}
+    for each, whole, blocks in _averaged(found):
+        values[each.name], about[each.name] = ((), whole), each
+        values[f"{each.name}_blocks"], about[f"{each.name}_blocks"] = (("block",), blocks), each
+    shaped = lambda x: x.reshape(*plan.shape, *x.shape[1:])
+    words = lambda name: {"long_name": about[name].text, "units": about[name].unit}
+    variables = {name: ((*plan.axes, *dims), shaped(x), words(name)) for name, (dims, x) in values.items()}
+    coordinates: dict[str, Any] = {"component": np.array(model.components, dtype=object), **_coordinates(plan)}
+    if not model.beside:
+        coordinates["revolution"] = np.arange(last - run.keep + 1, last + 1)
+    return xr.Dataset(variables, coordinates, _attributes(found))
+
+
+def _averaged(found: Found) -> list[tuple[Quantity, np.ndarray, np.ndarray]]:
+    """Each quantity that the model reports, its value over the whole run and in each block."""
+    model, seen, lanes = found.plan.model, found.seen, found.plan.lanes
+    if not model.quantities:
+        return []
+    numbers = over_lanes(lanes, np.arange(len(found.scale)), lambda model, speed: model.reference(speed))
+    given = model.beside, model.watched[1:], seen.integrals, seen.largest, numbers, found.run.block
+    return averaged(model.quantities, *given)
+
+
+def _coordinates(plan: Plan) -> dict[str, Any]:
+    """Values along the axes, speeds in revolutions per minute, and the speed that goes with the model's."""
+    model = plan.model
+    found: dict[str, Any] = dict(plan.coordinates)
+    if SPEED not in found:
+        return found
+    dims, speed = plan.coordinates[SPEED]
+    words = lambda text, unit: {"long_name": text, "units": unit}
+    found[SPEED] = dims, speed, words(model.speed_text, "rad/s")
+    found["rpm"] = dims, speed * 30 / np.pi, words(model.speed_text, "rpm")
+    if dims == (SPEED,) and not plan.lanes.several and (other := model.other_speed(1.0)) is not None:
+        text = other[0]
+        values = np.array([float(model.other_speed(w)[1]) for w in speed])  # pyright: ignore
+        found[f"{text.split()[0]}_rpm"] = dims, values * 30 / np.pi, words(text, "rpm")
+    return found
+
+
+def _attributes(found: Found) -> dict[str, Any]:
+    run, several = found.run, found.plan.lanes.several
+    return {
+        "title": "jaxcage run",
+        "model": type(found.plan.model).__name__,
+        "discard": run.discard,
+        "revolutions": run.revolutions,
+        "horizon": found.horizon,
+        "confirmed": json.dumps(found.confirmed),
+        "settings": json.dumps(settings_of(run.method)),
+        **({} if several else _configured(found.plan.model)),
+    }
+
+
+def _configured(model: AbstractForcedSystem) -> dict[str, str]:
+    """The TOML configuration of a model, where a file can hold it."""
+    from ..io import configuration  # the tables of configurations are loaded when they are needed
+
+    try:
+        return {"configuration": json.dumps(configuration(model))}
+    except InputError:
+        return {}
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Versions of the packages that lanes are computed with."""
+    return {f"version_{p}": version(p) for p in ("jaxcage", "jax", "diffrax", "equinox", "numpy")}
+
+
+def settings_of(method: AbstractMethod) -> dict[str, str]:
+    """Method and versions, by which a result can be reproduced."""
+    return {"method": str(method).replace("\n", " "), **versions()}
+
+
+def coded(found: xr.Dataset) -> xr.Dataset:
+    """The data set with codes in place of words, and their meanings in the way of the CF conventions."""
+    for name, words in CODES.items():
+        if name in found:
+            number = {word: code for code, word in enumerate(words)} | {PENDING: -1}
+            codes = np.array([number[word] for word in found[name].values.ravel()], dtype=np.int8)
+            found = found.assign({name: found[name].copy(data=codes.reshape(found[name].shape))})
+            found[name].attrs |= {"flag_values": [-1, *range(len(words))], "flag_meanings": " ".join([PENDING, *words])}
+    return found
+
+
+def decoded(found: xr.Dataset) -> xr.Dataset:
+    """The data set with words in place of codes."""
+    for name in CODES:
+        if name in found and "flag_meanings" in found[name].attrs:
+            words = np.array(found[name].attrs["flag_meanings"].split())
+            values = dict(zip(found[name].attrs["flag_values"], words, strict=True))
+            at = np.vectorize(values.__getitem__, otypes=[words.dtype])
+            found = found.assign({name: found[name].copy(data=at(found[name].values))})
+            found[name].attrs = {k: v for k, v in found[name].attrs.items() if not k.startswith("flag_")}
+    return found
+
+
+def save(path: str | Path, found: xr.Dataset) -> Path:
+    """Write a data set to the zarr folder `path`, whole or not at all; an earlier result stays until then."""
+    from ..io import replacing
+
+    with replacing(path) as temporary:
+        coded(found).to_zarr(temporary, mode="w", consolidated=False)
+    return Path(path)
+
+
+def load(path: str | Path) -> xr.Dataset:
+    """The data set that `save` wrote, in memory. **Raises:** `FileNotFoundError`."""
+    if not Path(path).is_dir():
+        raise FileNotFoundError(f"There is no stored run at '{path}'.")
+    # Version 3 only, which `save` writes: version 2 has a codec that unpickles, and so runs what a file says.
+    with xr.open_dataset(path, engine="zarr", zarr_format=3, consolidated=False, chunks=None) as stored:
+        return decoded(stored.load())
+
+
+def stored_configuration(found: xr.Dataset) -> Mapping[str, Any] | None:
+    """The configuration of the model that made a data set; None if there was none."""
+    text = found.attrs.get("configuration")
+    return None if text is None else json.loads(text)

@@ -1,0 +1,146 @@
+"""Lanes that have not settled are followed to a horizon, which tells how long their chaos lasts.
+
+Some leave chaos for good before the horizon: they were on a chaotic transient, whose mean life follows from the times
+of these escapes (`analysis.survival`). Lanes that settle early can also be stopped early.
+"""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped
+
+from ..analysis import (
+    CONFIRM,
+    LIFE_BLOCK,
+    calm_at_the_end,
+    calm_threshold,
+    closing_period,
+    escape_times,
+    on_torus,
+    scatter,
+)
+from .observe import Observation
+from .settings import Run
+
+
+STAGE = 12
+"""Number of blocks after which lanes that have settled are not run any further."""
+CALM = -1.0
+"""Growth that stands for that of a lane which has settled on a periodic orbit, and is not followed."""
+Onward = Callable[[Run, Int[np.ndarray, " some"], Float[np.ndarray, "some dim"] | None], Observation]
+"""Runs some lanes with some settings: from given states, or from their initial states."""
+
+
+def follow(
+    label: Shaped[np.ndarray, " lanes"],
+    seen: Observation,
+    run: Run,
+    scale: Float[np.ndarray, "lanes dim"],
+    onward: Onward,
+) -> tuple[Float[np.ndarray, " lanes"], int]:
+    """Follow the lanes that are not settled, and put their later states in place of what was `seen` of them.
+
+    They are run on in stages of `STAGE` blocks. A lane that has closed on a periodic orbit by the end of a stage, its
+    growth calm for as long as an escape takes to be confirmed, is not run any further; nor is one that was undecided
+    and is seen to be on a torus. Exponents of lanes that were undecided are those of the longer run.
+
+    **Arguments:** labels; observations and the settings that they were made with; scale of each lane's state; what runs
+    lanes on.
+
+    **Returns:** revolutions of the whole run after which a lane is calm, infinity for chaos at the horizon, NaN for a
+    failure; the horizon, in whole blocks.
+    """
+    early = _coarse(seen.growth[:, :, 0], run.block)
+    observed = run.discard + run.revolutions
+    blocks = -(-(run.horizon - observed) // LIFE_BLOCK) + CONFIRM  # to the horizon, and those that confirm an escape
+    late, ran = np.full((label.size, blocks), CALM), np.zeros(label.size, dtype=int)
+    undecided = label == "undecided"
+    calm = np.ones(label.size, dtype=bool)
+    active = np.flatnonzero(np.isin(label, ("chaotic", "undecided")))
+    for first in range(0, blocks, STAGE):
+        if not active.size:
+            break
+        last = min(first + STAGE, blocks)
+        keep = min(run.keep, LIFE_BLOCK * (last - first))
+        stage = dataclasses.replace(
+            run, discard=0, revolutions=LIFE_BLOCK * (last - first), blocks=last - first, keep=keep, exponents=1
+        )
+        new = onward(stage, active, seen.last[active])
+        _put(seen, active, new, undecided[active])
+        late[active, first:last], ran[active] = new.growth[:, :, 0], last
+        end = late[active, :last]
+        calm[active] = calm_at_the_end(new.strobe, scale[active], end, LIFE_BLOCK)
+        closed = closing_period(new.strobe, scale[active]) > 0
+        still = np.all(end[:, -CONFIRM:] <= calm_threshold(LIFE_BLOCK), axis=1)
+        torus = np.zeros(active.size, dtype=bool)
+        if (parts := _aligned(end, run.blocks)).shape[1]:
+            torus = undecided[active] & on_torus(new.strobe, scale[active], parts.mean(axis=1), scatter(parts, axis=1))
+        active = active[~(closed & still) & ~torus & (new.outcome == 0)]
+    for lane in np.flatnonzero(undecided & (ran > 0) & (seen.outcome == 0)):
+        if (parts := _aligned(late[None, lane, : ran[lane]], run.blocks)).shape[1]:
+            seen.growth[lane, :, 0] = parts[0]
+    times, end = escape_times(np.concatenate([early, late], axis=1), calm, LIFE_BLOCK, failed=seen.outcome != 0)
+    begin = run.discard + run.revolutions % LIFE_BLOCK
+    return begin + times, begin + end
+
+
+def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarray, "lanes parts"]:
+    """Growth in `count` equal parts of the run, the first block of each stage left out: tangent vectors still turn to
+    their direction there. Empty where there are fewer blocks."""
+    blocks = late[:, np.arange(late.shape[1]) % STAGE > 0]
+    size = blocks.shape[1] // count
+    if size == 0:
+        return blocks[:, :0]
+    return blocks[:, blocks.shape[1] - size * count :].reshape(len(late), count, size).mean(axis=2)
+
+
+def _put(seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]) -> None:
+    """Put the later states in place, NaN where a lane fails; the last strobe states of those that are `open_`, which may
+    close."""
+    seen.last[lanes], seen.outcome[lanes] = new.last, new.outcome
+    seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
+    every = np.concatenate([seen.strobe[lanes[open_]], new.strobe[open_]], axis=1)
+    seen.strobe[lanes[open_]] = every[:, new.strobe.shape[1] :]
+    lost = lanes[new.outcome != 0]
+    seen.strobe[lost] = seen.growth[lost] = np.nan
+
+
+def _coarse(growth: Float[np.ndarray, "lanes blocks"], block: int) -> Float[np.ndarray, "lanes coarse"]:
+    """Mean growth over whole blocks of `LIFE_BLOCK` revolutions, the last ones of those observed."""
+    every = np.repeat(growth, block, axis=1)
+    count = every.shape[1] // LIFE_BLOCK
+    return every[:, every.shape[1] - count * LIFE_BLOCK :].reshape(len(growth), count, LIFE_BLOCK).mean(axis=2)
+
+
+def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onward) -> Observation:
+    """Observe lanes, of which those that are periodic after `run.settled` revolutions, or after all that are discarded,
+    are not run any further, nor with tangent vectors: their exponents are NaN."""
+    lanes, seen, done = np.arange(len(scale)), None, 0
+    for until in sorted({run.settled, run.discard}):
+        short = min(run.keep, until - done)
+        look = dataclasses.replace(
+            run, discard=until - done - short, revolutions=short, blocks=1, keep=short, exponents=0
+        )
+        new = onward(look, lanes, None if seen is None else seen.last[lanes])
+        closed = closing_period(new.strobe, scale[lanes]) > 0
+        strobe = np.full((lanes.size, run.keep, scale.shape[1]), np.nan)
+        strobe[:, run.keep - short :] = new.strobe
+        growth = np.full((lanes.size, run.blocks, run.exponents), np.nan)
+        beside = {n: np.full((lanes.size, run.blocks, getattr(new, n).shape[2]), np.nan) for n in ("integrals", "largest")}
+        new = dataclasses.replace(new, strobe=strobe, growth=growth, doubt=growth[:, 0].copy(), **beside)
+        seen = new if seen is None else _later(seen, lanes, new)
+        lanes, done = lanes[~closed & (new.outcome == 0)], until
+    assert seen is not None
+    if lanes.size:
+        align = min(run.block, run.discard) if run.exponents else 0
+        seen = _later(seen, lanes, onward(dataclasses.replace(run, discard=align), lanes, seen.last[lanes]))
+    return seen
+
+
+def _later(seen: Observation, lanes: np.ndarray, new: Observation) -> Observation:
+    """What was seen of all lanes, and of some of them later."""
+    error = seen.error.copy()
+    error[lanes] = np.fmax(error[lanes], new.error)
+    seen.put(lanes, new)
+    return dataclasses.replace(seen, error=error)

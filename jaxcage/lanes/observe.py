@@ -1,0 +1,323 @@
+"""Lanes are run and observed: strobe states, growth of tangent vectors, integrals of quantities, errors.
+
+Every lane runs by itself: what it does depends neither on its neighbours nor on the number of threads. Arrays have the
+lanes first.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from .._form import Form, compiled
+from ..integrate import (
+    IMPLICIT,
+    OUTCOMES,
+    RETRIES,
+    SURE,
+    AbstractMethod,
+    EngineInJax,
+    Lanes,
+    NativeSteps,
+    codes_of,
+    cores,
+)
+from ..models import ESCAPE
+from ..solve import FIRST_STEP, STUCK, TOO_MANY, Engine, March
+from .settings import Run
+
+
+CHECKED = 8
+"""Revolutions of each lane, the last ones whose strobe states are kept, that are run again to measure their error."""
+FURTHER = 4
+"""Revolutions beyond the end of a run by which the error of its exponents is measured."""
+CHUNK = 4096
+"""Strobe states of a revolution, of all lanes together, that are held at a time."""
+LEAD = 10
+"""Revolutions in which a tangent vector turns to its direction, where exponents are followed for a part of the run."""
+Progress = Callable[[int, int], None]
+"""Called with lanes done and lanes in all."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Observation:
+    """What lanes did. A lane that failed is NaN with an outcome."""
+
+    outcome: Int[np.ndarray, " lanes"]
+    """Code of how each lane ended, its place in `OUTCOMES`."""
+    last: Float[np.ndarray, "lanes dim"]
+    """State at the end of the run [SI]."""
+    strobe: Float[np.ndarray, "lanes keep dim"]
+    """The last strobe states [SI]."""
+    growth: Float[np.ndarray, "lanes blocks exponents"]
+    """Mean logarithmic growth of tangent vectors per revolution in each block."""
+    peak: Float[np.ndarray, " lanes"]
+    """Largest excursion while observed; for a cage the eccentricity ratio."""
+    error: Float[np.ndarray, " lanes"]
+    """Largest error of a revolution, in units of the scale."""
+    doubt: Float[np.ndarray, "lanes exponents"]
+    """Error of the exponents that comes from the steps."""
+    steps: Float[np.ndarray, " lanes"]
+    """Mean number of steps in an observed revolution."""
+    integrals: Float[np.ndarray, "lanes blocks beside"]
+    """Integrals over each block of what the model integrates beside its state."""
+    largest: Float[np.ndarray, "lanes blocks watched"]
+    """Largest values in each block of what the model watches, beyond the excursion."""
+    place: Float[np.ndarray, "lanes samples 2"]
+    """Centre of the cage from that of its land, over the clearance, at each sample; for models that record several."""
+
+    def put(self, lanes: Int[np.ndarray, " some"], new: "Observation") -> None:
+        """Put what some lanes did in another run in place of what they did in this one."""
+        for field in dataclasses.fields(self):
+            getattr(self, field.name)[lanes] = getattr(new, field.name)
+
+    def at(self, lanes: Any) -> "Observation":
+        """Some of the lanes."""
+        return Observation(*(getattr(self, field.name)[lanes] for field in dataclasses.fields(self)))
+
+
+def joined(parts: list[Observation]) -> Observation:
+    """Lanes of several observations, one after the other."""
+    names = [field.name for field in dataclasses.fields(Observation)]
+    return Observation(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def observe(
+    lanes: Lanes,
+    run: Run,
+    states: Float[np.ndarray, "lanes dim"],
+    progress: Progress | None = None,
+    *,
+    method: AbstractMethod | None = None,
+    onward: bool = False,
+) -> Observation:
+    """Run lanes from their initial states.
+
+    **Arguments:** lanes; settings; states [SI]; called with lanes done and lanes in all; method, by default that of the
+    settings; whether lanes go on from where another run left them, where they may be as far out as lanes come on their
+    way.
+    """
+    count, each, done = lanes.speed.size, run.discard + run.revolutions, 0.0
+
+    def report(revolutions: float) -> None:
+        nonlocal done
+        done += revolutions / max(each, 1)
+        if progress is not None:
+            progress(min(int(done + 1e-9), count), count)
+
+    chosen, limit = run.method if method is None else method, ESCAPE if onward else 1.0
+    size = max(1, CHUNK // (1 if lanes.system.samples == 1 else 8))
+    parts = []
+    for first in range(0, count, size):
+        some = np.arange(first, min(first + size, count))
+        parts.append(_allowed(_Observer(lanes, run, some, states[some], limit, report), chosen))
+    return joined(parts)
+
+
+def _allowed(observer: "_Observer", method: AbstractMethod) -> Observation:
+    """Observe lanes; those with too large an error again with smaller tolerances, and those that take too many or too
+    short steps again by an implicit method."""
+    seen, stuck = observer.once(method, np.arange(observer.some.size))
+
+    def again(chosen: AbstractMethod, todo: Int[np.ndarray, " few"]) -> None:
+        found, lost = observer.once(chosen, todo)
+        seen.put(todo, found)
+        stuck[todo] = lost
+
+    large = lambda: (seen.error > method.allowed) & (seen.outcome == 0)  # of what was asked for, not of a finer run
+    if not observer.averages:
+        implicit = [method.implicit] if isinstance(method, NativeSteps) and method.pair != IMPLICIT else []
+        for chosen in [method, *implicit]:
+            if chosen is not method and np.any(todo := stuck | large()):
+                again(chosen, np.flatnonzero(todo))
+            for retry in range(1, RETRIES + 1):
+                todo = np.flatnonzero(large() & ~stuck)
+                if not todo.size:
+                    break
+                again(chosen.finer(retry), todo)
+    seen.outcome[large()] = OUTCOMES.index("inaccurate")
+    lost = seen.outcome != 0
+    if observer.averages:  # means of a lane that is inaccurate are reported, with its error
+        lost &= seen.outcome != OUTCOMES.index("inaccurate")
+    for values in (seen.strobe, seen.growth, seen.last, seen.integrals, seen.largest, seen.place):
+        values[lost] = np.nan
+    return seen
+
+
+class _Observer:
+    """Some lanes, and how they are observed."""
+
+    def __init__(
+        self,
+        lanes: Lanes,
+        run: Run,
+        some: Int[np.ndarray, " some"],
+        states: Float[np.ndarray, "some dim"],
+        limit: float,
+        report: Callable[[float], None],
+    ):
+        self.lanes, self.run, self.some, self.states, self.limit, self.report = lanes, run, some, states, limit, report
+        self.model = lanes.system
+        self.averages = len(self.model.beside) > 0
+
+    def _segments(self) -> list[tuple[int, int, bool]]:
+        """First and last revolution of each part of the run, and whether tangent vectors are followed in it."""
+        run, end = self.run, self.run.discard + self.run.revolutions
+        pushed = end
+        if run.exponents:
+            pushed = max(end - run.followed * run.block - (LEAD if self.averages else run.block), 0)
+            pushed -= (pushed - run.discard) % run.block if self.averages and pushed > run.discard else 0
+        cuts = {0, end, pushed if run.exponents else run.discard}
+        if self.averages:
+            cuts |= {run.discard, *range(run.discard, end, run.block)}
+        ordered = sorted(cuts)
+        return [(a, b, a >= pushed) for a, b in zip(ordered[:-1], ordered[1:], strict=True)]
+
+    def once(
+        self, method: AbstractMethod, which: Int[np.ndarray, " few"]
+    ) -> tuple[Observation, Bool[np.ndarray, " few"]]:
+        """Observe lanes by one method, and tell which took too many or too short steps."""
+        run, model, some, y0 = self.run, self.model, self.some[which], self.states[which]
+        count, dim, samples, end = which.size, model.dimension, model.samples, run.discard + run.revolutions
+        scale, excursion = self.lanes.begin(some, y0)
+        finite = np.all(np.isfinite(y0), axis=1)
+        outcome = np.where(excursion <= self.limit, 0, OUTCOMES.index("outside"))
+        outcome = np.where(finite, outcome, OUTCOMES.index("not_finite"))
+        nan = lambda *shape: np.full((count, *shape), np.nan)
+        state = np.concatenate([y0 / scale, np.zeros((count, len(model.beside)))], axis=1)
+        step, stuck, error = np.full(count, FIRST_STEP), np.zeros(count, dtype=bool), np.zeros(count)
+        tangents = np.tile(start_tangents(dim, run.exponents), (count, 1, 1))
+        growth, strobe, peak = nan(run.followed * run.block, run.exponents), nan(run.keep, dim), nan()
+        integrals, largest = nan(run.blocks, len(model.beside)), nan(run.blocks, len(model.watched) - 1)
+        place = nan(run.revolutions * samples if self.averages else 0, 2)
+        steps, doubt = np.zeros(count), np.zeros((count, run.exponents))
+        alive = np.flatnonzero(outcome == 0)
+        for begin, stop, pushed in self._segments():
+            alive = alive[outcome[alive] == 0]
+            if not alive.size:
+                break
+            engine = self.lanes.engine(run.exponents if pushed else 0, method, samples)
+            plain = self.lanes.engine(0, method, samples)
+            numbers, seen = self.lanes.numbers(engine, some[alive]), stop == end or (self.averages and begin >= run.discard)
+            if begin == 0 or (self.averages and seen):
+                found = self._error(plain, self.lanes.numbers(plain, some[alive]), state[alive], method)
+                error[alive] = np.maximum(error[alive], found)
+            strobes = (stop - begin) * samples
+            held = strobes if self.averages else max(run.keep, min(CHECKED + 1, strobes))
+            before, (_, begun) = state[alive], self.lanes.begin(some[alive], state[alive, :dim] * scale[alive])
+            ran = engine(
+                numbers, before, strobes, held if seen else 1, method, step=step[alive], threads=cores(),
+                tangents=tangents[alive] if pushed and run.exponents else None, report=self._reporter(stop - begin),
+            )  # fmt: skip
+            state[alive], step[alive], outcome[alive] = ran.state, ran.step, codes_of(ran.mark)
+            stuck[alive] = np.isin(ran.mark, (STUCK, TOO_MANY))
+            if pushed and run.exponents:
+                tangents[alive] = ran.tangents
+                each = ran.growth.reshape(alive.size, stop - begin, samples, run.exponents).sum(axis=2)
+                first = end - run.followed * run.block
+                if stop > first:
+                    growth[alive, max(begin - first, 0) : stop - first] = each[:, max(first - begin, 0) :]
+            if not seen:
+                continue
+            steps[alive] += ran.steps / (stop - begin) * (stop - max(begin, run.discard)) / run.revolutions
+            if self.averages:
+                block, n = (begin - run.discard) // run.block, len(model.watched)
+                integrals[alive, block] = ran.state[:, dim:] - before[:, dim:]
+                largest[alive, block] = ran.strobe[..., -n + 1 :].max(axis=1)
+                peak[alive] = np.fmax(peak[alive], ran.strobe[..., -n].max(axis=1))
+                recorded = ran.strobe[..., :dim] * scale[alive, None, :]
+                centres = over_lanes(self.lanes, some[alive], _centres, recorded)
+                place[alive, block * strobes : (block + 1) * strobes] = centres
+                continue
+            strobe[alive] = ran.strobe[:, held - run.keep :]
+            peak[alive] = np.maximum(ran.peak, begun)
+            doubt[alive] = self._doubt(engine, numbers, ran, method)
+            error[alive] = np.maximum(error[alive], self._error_of_strobes(plain, some[alive], ran.strobe, method))
+        blocks = growth.reshape(count, run.followed, run.block, run.exponents).mean(axis=2)
+        last = np.where((outcome == 0)[:, None], state[:, :dim] * scale, np.nan)
+        kept = strobe * scale[:, None, :]
+        return Observation(
+            outcome.astype(np.int32), last, kept, blocks, peak, error, doubt, steps, integrals, largest, place
+        ), stuck
+
+    def _reporter(self, revolutions: int) -> Callable[[int], None]:
+        done = 0
+
+        def tell(lanes_done: int) -> None:
+            nonlocal done
+            self.report((lanes_done - done) * revolutions)
+            done = lanes_done
+
+        return tell
+
+    @staticmethod
+    def _doubt(
+        engine: Engine | EngineInJax, numbers: Any, ran: March, method: AbstractMethod
+    ) -> Float[np.ndarray, "some exponents"]:
+        """Error of the exponents per revolution that comes from the steps: three times the change of the mean growth
+        over a few further revolutions by the method's reference."""
+        if not ran.tangents.shape[1]:
+            return np.zeros((len(ran.state), 0))
+        options: dict[str, Any] = dict(tangents=ran.tangents, step=ran.step, threads=cores())
+        further = lambda chosen: engine(numbers, ran.state, FURTHER, 1, chosen, **options).growth.mean(axis=1)
+        return SURE * np.abs(further(method) - further(method.reference))
+
+    def _error(
+        self, engine: Engine | EngineInJax, numbers: Any, state: Float[np.ndarray, "some numbers"], method: AbstractMethod
+    ) -> Float[np.ndarray, " some"]:
+        """Error of a revolution from a state: three times the distance of its end from that by the method's reference.
+
+        It is at least the tolerance, which protects against accidental agreement of the two.
+        """
+        dim = self.model.dimension
+        once = lambda chosen: engine(numbers, state, 1, 1, chosen, threads=cores()).state[:, :dim]
+        apart = np.max(np.abs(once(method) - once(method.reference)), axis=1)
+        return np.maximum(SURE * np.nan_to_num(apart), getattr(method, "tolerance", 0.0))
+
+    def _error_of_strobes(
+        self,
+        engine: Engine | EngineInJax,
+        some: Int[np.ndarray, " some"],
+        strobe: Float[np.ndarray, "some held dim"],
+        method: AbstractMethod,
+    ) -> Float[np.ndarray, " some"]:
+        """The same of the last revolutions, whose strobe states are known."""
+        pairs = strobe[:, -(CHECKED + 1) :]
+        count = pairs.shape[1] - 1
+        if count < 1:
+            return np.zeros(len(strobe))
+        numbers = self.lanes.numbers(engine, np.repeat(some, count))
+        starts = pairs[:, :-1].reshape(-1, pairs.shape[2])
+        sharper = engine(numbers, starts, 1, 1, method.reference, threads=cores()).state
+        apart = np.max(np.abs(sharper - pairs[:, 1:].reshape(sharper.shape)), axis=1)
+        worst = SURE * np.max(np.nan_to_num(apart.reshape(-1, count)), axis=1)
+        return np.maximum(worst, getattr(method, "tolerance", 0.0))
+
+
+def over_lanes(lanes: Lanes, some: Int[np.ndarray, " some"], f: Callable[..., Any], *arrays: np.ndarray) -> Any:
+    """`f(model, speed, ...)` of some lanes, the arrays with the lanes first."""
+    rows = [jnp.asarray(x) for x in lanes.rows(some)]
+    given = [jnp.asarray(x) for x in (lanes.speed[some], *arrays)]
+    return jax.tree.map(np.asarray, _mapped(f, lanes.form, lanes.several, rows, *given))
+
+
+@compiled
+def _mapped(f: Callable[..., Any], form: Form, several: bool, rows: Any, speed: Array, *arrays: Array) -> Any:
+    def lane(row: Any, speed: Array, *arrays: Array) -> Any:
+        return jax.tree.map(lambda x: jnp.asarray(x, float), f(form.filled(row), speed, *arrays))
+
+    return jax.vmap(lane, in_axes=(0 if several else None, 0, *(0 for _ in arrays)))(rows, speed, *arrays)
+
+
+def _centres(model: Any, speed: Array, states: Array) -> Array:
+    return jax.vmap(lambda y: jnp.stack(model.centre(tuple(y))))(states)
+
+
+def start_tangents(dimension: int, exponents: int) -> Float[np.ndarray, "exponents dim"]:
+    """Orthonormal directions with no component zero, so that none is orthogonal to a coordinate axis."""
+    i, d = np.arange(exponents)[:, None], np.arange(dimension)
+    return np.linalg.qr(np.cos((i + 1.0) * (d + 1) * 1.234 + d).T)[0].T

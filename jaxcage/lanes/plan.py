@@ -1,0 +1,155 @@
+"""Plans: which lanes are run, each a design at a speed from an initial state, and how they are laid out."""
+
+import dataclasses
+import math
+import reprlib
+from collections.abc import Mapping, Sequence
+from typing import Any, overload
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._arguments import require_at_least, wrong
+from .._errors import ArgumentError
+from .._form import compiled
+from .._types import State
+from ..integrate import Lanes
+from ..models import AbstractForcedSystem, require_speeds
+
+
+Speeds = float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]
+States = int | Sequence[State] | Float[np.ndarray, "speeds states dim"] | None
+"""Initial states: how many of the model's own, states for every speed, or states of each speed; all of its own."""
+DESIGN, SPEED, START = "design", "speed", "start"
+
+
+@overload
+def rpm(first: float | int) -> float: ...
+@overload
+def rpm(first: float | int, last: float | int, count: int = 2) -> Float[np.ndarray, " count"]: ...
+def rpm(first: float | int, last: float | int | None = None, count: int = 2) -> float | Float[np.ndarray, " count"]:
+    """Speeds given in revolutions per minute, in rad/s: one number, or an array of `count` from `first` to `last`.
+
+    **Raises:** `ValueError` for anything but finite numbers, and for a count below 1.
+    """
+    for name, value in {"first": first, **({} if last is None else {"last": last})}.items():
+        if wrong(float, value) or not math.isfinite(value):
+            raise ArgumentError(name, said=f"must be a finite number, but {reprlib.repr(value)} was given.")
+    if said := wrong(int, count):
+        raise ArgumentError("count", said=f"must be {said}, but {count!r} was given.")
+    require_at_least(1, count=count)
+    if last is None:
+        return float(first) * math.pi / 30
+    return np.linspace(first, last, count) * math.pi / 30
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Plan:
+    """Lanes, and the axes along which they are laid out."""
+
+    lanes: Lanes
+    """Design and speed of each lane."""
+    states: Float[np.ndarray, "lanes dim"]
+    """Initial state of each lane [SI]."""
+    axes: Mapping[str, int]
+    """Length of each axis, the slowest first; their product is the number of lanes."""
+    coordinates: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = dataclasses.field(default_factory=dict)
+    """Values along the axes by name: the axes of each, and values [SI]."""
+
+    @property
+    def model(self) -> AbstractForcedSystem:
+        """One of the designs."""
+        return self.lanes.system
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lanes along each axis."""
+        return tuple(self.axes.values())
+
+    @classmethod
+    def over_speed(
+        cls, designs: AbstractForcedSystem | Sequence[AbstractForcedSystem], speeds: Speeds, states: States = None
+    ) -> "Plan":
+        """Designs at speeds from initial states: axes `design` (of several), `speed` and `start`.
+
+        **Arguments:** a model, or several that differ in their numbers only; ascending speeds [rad/s]; initial states.
+
+        **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and states that do not fit.
+        """
+        models, speed = _models(designs), checked_speeds(speeds)
+        require_speeds(models[0], speed, "speeds")
+        begin = np.stack([initial_states(model, speed, states) for model in models])
+        shape = begin.shape[:3]
+        which, at = (np.repeat(x.ravel(), shape[2]) for x in np.indices(shape[:2]))
+        axes = dict(zip((DESIGN, SPEED, START), shape, strict=True))
+        if not isinstance(designs, Sequence):
+            del axes[DESIGN]
+        lanes = Lanes.of(models, speed[at], which)
+        return cls(lanes, begin.reshape(-1, begin.shape[-1]), axes, {SPEED: ((SPEED,), speed)})
+
+    @classmethod
+    def one_speed_each(cls, designs: Sequence[AbstractForcedSystem], speeds: Float[np.ndarray, " designs"]) -> "Plan":
+        """Designs, each at a speed of its own [rad/s], from all of their initial states: axes `design` and `start`."""
+        models = _models(designs)
+        begin = np.stack([initial_states(m, s, None)[0] for m, s in zip(models, speeds[:, None], strict=True)])
+        count, starts, _ = begin.shape
+        lanes = Lanes.of(models, np.repeat(speeds, starts), np.repeat(np.arange(count), starts))
+        axes = {DESIGN: count, START: starts}
+        return cls(lanes, begin.reshape(count * starts, -1), axes, {SPEED: ((DESIGN,), speeds)})
+
+    @property
+    def scale(self) -> Float[np.ndarray, "lanes dim"]:
+        """Characteristic magnitude of each state component in each lane."""
+        return self.lanes.begin(np.arange(len(self.states)), self.states)[0]
+
+
+def checked_speeds(speeds: Any) -> Float[np.ndarray, " speeds"]:
+    """Speeds as an array. **Raises:** `ValueError` for speeds that are empty, not positive or not ascending."""
+    speed = np.atleast_1d(np.asarray(speeds, dtype=float))
+    if speed.size == 0:
+        raise ArgumentError("speeds", said="must hold at least one speed, but it is empty.")
+    if not np.all(np.isfinite(speed)) or np.any(speed <= 0):
+        bad = speed[~(np.isfinite(speed) & (speed > 0))][0]
+        raise ArgumentError("speeds", said=f"must be positive and finite, but it holds {bad} rad/s.")
+    if np.any(np.diff(speed) <= 0):
+        raise ArgumentError("speeds", said="must be in ascending order without repetition, but it is not.")
+    return speed
+
+
+def _models(designs: AbstractForcedSystem | Sequence[AbstractForcedSystem]) -> list[AbstractForcedSystem]:
+    models = list(designs) if isinstance(designs, Sequence) else [designs]
+    if not models:
+        raise ArgumentError("model", said="must hold at least one design, but it is empty.")
+    return models
+
+
+def initial_states(
+    model: AbstractForcedSystem, speed: Float[np.ndarray, " speeds"], states: States
+) -> Float[np.ndarray, "speeds states dim"]:
+    """Initial states at each speed: the model's own, some of them, the same at every speed, or as given."""
+    if states is None or isinstance(states, int):
+        own = np.asarray(_own_states(model, jnp.asarray(speed)))
+        if states is not None and not 1 <= states <= own.shape[1]:
+            raise ArgumentError(
+                "starts", said=f"must be 1 to {own.shape[1]}, as many as the model has, but {states} was given."
+            )
+        return own[:, :states]
+    wanted = f"states of {model.dimension} numbers"
+    if isinstance(states, np.ndarray):
+        if states.ndim != 3 or states.shape[::2] != (speed.size, model.dimension):
+            raise ArgumentError(
+                "starts", said=f"must hold {wanted} for each of {speed.size} speeds, but has shape {states.shape}."
+            )
+        return states
+    rows = [np.array([float(c) for c in y]) for y in states]
+    if not rows or any(row.shape != (model.dimension,) for row in rows):
+        raise ArgumentError("starts", said=f"must hold {wanted}, but holds {states}.")
+    return np.broadcast_to(np.stack(rows), (speed.size, len(rows), model.dimension)).copy()
+
+
+@compiled
+def _own_states(model: AbstractForcedSystem, speed: Float[Array, " speeds"]) -> Float[Array, "speeds states dim"]:
+    row = lambda y: jnp.stack([jnp.asarray(c) for c in y])
+    return jax.vmap(lambda s: jnp.stack([row(y) for y in model.starts(s)]))(speed)

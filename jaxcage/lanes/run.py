@@ -1,0 +1,155 @@
+"""Lanes are run: a plan and settings in, one data set out."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Float
+
+from .._checks import require_x64
+from ..analysis import label_lanes, motion_label
+from ..integrate import OUTCOMES, AbstractMethod
+from ..models import INSTEAD, AbstractForcedSystem, require_known
+from .confirm import Confirmation, Labelled, confirm as confirm_lanes, doubtful
+from .dataset import Found, dataset, exponent_error
+from .horizon import follow, run_unsettled
+from .observe import Observation, Progress, observe
+from .plan import Plan, Speeds, States
+from .settings import Run
+
+
+def run_lanes(plan: Plan, run: Run, progress: Progress | None = None) -> xr.Dataset:
+    """Run the lanes of a plan.
+
+    **Arguments:** lanes; settings (`Run.of`); called with lanes done and lanes in all.
+
+    **Returns:** a data set over the axes of the plan, as `lanes.dataset` describes it. Lanes that fail are NaN with an
+    outcome and leave their neighbours untouched.
+    """
+    scale = plan.scale
+
+    def onward(run: Run, some: np.ndarray, y: Float[np.ndarray, "some dim"] | None, **more: Any) -> Observation:
+        begin = plan.states[some] if y is None else y
+        return observe(plan.lanes.at(some), run, begin, progress, onward=y is not None, **more)
+
+    seen = run_unsettled(run, scale, onward) if run.settled else onward(run, np.arange(len(scale)), None)
+    rounds: tuple[Confirmation, ...] = ()
+    escape, end = None, 0
+    if plan.model.samples > 1:
+        label = _motion_labels(seen, plan.model.samples)
+        return dataset(Found(plan, run, seen, scale, label))
+    if run.exponents and run.blocks > 1:  # without an error of the exponent no lane is called chaotic
+        if run.confirm:
+
+            def again(lanes: np.ndarray, times: int) -> Labelled:
+                seen.put(lanes, onward(run, lanes, None, method=run.method.finer(times)))
+                return labelled(seen.at(lanes), scale[lanes])
+
+            every = labelled(seen, scale)
+            rounds = confirm_lanes(doubtful(every.label.reshape(plan.shape)), every, again)
+        if run.horizon > run.discard + run.revolutions:
+            escape, end = follow(labelled(seen, scale).label, seen, run, scale, onward)
+    return dataset(Found(plan, run, seen, scale, labelled(seen, scale).label, escape, end, rounds))
+
+
+def labelled(seen: Observation, scale: Float[np.ndarray, "lanes dim"]) -> Labelled:
+    """Labels of lanes while they were observed, with the largest exponent and its standard error."""
+    unknown = np.full(len(scale), np.nan)
+    exponent, error = unknown, unknown
+    if seen.growth.shape[2]:
+        exponent, error = seen.growth.mean(axis=1)[:, 0], exponent_error(seen)[:, 0]
+    return Labelled(label_lanes(seen.outcome, seen.strobe, scale, exponent, error), exponent, error)
+
+
+def _motion_labels(seen: Observation, samples: int) -> np.ndarray:
+    """Names of the motion of the cage's centre."""
+    lost = ~np.isin(seen.outcome, [OUTCOMES.index(name) for name in ("successful", "inaccurate")])
+    labels = [motion_label(x, samples) for x in seen.place]
+    return np.where(lost, "failed", np.array(labels))
+
+
+def sweep(
+    model: AbstractForcedSystem | Sequence[AbstractForcedSystem],
+    speeds: Speeds,
+    *,
+    starts: States = None,
+    discard: int | None = None,
+    revolutions: int | None = None,
+    blocks: int | None = None,
+    exponents: int | None = None,
+    keep: int | None = None,
+    confirm: bool | None = None,
+    horizon: int | None = None,
+    settled: int | None = None,
+    tolerance: float | None = None,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run a model over speed from several initial states: strobe states, Lyapunov exponents, labels; of a whole bearing
+    slips, forces, losses and wear.
+
+    **Arguments:**
+
+    - `model`: a cage, a whole bearing, any system of one's own; or several designs that differ in their numbers only.
+    - `speeds`: ascending speeds [rad/s], of a cage its own, of a whole bearing its shaft's; `jaxcage.rpm` makes them
+        from revolutions per minute.
+    - `starts`: initial states, each a tuple of numbers, or an array with states of its own for each speed; or how many
+        of the model's own; by default all of these.
+    - `tolerance`: of machine code, relative to state and scale; `method`: any integration method instead.
+    - the rest: fields of `jaxcage.lanes.Run`, which names their defaults.
+    - `progress`: called with lanes done and lanes in all.
+
+    **Returns:** a data set over `speed` and `start` (of several designs over `design` too), with the labels, exponents
+    and quantities of every lane. Lanes that fail are NaN with an outcome.
+
+    **Raises:** `ValueError` for speeds that are empty, not positive or not ascending, and for impossible counts;
+    `RuntimeError` without double precision.
+    """
+    require_x64()
+    require_known("sweep", INSTEAD, model, speeds)
+    plan = Plan.over_speed(model, speeds, starts)
+    run = Run.of(
+        plan.model,
+        discard=discard,
+        revolutions=revolutions,
+        blocks=blocks,
+        exponents=exponents,
+        keep=keep,
+        confirm=confirm,
+        horizon=horizon,
+        settled=settled,
+        tolerance=tolerance,
+        method=method,
+    )
+    return run_lanes(plan, run, progress)
+
+
+def run_up_down(
+    model: AbstractForcedSystem, speeds: Speeds, *, progress: Progress | None = None, **settings: Any
+) -> tuple[xr.Dataset, xr.Dataset]:
+    """Sweep up and down in speed, each speed begun in the final state of the one before, which shows hysteresis.
+
+    After a failure the next speed begins in the model's own initial state, so that one failure does not spoil the rest.
+
+    **Arguments:** model; ascending speeds [rad/s]; called with speeds done and speeds in all; fields of
+    `jaxcage.lanes.Run`.
+
+    **Returns:** the sweep upwards and the sweep downwards, both at ascending speeds.
+    """
+    require_x64()
+    run = Run.of(model, **{"confirm": False, "horizon": 0, **settings})
+    up = Plan.over_speed(model, speeds, 1)
+    speed, state, seen = up.lanes.speed, None, []
+    for n in range(speed.size):  # one lane goes up, one comes down
+        place = np.array([n, speed.size - 1 - n])
+        fresh = up.states[place]
+        state = fresh if state is None else np.where(np.isfinite(state), state, fresh)
+        at = Plan(up.lanes.at(place), state, {"way": 2}, {"speed": (("way",), speed[place])})
+        seen.append(run_lanes(at, run))
+        state = seen[-1]["last"].values
+        if progress is not None:
+            progress(n + 1, speed.size)
+    rows = lambda way, order: [each.isel(way=way) for each in seen][::order]
+    joined = lambda way, order: xr.concat(rows(way, order), "speed").expand_dims("start", 1)
+    return joined(0, 1), joined(1, -1)

@@ -1,0 +1,95 @@
+"""Settings of a run: how long lanes run, what is computed of them, and how exactly."""
+
+import dataclasses
+from typing import Any
+
+from .._arguments import require_at_least
+from .._errors import ArgumentError
+from ..analysis import LONGEST_PERIOD
+from ..integrate import AbstractMethod, native
+from ..models import AbstractForcedSystem
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """How long lanes run, and how exactly; the same for all lanes of a plan.
+
+    The defaults are those of a forced system; a model has its own where these do not suit it (`run_defaults`).
+    """
+
+    discard: int = 300
+    """Revolutions left out at the beginning."""
+    revolutions: int = 300
+    """Revolutions observed after that."""
+    blocks: int = 20
+    """Blocks of the observed revolutions, from whose scatter standard errors come."""
+    exponents: int = 1
+    """Number of Lyapunov exponents, from the largest down."""
+    exponent_revolutions: int = 0
+    """The last of the observed revolutions, in which exponents are followed; 0 takes all."""
+    keep: int = 64
+    """Number of strobe states that are kept, the last ones. A period k is seen with at least 2 k of them."""
+    confirm: bool = True
+    """Run what is not periodic, its neighbours in speed and a tenth of the rest again with finer steps."""
+    horizon: int = 3000
+    """Revolutions of the whole run to which lanes that have not settled are followed; 0 for none."""
+    settled: int = 0
+    """Revolutions after which a lane whose strobe states repeat is stopped as periodic; 0 runs all to the end."""
+    method: AbstractMethod = dataclasses.field(default_factory=native)
+    """Integration method."""
+
+    @classmethod
+    def of(cls, model: AbstractForcedSystem, **given: Any) -> "Run":
+        """The settings for a model: what is given and not None, else the model's own defaults, else those above.
+
+        `tolerance` and `error` make the method that machine code takes.
+
+        **Raises:** `ValueError` for settings that do not go together, or not with the model.
+        """
+        chosen = {**model.run_defaults, **{name: value for name, value in given.items() if value is not None}}
+        accuracy = {name: chosen.pop(name) for name in ("tolerance", "error") if name in chosen}
+        if chosen.get("method") is None:
+            chosen["method"] = native(**accuracy)
+        run = cls(**chosen)
+        run = dataclasses.replace(run, keep=min(run.keep, run.revolutions))
+        run._check(model)
+        return run
+
+    def _check(self, model: AbstractForcedSystem) -> None:
+        require_at_least(0, discard=self.discard, horizon=self.horizon, exponent_revolutions=self.exponent_revolutions)
+        require_at_least(1, revolutions=self.revolutions, blocks=self.blocks, keep=self.keep)
+        if self.revolutions % self.blocks:
+            raise ArgumentError("blocks", said=f"must divide the {self.revolutions} revolutions, but it is {self.blocks}.")
+        most = model.dimension if model.samples == 1 else 1
+        if not 0 <= self.exponents <= most:
+            allowed = f"at most {most}" if self.exponents > 0 else "at least 0"
+            raise ArgumentError("exponents", said=f"must be {allowed}, but {self.exponents} was given.")
+        if self.settled and not 2 * LONGEST_PERIOD <= self.settled <= self.discard:
+            allowed = f"{2 * LONGEST_PERIOD} to the {self.discard} revolutions discarded"
+            raise ArgumentError("settled", said=f"must be 0, or {allowed}, but is {self.settled}.")
+        if self.settled and (self.confirm or self.horizon):
+            raise ArgumentError("settled", said="goes with `confirm=False` and `horizon=0`, but one of them was given.")
+        if model.samples > 1 and (self.confirm or self.horizon or self.settled):
+            raise ArgumentError(
+                "confirm", "horizon", "settled", said="must be left out for a model whose revolutions do not repeat."
+            )
+
+    @property
+    def block(self) -> int:
+        """Revolutions of a block."""
+        return self.revolutions // self.blocks
+
+    @property
+    def followed(self) -> int:
+        """Number of blocks, the last ones, in which exponents are followed."""
+        if not self.exponents:
+            return 0
+        if not self.exponent_revolutions:
+            return self.blocks
+        return min(self.blocks, max(2, -(-self.exponent_revolutions // self.block)))
+
+    @property
+    def length(self) -> str:
+        """How long lanes run, in words."""
+        lasting = f", chaos followed to {self.horizon}" if self.horizon else ""
+        return f"{self.discard} + {self.revolutions} revolutions{lasting}"
