@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any, Literal, TypeVar
 
@@ -367,3 +367,39 @@ def _checked(module: M) -> M:
         if check := vars(kind).get("__check_init__"):
             check(module)
     return module
+
+
+Parameter = str | Callable[[Any], Any]
+"""A parameter by its name, or a function that picks it from a model."""
+
+
+def pick(model: Any, parameter: Parameter) -> Callable[[Any], Any]:
+    """The function that picks a parameter from a model.
+
+    **Raises:** `ValueError` for a name that the model does not have, and for a function that picks no number of it.
+    """
+    if callable(parameter):
+        picked = parameter(model)
+        if not any(picked is leaf for leaf in jax.tree.leaves(model)) or jnp.ndim(picked):
+            said = "must pick a number that the system holds as it is, such as `lambda s: s.acceleration.force`"
+            raise ArgumentError("parameter", said=f"{said}, but picks something else.")
+        return parameter
+    paths = parameter_paths(model) or _by_field_name(model)
+    if parameter not in paths:
+        known = ", ".join(["speed", *paths])
+        raise ArgumentError("parameter", said=f"must be one of {known}, but '{parameter}' was given.")
+    path = paths[parameter]
+    return lambda m: get(m, path)
+
+
+def _by_field_name(model: Any) -> dict[str, tuple[str, ...]]:
+    """Numbers of a user's own module by the last word of their path, dotted where that alone is ambiguous."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(model)
+    paths: list[tuple[str, ...]] = []
+    for path, leaf in leaves:
+        names = tuple(key.name for key in path if isinstance(key, jax.tree_util.GetAttrKey))
+        public = len(names) == len(path) and not any(name.startswith("_") for name in names)
+        if public and (isinstance(leaf, float) or eqx.is_inexact_array(leaf)) and jnp.ndim(leaf) == 0:
+            paths.append(names)
+    last = [path[-1] for path in paths]
+    return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}

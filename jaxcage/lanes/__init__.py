@@ -9,6 +9,11 @@
 | `horizon`  | lanes followed until they settle                                                |
 | `run`      | plan and settings to data set; sweeps over speed                                |
 | `dataset`  | the data set with units, words and provenance; zarr                             |
+| `spread`   | how a parameter is sampled                                                      |
+| `grid`     | grids and samples of parameters, cut into chunks                                |
+| `study`    | lanes over any parameters, stored as they go; maps of labels                    |
+| `store`    | the zarr folder of a study, whole at any time                                   |
+| `cluster`  | chunks of a study on dask.distributed                                           |
 """
 
 from .._arguments import check_layer
@@ -16,8 +21,18 @@ from .confirm import Confirmation as Confirmation
 from .dataset import load as load, save as save, settings_of as settings_of, stored_configuration as stored_configuration, versions as versions
 from .observe import Progress as Progress
 from .plan import Plan as Plan, Speeds as Speeds, States as States, rpm as rpm
+from .grid import OIL as OIL, Grid as Grid, with_values as with_values
 from .run import run_lanes as run_lanes, run_up_down as run_up_down, sweep as sweep
 from .settings import Run as Run
+from .spread import Between as Between, Spread as Spread, Tolerance as Tolerance
+from .store import (
+    DamagedStore as DamagedStore,
+    OtherStudy as OtherStudy,
+    Store as Store,
+    check_study as check_study,
+    open_study as open_study,
+)
+from .study import Study as Study, label_map as label_map, run_study as run_study, study as study
 
 
-check_layer(globals(), "run_up_down sweep")
+check_layer(globals(), "check_study label_map open_study run_up_down study sweep")

@@ -126,7 +126,8 @@ def _coordinates(plan: Plan) -> dict[str, Any]:
 
 
 def _attributes(found: Found) -> dict[str, Any]:
-    run, several = found.run, found.plan.lanes.several
+    run = found.run
+    configured = None if found.plan.lanes.several else configuration_of(found.plan.model)
     return {
         "title": "jaxcage run",
         "model": type(found.plan.model).__name__,
@@ -135,18 +136,18 @@ def _attributes(found: Found) -> dict[str, Any]:
         "horizon": found.horizon,
         "confirmed": json.dumps(found.confirmed),
         "settings": json.dumps(settings_of(run.method)),
-        **({} if several else _configured(found.plan.model)),
+        **({} if configured is None else {"configuration": json.dumps(configured)}),
     }
 
 
-def _configured(model: AbstractForcedSystem) -> dict[str, str]:
-    """The TOML configuration of a model, where a file can hold it."""
+def configuration_of(model: AbstractForcedSystem) -> dict[str, Any] | None:
+    """The TOML configuration of a model as a nested mapping; None where no file can hold it."""
     from ..io import configuration  # the tables of configurations are loaded when they are needed
 
     try:
-        return {"configuration": json.dumps(configuration(model))}
+        return configuration(model)
     except InputError:
-        return {}
+        return None
 
 
 @functools.cache

@@ -18,21 +18,40 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from .._errors import ArgumentError, InputError
-from ..quantities import quantity
 from .._parameters import parameter_info
-from ..io import sync
-from ._plan import SAMPLE
-from ._stored import PENDING, SPEED, AbstractStudy, Results, Variable
-from ._study import LABELS, OIL
+from ..quantities import quantity
+from .dataset import configuration_of, decoded
+from .grid import OIL, SAMPLE
+from .plan import SPEED
 
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from .study import Study
 
-FORMAT = 3
-"""Of stores."""
+FORMAT = 4
+"""Version of the layout of stores."""
+PENDING = -1
+"""Code of a lane that has not been run yet."""
+Results = dict[str, np.ndarray]
+"""Output by name; the lanes are the first axis."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Variable:
+    """A variable that is stored of every lane."""
+
+    text: str
+    unit: str
+    kind: str = "float64"
+    names: tuple[str, ...] = ()
+    """Meanings of the codes 0, 1, ...; none for numbers that are no codes."""
+    within: tuple[str, ...] = ()
+    """Axes within a lane."""
+
+
 OUTCOME = "outcome"
 """The variable that is written last: a chunk without it has never been finished."""
 
@@ -48,7 +67,7 @@ class DamagedStore(InputError):
 class Store:
     """The store of a study, made if there is none."""
 
-    def __init__(self, path: str | Path, study: AbstractStudy):
+    def __init__(self, path: str | Path, study: "Study"):
         """**Raises:** `OtherStudy` for a folder that holds anything else than results of this very study; `ValueError`
         for a study of the user's own code without a name and a version.
         """
@@ -65,7 +84,7 @@ class Store:
 
     def pending(self, among: Iterable[int] | None = None) -> list[int]:
         """Chunks that are not finished, or are not what was written."""
-        chunks = range(self.study.plan.chunks) if among is None else among
+        chunks = range(self.study.grid.chunks) if among is None else among
         self._finished |= {c for c in chunks if c not in self._finished and self._chunks.damage(c) is None}
         return [chunk for chunk in chunks if chunk not in self._finished]
 
@@ -82,7 +101,7 @@ class Store:
         self._finished.add(chunk)
 
     def _put(self, chunk: int, results: Results) -> None:
-        region = self.study.plan.region(chunk)
+        region = self.study.grid.region(chunk)
         for name in sorted(results, key=lambda name: name == OUTCOME):
             self._chunks.arrays[name][region] = results[name]
 
@@ -128,30 +147,21 @@ def check_study(path: str | Path) -> StoreState:
     return StoreState(len(wrong), sum(what is None for what in wrong.values()), damaged)
 
 
-def open_study(path: str | Path) -> "xr.Dataset":
+def open_study(path: str | Path) -> xr.Dataset:
     """The results of a study so far, read from disk when they are used.
 
-    Lanes that have not been run are NaN with the label and outcome -1. Reading a chunk that does not agree with its
+    Lanes that have not been run are NaN with the label and outcome `pending`. Reading a chunk that does not agree with its
     checksum is a `ValueError` of zarr's; running the study again computes it again.
 
     **Raises:** `FileNotFoundError`; `DamagedStore`, a `ValueError`, if it cannot be opened.
     """
-    import xarray as xr
-
     _opened(Path(path), "r")
     # Version 3 only, and not what consolidated metadata say: version 2 has a codec that runs what a file says.
     options: dict[str, Any] = dict(engine="zarr", zarr_format=3, consolidated=False, chunks=None)
     try:
-        return xr.open_dataset(path, **options)
+        return decoded(xr.open_dataset(path, **options))
     except ValueError as error:
         raise _damaged(path, error) from error
-
-
-def label_names(dataset: "xr.Dataset") -> "xr.DataArray":
-    """What each lane of a study does, in words; `pending` where it has not been run."""
-    names = np.array([*LABELS, "pending"])  # -1 is the last
-    label = dataset["label"]
-    return label.copy(data=names[np.asarray(label.values, int)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -229,7 +239,7 @@ def _going_on(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _same(path: Path, study: AbstractStudy) -> tuple[dict[str, Any], dict[str, Any]]:
+def _same(path: Path, study: "Study") -> tuple[dict[str, Any], dict[str, Any]]:
     """Attributes and arrays of the store of this study.
 
     **Raises:** `OtherStudy`.
@@ -260,8 +270,10 @@ def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
 # The empty store: what describes it follows from the study alone, byte for byte.
 
 
-def _create(path: Path, study: AbstractStudy) -> None:
+def _create(path: Path, study: "Study") -> None:
     """Make an empty store beside its place and move it there in one step; whoever comes second leaves it alone."""
+    from ..io import sync
+
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
     try:
@@ -275,19 +287,18 @@ def _create(path: Path, study: AbstractStudy) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _write(path: Path, study: AbstractStudy) -> None:
-    import xarray as xr
+def _write(path: Path, study: "Study") -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    plan, compressors = study.plan, (ZstdCodec(), Crc32cCodec())  # any reader of zarr compares the checksums
+    plan, compressors = study.grid, (ZstdCodec(), Crc32cCodec())  # any reader of zarr compares the checksums
     coordinates = _coordinates(study)
     dataset = xr.Dataset(coords=coordinates, attrs=_attributes(study))
     checked = {name: {"compressors": compressors} for name in coordinates}
     dataset.to_zarr(path, mode="w", consolidated=False, encoding=checked)
     group = zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
     for name, variable in study.variables.items():
-        extra = [study.extents[d] for d in variable.within]
+        extra = [study.within[d].size for d in variable.within]
         group.create_array(
             name,
             shape=(*plan.shape, *extra),
@@ -311,34 +322,33 @@ def _words(variable: Variable) -> dict[str, Any]:
     return words | {"flag_values": codes, "flag_meanings": " ".join(["pending", *variable.names])}
 
 
-def _coordinates(study: AbstractStudy) -> dict[str, Any]:
-    plan, info = study.plan, parameter_info(study.system)
+def _coordinates(study: "Study") -> dict[str, Any]:
+    grid, info = study.grid, parameter_info(study.model)
 
     def words(name: str) -> dict[str, str]:
         if name == OIL:
             return {"long_name": "ISO VG grade of the oil", "units": "mm^2/s"}
         if name == SPEED:
-            return {"long_name": study.speed_text, "units": "rad/s"}
+            return {"long_name": study.model.speed_text, "units": "rad/s"}
         known = info.get(name) or quantity(name)
         return {"long_name": known.text, "units": known.unit}
 
-    found: dict[str, Any] = {name: (name, np.asarray(x), words(name)) for name, x in plan.grid.items()}
-    found |= {name: (SAMPLE, x, words(name)) for name, x in plan.cloud.items()}
-    if SPEED in plan.names:
-        dims, speed, _ = found[SPEED]
-        found["speed_rpm"] = (dims, speed * 30 / np.pi, {"long_name": study.speed_text, "units": "rpm"})
-    return found | study.labels_within
+    found: dict[str, Any] = {name: (name, np.asarray(x), words(name)) for name, x in grid.values.items()}
+    found |= {name: (SAMPLE, x, words(name)) for name, x in grid.cloud.items()}
+    dims, speed, about = found[SPEED]
+    return found | {"rpm": (dims, speed * 30 / np.pi, about | {"units": "rpm"})} | study.within
 
 
-def _attributes(study: AbstractStudy) -> dict[str, Any]:
-    described, configured = study.describe(), study.configuration
+def _attributes(study: "Study") -> dict[str, Any]:
+    described = json.loads(study.description)
+    configured = configuration_of(study.model)
     return {
         "title": "jaxcage study",
         "store_format": FORMAT,
         "study": study.description,
-        "discard": study.discard,
-        "revolutions": study.revolutions,
-        "seed": study.plan.seed,
+        "discard": study.run.discard,
+        "revolutions": study.run.revolutions,
+        "seed": study.grid.seed,
         **({} if configured is None else {"configuration": json.dumps(configured)}),
         **{name: text for name, text in described.items() if name.startswith("version_")},
     }

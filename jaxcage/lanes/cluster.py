@@ -11,12 +11,16 @@ import pickle
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError
 from ..integrate import cores
-from ._stored import AbstractStudy, Results
+from .store import Results
+
+
+if TYPE_CHECKING:
+    from .study import Study
 
 
 AHEAD = 2
@@ -29,7 +33,7 @@ _one_at_a_time = threading.Lock()  # a chunk uses all cores, however many thread
 
 
 def chunks_on_dask(
-    about: AbstractStudy, chunks: Sequence[int], scheduler: str | None = None, workers: int | None = None
+    about: "Study", chunks: Sequence[int], scheduler: str | None = None, workers: int | None = None
 ) -> Iterator[tuple[int, Results]]:
     """The results of `chunks` as they arrive.
 
@@ -87,7 +91,7 @@ def _compute(packed: bytes, chunk: int, description: str) -> Results:
     with _one_at_a_time:
         jax.config.update("jax_enable_x64", True)
         keep_compiled_programs()
-        about: AbstractStudy = pickle.loads(packed)
+        about: Any = pickle.loads(packed)
         if about.description != description:
             raise RuntimeError("A worker has another version of jaxcage, jax or NumPy than this process.")
         return about.chunk(chunk)

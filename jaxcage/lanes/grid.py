@@ -1,7 +1,7 @@
-"""What a study varies, and how its lanes are cut into chunks.
+"""Grids and samples of parameters, whose lanes are cut into chunks.
 
-A lane is one sample, one value on each axis of the grid, and one start. Its numbers follow from the plan and its place
-alone, so that any process can compute any chunk, today or next week, and gets the same bits.
+A lane is one sample, one value on each axis of the grid, and one initial state. Its numbers follow from the grid and its
+place alone, so that any process can compute any chunk at any time, and gets the same bits.
 """
 
 import dataclasses
@@ -11,28 +11,39 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
+import xarray as xr
 from jaxtyping import Float, Int
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
+from .._parameters import pick
 from .._sobol import sobol
-from ._vary import Spread
+from ..bearing import vg
+from ..integrate import Lanes
+from ..models import AbstractForcedSystem
+from .observe import over_lanes
+from .plan import SPEED, START, Plan
+from .spread import Spread
 
 
-SAMPLE, START = "sample", "start"
+SAMPLE = "sample"
+OIL = "oil"
+"""Name of the ISO VG grade of a mineral oil beside those of the model's parameters."""
 LANES = 2048
-"""Lanes of a chunk, at most: some seconds of work, which is what a kill costs."""
+"""Lanes of a chunk, at most: some seconds of work, which is what is lost with a process that is killed."""
 
 Values = dict[str, Float[np.ndarray, " lanes"]]
 """Parameter by name -> its value in each lane [SI]."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Plan:
-    """The lanes of a study: samples x grid x starts, in chunks that are blocks of this grid."""
+class Grid:
+    """Samples x axes x initial states, in chunks that are blocks of this grid."""
 
-    grid: Mapping[str, Float[np.ndarray, " values"]]
+    values: Mapping[str, Float[np.ndarray, " values"]]
     """Parameter -> its values [SI], one axis each."""
     sampled: Mapping[str, Spread]
     """Parameter -> how it is sampled; all of them together are one axis."""
@@ -44,11 +55,13 @@ class Plan:
     """Lanes of a chunk, at most."""
 
     def __post_init__(self):
-        for name, values in self.grid.items():
+        if SPEED not in self.names:
+            raise ArgumentError("vary", said="must hold the speed: a single value is enough.")
+        for name, values in self.values.items():
             distinct = np.unique(values).size == np.size(values) > 0
             if np.ndim(values) != 1 or not distinct or not np.all(np.isfinite(values)):
                 raise ArgumentError("vary", said=f"must hold distinct numbers for {name}, but {values} was given.")
-        if both := set(self.grid) & set(self.sampled):
+        if both := set(self.values) & set(self.sampled):
             raise ArgumentError("vary", said=f"must name each parameter once, but names {', '.join(both)} twice.")
         if self.sampled and self.samples < 1:
             names = ", ".join(self.sampled)
@@ -65,13 +78,13 @@ class Plan:
     @property
     def names(self) -> tuple[str, ...]:
         """Everything that is varied."""
-        return (*self.sampled, *self.grid)
+        return (*self.sampled, *self.values)
 
     @property
     def axes(self) -> dict[str, int]:
         """Length of each axis by name, the slowest first."""
         sample = {SAMPLE: self.samples} if self.sampled else {}
-        return {**sample, **{name: len(values) for name, values in self.grid.items()}, START: self.starts}
+        return {**sample, **{name: len(values) for name, values in self.values.items()}, START: self.starts}
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -126,12 +139,43 @@ class Plan:
         """What each lane has: the value of every varied parameter, and the number of its start."""
         place = dict(zip(self.axes, np.unravel_index(lane, self.shape), strict=True))
         sampled = {name: values[place[SAMPLE]] for name, values in self.cloud.items()}
-        return {**sampled, **{name: values[place[name]] for name, values in self.grid.items()}}, place[START]
+        return {**sampled, **{name: values[place[name]] for name, values in self.values.items()}}, place[START]
+
+    def require_known(self, model: AbstractForcedSystem) -> None:
+        """**Raises:** `ValueError` for a parameter that the model does not have, or more initial states than it has."""
+        for name in self.names:
+            if name not in (SPEED, OIL):
+                pick(model, name)
+        if OIL in self.names and not hasattr(model, "lubricant"):
+            raise ArgumentError("vary", said=f"must not hold {OIL} for a model without oil.")
+        if self.starts > (own := len(model.starts(1.0))):
+            raise ArgumentError("starts", said=f"must be at most {own}, but {self.starts} was given.")
+
+    def plan(self, model: AbstractForcedSystem, lanes: Int[np.ndarray, " lanes"]) -> Plan:
+        """Some lanes of a model, on one axis `lane`."""
+        values, start = self.at(lanes)
+        speed = values.pop(SPEED)
+        if values:
+            given = {name: jnp.asarray(x) for name, x in values.items()}
+            designs = eqx.filter_vmap(lambda own: with_values(model, own), axis_size=lanes.size)(given)
+            chosen = Lanes(designs, max(lanes.size, 2), np.arange(lanes.size), speed)
+        else:
+            chosen = Lanes.of([model], speed)
+        every = over_lanes(chosen, np.arange(lanes.size), _states)
+        return Plan(chosen, every[np.arange(lanes.size), start], {"lane": lanes.size}, {SPEED: (("lane",), speed)})
+
+    def laid_out(self, found: xr.Dataset) -> xr.Dataset:
+        """A data set of all lanes on one axis, over the axes of the grid; an axis of one speed becomes a coordinate."""
+        shaped = lambda x: ((*self.axes, *x.dims[1:]), x.values.reshape(*self.shape, *x.shape[1:]), x.attrs)
+        kept = {name: x for name, x in found.coords.items() if "lane" not in x.dims}
+        axes = {name: (name, np.asarray(x)) for name, x in self.values.items()}
+        laid = xr.Dataset({str(n): shaped(x) for n, x in found.data_vars.items()}, {**kept, **axes}, found.attrs)
+        return laid.isel({SPEED: 0}) if self.axes.get(SPEED) == 1 else laid
 
     def describe(self) -> dict[str, Any]:
-        """Everything that the lanes follow from, for a store to be recognised by."""
+        """Everything that the lanes follow from, by which a store is recognised."""
         return {
-            "grid": {name: _summary(values) for name, values in self.grid.items()},
+            "grid": {name: _summary(values) for name, values in self.values.items()},
             "sampled": {name: repr(spread) for name, spread in self.sampled.items()},
             "cloud": {name: _summary(values) for name, values in self.cloud.items()},
             "samples": self.samples,
@@ -145,3 +189,18 @@ def _summary(values: np.ndarray) -> list[Any]:
     """Count, ends and a digest of every bit."""
     exact = np.ascontiguousarray(values, dtype="<f8")
     return [exact.size, float(exact[0]), float(exact[-1]), hashlib.sha256(exact.tobytes()).hexdigest()[:16]]
+
+
+def _states(model: AbstractForcedSystem, speed: Any) -> Any:
+    row = lambda y: jnp.stack([jnp.asarray(c, dtype=float) for c in y])
+    return jnp.stack([row(y) for y in model.starts(speed)])
+
+
+def with_values(model: Any, values: Mapping[str, Any]) -> Any:
+    """The model with parameters set by name; `oil` makes the lubricant a mineral oil of that grade."""
+    for name, value in values.items():
+        if name == OIL:
+            model = eqx.tree_at(lambda m: m.lubricant, model, vg(value, model.lubricant.temperature))
+        else:
+            model = eqx.tree_at(pick(model, name), model, value)
+    return model

@@ -1,0 +1,303 @@
+"""Studies: lanes over any parameters, computed chunk by chunk into a store, in this process or on a cluster, from where
+an earlier run stopped."""
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import numpy as np
+import xarray as xr
+from jaxtyping import Array, Float, Int
+
+from .._arguments import require_at_least
+from .._checks import require_x64
+from .._errors import ArgumentError
+from ..analysis import scatter
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem, require_speeds
+from ..quantities import quantity
+from .dataset import CODES, configuration_of, settings_of
+from .grid import LANES, Grid
+from .observe import Progress
+from .plan import SPEED
+from .run import run_lanes
+from .settings import Run
+from .spread import Spread
+from .store import Results, Store, Variable, open_study
+
+
+Vary = Mapping[str, Float[Array, " values"] | Float[np.ndarray, " values"] | Spread]
+"""Parameter, or `"speed"` or `"oil"` -> values that make an axis of the grid [SI], or how to sample it."""
+Shard = tuple[int, int]
+"""(i, n): the i-th of n parts, counted from 1."""
+KNOWN = "jaxcage jax jaxlib numpy diffrax equinox lineax optimistix builtins".split()
+"""Packages whose code is known by their versions."""
+SCALARS = ("peak", "error", "steps")
+"""Numbers that every lane has, whatever its model reports."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Study:
+    """A model, the grid over which it is run, and the settings of its runs."""
+
+    model: AbstractForcedSystem
+    grid: Grid
+    run: Run
+    strobe: int = 0
+    """Strobe states stored of each lane, the last ones."""
+    name: str = ""
+    version: str = ""
+    """Name and version of code of the user's own, which a store cannot recognise by itself."""
+
+    def __post_init__(self):
+        self.grid.require_known(self.model)
+        if not 0 <= self.strobe <= self.run.revolutions * (not self.model.beside):
+            raise ArgumentError(
+                "strobe",
+                said=f"must lie between 0 and the {self.run.revolutions} revolutions of a model whose revolutions repeat, "
+                f"but is {self.strobe}.",
+            )
+
+    @property
+    def description(self) -> str:
+        """All that a store is recognised by, as JSON."""
+        run = {f.name: getattr(self.run, f.name) for f in dataclasses.fields(self.run) if f.name != "method"}
+        about = {"name": self.name, "version": self.version, "system": _described(self.model), "strobe": self.strobe}
+        method = {"method_numbers": numbers_of(self.run.method), **settings_of(self.run.method)}
+        return json.dumps({**about, "plan": self.grid.describe(), **run, **method}, sort_keys=True)
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """Variables that are stored of every lane, by name."""
+        known = lambda name: (quantity(name).text, quantity(name).unit)
+        found = {name: Variable(*known(name)) for name in SCALARS}
+        if self.run.exponents:
+            found["exponents"] = Variable(*known("exponent"), within=("exponent",))
+            found["standard_error"] = Variable(*known("standard_error"), within=("exponent",))
+        for each in self.model.quantities:
+            found[each.name] = Variable(each.text, each.unit)
+            found[f"{each.name}_standard_error"] = Variable(f"standard error, {each.text}", each.unit)
+        if self.strobe:
+            found["strobe"] = Variable(*known("strobe"), within=("revolution", "component"))
+        return found | {name: Variable(*known(name), kind="int8", names=words) for name, words in CODES.items()}
+
+    @property
+    def within(self) -> dict[str, np.ndarray]:
+        """Axes within a lane, with their coordinates."""
+        last = self.run.discard + self.run.revolutions
+        found: dict[str, np.ndarray] = {"exponent": np.arange(1, self.run.exponents + 1)}
+        if self.strobe:
+            found["revolution"] = np.arange(last - self.strobe + 1, last + 1)
+            found["component"] = np.array(self.model.components, dtype=object)
+        return found
+
+    @property
+    def own_code(self) -> str | None:
+        """A class or function of the user's own that lanes are computed by, None if there is none."""
+        return _own_code([self.model, self.run.method])
+
+    def chunk(self, number: int) -> Results:
+        """The results of a chunk, laid out as its block of the grid."""
+        found = self.at(self.grid.lanes_of(number))
+        shape = tuple(part.stop - part.start for part in self.grid.region(number))
+        return {name: x.reshape(*shape, *x.shape[1:]) for name, x in found.items()}
+
+    def at(self, lanes: Int[np.ndarray, " lanes"]) -> Results:
+        """The results of any lanes, by their numbers; the bits are the same whatever their company."""
+        found = run_lanes(self.grid.plan(self.model, lanes), self.run)
+        results: Results = {}
+        for name, variable in self.variables.items():
+            if name in CODES:
+                results[name] = np.array([CODES[name].index(word) for word in found[name].values], dtype=np.int8)
+            elif name.endswith("_standard_error"):
+                results[name] = scatter(found[f"{name.removesuffix('_standard_error')}_blocks"].values)
+            else:
+                results[name] = found[name].values[:, -self.strobe :] if name == "strobe" else found[name].values
+            results[name] = results[name].astype(variable.kind)
+        return results
+
+
+def study(
+    model: AbstractForcedSystem,
+    vary: Vary,
+    *,
+    store: str | Path,
+    samples: int = 0,
+    seed: int = 0,
+    starts: int | None = None,
+    strobe: int = 0,
+    lanes: int | None = None,
+    shard: Shard = (1, 1),
+    executor: Literal["local", "dask"] = "local",
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+    name: str = "",
+    version: str = "",
+    **settings: Any,
+) -> xr.Dataset:
+    """Run a model over any grid or sample of its parameters, and keep what each lane does in a zarr folder.
+
+    What is stored already is not computed again: after a kill the same call continues where it stopped, and the store
+    ends up with the same bits as that of an unbroken run, whichever processes computed it.
+
+    **Arguments:**
+
+    - `model`: a cage, a whole bearing or a system of one's own.
+    - `vary`: what is varied. Arrays are axes of a grid [SI]; `Between` and `Tolerance` are sampled together. The speed
+        [rad/s] must be among them, of a whole bearing the shaft's; `oil` is the ISO VG grade of a mineral oil.
+    - `store`: the folder.
+    - `samples`, `seed`: number of samples (a scrambled Sobol sequence; best a power of 2) and seed.
+    - `starts`: how many of the model's own initial states are run at each point, by default all.
+    - `strobe`: strobe states stored of each lane, by default none.
+    - `lanes`: lanes of a chunk, at most; by default 2048, or fewer where a lane takes long.
+    - `shard`: (i, n) runs every n-th chunk from the i-th on. All shards write to the same folder.
+    - `executor`: `"local"` runs on all cores of this process, `"dask"` on a dask.distributed cluster.
+    - `scheduler`, `workers`: address of the scheduler of a cluster, by default one of its own with so many processes.
+    - `progress`: called with lanes done and lanes in all, those that were stored before included.
+    - `name`, `version`: of a function or class of your own that the model is made of. They must be given then, since a
+        store cannot tell by itself whether your code is still the same: change the version whenever it changes.
+    - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
+
+    **Returns:** the store, opened by xarray: variables over the samples, the axes of the grid and `start`.
+
+    **Raises:** `ValueError` for arguments that do not fit together, and for a store of another study; `ImportError`
+    without dask.
+    """
+    require_x64()
+    sampled: dict[str, Spread] = {each: how for each, how in vary.items() if isinstance(how, Spread)}
+    axes = {each: np.asarray(x, dtype=float) for each, x in vary.items() if each not in sampled}
+    own = len(model.starts(1.0)) if starts is None else starts
+    most = lanes or (LANES if model.samples == 1 else LANES // 42)
+    run = Run.of(model, **{"keep": max(16, strobe), **settings, "confirm": False, "horizon": 0})
+    about = Study(model, Grid(axes, sampled, samples, seed, own, most), run, strobe, name, version)
+    run_study(about, store, shard, executor, scheduler, workers, progress)
+    return open_study(store)
+
+
+def run_study(
+    about: Study,
+    path: str | Path,
+    shard: Shard = (1, 1),
+    executor: str = "local",
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Compute what the store at `path` lacks; arguments as for `study`."""
+    i, n = shard
+    if not 1 <= i <= n:
+        raise ArgumentError("shard", said=f"must be (i, n) with i from 1 to n, but ({i}, {n}) was given.")
+    if executor not in ("local", "dask"):
+        raise ArgumentError("executor", said=f"must be local or dask, but {executor!r} was given.")
+    if workers is not None:
+        require_at_least(1, workers=workers)
+    store = Store(path, about)
+    part = range(about.grid.chunks)[i - 1 :: n]
+    mine, pending = set(part), store.pending(part)
+    size = {chunk: about.grid.lanes_of(chunk).size for chunk in mine}
+    done, total = sum(size[c] for c in mine - set(pending)), sum(size.values())
+    report = progress or (lambda done, total: None)
+    report(done, total)
+    if executor == "dask":
+        from .cluster import chunks_on_dask  # needs an extra
+
+        computed = chunks_on_dask(about, pending, scheduler, workers)
+    else:
+        computed = ((chunk, about.chunk(chunk)) for chunk in pending)
+    for chunk, results in computed:
+        store.write(chunk, results)
+        done += size[chunk]
+        report(done, total)
+    left = set(store.pending())
+    if left & mine:
+        raise RuntimeError(f"{len(left & mine)} of {len(mine)} chunks did not come back.")
+    if not left:
+        store.tidy()
+
+
+Stage = Callable[[str, int, int], None]
+"""Called with what is under way, and how many of its lanes are done."""
+
+
+def label_map(
+    model: AbstractForcedSystem,
+    x: Mapping[str, Float[np.ndarray, " x"]],
+    y: Mapping[str, Float[np.ndarray, " y"]],
+    *,
+    speed: float | None = None,
+    starts: int = 1,
+    persist: int = 0,
+    stage: Stage | None = None,
+    **settings: Any,
+) -> xr.Dataset:
+    """Labels and exponents over two parameters.
+
+    **Arguments:**
+
+    - `model`: a cage, a whole bearing or a system of one's own.
+    - `x`, `y`: name and ascending values [SI] of a parameter each; `"speed"` is one.
+    - `speed`: the speed [rad/s], if it is neither of them.
+    - `starts`: how many of the model's own initial states are run at each point.
+    - `persist`: revolutions that chaos must outlast to count: lanes found chaotic are run again with so many discarded,
+        and what has died out by then was a transient. 0 turns this off.
+    - `stage`: called as lanes are done.
+    - `settings`: fields of `jaxcage.lanes.Run`; lanes are neither confirmed nor followed to a horizon.
+
+    **Returns:** a data set over x, y and `start`, with the speed as a coordinate.
+
+    **Raises:** `ValueError` for arguments that do not fit together.
+    """
+    require_x64()
+    (x_name, x_value), (y_name, y_value) = (*x.items(), *y.items())
+    if speed is not None:
+        require_speeds(model, speed)
+    if min(len(x_value), len(y_value)) < 2:
+        raise ArgumentError("x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}.")
+    fixed = {} if speed is None else {SPEED: np.array([speed])}
+    grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, starts)
+    grid.require_known(model)
+    run = Run.of(model, **{**settings, "confirm": False, "horizon": 0})
+    require_at_least(0, persist=persist)
+    if persist and (persist <= run.discard or run.exponents < 1 or run.blocks < 2):
+        said = f"must be 0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks, but is {persist}."
+        raise ArgumentError("persist", said=said)
+    say = lambda what: None if stage is None else lambda done, total: stage(what, done, total)
+    every = np.arange(grid.size)
+    found = run_lanes(grid.plan(model, every), run, say(f"{grid.size} lanes"))
+    again = every[found["label"].values == "chaotic"] if persist else every[:0]
+    if again.size:
+        longer = dataclasses.replace(run, discard=persist)
+        later = run_lanes(grid.plan(model, again), longer, say(f"{again.size} chaotic lanes again"))
+        for name in found.data_vars:
+            found[name].values[again] = later[name].values
+    return grid.laid_out(found)
+
+
+def _described(model: AbstractForcedSystem) -> Any:
+    """The configuration of a model, else its numbers."""
+    found = configuration_of(model)
+    return numbers_of(model) if found is None else found
+
+
+def numbers_of(module: eqx.Module) -> dict[str, Any]:
+    """All numbers of a module by the names of their places."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(module)
+    named = lambda path: jax.tree_util.keystr(path).lstrip(".")
+    return {named(path): np.asarray(x).tolist() for path, x in leaves if eqx.is_array_like(x)}
+
+
+def _own_code(x: Any) -> str | None:
+    """The first class or function in a tree that belongs neither to this package nor to one that it is built on."""
+    if isinstance(x, tuple | list | dict):
+        parts = list(x.values() if isinstance(x, dict) else x)
+    else:
+        module = getattr(x, "__module__", None) or type(x).__module__
+        if module.partition(".")[0] not in KNOWN:
+            return getattr(x, "__name__", type(x).__name__)
+        parts = [getattr(x, f.name, None) for f in dataclasses.fields(x)] if dataclasses.is_dataclass(x) else []
+    return next(filter(None, map(_own_code, parts)), None)
