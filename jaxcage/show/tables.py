@@ -1,0 +1,158 @@
+"""Tables: columns of numbers with their units, turned into text only when they are shown.
+
+A table is shown on a terminal, in a report page, or as records of a JSON document, always from the same numbers. Units
+are converted by pint when a table is shown, and numbers carry the digits of their error.
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+
+SHOWN = {"m": "mm", "rad/s": "rpm", "rad": "deg", "1": ""}
+"""Units in which quantities of an SI unit are shown, unless a column says otherwise."""
+NOTHING = "-"
+"""Cell of a value that is not known."""
+
+
+@functools.cache
+def factor(unit: str, shown: str) -> float:
+    """Factor from one unit to another."""
+    if unit == shown or {unit, shown} <= {"1", ""}:
+        return 1.0
+    if (unit, shown) == ("1", "%"):
+        return 100.0
+    from ..files import unit_registry  # pint takes a while to load
+
+    return float(unit_registry().Quantity(1.0, unit.replace("^", "**")).to(shown.replace("^", "**")).magnitude)
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """A column: its head, its values, and how they are shown."""
+
+    head: str
+    values: Sequence[Any]
+    """Numbers in `unit`, texts, or None for what is not known."""
+    unit: str = "1"
+    shown: str | None = None
+    """Unit in which numbers are shown; None takes that of `SHOWN`."""
+    errors: Sequence[float] | None = None
+    """Standard errors, or uncertainties, in `unit`."""
+    digits: int | None = None
+    """Digits after the point; None takes those of the error, or four significant ones."""
+    key: str = ""
+    """Name in a document; the head if it is left out."""
+
+    @property
+    def unit_shown(self) -> str:
+        """Unit in which the numbers are shown."""
+        return SHOWN.get(self.unit, self.unit) if self.shown is None else self.shown
+
+    @property
+    def title(self) -> str:
+        """Head with the unit."""
+        return f"{self.head} [{self.unit_shown}]" if self.unit_shown else self.head
+
+    @property
+    def cells(self) -> list[str]:
+        """Values as texts."""
+        errors = [None] * len(self.values) if self.errors is None else self.errors
+        return [self._cell(value, error) for value, error in zip(self.values, errors, strict=True)]
+
+    def _cell(self, value: Any, error: float | None) -> str:
+        if value is None or isinstance(value, str):
+            return value or NOTHING
+        if not math.isfinite(float(value)):
+            return NOTHING
+        if isinstance(value, bool | np.bool_):
+            return "yes" if value else "no"
+        if isinstance(value, int | np.integer) and self.unit_shown == SHOWN.get(self.unit, self.unit):
+            return str(value)
+        times = factor(self.unit, self.unit_shown)
+        return number(times * float(value), None if error is None else times * float(error), self.digits)
+
+
+def number(value: float, error: float | None = None, digits: int | None = None) -> str:
+    """A number as text: with the digits of its error, with given digits, or with four significant ones."""
+    if not math.isfinite(value):
+        return NOTHING
+    if error is None or not math.isfinite(error) or error <= 0:
+        return f"{value:.{digits}f}" if digits is not None else _significant(value)
+    places = digits if digits is not None else max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def _significant(value: float, digits: int = 4) -> str:
+    """A number with so many significant digits, without an exponent where it is neither large nor small."""
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        places = digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)
+        return f"{value:.{max(places, 0)}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """A titled table of columns that have the same length."""
+
+    title: str
+    columns: Sequence[Column]
+
+    @property
+    def heads(self) -> list[str]:
+        """Heads of the columns with their units."""
+        return [column.title for column in self.columns]
+
+    @property
+    def rows(self) -> list[tuple[str, ...]]:
+        """Cells as texts, row by row."""
+        return list(zip(*(column.cells for column in self.columns), strict=True))
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """Numbers in SI units, row by row, for a document."""
+        found = [{(c.key or c.head): c.values[i] for c in self.columns} for i in range(len(self))]
+        for column in self.columns:
+            if column.errors is not None:
+                for record, error in zip(found, column.errors, strict=True):
+                    record[f"{column.key or column.head}_error"] = error
+        return found
+
+    def __len__(self) -> int:
+        return len(self.columns[0].values)
+
+    def __str__(self) -> str:
+        lines = [self.heads, *map(list, self.rows)]
+        widths = [max(len(line[i]) for line in lines) for i in range(len(self.columns))]
+        first = lambda line: f"{line[0]:<{widths[0]}}"
+        rest = lambda line: [f"{cell:>{width}}" for cell, width in zip(line[1:], widths[1:], strict=True)]
+        return "\n".join([self.title, *("  ".join([first(line), *rest(line)]).rstrip() for line in lines)])
+
+
+def table(title: str, found: xr.Dataset, columns: Mapping[str, str | Column], errors: Mapping[str, str] = {}) -> Table:
+    """Variables of a data set along one axis as a table.
+
+    **Arguments:** title; a data set of one axis; columns as name of the variable -> head (its unit is that of the data
+    set), or name -> a column of one's own; variable -> the variable that holds its standard error.
+    """
+    made = []
+    for name, head in columns.items():
+        if isinstance(head, Column):
+            made.append(head)
+            continue
+        values = found[name]
+        deviation = found[errors[name]].values.tolist() if name in errors else None
+        made.append(Column(head, values.values.tolist(), values.attrs.get("units", "1"), errors=deviation, key=name))
+    return Table(title, made)
+
+
+def rows_table(title: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> Table:
+    """A table of records: each column without values takes those under its key."""
+    found = list(rows)
+    pick = lambda column: [row.get(column.key or column.head) for row in found]
+    return Table(title, [dataclasses.replace(column, values=pick(column)) for column in columns])
