@@ -202,7 +202,10 @@ class _Observer:
                 break
             engine = self.lanes.engine(run.exponents if pushed else 0, method, samples)
             plain = self.lanes.engine(0, method, samples)
-            numbers, seen = self.lanes.numbers(engine, some[alive]), stop == end or (self.averages and begin >= run.discard)
+            numbers, seen = (
+                self.lanes.numbers(engine, some[alive]),
+                stop == end or (self.averages and begin >= run.discard),
+            )
             if begin == 0 or (self.averages and seen):
                 found = self._error(plain, self.lanes.numbers(plain, some[alive]), state[alive], method)
                 error[alive] = np.maximum(error[alive], found)
@@ -267,7 +270,11 @@ class _Observer:
         return SURE * np.abs(further(method) - further(method.reference))
 
     def _error(
-        self, engine: Engine | EngineInJax, numbers: Any, state: Float[np.ndarray, "some numbers"], method: AbstractMethod
+        self,
+        engine: Engine | EngineInJax,
+        numbers: Any,
+        state: Float[np.ndarray, "some numbers"],
+        method: AbstractMethod,
     ) -> Float[np.ndarray, " some"]:
         """Error of a revolution from a state: three times the distance of its end from that by the method's reference.
 
