@@ -37,6 +37,30 @@ class AbstractForcedSystem(eqx.Module):
         """Number of state components; a second-order system has its velocities behind its coordinates."""
 
     @property
+    def beside(self) -> tuple[str, ...]:
+        """Names of the quantities that are integrated beside the state; the state does not follow from them."""
+        return ()
+
+    @property
+    def beside_start(self) -> tuple[float, ...]:
+        """Values of the quantities beside the state at the beginning of a run."""
+        return (0.0,) * len(self.beside)
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Names of the quantities whose largest values are recorded."""
+        return ("excursion",)
+
+    @property
+    def samples(self) -> int:
+        """Number of strobe states of a revolution that a sweep records."""
+        return 1
+
+    def comparable(self, speed: float) -> float:
+        """Phase [rad] over which a run is compared with a more exact one: its error is stated for such a stretch."""
+        return 2 * math.pi
+
+    @property
     def harmonics(self) -> int:
         """The highest harmonic of the revolution in the forcing, a static number; 1 by default.
 
