@@ -15,8 +15,8 @@ from jaxtyping import Array, Float
 from .._arguments import require_above_zero
 from .._errors import ArgumentError
 from .._types import Scalar
-from ..integrate import BearingRun
-from ..models.whole import BearingModel, BearingState
+from ..models import BearingModel, BearingState
+from ..solve import Trajectory
 from ._bearing_measures import from_land, samples_of
 from ._spectra import OrderSpectrum, Peak, dominant_orders, spectrum_of
 
@@ -72,11 +72,10 @@ def _at_samples(model: BearingModel, speed: Scalar, states: BearingState) -> tup
     return jax.lax.map(one, states, batch_size=BATCH)
 
 
-def bearing_history(model: BearingModel, run: BearingRun, speed: float) -> BearingHistory:
+def bearing_history(model: BearingModel, run: Trajectory, speed: float) -> BearingHistory:
     """Forces, loads and slips of every roller at the samples of a run at the shaft speed `speed` [rad/s]."""
     require_above_zero(speed=speed)
-    clock = np.stack([run.angle, run.time], axis=1)
-    states = BearingState(jnp.asarray(run.rollers), jnp.asarray(run.bodies), jnp.asarray(clock))
+    states = BearingState(*map(jnp.asarray, (run.rollers, run.bodies, run.integrals[:, :2])))
     found = tuple(map(np.asarray, _at_samples(model, jnp.asarray(float(speed)), states)))
     pocket, inner, outer, inner_sliding, outer_sliding, on_cage, land = found
     n = model.bearing.n_rollers
@@ -159,7 +158,7 @@ def pocket_force_distribution(history: BearingHistory) -> dict[str, float]:
     return found
 
 
-def bearing_orders(model: BearingModel, run: BearingRun, speed: float) -> dict[str, float]:
+def bearing_orders(model: BearingModel, run: Trajectory, speed: float) -> dict[str, float]:
     """Frequencies that a bearing is known by, over that of the cage: means over the run."""
     cage = run.total("cage_speed") / (run.time[-1] - run.time[0])
     spin = run.total("roller_spin") / (run.time[-1] - run.time[0])

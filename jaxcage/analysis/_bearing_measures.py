@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from ..integrate import BearingRun
-from ..models.whole import LEDGER, MEANS, BearingModel
+from ..models import LEDGER, BearingModel
+from ..solve import Trajectory
 
 
 CIRCULAR, REPEATING = 0.1, 0.1
@@ -54,7 +54,7 @@ class BearingMeasures:
     state: str = measure("", "what the cage's centre does: circular, locally_periodic or disordered")
 
 
-def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> BearingMeasures:
+def bearing_measures(model: BearingModel, run: Trajectory, speed: float) -> BearingMeasures:
     """Measures of a run at the shaft speed `speed` [rad/s]; NaN where the run failed."""
     spent = run.time[-1] - run.time[0]
     rolling = float(model.rolling_cage_speed(speed))
@@ -95,7 +95,7 @@ def bearing_measures(model: BearingModel, run: BearingRun, speed: float) -> Bear
     )
 
 
-def equivalent_synchronous_force(run: BearingRun) -> tuple[float, float, float]:
+def equivalent_synchronous_force(run: Trajectory) -> tuple[float, float, float]:
     """First harmonic, over the cage's angle, of the force of all rollers on the cage: what a cage model that prescribes
     one force at cage frequency has in its place.
 
@@ -103,7 +103,7 @@ def equivalent_synchronous_force(run: BearingRun) -> tuple[float, float, float]:
     revolution. An amplitude that is not several times its error is noise.
     """
     samples = samples_of(run)
-    names = [(*LEDGER, *MEANS).index(f"pocket_{axis}_{part}") for axis in "xy" for part in ("cos", "sin")]
+    names = [run.beside.index(f"pocket_{axis}_{part}") for axis in "xy" for part in ("cos", "sin")]
     each = np.diff(run.integrals[::samples][:, names], axis=0) / np.diff(run.time[::samples])[:, None]
     x, y = (2 * np.hypot(*each.mean(axis=0)[pair]) for pair in (slice(0, 2), slice(2, 4)))
     if len(each) < 2:
@@ -111,12 +111,12 @@ def equivalent_synchronous_force(run: BearingRun) -> tuple[float, float, float]:
     return float(x), float(y), float(2 * np.sqrt(each.var(axis=0, ddof=1).max() / len(each)))
 
 
-def samples_of(run: BearingRun) -> int:
+def samples_of(run: Trajectory) -> int:
     """Samples of a revolution."""
     return max(1, round(2 * np.pi / abs(float(run.angle[1] - run.angle[0]))))
 
 
-def from_land(model: BearingModel, run: BearingRun) -> Float[np.ndarray, "n 2"]:
+def from_land(model: BearingModel, run: Trajectory) -> Float[np.ndarray, "n 2"]:
     """Cage centre from the land's [m]."""
     return run.bodies[:, 0:2] - (run.bodies[:, 5:7] if model.guidance == "inner" else 0.0)
 

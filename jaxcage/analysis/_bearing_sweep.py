@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from .._errors import ArgumentError
-from ..integrate import OUTCOMES
-from ..models.whole import LEDGER
+from ..models import LEDGER
+from ..solve import OUTCOMES
 from ._bearing_measures import cage_state, measure
 from ._labels import scatter
 

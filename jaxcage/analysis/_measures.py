@@ -16,8 +16,8 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from ..forces import Force
-from ..integrate import Trajectory
 from ..models import FORCES, CageModel
+from ..solve import Trajectory
 from ._bearing_measures import measure
 
 

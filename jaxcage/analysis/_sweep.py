@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 
 from .._errors import ArgumentError
 from .._notebook import notebook_html
-from ..integrate import OUTCOMES
+from ..solve import OUTCOMES
 from ._labels import label_lanes, motion_size, revolutions_to_decide, scatter, too_few_revolutions
 from ._transients import Survival, survival
 

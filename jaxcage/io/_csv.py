@@ -8,8 +8,8 @@ from jaxtyping import Float, Shaped
 
 from .._glossary import component_names, quantity
 from ..analysis import Sweep
-from ..integrate import Trajectory
 from ..orbits import Branch
+from ..solve import Trajectory
 from ._files import read_bytes, replacing
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from .._glossary import component_names, quantity
 from ..analysis import BearingSweep, Confirmation, Sweep
-from ..integrate import OUTCOMES
 from ..models import BearingModel, CageModel
+from ..solve import OUTCOMES
 from ._files import replacing
 from ._write_config import configuration
 

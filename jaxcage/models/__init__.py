@@ -61,6 +61,7 @@ from .whole import (
     Wear as Wear,
     drawn_places as drawn_places,
     rolling_start as rolling_start,
+    slowness as slowness,
     state_scale as state_scale,
     whole_bearing as whole_bearing,
 )

@@ -1,7 +1,7 @@
 """Contacts in the whole bearing: raceways, pockets, guiding land and oil, with their parameters.
 
 Each contact gives one set of numbers, which both bodies use. A raceway contact acts at the middle of the overlap: the
-roller's arm is h = D/2 - delta/2, and that of the race ends there too; other arms would leave a couple of traction times
+roller's arm is h = D/2 - delta/2, and that of the race ends there too; other arms would leave a couple of traction and
 overlap. Line contacts have the damping of Hunt and Crossley, Q = K p^(10/9) (1 + (3/2) alpha delta') >= 0, where p is
 the overlap delta cut off smoothly at zero, and alpha the slope of the coefficient of restitution over the approach
 speed (K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42 (1975) 440). Traction follows Gupta's law, made odd and

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from .._checks import require_x64
 from .._errors import ArgumentError
+from .._form import compiled
 from .._parameters import choice, parameter
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
@@ -42,7 +43,7 @@ SAMPLES = 16
 """Strobe states of a revolution that a sweep records."""
 SPACING = TURN / 16
 PERIODS, COMPARED, SLOWEST = 50, 10, 1000.0
-"""Limits of `BearingModel.comparable` and `BearingModel.slowness`."""
+"""Constants of `BearingModel.comparable` and `slowness`."""
 
 
 class InnerRing(eqx.Module):
@@ -84,8 +85,8 @@ class BearingModel(AbstractForcedSystem):
     counter-clockwise is positive, and the load acts on the inner ring along -y. Cage and rollers turn freely between
     rings at prescribed speeds; the centre of the outer ring is fixed.
 
-    A state is a row of 5 numbers for each roller and 9 for cage and inner ring (`BearingState.row`). A revolution is one
-    of the cage, whose angle is the phase.
+    A state is a row of 5 numbers for each roller and 9 for cage and inner ring (`BearingState.row`). A revolution is
+    one of the cage, whose angle is the phase.
     """
 
     bearing: Bearing
@@ -178,7 +179,7 @@ class BearingModel(AbstractForcedSystem):
         return tuple(state_scale(self, speed).row)
 
     def starts(self, speed: Scalar) -> tuple[State, ...]:
-        return tuple(tuple(rolling_start(self, speed, k).row) for k in range(len(CAGE_STARTS)))
+        return tuple(tuple(row) for row in _starts(self, jnp.asarray(speed)))
 
     def excursion(self, y: State) -> Scalar:
         """Eccentricity ratio of the cage in its land."""
@@ -193,14 +194,8 @@ class BearingModel(AbstractForcedSystem):
         vibration on its raceway (NU2310 below 4000 rpm), 10 such periods: neighbouring motions diverge over time, not
         over revolutions.
         """
-        slow = self.slowness(speed)
+        slow = float(_slowness(self, jnp.asarray(speed)))
         return COMPARED / PERIODS * SPACING / slow if slow > 1 else SPACING
-
-    def slowness(self, speed: float) -> float:
-        """Number of a roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`."""
-        depth, fast = (float(state_scale(self, speed).rollers[k, 0]) for k in (2, 3))
-        turned = PERIODS * TURN * depth / fast * abs(float(self.rolling_cage_speed(speed)))
-        return min(max(SPACING / turned, 1.0), SLOWEST) if turned > 0 else SLOWEST
 
     def at_speed(self, speed: Scalar) -> BearingAtSpeed:
         """The equations of motion at the shaft speed `speed` [rad/s]."""
@@ -248,6 +243,26 @@ class BearingModel(AbstractForcedSystem):
             rolling_cage_speed=self.rolling_cage_speed(speed),
             rolling_spin=self.rolling_spin(speed),
         )
+
+
+def slowness(depth: Scalar, radial: Scalar, cage_speed: Scalar) -> Array:
+    """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`.
+
+    **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s].
+    """
+    turned = PERIODS * TURN * depth / radial * jnp.abs(cage_speed)
+    return jnp.clip(SPACING / turned, 1.0, SLOWEST)
+
+
+@compiled
+def _slowness(model: BearingModel, speed: Scalar) -> Array:
+    scale = state_scale(model, speed).row
+    return slowness(scale[2], scale[3], model.rolling_cage_speed(speed))
+
+
+@compiled
+def _starts(model: BearingModel, speed: Scalar) -> Array:
+    return jnp.stack([rolling_start(model, speed, k).row for k in range(len(CAGE_STARTS))])
 
 
 class BearingOverTime(BearingModel):

@@ -1,7 +1,7 @@
 """Equations of motion of the whole bearing at one shaft speed.
 
-The independent variable is the cage's angle, or time. Rollers are an axis of arrays. One function computes each contact,
-and both bodies get the same numbers of it: forces and moments inside the bearing cancel to rounding. Rates of the
+The independent variable is the cage's angle, or time. Rollers are an axis of arrays. Each contact is computed once, and
+both bodies get the same numbers of it: forces and moments inside the bearing cancel to rounding. Rates of the
 rollers contain the cage's speed, but not its acceleration: rollers are coupled only through cage and inner ring.
 
 Cage, with mass centre G at distance e from C along n = (cos theta, sin theta), t across, all outer forces F_C (weight
@@ -159,6 +159,12 @@ class BearingAtSpeed(AbstractField):
         rates = self.rates(self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])))
         pace = self.pace(rates.state.clock[0])
         return pace * rates.state.row, pace * jnp.concatenate([rates.state.clock, rates.integrals]), rates.watched
+
+    def settled_row(
+        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
+    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"]]:
+        """A state and the quantities beside it with a quasi-static inner ring in its place."""
+        return self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])).row, beside
 
     def pace(self, cage_speed: Scalar) -> Scalar:
         """Factor from rates over time to rates over the independent variable."""

@@ -15,7 +15,7 @@ from typing import Any
 
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError
-from ..integrate import cores
+from ..solve import cores
 from ._stored import AbstractStudy, Results
 
 

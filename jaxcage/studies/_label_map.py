@@ -11,8 +11,8 @@ from jaxtyping import Bool, Float, Int
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._parameters import parameter_info
-from ..integrate import AbstractMethod, native
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import AbstractMethod, native
 from ..sweeps import require_persist
 from ._plan import LANES, Plan
 from ._stored import SPEED

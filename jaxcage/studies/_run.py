@@ -10,9 +10,8 @@ from jaxtyping import Array, Float
 from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod, native
-from ..models import AbstractForcedSystem, BearingModel
-from ..models.whole import CAGE_STARTS
+from ..models import CAGE_STARTS, AbstractForcedSystem, BearingModel
+from ..solve import AbstractMethod, native
 from ..sweeps import Progress
 from ._plan import LANES, Plan
 from ._store import Store, open_study

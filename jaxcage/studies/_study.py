@@ -17,9 +17,9 @@ from .._glossary import component_names, quantity
 from .._parameters import replace
 from ..analysis import Observation, closing_period, label_lanes, too_few_revolutions
 from ..bearing import vg
-from ..integrate import OUTCOMES, AbstractMethod, Lanes
 from ..models import AbstractForcedSystem, CageModel
 from ..orbits import pick
+from ..solve import OUTCOMES, AbstractMethod, Lanes
 from ..sweeps import Progress, make_plan, run_lanes, settings_of
 from ._plan import Plan, Values
 from ._stored import SPEED, AbstractStudy, Results, Variable

@@ -9,9 +9,8 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from ..analysis import CAGE_STATES, STATISTIC_UNITS, BearingSweep, OfLanes
-from ..integrate import OUTCOMES
-from ..models import BearingModel
-from ..models.whole import CAGE_STARTS
+from ..models import CAGE_STARTS, BearingModel
+from ..solve import OUTCOMES
 from ..sweeps import require_bearings, sweep_bearings, versions
 from ._plan import Plan
 from ._stored import SPEED, AbstractStudy, Results, Variable
