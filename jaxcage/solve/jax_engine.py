@@ -31,11 +31,11 @@ def _strobe(
     y: Float[Array, "lanes numbers"],
     tangents: Float[Array, "lanes tangents dim"],
     i: Int[Array, " lanes"],
-    parts: Float[Array, " lanes"],
+    parts: int | Float[Array, " lanes"],
 ) -> tuple[Array, Array, Array, Array]:
     """Lanes over the i-th of a number of parts of a revolution, in units of their scales."""
 
-    def lane(own: Any, y: Array, tangents: Array, i: Array, parts: Array) -> tuple[Array, Array, Array, Array]:
+    def lane(own: Any, y: Array, tangents: Array, i: Array, parts: Any) -> tuple[Array, Array, Array, Array]:
         speed, *numbers = own
         system = form.filled(numbers if several else shared)
         wrapped = Beside(system) if system.beside else system
@@ -47,6 +47,8 @@ def _strobe(
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
         return row(moved.y), after, jnp.atleast_1d(moved.peak), moved.outcome
 
+    if isinstance(parts, int):
+        return jax.vmap(lambda *x: lane(*x, parts))(list(own), y, tangents, i)
     return jax.vmap(lane)(list(own), y, tangents, i, parts)
 
 
@@ -111,13 +113,14 @@ class JaxEngine:
         peaks = np.full((lanes, keep, self._recorded), np.nan) if self._recorded else np.zeros((lanes, 1, 1))
         mark, size = np.zeros(lanes), min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
         first = np.broadcast_to(np.asarray(begin, dtype=int), lanes)
-        parts = np.broadcast_to(np.asarray(self._samples if turn is None else REVOLUTION / turn, dtype=float), lanes)
+        parts = None if turn is None else np.broadcast_to(REVOLUTION / np.asarray(turn, dtype=float), lanes)
 
         def chunk(some: Int[np.ndarray, " some"], k: int) -> list[np.ndarray]:
             filled = np.concatenate([some, np.repeat(some[-1:], size - some.size)])
             given = [jnp.asarray(x[filled]) for x in own], shared, jnp.asarray(y[filled]), jnp.asarray(t[filled])
             i = jnp.asarray((first[filled] + k) % self._samples)
-            out = _strobe(self._form, self._several, chosen, *given, i, jnp.asarray(parts[filled]))
+            some_parts = self._samples if parts is None else jnp.asarray(parts[filled])
+            out = _strobe(self._form, self._several, chosen, *given, i, some_parts)
             return [np.asarray(x)[: some.size] for x in out]
 
         with concurrent.futures.ThreadPoolExecutor(threads) as pool:
