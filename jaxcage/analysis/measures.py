@@ -11,7 +11,7 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from ..forces import Force
-from ..integrate import Trajectory
+from ..solve import Trajectory
 from ..models import FORCES, AbstractForcedSystem, CageModel
 from ..models.cage_quantities import QUANTITIES, CageHistory
 from ..quantities import Quantity, averaged

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from .._checks import require_x64
 from ..analysis import label_lanes, motion_label
-from ..integrate import OUTCOMES, AbstractMethod
+from ..solve import OUTCOMES, AbstractMethod
 from ..models import INSTEAD, AbstractForcedSystem, require_known
 from .confirm import Confirmation, Labelled, confirm as confirm_lanes, doubtful
 from .dataset import Found, dataset, exponent_error

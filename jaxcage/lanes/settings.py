@@ -6,7 +6,7 @@ from typing import Any
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD
-from ..integrate import AbstractMethod, native
+from ..solve import AbstractMethod, native
 from ..models import AbstractForcedSystem
 
 
