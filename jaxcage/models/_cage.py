@@ -10,10 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from .._arguments import is_concrete
 from .._errors import ArgumentError
 from .._parameters import parameter, reading, require_readings, with_numbers
 from .._types import Scalar, State
-from ..bearing import Bearing, Lubricant, is_concrete
+from ..bearing import Bearing, Lubricant
 from ..forces import (
     AbstractForce,
     ElasticRib,

@@ -6,8 +6,8 @@ from typing import Any
 import jax
 import numpy as np
 
+from .._arguments import is_concrete
 from .._errors import ArgumentError
-from ..bearing import is_concrete
 from ._cage import CageModel
 from ._system import AbstractForcedSystem
 

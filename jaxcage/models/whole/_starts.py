@@ -9,8 +9,7 @@ from jaxtyping import Array, Float
 
 from ..._errors import ArgumentError
 from ..._types import Scalar
-from ...bearing import line_contact_approach, load_distribution
-from ...bearing._line_contact import raceway_loads_of_all
+from ...bearing import line_contact_approach, load_distribution, raceway_loads_of_all
 from ._model import BearingModel
 from ._state import BearingState, Bodies, Rollers
 

@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from ..._arguments import is_concrete
 from ..._errors import ArgumentError
 from ..._parameters import parameter
 from ..._types import Scalar
-from ...bearing import is_concrete
 
 
 class TractionCurve(eqx.Module):
