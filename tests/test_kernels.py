@@ -14,7 +14,7 @@ import jaxcage as jc
 from jaxcage._form import compiled
 from jaxcage.integrate import OUTCOMES, method, native, strobe_map
 from jaxcage.integrate._method import TERM, moved_by
-from jaxcage.models._field import _columns
+from jaxcage.models.field import _columns
 from jaxcage.solve import march
 
 

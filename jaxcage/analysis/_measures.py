@@ -17,7 +17,7 @@ from .._form import compiled
 from .._notebook import notebook_html
 from ..forces import Force
 from ..integrate import Trajectory
-from ..models import FORCES, CageModel
+from ..models import CageModel
 from ._bearing_measures import measure
 
 
@@ -104,8 +104,7 @@ def _along(model: CageModel, trajectory: Trajectory) -> Histories:
         forces = _forces_at_one_speed(model, speed[0], tau, motion)
     else:
         forces = _forces(model, speed, tau, motion)
-    names = (*FORCES, *(type(law).__name__ for law in model.extra))
-    return {name: forces[name] for name in names}  # programs return a dictionary sorted
+    return {name: forces[name] for name in model.force_names}  # programs return a dictionary sorted
 
 
 def film_drag_power(

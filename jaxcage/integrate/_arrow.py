@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._types import Scalar
-from ..forces._phase import cos_sin
+from ..forces import cos_sin
 from ..models.whole import BearingAtSpeed, Bodies, Passed, Rollers
 from ..solve import lanewise
 

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._form import Form, split
-from ..forces._phase import cos_sin
+from ..forces import cos_sin
 from ..models.whole import LEDGER, MEANS, MOVING, BearingAtSpeed, BearingState, Bodies, Passed, Rollers
 from .ir import Value, number
 from .loop import Code, Field, Layout, fixed_numbers

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ...forces._phase import cos_sin
+from ...forces import cos_sin
 from ._field import BearingAtSpeed
 from ._raceway import contact_energy
 from ._state import BearingState, Bodies, Rollers

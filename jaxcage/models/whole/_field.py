@@ -18,8 +18,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._types import Scalar
-from ...forces import Land
-from ...forces._phase import cos_sin
+from ...forces import Land, cos_sin
 from ._contacts import (
     PocketConstants,
     PocketForces,
