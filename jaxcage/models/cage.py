@@ -68,7 +68,7 @@ def _check_laws(laws: Any) -> None:
     """**Raises:** `ValueError` for anything but a tuple of laws, each of its own name, that has all of `NEEDED`."""
     if wrong := [law for law in (laws if isinstance(laws, tuple) else [laws]) if not isinstance(law, AbstractLaw)]:
         said = (
-            f"must be a tuple of laws, yours of `jaxcage.forces.AbstractForce`, but holds: {type(wrong[0]).__name__}."
+            f"must be a tuple of laws, each a `jaxcage.forces.AbstractLaw`, but holds: {type(wrong[0]).__name__}."
         )
         raise ArgumentError("forces", said=said)
     for law in laws:
