@@ -1,4 +1,4 @@
-"""How an edge moves with every parameter: derivatives, elasticities, and the identities they must satisfy.
+"""Gradients of edges and of multipliers: derivatives, elasticities, and the identities that they must satisfy.
 
 An edge speed w is a rate. Whatever the units of mass, length and time, the same physics must come out, so that with the
 exponents a_i of a unit in every parameter p_i
@@ -7,10 +7,9 @@ These hold for every kind of edge and test a gradient without any reference.
 
 With P(z, k) = z an orbit and M(z, k) its monodromy matrix, dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple
 multiplier mu with left and right vectors l, r moves by l dM r / l r. One expansion of the return map to second order
-gives all of it, for edges and for the largest multiplier of an orbit.
+gives all derivatives, for every kind of edge and for the largest multiplier of an orbit, by one compiled program.
 """
 
-import concurrent.futures
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -28,30 +27,37 @@ from .._form import compiled
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..bearing import checked_before
-from ..integrate import AbstractMethod, cores
-from ..models import AbstractForcedSystem, require_speeds
-from ._bifurcation import TANGENTIAL, Singular, critical_rate
-from ._cascade import FEIGENBAUM, Cascade
-from ._implicit import expansion, numbers_around, numbers_of
-from ._orbit import OrbitEquations, StateLike
-from ._point import Point
-from ._problem import SPEED, Given, OrbitProblem, make_problem
-from ._singularity import Kind, bordered, null_vectors, singular_matrix
-from ._steps import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, SLOPE, Counts, by_steps, counted, from_steps, that_serves
+from ..integrate import AbstractMethod
+from ..models import AbstractForcedSystem
+from .bifurcation import TANGENTIAL, Singular, critical_rate
+from .branch import FEIGENBAUM, Cascade
+from .continuation import in_parallel
+from .implicit import expansion, numbers_around, numbers_of
+from .orbit import OrbitEquations, StateLike, periodic_orbit
+from .point import Kind, Point, bordered, null_vectors, singular_matrix
+from .problem import SPEED, Given, OrbitProblem, make_problem
+from .step_counts import (
+    GIVEN_UP,
+    MOST_OF_A_POINT,
+    POINT,
+    SETTLED,
+    Counts,
+    by_steps,
+    from_steps,
+    with_a_solver_that_serves,
+)
 
 
 PER_RPM = np.pi / 30
-POLISHING = 6
+ITERATIONS = 6
 POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
-"""Newton's steps end below the first, must be below the second, and may lead no further than the third, in units of the
-system's scale and of a tenth of the speed."""
-NEWTON, CLOSED, FAR = 20, 1e-10, 3.0
-"""The same of orbits: most steps, size of a last step, and how far an orbit may lie from its guess."""
+"""Limits of Newton's method, in units of the system's scale and of a tenth of the speed: it ends with a step below the
+first, the step must be below the second, and it may lead no further from the guess than the third."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of one edge, or of the width between two, with respect to every parameter."""
+    """Derivatives of an edge, or of the width between two edges, with respect to every parameter."""
 
     name: str
     kind: str
@@ -61,16 +67,16 @@ class Sensitivity:
     elasticity: dict[str, float]
     """Relative change of the value over the relative change of the parameter."""
     homogeneity: dict[str, float]
-    """Relative residuals of the identities for mass, length and time; NaN where a parameter's unit is not known."""
+    """Relative residuals of the identities for mass, length and time; NaN if a parameter's unit is not known."""
     transversality: float
-    """d|mu|/d speed [s] (see `Point`); of a width or limit the smallest one."""
+    """d|mu|/d speed [s] (see `Point`); the smallest one for a width or a limit."""
     status: str
     state: Float[np.ndarray, " dim"] | None = None
-    """State of the orbit at phase 0 [SI]; of a width or limit None."""
+    """State of the orbit at phase 0 [SI]; None for a width or a limit."""
     error_rpm: float = float("nan")
     """Distance of the value to that by half the steps."""
     steps: int = 0
-    """Steps per revolution; of a width or limit 0."""
+    """Steps per revolution; 0 for a width or a limit."""
 
     @property
     def trusted(self) -> bool:
@@ -98,6 +104,7 @@ class _Expansion(NamedTuple):
 
 
 def _expand(problem: OrbitProblem, given: Given, u: Float[Array, " n"]) -> _Expansion:
+    """Expand the return map around the unknowns u: the state, then the speed."""
     numbers = numbers_around(OrbitEquations(problem), u, given)
     (image, monodromy), (image_slope, monodromy_slope) = expansion(problem, u, numbers)
     return _Expansion(image, monodromy, image_slope, monodromy_slope, numbers.of_u)
@@ -105,7 +112,7 @@ def _expand(problem: OrbitProblem, given: Given, u: Float[Array, " n"]) -> _Expa
 
 @compiled
 def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> AbstractForcedSystem:
-    """d(weight . k) / d system."""
+    """Return d(weight . k) / d system."""
     row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed)))[0]
     with checked_before():
         _, pull = eqx.filter_vjp(row, given.system)
@@ -113,24 +120,44 @@ def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> 
 
 
 def _pulled_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> dict[str, float]:
-    """d(weight . k) / d parameter [SI]."""
+    """Return d(weight . k) / d parameter [SI]."""
     pulled = _pull_back(problem, given, u, weight)
     return {n: float(get(pulled, path)) for n, path in parameter_paths(given.system).items()}
 
 
-class _Unfolding(NamedTuple):
-    """What is known of a bifurcation point at one orbit."""
+class _Edge(NamedTuple):
+    """An edge located to rounding, by some number of steps."""
 
-    residual: Float[Array, " m"]
-    """Newton's step to the point, in the unknowns' units."""
-    weight: Float[Array, " k"]
-    """Derivatives of the parameter at the point by the numbers of the field."""
-    rate: Array
-    """d|mu| / d parameter in the parameter's unit (at a fold: the drift along the critical direction)."""
+    problem: OrbitProblem
+    u: Array
+    residual: Array
+    """Newton's last step, in the unknowns' units."""
+    weight: Array
+    """Derivatives of the speed at the edge by the numbers of the field."""
+    rate: float
+    """d|mu| / d speed (at a fold: the drift along the critical direction)."""
+    error: float = float("nan")
+    """Distance of the speed to that by half the steps [rad/s]."""
+    steps: int = 0
+
+    @property
+    def speed(self) -> float:
+        return float(self.problem.values(self.u)[0])
+
+    @property
+    def found(self) -> bool:
+        return bool(jnp.max(jnp.abs(self.residual)) < SETTLED_TO)
+
+    @property
+    def status(self) -> str:
+        if not self.found:
+            return "no such point"
+        return "not converged" if self.error > SETTLED * self.speed else "converged"
 
 
 @compiled
-def _unfold(kind: Kind, unit: Array, z: Array, around: _Expansion) -> _Unfolding:
+def _unfold(kind: Kind, unit: Array, z: Array, around: _Expansion) -> tuple[Array, Array, Array]:
+    """Return Newton's step to the bifurcation near the orbit z, and weight and rate there (see `_Edge`)."""
     n = z.size
     borders = null_vectors(singular_matrix(kind, around.monodromy))
     scalar = lambda m: bordered(singular_matrix(kind, m), *borders)[0]
@@ -142,75 +169,49 @@ def _unfold(kind: Kind, unit: Array, z: Array, around: _Expansion) -> _Unfolding
     of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.of_u[:, n])[:, None]], axis=1)
     step = jnp.linalg.solve(of_unknowns, jnp.append(around.image - z, g))
     adjoint = jnp.linalg.solve(of_unknowns.T, jnp.zeros(n + 1).at[-1].set(1.0))
-    return _Unfolding(step, -(adjoint @ of_numbers) * unit, critical_rate(kind, n, of_unknowns, known, borders))
-
-
-class _Edge(NamedTuple):
-    """An edge located to rounding, by some number of steps."""
-
-    problem: OrbitProblem
-    u: Array
-    residual: Array
-    weight: Array
-    rate: float
-    """See `_Unfolding`, here d|mu| / d speed."""
-    found: bool
-    error: float = float("nan")
-    """Distance of the speed to that by half the steps [rad/s]."""
-    steps: int = 0
-
-    @property
-    def speed(self) -> float:
-        return float(self.problem.values(self.u)[0])
-
-    @property
-    def status(self) -> str:
-        if not self.found:
-            return "no such point"
-        return "not converged" if self.error > SETTLED * self.speed else "converged"
+    return step, -(adjoint @ of_numbers) * unit, critical_rate(kind, n, of_unknowns, known, borders) / unit
 
 
 def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
-    """The edge near `point`, solved for again by twice the steps until it stays where it is."""
-    return that_serves(lambda chosen, counts: _settled(system, point, chosen, counts), method, MOST_OF_A_POINT)
+    """Locate the edge near `point`, and again with twice the steps until it stays where it is."""
 
+    def find(chosen: AbstractMethod, counts: Counts) -> _Edge:
+        counts = from_steps(counts, int(point.steps) or None)
+        given = Given(system, jnp.asarray(point.speed, dtype=float))
+        problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
+        near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
+        before, edge = None, None
+        for i in range(int(counts.tries)):
+            steps = int(counts.steps(i))
+            before, edge = edge, _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
+            if before is not None:
+                both = before.found and edge.found
+                edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
+            known = edge.found or (before is not None and before.found)
+            if edge.error <= POINT * edge.speed * float(counts.tolerance) or (steps >= GIVEN_UP and not known):
+                break
+            near = edge.u if edge.found else begin
+        assert edge is not None
+        return edge
 
-def _settled(system: AbstractForcedSystem, point: Point, chosen: AbstractMethod, counts: Counts) -> _Edge:
-    counts = from_steps(counts, int(point.steps) or None)
-    given = Given(system, jnp.asarray(point.speed, dtype=float))
-    problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
-    near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
-    edge = None
-    for steps in counts.each():
-        before, edge = edge, _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
-        if before is not None:
-            both = before.found and edge.found
-            edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
-        known = edge.found or (before is not None and before.found)
-        if edge.error <= POINT * edge.speed * float(counts.tolerance) or (steps >= GIVEN_UP and not known):
-            break
-        near = edge.u if edge.found else begin
-    assert edge is not None
-    return edge
+    return with_a_solver_that_serves(find, method, MOST_OF_A_POINT)
 
 
 def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
-    """The edge near the unknowns `first`, by the steps of the problem."""
+    """Locate the edge near the unknowns `first` by Newton's method, with the steps of the problem."""
     u, unit = first, problem.units[0]
-    unfold = lambda u: _unfold(kind, unit, u[:-1], _expand(problem, given, u))
-    here = unfold(u)
-    for _ in range(POLISHING):
-        leads = jnp.max(jnp.abs(u - here.residual - first))
-        if not bool((jnp.max(jnp.abs(here.residual)) > POLISHED) & (leads < NEARBY)):  # there, lost, or not a number
+    for i in range(ITERATIONS + 1):
+        step, weight, rate = _unfold(kind, unit, u[:-1], _expand(problem, given, u))
+        leads = jnp.max(jnp.abs(u - step - first))
+        goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
+        if i == ITERATIONS or not bool(goes_on):
             break
-        u = u - here.residual
-        here = unfold(u)
-    found = bool(jnp.max(jnp.abs(here.residual)) < SETTLED_TO)
-    return _Edge(problem, u, here.residual, here.weight, float(here.rate) / float(unit), found)
+        u = u - step
+    return _Edge(problem, u, step, weight, float(rate))
 
 
 def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
-    """Speed [rad/s] of the edge near `point`; NaN where it is not found, or elsewhere by half the steps."""
+    """Return the speed [rad/s] of the edge near `point`; NaN if it is not found, or elsewhere by half the steps."""
     require_x64()
     if point.kind == "branch-point":
         said = "must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
@@ -222,15 +223,15 @@ def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMetho
 def sensitivity(
     system: AbstractForcedSystem, point: Point, name: str = "edge", method: AbstractMethod | None = None
 ) -> Sensitivity:
-    """Derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
+    """Return the derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
 
-    The point is located by Newton's method first, and again with twice the steps until it no longer moves.
-    `bifurcation` gives the same derivatives, and higher ones.
+    Newton's method locates the point first, and again with twice the steps until it no longer moves. `bifurcation`
+    gives the same derivatives, and higher ones.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
 
-    **Returns:** `Sensitivity`; NaN where Newton's method does not find the point again, or finds it elsewhere with half
-    the steps, and for a branch point.
+    **Returns:** `Sensitivity`; it is NaN for a branch point, and if Newton's method does not find the point again, or
+    finds it elsewhere with half the steps.
     """
     require_x64()
     if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design
@@ -260,7 +261,7 @@ def sensitivity(
 def _nowhere(
     system: AbstractForcedSystem, kind: str, name: str, status: str = "no such point", error_rpm: float = float("nan")
 ) -> Sensitivity:
-    """What is known of an edge that was not found again, or elsewhere."""
+    """Return the result for an edge that was not found again, or elsewhere."""
     nan = float("nan")
     row = dict.fromkeys(parameter_paths(system), nan)
     broken: dict[str, float] = dict.fromkeys(("mass", "length", "time"), nan)
@@ -270,17 +271,16 @@ def _nowhere(
 def sensitivities(
     system: AbstractForcedSystem, points: Mapping[str, Point], method: AbstractMethod | None = None
 ) -> dict[str, Sensitivity]:
-    """The sensitivity of each named edge, on all cores."""
+    """Return the sensitivity of each named edge; edges run on all cores."""
     require_x64()
-    with concurrent.futures.ThreadPoolExecutor(cores()) as pool:
-        found = pool.map(lambda name: sensitivity(system, points[name], name, method), points)
-        return dict(zip(points, found, strict=True))
+    found = in_parallel(lambda name: sensitivity(system, points[name], name, method), list(points))
+    return dict(zip(points, found, strict=True))
 
 
 def limit_sensitivity(
     system: AbstractForcedSystem, cascade: Cascade, name: str = "limit", method: AbstractMethod | None = None
 ) -> Sensitivity:
-    """The sensitivity of the speed at which a cascade accumulates, extrapolated like that speed itself.
+    """Return the sensitivity of the speed at which a cascade accumulates, extrapolated like that speed itself.
 
     **Raises:** `ValueError` for a cascade over another parameter than speed, or of fewer than two points.
     """
@@ -291,12 +291,12 @@ def limit_sensitivity(
 
 
 def width(onset: Sensitivity, exit_: Sensitivity, name: str = "width") -> Sensitivity:
-    """The sensitivity of the width between two edges."""
+    """Return the sensitivity of the width between two edges."""
     return _combined(name, "synchronous-loss", ((1.0, exit_), (-1.0, onset)))
 
 
 def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) -> Sensitivity:
-    """A weighted sum of edges."""
+    """Return the sensitivity of a weighted sum of edges."""
     total = sum(w * s.value_rpm for w, s in parts)
     first = parts[0][1]
     weighted = lambda rows: sum(w * s.value_rpm * row for (w, s), row in zip(parts, rows, strict=True)) / total
@@ -314,23 +314,19 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
 
 
 class LeadingMultiplier(NamedTuple):
-    """The largest multiplier of the orbit near a guess; NaN where there is none."""
+    """The largest multiplier of the orbit near a guess; NaN if there is none."""
 
     size: float
     """|mu|: below 1 the orbit is stable."""
     derivative: dict[str, float]
     """d|mu| / d parameter [SI]."""
     state: Float[np.ndarray, " dim"]
-    """Of the orbit at phase 0 [SI]."""
-    error: float = float("nan")
-    """Distance of the size to that by half the steps, infinite where these find no orbit."""
-    steps: int = 0
-    """Steps per revolution."""
+    """State of the orbit at phase 0 [SI]."""
 
 
 @compiled
-def _moved(n: int, around: _Expansion) -> tuple[Array, Array]:
-    """|mu|, and its derivatives by the numbers of the field."""
+def _largest(n: int, around: _Expansion) -> tuple[Array, Array]:
+    """Return |mu| of the largest multiplier, and its derivatives by the numbers of the field."""
     mu, right = jnp.linalg.eig(around.monodromy)
     left = jnp.linalg.inv(right)  # in rows, with l r = 1
     i = jnp.argmax(jnp.abs(mu))
@@ -350,43 +346,18 @@ def leading_multiplier(
     periods: int = 1,
     method: AbstractMethod | None = None,
 ) -> LeadingMultiplier:
-    """Size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
+    """Return the size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
 
     **Arguments:** a system whose parameters are declared, such as `CageModel`; speed [rad/s]; guess; revolutions after
-    which the orbit closes; integration method. Where two multipliers are equal in size, one of them is taken.
+    which the orbit closes; integration method. If two multipliers are equal in size, one of them is taken.
     """
-    require_x64()
     require_at_least(1, periods=periods)
-    require_speeds(system, speed)
-    chosen, counts = counted(method)
-    at, state = jnp.asarray(speed, dtype=float), jnp.asarray(guess, dtype=float)
-    given = Given(system, at)
-    problem = make_problem(given, (SPEED,), 0.1 * at[None], periods, chosen)
-    first = jnp.append(state / problem.scale, 10.0)
-    found, error, steps = None, np.inf, 0
-    for steps in counts.each():
-        before, found = found, _by_newton(by_steps(problem, steps), given, first if found is None else found[0])
-        error = np.inf if found is None or before is None else abs(float(found[1] - before[1]))
-        if error <= SLOPE * float(counts.tolerance) or (found is None and steps >= GIVEN_UP):
-            break
-    if found is None:
-        nan, names = float("nan"), parameter_paths(system)
-        return LeadingMultiplier(nan, dict.fromkeys(names, nan), np.full(system.dimension, nan), error, steps)
-    u, size, weight = found
-    slope = _pulled_back(by_steps(problem, steps), given, u, weight)
-    return LeadingMultiplier(float(size), slope, np.asarray(problem.state(u)), error, steps)
-
-
-def _by_newton(problem: OrbitProblem, given: Given, first: Array) -> tuple[Array, Array, Array] | None:
-    """The orbit near the unknowns `first`, the size of its largest multiplier, and the derivatives of that."""
-    n, u = problem.dimension, first
-    for _ in range(NEWTON):
-        around = _expand(problem, given, u)
-        step = jnp.linalg.solve(around.image_slope[:, :n] - jnp.eye(n), around.image - u[:n])
-        size = float(jnp.max(jnp.abs(step)))
-        if not size < FAR or float(jnp.max(jnp.abs(u - first))) > FAR:
-            return None
-        if size < CLOSED:
-            return u, *_moved(n, around)
-        u = u.at[:n].add(-step)
-    return None
+    orbit = periodic_orbit(system, speed, periods, guess=guess, method=method)
+    if not bool(orbit.converged):
+        nan = float("nan")
+        return LeadingMultiplier(nan, dict.fromkeys(parameter_paths(system), nan), np.asarray(orbit.state))
+    given = Given(system, jnp.asarray(speed, dtype=float))
+    problem = make_problem(given, (SPEED,), 0.1 * given.speed[None], periods, orbit.method)
+    u = jnp.append(orbit.state / problem.scale, 10.0)
+    size, weight = _largest(problem.dimension, _expand(problem, given, u))
+    return LeadingMultiplier(float(size), _pulled_back(problem, given, u, weight), np.asarray(orbit.state))

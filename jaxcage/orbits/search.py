@@ -1,9 +1,8 @@
-"""Orbits found without a hint of where they are: the synchronous (period-1) ones of a system over a range of speed, and
-all that many starts lead to at one speed.
+"""Search for orbits without a hint: synchronous (period-1) orbits over a range of speed, coexisting ones at one speed.
 
-Newton's method leads from the ends of simulations on a coarse grid, from the system's starts and from their opposites,
-to stable orbits; each is followed both ways by arclength, until every orbit that was met lies on a branch that is
-known. Stable stretches of the branches, bounded by bifurcations, are what the synchronous-loss edges are about.
+Newton's method leads to stable orbits from the ends of simulations on a coarse grid of speeds. Each orbit is followed
+both ways, until every orbit that was met lies on a known branch. Stable stretches of the branches are bounded by
+bifurcations; between them are the unstable ranges of the synchronous orbit.
 """
 
 import dataclasses
@@ -25,33 +24,36 @@ from ..analysis import Sweep
 from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import initial_states, sweep
-from ._arclength import Steps, take
-from ._branch import Branch, follow_both_ways
-from ._follower import Follower, make_follower, seeds, stable_steps
-from ._orbit import Orbit, periodic_orbit
-from ._point import Point
-from ._problem import SPEED, Given
+from .branch import Branch, follow_both_ways
+from .continuation import ContinuationProblem, orbit_curves, orbits_near, take, with_stable_steps
+from .orbit import Orbit, periodic_orbit
+from .point import Point
+from .problem import SPEED, Given
+from .step_control import StepControl
 
 
 ROUND = 4
 """Branches followed at a time."""
 ROUNDS = 8
 PATIENCE = 150
-"""Unstable orbits in a row after which a branch is left."""
+"""Unstable orbits in a row after which a branch is not followed further."""
 ON_BRANCH = 0.03
 """An orbit lies on a branch if it is within this distance of it, in units of the system's scale."""
 SPREAD = 0.6
 """Random starts are spread over this share of the system's scale in every direction."""
 SAME = 1e-4
-"""Orbits are the same within this: one that hardly attracts moves by a hundred times the error of its map."""
+"""Orbits are the same within this: an orbit that hardly attracts moves by a hundred times the error of its map."""
+NEARLY = 0.1
+"""A simulation that moves by less in its last revolution, in units of the scale, approaches an orbit. Another one is
+chaotic, and Newton's method tries only few numbers of steps from it."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
-"""Of the state, at a speed [rad/s]."""
+"""Units of the state at a speed [rad/s]."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stable part of a branch of synchronous orbits; an end is None where it leaves the range or was left."""
+    """A stable part of a branch of synchronous orbits; an end is None if the range or the branch ends there."""
 
     lower: Point | None
     upper: Point | None
@@ -59,25 +61,25 @@ class Stretch:
     upper_rpm: float
     branch: int
     family: int = 0
-    """The same for all branches that are parts of one."""
+    """The same number for all branches that are parts of one."""
     met: int = 0
-    """How many simulations settled on it."""
+    """Number of simulations that settled on it."""
     met_first: int = 0
-    """How many of those from the system's conventional start, the first of its starts, did."""
+    """Number of those that began at the system's conventional start, the first of its initial states."""
 
     @property
     def width_rpm(self) -> float:
-        """How much speed it covers [rpm]."""
+        """Range of speed [rpm]."""
         return self.upper_rpm - self.lower_rpm
 
     @property
     def error_rpm(self) -> float:
-        """By how much the width is not known: what half the steps change in its ends [rpm]."""
+        """Uncertainty of the width [rpm]: the errors of its ends."""
         return sum((float(p.error_rpm) for p in (self.lower, self.upper) if p is not None), 0.0)
 
     @property
     def confirmed(self) -> bool:
-        """Whether it is there by half the steps, too: both ends are located to less than its width."""
+        """Whether both ends are located to less than its width."""
         return not self.error_rpm > self.width_rpm
 
     def __str__(self) -> str:
@@ -95,9 +97,9 @@ class SynchronousOrbits:
     stretches: tuple[Stretch, ...]
     """Stable stretches, by their lower end."""
     sweep: Sweep
-    """The simulations that the branches were started from; its labels do not tell chaos."""
+    """The simulations from which the branches begin; too short for labels that tell chaos."""
     missed: int
-    """Settled orbits that lie on no branch that was followed."""
+    """Number of orbits that simulations settled on and that lie on no branch."""
     lower_rpm: float
     upper_rpm: float
 
@@ -113,19 +115,22 @@ class SynchronousOrbits:
 
     @property
     def unsettled(self) -> int:
-        """How many bifurcations are elsewhere, or nowhere, by half the steps: none of them is in `points`."""
+        """Number of bifurcations that half the steps put elsewhere: `points` has none of them."""
         return sum(p.status == "not converged" for b in self.branches for p in b.special)
 
     @property
     def unexplained(self) -> tuple[Point, ...]:
-        """Where the stability of an orbit changes and no bifurcation is found: none of these is in `points`."""
+        """Places where the stability changes and no bifurcation is found: `points` has none of them."""
         return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
-        """Orbits at `speed` [rad/s]: branch, whether stable, state [SI], multipliers; to the accuracy of the steps."""
+        """Return the orbits at `speed` [rad/s], to the accuracy of the continuation's steps.
+
+        **Returns:** for each the number of its branch, whether it is stable, its state [SI] and its multipliers.
+        """
         found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
         for i, b in enumerate(self.branches):
-            for stable, state, multipliers in crossings(b, speed):
+            for stable, state, multipliers in _crossings(b, speed):
                 if not any(np.allclose(state, other, rtol=1e-2) for _, _, other, _ in found):  # parts may overlap
                     found.append((i, stable, state, multipliers))
         return found
@@ -137,8 +142,8 @@ class SynchronousOrbits:
     _repr_html_ = notebook_html
 
 
-def crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:
-    """Where a branch over speed passes `speed`: stable or not, state, multipliers, by linear interpolation."""
+def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:
+    """Return stability, state and multipliers where a branch passes `speed`, by linear interpolation."""
     v = branch.value
     found = []
     for k in np.flatnonzero(((v[:-1] - speed) * (v[1:] - speed) < 0) | (v[:-1] == speed)):
@@ -160,13 +165,13 @@ class _Piece(NamedTuple):
         return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
 
     def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
-        """Whether the orbit `state` at `rpm` lies on this piece."""
+        """Return whether the orbit `state` at `rpm` lies on this piece."""
         inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
         return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
 
 
 def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
-    """The stable parts of a branch over speed, cut to the limits [rpm]."""
+    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
     found = []
     edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
     change = np.flatnonzero(np.diff(branch.stable.astype(int)))
@@ -185,7 +190,7 @@ def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_P
 
 
 def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
-    """Pieces of the same orbits, met on two branches that were followed from different starts, made one."""
+    """Return the pieces with those joined that two branches from different starts share."""
     whole: list[_Piece] = []
     for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
         for i, other in enumerate(whole):
@@ -206,7 +211,7 @@ def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
 
 
 def _distinct(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Points by speed, those met twice taken once."""
+    """Return points by speed, each once."""
     kept: list[Point] = []
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
         apart = lambda q: max(1e-6 * p.value, p.error + q.error) if p.error + q.error >= 0 else 1e-6 * p.value
@@ -223,19 +228,19 @@ def synchronous_orbits(
     *,
     count: int = 251,
     discard: int = 250,
-    steps: Steps = Steps(most=1500),
+    steps: StepControl = StepControl(most=1500),
     settled: Sweep | None = None,
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> SynchronousOrbits:
     """Find and follow the synchronous orbits between two speeds [rad/s].
 
-    **Arguments:** system and range; number of speeds that are simulated from each of the system's starts, and
-    revolutions left out; or a sweep that was made before; steps of the continuation, in units of 1/20 of the range.
-    The same speeds are simulated from the opposites of the starts too, which serve only to locate orbits.
+    **Arguments:** system and range; number of speeds that are simulated from each of the system's initial states, and
+    revolutions left out; steps of the continuation, in units of 1/20 of the range; a sweep that was made before,
+    instead of simulations. Simulations from the opposites of the initial states serve only to find orbits.
 
-    **Returns:** `SynchronousOrbits`. Stable orbits with a small basin can escape the simulations: `missed` counts those
-    that were met but not followed; those that were not met cannot be counted.
+    **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin: `missed` counts those that
+    were met but not followed; those that were not met cannot be counted.
     """
     require_at_least(1, count=count)
     say = progress or (lambda what, done, of: None)
@@ -248,13 +253,12 @@ def synchronous_orbits(
 
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
-    follower = make_follower(Given(system, jnp.asarray((lower + upper) / 2)), SPEED, lower, upper, method)
-    met = _met(settled)
-    if met:
+    problem = orbit_curves(Given(system, jnp.asarray((lower + upper) / 2)), SPEED, lower, upper, method)
+    if met := _met(settled):
         middle = met[len(met) // 2]
-        follower = stable_steps(follower, (settled.last[tuple(middle)], float(settled.speed[middle[0]])))
-    orbits = _stable_orbits(follower, settled, scale)
-    waiting = sorted(orbits + _stable_orbits(follower, opposite, scale), key=lambda o: o.speed)
+        problem = with_stable_steps(problem, (settled.last[tuple(middle)], float(settled.speed[middle[0]])))
+    orbits = _stable_orbits(problem, settled, scale)
+    waiting = sorted(orbits + _stable_orbits(problem, opposite, scale), key=lambda o: o.speed)
     branches: list[Branch] = []
     for turn in range(ROUNDS):
         if not waiting:
@@ -262,7 +266,7 @@ def synchronous_orbits(
         say("branches", turn, ROUNDS)
         picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
         starts = [(waiting[i].state, waiting[i].speed) for i in picked]
-        branches += [b for b in follow_both_ways(follower, starts, steps, PATIENCE) if b is not None]
+        branches += [b for b in follow_both_ways(problem, starts, steps, PATIENCE) if b is not None]
         waiting = [w for w in waiting if not any(_covers(b, w, scale(w.speed)) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi
@@ -287,41 +291,36 @@ class _Settled(NamedTuple):
     """Whether the simulation had come near it, before Newton's method."""
 
 
-NEARLY = 0.1
-"""A simulation that moves by less in its last revolution, in units of the scale, is on its way to an orbit: another one
-is chaotic, and Newton's method is not tried from it again and again."""
-
-
 def _met(settled: Sweep) -> list[list[int]]:
-    """Speed and start of the simulations that ran to their end, though some may be still on the way to an orbit."""
+    """Return numbers of speed and start of the simulations that ran to their end."""
     return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
 
 
-def _stable_orbits(follower: Follower, settled: Sweep, scale: Scale) -> list[_Settled]:
-    """Stable orbits to which Newton's method leads from the ends of simulations, by speed."""
+def _stable_orbits(problem: ContinuationProblem, settled: Sweep, scale: Scale) -> list[_Settled]:
+    """Return the stable orbits to which Newton's method leads from the ends of simulations, by speed."""
     lanes = _met(settled)
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
-    follower = follower.around(met[0][1])
+    problem = problem.around(met[0][1])
     moved = settled.strobe[..., -1, :] - settled.strobe[..., -2, :] if settled.strobe.shape[2] > 1 else 0.0
     near = np.max(np.abs(moved / settled.scale[:, None]), axis=-1) < NEARLY
-    points = seeds(follower, met, np.array([near[i, j] for i, j in lanes]))
+    points = orbits_near(problem, met, np.array([near[i, j] for i, j in lanes]))
     good = points.converged.copy()
-    good[good] = follower.unstable(take(points, good)) == 0
-    states = points.u[:, :-1] * np.asarray(follower.problem.scale)
+    good[good] = problem.unstable(take(points, good)) == 0
+    states = problem.states(points.u)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
 
 
 def _covers(branch: Branch, orbit: _Settled, scale: np.ndarray) -> bool:
-    """Whether an orbit lies on a branch."""
-    apart = (np.max(np.abs(s - orbit.state) / scale) for _, s, _ in crossings(branch, orbit.speed))
+    """Return whether an orbit lies on a branch."""
+    apart = (np.max(np.abs(s - orbit.state) / scale) for _, s, _ in _crossings(branch, orbit.speed))
     return any(a < ON_BRANCH for a in apart)
 
 
 def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
-    """A number for each branch, the same for parts of one: a part that was stopped on another ends there."""
+    """Return a number for each branch, the same for parts of one: the end of a stopped part lies on another part."""
     family = list(range(len(branches)))
     for i, b in enumerate(branches):
         for end, why in zip((0, -1), b.ended, strict=True):
@@ -342,12 +341,12 @@ def coexisting_orbits(
     seed: int = 0,
     method: AbstractMethod | None = None,
 ) -> list[Orbit]:
-    """Orbits that close after `periods` revolutions and not earlier, from the system's own starts and random ones.
+    """Find orbits that close after `periods` revolutions and not earlier, from the system's and random initial states.
 
-    **Arguments:** system and speed [rad/s]; number of random starts and their seed; revolutions of simulation before
-    Newton's method takes over: with few, unstable orbits are found as well.
+    **Arguments:** system and speed [rad/s]; number of random states and their seed; revolutions of simulation before
+    Newton's method: with few, unstable orbits are found as well.
 
-    **Returns:** distinct orbits, the stable ones first. There is no proof that these are all.
+    **Returns:** distinct orbits, the stable ones first. There may be more.
     """
     require_x64()
     require_at_least(0, seed=seed)
