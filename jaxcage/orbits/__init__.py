@@ -26,7 +26,6 @@ from .branch import (
     Cascade as Cascade,
     branch as branch,
     cascade as cascade,
-    doubled_branch as doubled_branch,
 )
 from .curves import Curve as Curve, curve as curve
 from .gradient import (
@@ -66,6 +65,6 @@ from .unstable_ranges import (
 
 check_layer(
     globals(),
-    "bifurcation branch cascade coexisting_orbits curve doubled_branch "
+    "bifurcation branch cascade coexisting_orbits curve "
     "explain leading_multiplier loss_zones periodic_orbit sensitivities sensitivity synchronous_orbits",
 )

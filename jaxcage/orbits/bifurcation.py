@@ -16,19 +16,15 @@ from .._types import Scalar
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
 from .branch import follow_both_ways
-from .continuation import Curve, orbit_curves, stacked
+from .continuation import Path, orbit_curves
 from .implicit import as_root
 from .location import sign_changes
 from .newton import AbstractEquations, Found, refined
 from .orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, simulated, sorted_multipliers
 from .point import (
-    FOUND,
     KINDS,
-    NO_SUCH_POINT,
-    NOT_CONVERGED,
-    OTHER_KIND,
-    TANGENT,
     Kind,
+    Outcome,
     Point,
     bordered,
     null_vectors,
@@ -38,7 +34,7 @@ from .point import (
     value_at,
 )
 from .problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, name_of
-from .step_control import StepControl
+from .step_control import Points, StepControl
 from .step_counts import (
     BY_OTHERS,
     ENOUGH,
@@ -47,9 +43,8 @@ from .step_counts import (
     SETTLED,
     Counts,
     by_steps,
-    from_steps,
     other_steps,
-    with_a_solver_that_serves,
+    with_fallback,
 )
 
 
@@ -157,14 +152,14 @@ def bifurcation(
 
     def find(begin: _Begin) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:
-            counts = from_steps(counts, None if near is None else near.steps)
+            counts = counts.near(None if near is None else near.steps)
             found, equations, u, known = newton(method, counts, begin)
             if is_traced((given, found)):
                 u, _ = as_root(given, equations=equations, u=u, aux=known)
                 return dataclasses.replace(found, **_place(equations, u, given, found.converged))
             return compared(found, method, counts) if bool(found.converged) and counts.chooses else found
 
-        return with_a_solver_that_serves(by, method, MOST_OF_A_POINT)
+        return with_fallback(by, method, MOST_OF_A_POINT)
 
     def compared(found: Point, method: AbstractMethod, counts: Counts) -> Point:
         """Return the point with the larger error that a comparison with other steps may show."""
@@ -175,10 +170,14 @@ def bifurcation(
         apart = jnp.where(other.converged, BY_OTHERS * jnp.abs(other.value - found.value), lost)
         error = jnp.maximum(found.error, apart)
         far = error > SETTLED * jnp.maximum(jnp.abs(found.value), jnp.abs(start.at) if start.at else 1.0)
-        return dataclasses.replace(found, error=error, outcome=jnp.where(far, NOT_CONVERGED, found.outcome))
+        return dataclasses.replace(found, error=error, outcome=jnp.where(far, Outcome.NOT_CONVERGED, found.outcome))
 
     found = find(start)
-    if is_traced((found, given, start)) or not reach or int(found.outcome) not in (NO_SUCH_POINT, OTHER_KIND):
+    if (
+        is_traced((found, given, start))
+        or not reach
+        or int(found.outcome) not in (Outcome.NO_SUCH_POINT, Outcome.OTHER_KIND)
+    ):
         return found
     if start.spin:
         here = Given(system, start.speed).changed(parameter, start.at)
@@ -226,9 +225,9 @@ def _along_branch(
     name = "the parameter" if callable(parameter) else parameter
     reached: list[float] = []
 
-    def passed(curve: Curve) -> str:
+    def passed(curve: Path) -> str:
         """Event: a point of the kind was passed, or the other direction found one at a smaller distance."""
-        step = stacked(curve.points[-2:])
+        step = Points.stacked(curve.points[-2:])
         far = float(abs(step.u[1, -1] - curve.points[0].u[-1]))
         before, after = problem.unstable(step)
         if before != after and any(k == kind for _, k in sign_changes(problem, step)):
@@ -319,9 +318,9 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     error = found.error * unit
     moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * unit)
     tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.dimension]), 10.0) < TANGENTIAL
-    kept = jnp.where(moving, NOT_CONVERGED, jnp.where(tangential, TANGENT, FOUND))
-    outcome = jnp.where(found.converged, jnp.where(matches, kept, OTHER_KIND), NO_SUCH_POINT)
-    there = (outcome == FOUND) | (outcome == TANGENT)
+    kept = jnp.where(moving, Outcome.NOT_CONVERGED, jnp.where(tangential, Outcome.TANGENTIAL, Outcome.FOUND))
+    outcome = jnp.where(found.converged, jnp.where(matches, kept, Outcome.OTHER_KIND), Outcome.NO_SUCH_POINT)
+    there = (outcome == Outcome.FOUND) | (outcome == Outcome.TANGENTIAL)
     keep = lambda x: jnp.where(there, x, jnp.nan)
     direction = jnp.zeros(problem.dimension) if kind == "Neimark-Sacker" else known.right
     length = jnp.linalg.norm(direction)

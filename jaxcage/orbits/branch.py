@@ -21,67 +21,45 @@ from .continuation import (
     ONCE,
     Continuation,
     ContinuationProblem,
-    Curve,
     Event,
+    Path,
+    Start,
     correct,
     first_points,
-    in_a_row,
     orbit_curves,
-    orbits_near,
-    passes,
-    require_range,
-    require_within,
-    take,
-    turned,
-    with_stable_steps,
 )
 from .location import Place, bifurcations_of
 from .orbit import NearOrbit, Orbit, guess_state
-from .point import (
-    CRITICAL,
-    FOUND,
-    NOT_CONVERGED,
-    NOT_EXPLAINED,
-    UNEXPLAINED,
-    Point,
-    require_found,
-    test_functions,
-    value_at,
-)
+from .point import CRITICAL, UNEXPLAINED, Outcome, Point, require_found, test_functions, value_at
 from .problem import SPEED, Given, Parameter, name_of
 from .step_control import Points, StepControl
 from .step_counts import SETTLED
 
 
 FEIGENBAUM = 4.669201609102990
-SMALLEST_AMPLITUDE = 1e-5
-"""A doubled branch is looked for down to this distance from its period doubling."""
+AMPLITUDE, SMALLEST_AMPLITUDE = 0.02, 1e-5
+"""Distance from its period doubling at which a doubled branch is entered, and the smallest tried."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Orbits in order along a branch."""
+    """Orbits in order along a branch: values of the parameter [SI], speeds [rad/s], states at phase 0 [SI], multipliers,
+    steps per revolution, and errors as in `Orbit`; bifurcations in order along the branch."""
 
     parameter: str
     value: Float[np.ndarray, " points"]
-    """Values of the parameter [SI]."""
     speed: Float[np.ndarray, " points"]
-    """Speeds [rad/s]."""
     state: Float[np.ndarray, "points dim"]
-    """States at phase 0 [SI]."""
     multipliers: Complex[np.ndarray, "points dim"]
     stable: Bool[np.ndarray, " points"]
     special: tuple[Point, ...]
-    """Bifurcations, in order along the branch."""
     periods: int
     ended: tuple[str, str]
     """Why it ends where it begins and where it ends: `range`, it leaves the range; `closed`; `steps`, the largest
     number; `stopped`, on another branch or after many unstable orbits; `stuck`, no further orbit was found;
     `inaccurate`, the finest steps do not tell where it is; `doubling`, it forks off."""
     steps: Int[np.ndarray, " points"]
-    """Steps per revolution."""
     error: Float[np.ndarray, " points"]
-    """Error of each orbit (see `Orbit.error`)."""
 
     @property
     def speed_rpm(self) -> Float[np.ndarray, " points"]:
@@ -129,7 +107,6 @@ def branch(
     """
     require_x64()
     require_at_least(1, periods=periods)
-    require_range(parameter, lower, upper)
     if isinstance(orbit, Orbit | Point):
         speed, periods = orbit.speed, int(orbit.periods)
         state, at = orbit.state, value_at(orbit, system, speed, parameter)
@@ -139,9 +116,9 @@ def branch(
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_speeds(system, known_speed)
-    require_within("orbit", float(at), lower, upper)
     given = Given(system, jnp.asarray(known_speed, dtype=float))
     problem = orbit_curves(given, parameter, lower, upper, method, periods)
+    problem.require_inside("orbit", float(at))
     if method is None and isinstance(orbit, Orbit) and isinstance(orbit.solver, Rodas4):
         problem = problem.by_rodas4()
     state = guess_state(system, known_speed, state)
@@ -153,7 +130,7 @@ def branch(
 
 def follow_both_ways(
     problem: ContinuationProblem,
-    starts: Sequence[tuple[np.ndarray, float]],
+    starts: Sequence[Start],
     control: StepControl,
     patience: int | float = math.inf,
     events: Sequence[Event] = (),
@@ -165,47 +142,46 @@ def follow_both_ways(
 
     **Returns:** None for a start that is not near an orbit, or lies on the branch of an earlier one.
     """
-    problem = with_stable_steps(problem.around(starts[0][1]), starts[0])
-    first = orbits_near(problem, starts)
+    problem = problem.around(starts[0][1]).with_stable_steps(starts[0])
+    first = problem.orbits_near(starts)
     count = len(starts)
     taken = ~first.converged
     unstable = [0] * (2 * count)
 
-    def meets_another(curve: Curve) -> str:
-        own, step = curve.number % count, (curve.points[-2].u, curve.points[-1].u)
+    def meets_another(curve: Path) -> str:
+        own = curve.number % count
         for other in range(own + 1, count):
-            taken[other] |= passes(*step, first.u[other][None])
+            taken[other] |= curve.passes(first.u[other][None])
         others = [c for c in walk.curves if c.number % count != own and not taken[c.number % count]]
         points = [p.u for c in others if len(c.points) > 1 for p in c.points]
-        return "stopped" if points and passes(*step, np.stack(points)) else ""
+        return "stopped" if points and curve.passes(np.stack(points)) else ""
 
-    def stops(curve: Curve) -> str:
+    def stops(curve: Path) -> str:
         calm = problem.unstable(curve.points[-1]) == 0
         unstable[curve.number] = 0 if calm else unstable[curve.number] + 1
         return "stopped" if taken[curve.number % count] or unstable[curve.number] >= patience else ""
 
-    both = turned(take(first, np.tile(np.arange(count), 2)), np.repeat([1.0, -1.0], count))
+    both = first.take(np.tile(np.arange(count), 2)).turned(np.repeat([1.0, -1.0], count))
     walk = Continuation(problem, both, control, (stops, *events, meets_another))
-    for _ in walk:
-        pass
+    walk.finished()
     kept = [i for i in range(count) if not taken[i]]
     rows = [_joined(problem, walk.curves[i], walk.curves[i + count]) for i in kept]
     found = dict(zip(kept, described(problem, rows), strict=True))
     return [found.get(i) for i in range(count)]
 
 
-def _joined(problem: ContinuationProblem, up: Curve, down: Curve) -> tuple[Points, tuple[str, str]]:
+def _joined(problem: ContinuationProblem, up: Path, down: Path) -> tuple[Points, tuple[str, str]]:
     """Return both directions as one row of points, and why they end.
 
     A closed curve, which was gone round twice, is taken once, from an unstable orbit on, so that no stable part is cut.
     """
     if "closed" not in (up.ended, down.ended):
-        return in_a_row(down.row, up.row), (down.ended, up.ended)
+        return up.row.after(down.row), (down.ended, up.ended)
     row = (up if up.ended == "closed" else down).row
     stable = problem.unstable(row) == 0
     count = stable.size - 1  # the last point is past the first
     order = (np.arange(count + 1) + int(np.argmin(stable[:-1]))) % count
-    return take(row, order), ("closed", "closed")
+    return row.take(order), ("closed", "closed")
 
 
 def described(problem: ContinuationProblem, rows: Sequence[tuple[Points, tuple[str, str]]]) -> list[Branch]:
@@ -216,125 +192,61 @@ def described(problem: ContinuationProblem, rows: Sequence[tuple[Points, tuple[s
 
 def _branch(problem: ContinuationProblem, points: Points, places: Sequence[Place], ended: tuple[str, str]) -> Branch:
     stable = problem.unstable(points) == 0
-    value = problem.values(points.u)[:, 0]
-    periods, name = int(problem.problem.periods), name_of(problem.parameter)
     before = [place.after for place in places]
-    special = []
-    for i, place in enumerate(places):
-        k, kind, p, error = place.after, place.kind, place.point, place.error * problem.unit
-        assert p is not None
-        direction = np.zeros(problem.scale.size)
-        if kind in CRITICAL:
-            singular = problem.equations.monodromy(p) - CRITICAL[kind] * np.eye(direction.size)
-            direction = np.linalg.svd(singular)[2][-1]
-        # Of several between two points, only the outer ones are next to orbits whose stability is known.
-        edge = bool((stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :]))
-        at = float(problem.values(p.u)[0])
-        settled = NOT_CONVERGED if error > SETTLED * max(abs(at), problem.unit) else FOUND
-        outcome = NOT_EXPLAINED if kind == UNEXPLAINED else settled
-        known = float("nan") if outcome == NOT_CONVERGED else 1.0
-        special.append(
-            Point(
-                kind=kind,
-                speed=known * (at if name == SPEED else float(problem.given.speed)),
-                state=problem.states(p.u),
-                periods=periods,
-                steps=int(p.steps),
-                parameter=name,
-                value=at * known,
-                error=error,
-                multipliers=problem.multipliers(p),
-                direction=direction * problem.scale,
-                outcome=outcome,
-                index=k,
-                edge=edge,
-            )
-        )
-    return Branch(
-        parameter=name,
-        value=value,
-        speed=value if name == SPEED else np.full(value.shape, float(problem.given.speed)),
-        state=problem.states(points.u),
-        multipliers=problem.multipliers(points),
-        stable=stable,
-        steps=points.steps,
-        error=points.error,
-        special=tuple(special),
-        periods=periods,
-        ended=ended,
+    # Of several between two points, only the outer ones are next to orbits whose stability is known.
+    outer = lambda i, k: (stable[k] and k not in before[:i]) or (stable[k + 1] and k not in before[i + 1 :])
+    special = [_point(problem, place, bool(outer(i, place.after))) for i, place in enumerate(places)]
+    value = problem.values(points.u)[:, 0]
+    speed = value if problem.parameter == SPEED else np.full(value.shape, float(problem.given.speed))
+    state, multipliers = problem.states(points.u), problem.multipliers(points)
+    name, periods = name_of(problem.parameter), int(problem.equations.problem.periods)
+    accuracy = points.steps, points.error
+    return Branch(name, value, speed, state, multipliers, stable, tuple(special), periods, ended, *accuracy)
+
+
+def _point(problem: ContinuationProblem, place: Place, edge: bool) -> Point:
+    kind, p, unit = place.kind, place.point, problem.units[0]
+    assert p is not None
+    direction = np.zeros(problem.scale.size)
+    if kind in CRITICAL:
+        direction = np.linalg.svd(problem.equations.monodromy(p) - CRITICAL[kind] * np.eye(direction.size))[2][-1]
+    at, error = float(problem.values(p.u)[0]), place.error * unit
+    lost = kind != UNEXPLAINED and error > SETTLED * max(abs(at), unit)
+    value = float("nan") if lost else at
+    speed = value if problem.parameter == SPEED else value - value + float(problem.given.speed)
+    return Point(
+        kind,
+        speed,
+        problem.states(p.u),
+        int(problem.equations.problem.periods),
+        int(p.steps),
+        name_of(problem.parameter),
+        value,
+        error,
+        problem.multipliers(p),
+        direction * problem.scale,
+        outcome=Outcome.UNEXPLAINED if kind == UNEXPLAINED else Outcome.NOT_CONVERGED if lost else Outcome.FOUND,
+        index=place.after,
+        edge=edge,
     )
 
 
 # --- period doublings ----------------------------------------------------------------------------------------------
 
 
-def doubled_branch(
-    system: AbstractForcedSystem,
-    point: Point,
-    parameter: Parameter = SPEED,
-    *,
-    lower: float,
-    upper: float,
-    steps: StepControl = StepControl(first=0.01),
-    amplitude: float = 0.02,
-    until_doubling: bool = False,
-    method: AbstractMethod | None = None,
-) -> Branch:
-    """Follow the branch of orbits of twice the period that begins at a period doubling.
-
-    **Arguments:**
-
-    - `point`: a period doubling, of an orbit of any number of revolutions.
-    - `lower`, `upper`, `steps`: as for `branch`.
-    - `amplitude`: distance from the doubling at which the branch is entered, along the critical direction in units of
-        the system's scale.
-    - `until_doubling`: end with the branch's own first period doubling.
-
-    **Raises:** `ValueError` if the branch is not found.
-    """
-    require_x64()
-    require_range(parameter, lower, upper)
-    if point.kind != "period-doubling":
-        raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
-    require_found(point)
-    at, periods = float(point.value), int(point.periods)
-    given = Given(system, jnp.asarray(point.speed, dtype=float))
-    problem = orbit_curves(given, parameter, lower, upper, method).around(at, 2 * periods)
-    half = problem.around(at, periods)
-    test = lambda points: test_functions(problem.multipliers(points))["period-doubling"]
-    u = problem.unknowns(point.state, at)[None]
-    across = np.append(np.asarray(point.direction) / problem.scale, 0.0)[None]
-    across /= np.linalg.norm(across)
-    while amplitude > SMALLEST_AMPLITUDE:
-        start = first_points(problem, u + amplitude * across, across, int(point.steps))
-        near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
-        once = correct(half, start.u, across, start.steps, ONCE)  # where it is half of its revolutions later
-        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # nothing if it is the orbit that doubles
-        if near and test(start)[0] > 0 and away > amplitude:
-            break
-        amplitude /= 4
-    else:
-        raise ArgumentError("point", said=f"must be a period doubling, but no doubled branch begins at {at:g}.")
-    doubles: Event = lambda curve: "stopped" if until_doubling and test(curve.points[-1]) < 0 else ""
-    walk = Continuation(problem, start, steps, (doubles,))
-    for _ in walk:
-        pass
-    (curve,) = walk.curves
-    return described(problem, [(curve.row, ("doubling", curve.ended))])[0]
-
-
 @dataclasses.dataclass(frozen=True)
 class Cascade:
-    """Period doublings of orbits of period 1, 2, 4, ... times the first one's."""
+    """Period doublings of orbits of period 1, 2, 4, ... times the first one's, and where they accumulate [SI].
+
+    The limit is extrapolated with Feigenbaum's ratio, and NaN with fewer than two points. Its error is the distance of
+    the last two extrapolations and the errors of the last two points, and infinite with fewer than three. `ended` says
+    why there are not as many points as were asked for.
+    """
 
     points: tuple[Point, ...]
-    """Fewer than asked for if the doubled branch was lost or does not double again (`ended`)."""
     limit: float
-    """Where they accumulate [SI], extrapolated with Feigenbaum's ratio; NaN with fewer than two points."""
     error: float
-    """Distance of the last two extrapolations and errors of the last two points; infinite with fewer than three."""
     ended: str = ""
-    """Why there are not as many points as were asked for."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -366,38 +278,56 @@ def cascade(
     levels: int = 4,
     method: AbstractMethod | None = None,
 ) -> Cascade:
-    """Follow a period-doubling cascade from the doubling of a period-1 orbit.
+    """Follow a period-doubling cascade: each doubled branch from its beginning to its own first period doubling.
 
-    **Arguments:** system; first point; parameter and its range [SI]; number of doublings; integration method.
+    **Arguments:** system; first point, the doubling of an orbit of any period; parameter and its range [SI]; number of
+    doublings; integration method.
+
+    **Raises:** `ValueError` for a point that is no period doubling, or was not found.
     """
     require_x64()
-    require_range(parameter, lower, upper)
+    if point.kind != "period-doubling":
+        raise ArgumentError("point", said=f"must be a period doubling, but it is a {point.kind}.")
     require_found(point)
     require_at_least(1, levels=levels)
-    points, amplitude, ended = [point], 0.02, ""
-    while len(points) < levels:
-        try:
-            doubled = doubled_branch(
-                system,
-                points[-1],
-                parameter,
-                lower=lower,
-                upper=upper,
-                amplitude=amplitude,
-                until_doubling=True,
-                method=method,
-            )
-        except ValueError as error:
-            ended = str(error)
+    given = Given(system, jnp.asarray(point.speed, dtype=float))
+    problem = orbit_curves(given, parameter, lower, upper, method)
+    points, ended = [point], ""
+    while len(points) < levels and not ended:
+        doubled = _doubled(problem, points[-1], AMPLITUDE / 2 ** (len(points) - 1))
+        if doubled is None:
+            ended = f"no doubled branch begins at {float(points[-1].value):g}"
             break
         following = [p for p in doubled.special if p.kind == "period-doubling" and p.status == "converged"]
         if not following:
             ended = f"the branch of period {doubled.periods} does not double again (ends: {doubled.ended[1]})"
-            break
-        points.append(following[0])
-        amplitude /= 2
+        points += following[:1]
     pairs = itertools.pairwise(float(p.value) for p in points)
     limits = [b + (b - a) / (FEIGENBAUM - 1) for a, b in pairs] or [float("nan")]
     error = abs(limits[-1] - limits[-2]) if len(limits) > 1 else float("inf")
     located = sum(w * float(np.nan_to_num(p.error)) for w, p in zip((1 + 1 / (FEIGENBAUM - 1), 0.3), points[::-1]))
     return Cascade(tuple(points), limits[-1], error + located, ended)
+
+
+def _doubled(problem: ContinuationProblem, point: Point, amplitude: float) -> Branch | None:
+    """Follow the branch of orbits of twice the period from a period doubling to its own first one, if it is found.
+
+    It is entered at a distance of `amplitude` along the critical direction, in units of the system's scale.
+    """
+    at, periods = float(point.value), int(point.periods)
+    problem, half = problem.around(at, 2 * periods), problem.around(at, periods)
+    test = lambda points: test_functions(problem.multipliers(points))["period-doubling"]
+    u = problem.unknowns(point.state, at)[None]
+    across = np.append(np.asarray(point.direction) / problem.scale, 0.0)[None]
+    across /= np.linalg.norm(across)
+    while amplitude > SMALLEST_AMPLITUDE:
+        start = first_points(problem, u + amplitude * across, across, int(point.steps))
+        near = start.converged[0] and abs(start.u[0, -1] - u[0, -1]) < 1.0
+        once = correct(half, start.u, across, start.steps, ONCE)  # where it is half of its revolutions later
+        away = np.linalg.norm(once.jacobian[0] @ (start.u - once.u)[0])  # nothing if it is the orbit that doubles
+        if near and test(start)[0] > 0 and away > amplitude:
+            doubles: Event = lambda path: "stopped" if test(path.points[-1]) < 0 else ""
+            (path,) = Continuation(problem, start, StepControl(first=0.01), (doubles,)).finished()
+            return described(problem, [(path.row, ("doubling", path.ended))])[0]
+        amplitude /= 4
+    return None

@@ -24,13 +24,13 @@ from ..integrate import AbstractMethod, cores
 from .newton import TOLERANCE, AbstractEquations, solve
 from .orbit import OrbitEquations
 from .point import eigenvalues
-from .problem import SPEED, Given, OrbitProblem, Parameter, make_problem
+from .problem import SPEED, Given, Parameter, make_problem
 from .step_control import Points, StepControl
 from .step_counts import GIVEN_UP, SETTLED, Counts, by_rodas4, by_steps, counted
 
 
 CHUNK = 8
-"""Points per call. Up to eight cost what one does, since they share the processor's instructions."""
+"""Points per call: up to eight cost what one does, since they share the processor's instructions."""
 FOLLOWING, OF_A_STEP = 1e-6, 1e-5
 """Newton's last step during continuation, in the unknowns' units, and over the step's length if that is less: points
 are then good to about its square."""
@@ -49,6 +49,10 @@ crosses another one, and is left by one step from the second distance before the
 to rounding."""
 
 
+Start = tuple[np.ndarray, float]
+"""A state [SI] and the value of the parameter."""
+
+
 class ContinuationProblem(eqx.Module):
     """Equations of orbits or of bifurcation points, and the range in which their curves are followed."""
 
@@ -59,27 +63,23 @@ class ContinuationProblem(eqx.Module):
     upper: Float[np.ndarray, " parameters"]
 
     @property
-    def problem(self) -> OrbitProblem:
-        return self.equations.problem
-
-    @property
     def parameter(self) -> Parameter:
         """The first free parameter."""
-        return self.problem.parameters[0]
+        return self.equations.problem.parameters[0]
 
     @property
-    def unit(self) -> float:
-        """Unit of the first free parameter."""
-        return float(self.problem.units[0])
+    def units(self) -> np.ndarray:
+        """Units of the free parameters."""
+        return np.asarray(self.equations.problem.units)
 
     @property
     def scale(self) -> np.ndarray:
         """Units of the state."""
-        return np.asarray(self.problem.scale)
+        return np.asarray(self.equations.problem.scale)
 
     def around(self, at: Any, periods: Any = None) -> "ContinuationProblem":
         """Return the problem of orbits in the system's scale at a value of the parameter, for other `periods`."""
-        mine, there = self.problem, self.given.changed(self.parameter, jnp.asarray(at, dtype=float))
+        mine, there = self.equations.problem, self.given.changed(self.parameter, jnp.asarray(at, dtype=float))
         periods = mine.periods if periods is None else periods
         problem = make_problem(there, mine.parameters, mine.units, periods, mine.method)
         return dataclasses.replace(self, equations=OrbitEquations(problem))
@@ -88,9 +88,20 @@ class ContinuationProblem(eqx.Module):
         """Return the problem with Rodas4 and as many steps as are needed."""
         return eqx.tree_at(lambda p: (p.equations.problem.method, p.counts), self, by_rodas4())
 
+    def with_stable_steps(self, start: Start) -> "ContinuationProblem":
+        """Return the problem itself or, if it chooses its steps and Runge-Kutta's are not stable, one with Rodas4."""
+        if not self.counts.chooses or np.all(np.isfinite(self.around(start[1]).orbits_near([start]).jacobian)):
+            return self
+        return self.by_rodas4()
+
+    def orbits_near(self, starts: Sequence[Start], likely: np.ndarray | None = None) -> Points:
+        """Find orbits near states at fixed values of the parameter (see `first_points` for `likely`)."""
+        u = np.array([self.unknowns(state, value) for state, value in starts])
+        return first_points(self, u, np.eye(1, u.shape[1], u.shape[1] - 1).repeat(len(u), axis=0), likely=likely)
+
     def unknowns(self, state: Any, *values: float) -> np.ndarray:
         """Return the unknowns of a state and of the parameters' values [SI]."""
-        return np.array([*(np.asarray(state) / self.scale), *(np.array(values) / np.asarray(self.problem.units))])
+        return np.array([*(np.asarray(state) / self.scale), *(np.array(values) / self.units)])
 
     def states(self, u: np.ndarray) -> np.ndarray:
         """Return states [SI], shape (..., dim)."""
@@ -98,12 +109,19 @@ class ContinuationProblem(eqx.Module):
 
     def values(self, u: np.ndarray) -> np.ndarray:
         """Return values of the parameters [SI], shape (..., parameters)."""
-        return u[..., self.scale.size :] * np.asarray(self.problem.units)
+        return u[..., self.scale.size :] * self.units
 
     def inside(self, u: np.ndarray) -> bool:
         """Return whether the parameters of a point are within the range."""
-        values = self.values(u)
-        return bool(np.all((values > self.lower) & (values < self.upper)))
+        return bool(np.all((self.lower < self.values(u)) & (self.values(u) < self.upper)))
+
+    def require_inside(self, name: str, at: float) -> None:
+        """**Raises:** `ArgumentError` for a first point outside the range of the first parameter."""
+        lower, upper = self.lower[0], self.upper[0]
+        slack = 1e-9 * max(abs(lower), abs(upper))  # speeds in rpm are rounded
+        if not lower - slack <= at <= upper + slack:
+            said = f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
+            raise ArgumentError(name, said=said)
 
     def multipliers(self, points: Points) -> np.ndarray:
         """Return the multipliers of each orbit, the largest first."""
@@ -117,72 +135,19 @@ class ContinuationProblem(eqx.Module):
 def orbit_curves(
     given: Given, parameter: Parameter, lower: float, upper: float, method: AbstractMethod | None, periods: int = 1
 ) -> ContinuationProblem:
-    """Return the problem of the branches of orbits over a parameter, in the system's scale at the given speed."""
-    chosen, counts = counted(method)
-    problem = make_problem(given, (parameter,), [(upper - lower) / 20], periods, chosen)
-    return ContinuationProblem(OrbitEquations(problem), given, counts, np.array([lower]), np.array([upper]))
+    """Return the problem of the branches of orbits over a parameter, in the system's scale at the given speed.
 
-
-ROUNDED = 1e-9
-"""Distance by which a parameter may be outside its range, relative: rounding of speeds in rpm is less."""
-
-
-def require_range(parameter: Parameter, lower: float, upper: float) -> None:
-    """**Raises:** `ArgumentError` for a range in which a parameter cannot be followed."""
+    **Raises:** `ArgumentError` for a range in which the parameter cannot be followed.
+    """
     if not lower < upper:
         raise ArgumentError("upper", said=f"must be above `lower`, but they are {upper:g} and {lower:g}.")
     if not -math.inf < lower < upper < math.inf:
         raise ArgumentError("lower", "upper", said=f"must be finite, but are {lower:g} and {upper:g}.")
     if parameter == SPEED and lower <= 0:
         raise ArgumentError("lower", said=f"must be positive where the speed is followed, but {lower:g} was given.")
-
-
-def require_within(name: str, at: float, lower: float, upper: float) -> None:
-    """**Raises:** `ArgumentError` for an orbit outside the range in which it is to be followed."""
-    slack = ROUNDED * max(abs(lower), abs(upper))
-    if at < lower - slack or at > upper + slack:
-        said = f"must begin from {lower:g} to {upper:g}, `lower` and `upper`, but is at {at:g}."
-        raise ArgumentError(name, said=said)
-
-
-# --- points as arrays ----------------------------------------------------------------------------------------------
-
-
-def take(points: Points, which: Any) -> Points:
-    """Return some of the points."""
-    return jax.tree.map(lambda x: x[which], points)  # of NumPy: JAX takes a millisecond for each array
-
-
-def put(points: Points, which: np.ndarray, new: Points) -> Points:
-    """Return the points with `new` ones in these places."""
-
-    def placed(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        whole = np.array(x)
-        whole[which] = y
-        return whole
-
-    return jax.tree.map(placed, points, new)
-
-
-def stacked(points: Sequence[Points]) -> Points:
-    """Return single points as a row."""
-    return jax.tree.map(lambda *x: np.stack(x), *points)
-
-
-def with_errors_of(new: Points, old: Points) -> Points:
-    """Return the first points with the errors of the second ones."""
-    return new._replace(error=old.error, excess=old.excess, moved=old.moved)
-
-
-def turned(points: Points, sign: Any) -> Points:
-    """Return the same points, to be followed the other way if `sign` is -1."""
-    return points._replace(tangent=points.tangent * np.asarray(sign)[..., None])
-
-
-def in_a_row(back: Points, ahead: Points) -> Points:
-    """Return the points of two directions from one point in a row, from the end of the first to that of the second."""
-    back = turned(take(back, slice(None, 0, -1)), -1.0)
-    return jax.tree.map(lambda a, b: np.concatenate([a, b]), back, ahead)
+    chosen, counts = counted(method)
+    problem = make_problem(given, (parameter,), [(upper - lower) / 20], periods, chosen)
+    return ContinuationProblem(OrbitEquations(problem), given, counts, np.array([lower]), np.array([upper]))
 
 
 # --- corrector -----------------------------------------------------------------------------------------------------
@@ -244,7 +209,7 @@ def correct(
     parts = in_parallel(part, chunks)
     _, where = np.unique(np.concatenate(chunks), return_index=True)
     both = jax.tree.map(lambda *x: np.concatenate(x)[where], *parts)
-    points, half = take(both, (slice(None), 0)), take(both, (slice(None), 1))
+    points, half = both.take((slice(None), 0)), both.take((slice(None), 1))
     if not measured:
         return points
     with np.errstate(invalid="ignore"):
@@ -284,32 +249,15 @@ def first_points(
         if not again.size:
             break
         begin = np.where(found.converged[again, None], found.u[again], at[again])
-        found = put(found, again, correct(problem, begin, normal[again], 2 * found.steps[again], measured=True))
+        found = found.put(again, correct(problem, begin, normal[again], 2 * found.steps[again], measured=True))
     return found
-
-
-def orbits_near(
-    problem: ContinuationProblem, starts: Sequence[tuple[np.ndarray, float]], likely: np.ndarray | None = None
-) -> Points:
-    """Find orbits near states [SI] at fixed values of the parameter (see `first_points` for `likely`)."""
-    u = np.array([problem.unknowns(state, value) for state, value in starts])
-    normal = np.zeros_like(u)
-    normal[:, -1] = 1.0
-    return first_points(problem, u, normal, likely=likely)
-
-
-def with_stable_steps(problem: ContinuationProblem, start: tuple[np.ndarray, float]) -> ContinuationProblem:
-    """Return the problem itself or, if it chooses its steps and Runge-Kutta's are not stable, the one with Rodas4."""
-    if not problem.counts.chooses or np.all(np.isfinite(orbits_near(problem.around(start[1]), [start]).jacobian)):
-        return problem
-    return problem.by_rodas4()
 
 
 # --- iterator ------------------------------------------------------------------------------------------------------
 
 
 @dataclasses.dataclass
-class Curve:
+class Path:
     """A curve while it is followed."""
 
     points: list[Points]
@@ -328,27 +276,25 @@ class Curve:
     @property
     def row(self) -> Points:
         """All points."""
-        return stacked(self.points)
+        return Points.stacked(self.points)
+
+    def passes(self, places: Float[np.ndarray, "places n"]) -> bool:
+        """Return whether the last step goes through one of some places, to the accuracy of the chord."""
+        begin, step = self.points[-2].u, self.points[-1].u - self.points[-2].u
+        share = (places - begin) @ step / np.dot(step, step)
+        off = np.linalg.norm(begin + share[:, None] * step - places, axis=1)
+        return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
 
 
-Event = Callable[[Curve], str]
+Event = Callable[[Path], str]
 """Returns why a curve ends with its last point, or an empty text."""
 
 
-def passes(u: np.ndarray, v: np.ndarray, points: Float[np.ndarray, "points n"]) -> bool:
-    """Return whether the step from u to v goes through one of `points`, to the accuracy of the chord."""
-    step = v - u
-    share = (points - u) @ step / np.dot(step, step)
-    off = np.linalg.norm(u + share[:, None] * step - points, axis=1)
-    return bool(np.any((share > 0) & (share <= 1) & (off < 0.2 * np.linalg.norm(step))))
-
-
-def closes(curve: Curve) -> str:
+def closes(path: Path) -> str:
     """Event: the last step passed the first point in the same direction."""
-    first, before, last = curve.points[0], curve.points[-2], curve.points[-1]
+    first, before, last = path.points[0], path.points[-2], path.points[-1]
     same = np.dot(last.u - before.u, first.tangent) > 0
-    closed = len(curve.points) >= 8 and bool(same) and passes(before.u, last.u, first.u[None])
-    return "closed" if closed else ""
+    return "closed" if len(path.points) >= 8 and same and path.passes(first.u[None]) else ""
 
 
 class Continuation:
@@ -376,14 +322,20 @@ class Continuation:
         counts = lambda curve: "steps" if len(curve.points) > control.most else ""
         self.events = (leaves, *events, closes, counts)
         self.curves = [
-            Curve([take(start, i)], control.first, int(start.steps[i]), i, "" if start.converged[i] else "stuck")
+            Path([start.take(i)], control.first, int(start.steps[i]), i, "" if start.converged[i] else "stuck")
             for i in range(len(start.u))
         ]
+
+    def finished(self) -> list[Path]:
+        """Take all steps, and return the curves."""
+        for _ in self:
+            pass
+        return self.curves
 
     def __iter__(self) -> "Continuation":
         return self
 
-    def __next__(self) -> list[Curve]:
+    def __next__(self) -> list[Path]:
         active = [c for c in self.curves if not c.ended]
         if not active:
             raise StopIteration
@@ -391,7 +343,7 @@ class Continuation:
         ahead, normal = (
             np.stack(x) for x in zip(*(self.control.predict(c.points, c.length) for c in active), strict=True)
         )
-        steps, lengths = np.array([c.steps for c in active]), np.array([c.length for c in active])
+        steps, lengths = (np.array([getattr(c, name) for c in active]) for name in ("steps", "length"))
         closely = np.clip(OF_A_STEP * lengths, 2 * TOLERANCE, FOLLOWING)
         got = self.corrector(self.problem, ahead, normal, steps, closely, measured=True)
         counts = self.problem.counts
@@ -400,12 +352,12 @@ class Continuation:
         )  # because of the steps, or of Newton's last step
         if unknown.size:
             closer = self.corrector(self.problem, got.u[unknown], normal[unknown], steps[unknown], measured=True)
-            got = put(got, unknown, closer)
+            got = got.put(unknown, closer)
         return [
-            c for i, c in enumerate(active) if self._advances(c, take(got, i), ahead[i], normal[i], bool(i in unknown))
+            c for i, c in enumerate(active) if self._advances(c, got.take(i), ahead[i], normal[i], bool(i in unknown))
         ]
 
-    def _advances(self, curve: Curve, new: Points, ahead: np.ndarray, normal: np.ndarray, unknown: bool) -> bool:
+    def _advances(self, curve: Path, new: Points, ahead: np.ndarray, normal: np.ndarray, unknown: bool) -> bool:
         """Accept a new point or refuse it, and choose the next step."""
         control, counts, length = self.control, self.problem.counts, curve.length
         step = control.compare(curve.points, new, ahead, normal, length)
@@ -442,12 +394,12 @@ class Continuation:
         curve.ended = next(filter(None, (event(curve) for event in self.events)), "")
         return True
 
-    def _solve_again(self, curves: list[Curve]) -> None:
+    def _solve_again(self, curves: list[Path]) -> None:
         """Solve for the last points again, by the steps that hold now."""
         if not curves:
             return
-        last = stacked([c.points[-1] for c in curves])
+        last = Points.stacked([c.points[-1] for c in curves])
         again = self.corrector(self.problem, last.u, last.tangent, np.array([c.steps for c in curves]))
         for i, curve in enumerate(curves):
             if again.converged[i]:
-                curve.points[-1] = with_errors_of(take(again, i), curve.points[-1])
+                curve.points[-1] = again.take(i).with_errors_of(curve.points[-1])

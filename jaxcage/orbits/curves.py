@@ -14,16 +14,7 @@ from .._notebook import notebook_html
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
 from .bifurcation import PointEquations
-from .continuation import (
-    Continuation,
-    ContinuationProblem,
-    Curve as FollowedCurve,
-    first_points,
-    in_a_row,
-    in_parallel,
-    require_within,
-    turned,
-)
+from .continuation import Continuation, ContinuationProblem, Path, first_points, in_parallel
 from .point import Point, null_vectors, require_found, singular_matrix
 from .problem import SPEED, Given, make_problem, value_of
 from .step_control import StepControl
@@ -32,25 +23,24 @@ from .step_counts import ENOUGH, by_steps, counted
 
 @dataclasses.dataclass(frozen=True)
 class Curve:
-    """Bifurcation points of one kind over two parameters, in order along the curve."""
+    """Bifurcation points of one kind over two parameters [SI], in order along the curve.
+
+    A curve of Neimark-Sacker bifurcations is not `genuine` where it goes on as neutral saddles. `ended` is as in
+    `Branch`. `error` is the distance in x, or in y in the same share of its range, to the curve by half the steps.
+    """
 
     kind: str
     x: str
     y: str
     x_value: Float[np.ndarray, " points"]
-    """[SI]; a speed in rad/s."""
     y_value: Float[np.ndarray, " points"]
     state: Float[np.ndarray, "points dim"]
     multipliers: Complex[np.ndarray, "points dim"]
     genuine: Bool[np.ndarray, " points"]
-    """False where a curve of Neimark-Sacker bifurcations goes on as neutral saddles."""
     ended: tuple[str, str]
-    """Why the curve ends where it begins and where it ends: as for `Branch`."""
     name: str = ""
     steps: Int[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0, dtype=int))
-    """Steps per revolution."""
     error: Float[np.ndarray, " points"] = dataclasses.field(default_factory=lambda: np.zeros(0))
-    """Distance in x, or in y in the same share of its range, to the curve by half the steps [SI]."""
 
     def __str__(self) -> str:
         head = f"{self.name or 'curve'}: {self.kind} over {self.x} and {self.y}"
@@ -92,7 +82,6 @@ def curve(
     require_found(point)
     if not (lower < upper and x_lower < x_upper):
         raise ArgumentError("lower", "upper", "x_lower", "x_upper", said="must be in ascending order.")
-    require_within("point", float(point.value), x_lower, x_upper)
     own = float(value_of(system, point.speed, y))
     if not lower <= own <= upper:
         said = f"must have the system's {y} between them, {own:g}, but are {lower:g} and {upper:g}."
@@ -108,36 +97,27 @@ def curve(
     _, monodromy = orbit.returned(by_steps(orbit, count).prepare(there, given), z)
     borders = null_vectors(singular_matrix(point.kind, monodromy))
     problem = ContinuationProblem(PointEquations(orbit, *borders, point.kind), given, counts, low, high)
+    problem.require_inside("point", float(point.value))
     u = problem.unknowns(point.state, float(point.value), own)
     start = first_points(problem, u[None], np.eye(1, u.size, u.size - 1), count // 2)  # at this value of y
     if not bool(start.converged[0]):
         said = f"must be a {point.kind} of the system, but Newton's method finds none there."
         raise ArgumentError("point", said=said)
 
-    def followed(sign: float) -> FollowedCurve:
-        walk = Continuation(problem, turned(start, sign), steps, oriented=False)
+    def followed(sign: float) -> Path:
+        walk = Continuation(problem, start.turned(sign), steps, oriented=False)
         for advanced in walk:
             for one in advanced:
                 walk.problem = _with_fresh_borders(walk.problem, one)
         return walk.curves[0]
 
     up, down = in_parallel(followed, [1.0, -1.0])
-    points = in_a_row(down.row, up.row)
+    points = up.row.after(down.row)
     multipliers, values = problem.multipliers(points), problem.values(points.u)
-    return Curve(
-        kind=point.kind,
-        x=x,
-        y=y,
-        x_value=values[:, 0],
-        y_value=values[:, 1],
-        state=problem.states(points.u),
-        multipliers=multipliers,
-        genuine=np.array([point.kind != "Neimark-Sacker" or _is_on_circle(mu) for mu in multipliers]),
-        steps=points.steps,
-        error=points.error * problem.unit,
-        ended=(down.ended, up.ended),
-        name=name,
-    )
+    genuine = np.array([point.kind != "Neimark-Sacker" or _is_on_circle(mu) for mu in multipliers])
+    ended, error = (down.ended, up.ended), points.error * problem.units[0]
+    states = problem.states(points.u)
+    return Curve(point.kind, x, y, *values.T, states, multipliers, genuine, ended, name, points.steps, error)
 
 
 def _is_on_circle(multipliers: np.ndarray) -> bool:
@@ -146,7 +126,7 @@ def _is_on_circle(multipliers: np.ndarray) -> bool:
     return bool(abs((one + other).real / 2) <= 1)
 
 
-def _with_fresh_borders(problem: ContinuationProblem, followed: FollowedCurve) -> ContinuationProblem:
+def _with_fresh_borders(problem: ContinuationProblem, followed: Path) -> ContinuationProblem:
     """Return the problem with borders from the null vectors at the last point, which keep it far from singular."""
     known = followed.points[-1].aux
     borders = tuple(v / np.linalg.norm(v) for v in (known.left, known.right))

@@ -29,23 +29,14 @@ from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..bearing import checked_before
 from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
-from .bifurcation import TANGENTIAL, Singular, critical_rate
+from .bifurcation import TANGENTIAL, PointEquations, critical_rate
 from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
-from .implicit import expansion, numbers_around, numbers_of
-from .orbit import OrbitEquations, StateLike, periodic_orbit
-from .point import Kind, Point, bordered, null_vectors, singular_matrix
+from .implicit import FieldNumbers, around_root, expansion, numbers_around, numbers_of
+from .orbit import OrbitEquations, StateLike, periodic_orbit, sorted_multipliers
+from .point import Kind, Point, null_vectors, singular_matrix
 from .problem import SPEED, Given, OrbitProblem, make_problem
-from .step_counts import (
-    GIVEN_UP,
-    MOST_OF_A_POINT,
-    POINT,
-    SETTLED,
-    Counts,
-    by_steps,
-    from_steps,
-    with_a_solver_that_serves,
-)
+from .step_counts import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, with_fallback
 
 
 PER_RPM = np.pi / 30
@@ -90,24 +81,6 @@ class Sensitivity:
         return "\n".join([f"{self.name}: {at}, elasticities", *rows])
 
     _repr_html_ = notebook_html
-
-
-class _Expansion(NamedTuple):
-    """The return map and its monodromy matrix around an orbit, in the state and the field's numbers k."""
-
-    image: Float[Array, " dim"]
-    monodromy: Float[Array, "dim dim"]
-    image_slope: Float[Array, "dim x"]
-    monodromy_slope: Float[Array, "dim dim x"]
-    of_u: Float[Array, "k n"]
-    """Derivatives of k with respect to the unknowns."""
-
-
-def _expand(problem: OrbitProblem, given: Given, u: Float[Array, " n"]) -> _Expansion:
-    """Expand the return map around the unknowns u: the state, then the speed."""
-    numbers = numbers_around(OrbitEquations(problem), u, given)
-    (image, monodromy), (image_slope, monodromy_slope) = expansion(problem, u, numbers)
-    return _Expansion(image, monodromy, image_slope, monodromy_slope, numbers.of_u)
 
 
 @compiled
@@ -156,27 +129,25 @@ class _Edge(NamedTuple):
 
 
 @compiled
-def _unfold(kind: Kind, unit: Array, z: Array, around: _Expansion) -> tuple[Array, Array, Array]:
-    """Return Newton's step to the bifurcation near the orbit z, and weight and rate there (see `_Edge`)."""
-    n = z.size
-    borders = null_vectors(singular_matrix(kind, around.monodromy))
-    scalar = lambda m: bordered(singular_matrix(kind, m), *borders)[0]
-    g, slope = jax.value_and_grad(scalar)(around.monodromy)
-    known = Singular(around.monodromy, *bordered(singular_matrix(kind, around.monodromy), *borders)[1:])
-    closing = around.image_slope - jnp.eye(n, around.image_slope.shape[1])
-    whole = jnp.concatenate([closing, jnp.einsum("ij,ijx->x", slope, around.monodromy_slope)[None]])
-    of_numbers = whole[:, n:]
-    of_unknowns = jnp.concatenate([whole[:, :n], (of_numbers @ around.of_u[:, n])[:, None]], axis=1)
-    step = jnp.linalg.solve(of_unknowns, jnp.append(around.image - z, g))
-    adjoint = jnp.linalg.solve(of_unknowns.T, jnp.zeros(n + 1).at[-1].set(1.0))
-    return step, -(adjoint @ of_numbers) * unit, critical_rate(kind, n, of_unknowns, known, borders) / unit
+def _unfold(
+    kind: Kind, problem: OrbitProblem, u: Array, numbers: FieldNumbers, around: Any, slopes: Any
+) -> tuple[Array, Array, Array]:
+    """Return Newton's step to the bifurcation near the unknowns u, and weight and rate there (see `_Edge`)."""
+    n, m, unit = problem.dimension, u.size, problem.units[0]
+    borders = null_vectors(singular_matrix(kind, around[1]))
+    equations = PointEquations(problem, *borders, kind)
+    (r, known), (of_r, _) = around_root(equations, u, numbers, around, slopes)
+    jacobian = of_r[:, :m] + of_r[:, m:] @ numbers.of_u
+    adjoint = jnp.linalg.solve(jacobian.T, jnp.zeros(m).at[-1].set(1.0))
+    rate = critical_rate(kind, n, jacobian, known, borders) / unit
+    return jnp.linalg.solve(jacobian, r), -(adjoint @ of_r[:, m:]) * unit, rate
 
 
 def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
     """Locate the edge near `point`, and again with twice the steps until it stays where it is."""
 
     def find(chosen: AbstractMethod, counts: Counts) -> _Edge:
-        counts = from_steps(counts, int(point.steps) or None)
+        counts = counts.near(int(point.steps) or None)
         given = Given(system, jnp.asarray(point.speed, dtype=float))
         problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
         near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
@@ -194,14 +165,15 @@ def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod 
         assert edge is not None
         return edge
 
-    return with_a_solver_that_serves(find, method, MOST_OF_A_POINT)
+    return with_fallback(find, method, MOST_OF_A_POINT)
 
 
 def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
     """Locate the edge near the unknowns `first` by Newton's method, with the steps of the problem."""
-    u, unit = first, problem.units[0]
+    u, orbit = first, OrbitEquations(problem)
     for i in range(ITERATIONS + 1):
-        step, weight, rate = _unfold(kind, unit, u[:-1], _expand(problem, given, u))
+        numbers = numbers_around(orbit, u, given)
+        step, weight, rate = _unfold(kind, problem, u, numbers, *expansion(problem, u, numbers))
         leads = jnp.max(jnp.abs(u - step - first))
         goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
         if i == ITERATIONS or not bool(goes_on):
@@ -325,17 +297,12 @@ class LeadingMultiplier(NamedTuple):
 
 
 @compiled
-def _largest(n: int, around: _Expansion) -> tuple[Array, Array]:
+def _largest(monodromy: Array, of_r: Array, of_monodromy: Array) -> tuple[Array, Array]:
     """Return |mu| of the largest multiplier, and its derivatives by the numbers of the field."""
-    mu, right = jnp.linalg.eig(around.monodromy)
-    left = jnp.linalg.inv(right)  # in rows, with l r = 1
-    i = jnp.argmax(jnp.abs(mu))
-    closing = around.image_slope[:, :n] - jnp.eye(n)
-    orbit = -jnp.linalg.solve(closing, around.image_slope[:, n:])
-    matrix = around.monodromy_slope[:, :, n:] + jnp.einsum("abz,zk->abk", around.monodromy_slope[:, :, :n], orbit)
-    change = jnp.einsum("a,abk,b->k", left[i], matrix.astype(mu.dtype), right[:, i])
-    size = jnp.abs(mu[i])
-    return size, jnp.real(jnp.conj(mu[i]) * change) / size
+    n = monodromy.shape[0]
+    size, weight = jax.value_and_grad(lambda m: jnp.abs(sorted_multipliers(m)[0]))(monodromy)
+    moved = -jnp.linalg.solve(of_r[:, :n], of_r[:, n:])
+    return size, jnp.einsum("ij,ijk->k", weight, of_monodromy[..., n:] + of_monodromy[..., :n] @ moved)
 
 
 def leading_multiplier(
@@ -357,7 +324,9 @@ def leading_multiplier(
         nan = float("nan")
         return LeadingMultiplier(nan, dict.fromkeys(parameter_paths(system), nan), np.asarray(orbit.state))
     given = Given(system, jnp.asarray(speed, dtype=float))
-    problem = make_problem(given, (SPEED,), 0.1 * given.speed[None], periods, orbit.method)
-    u = jnp.append(orbit.state / problem.scale, 10.0)
-    size, weight = _largest(problem.dimension, _expand(problem, given, u))
+    problem = make_problem(given, (), jnp.ones(0), periods, orbit.method)
+    equations, u = OrbitEquations(problem), orbit.state / problem.scale
+    numbers = numbers_around(equations, u, given)
+    (_, monodromy), slopes = around_root(equations, u, numbers, *expansion(problem, u, numbers))
+    size, weight = _largest(monodromy, *slopes)
     return LeadingMultiplier(float(size), _pulled_back(problem, given, u, weight), np.asarray(orbit.state))

@@ -42,7 +42,8 @@ def _as_root_jvp(primals: Any, tangents: Any, *, equations: AbstractEquations, u
     u, aux = _as_root(given, equations=equations, u=u, aux=aux)
     numbers, moving = eqx.filter_jvp(lambda g: numbers_around(equations, u, g), (given,), (given_dot,))
     around, slopes = expansion(equations.problem, u, numbers)
-    return (u, aux), _root_tangent(equations, u, numbers, around, slopes, moving.k)
+    _, slopes = around_root(equations, u, numbers, around, slopes)
+    return (u, aux), _root_tangent(numbers, *slopes, moving.k)
 
 
 class FieldNumbers(NamedTuple):
@@ -69,22 +70,29 @@ def expansion(problem: OrbitProblem, u: Float[Array, " n"], numbers: FieldNumber
 
 
 @compiled
-def _root_tangent(
-    equations: AbstractEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any, k_dot: Array
-) -> tuple[Array, Any]:
-    """Return the derivatives of a root, and of what else is known there, along `k_dot`."""
-    k, k_of_u, like = numbers
-    n, m, remake = equations.problem.dimension, u.size, numbers_of(like)[1]
+def around_root(
+    equations: AbstractEquations, u: Array, numbers: FieldNumbers, around: Any, slopes: Any
+) -> tuple[tuple[Array, Any], tuple[Array, Any]]:
+    """Return the equations and what else is known at u, and the derivatives of both by u and, then, by k."""
+    n, m, remake = equations.problem.dimension, u.size, numbers_of(numbers.like)[1]
 
-    def closing(moved: Array) -> tuple[Array, Any]:
+    def closing(moved: Array) -> tuple[Any, Any]:
         """Return the equations, with the map linear from here."""
-        y = jnp.concatenate([u, k]) + moved
+        y = jnp.concatenate([u, numbers.k]) + moved
         off = jnp.concatenate([moved[:n], moved[m:]])
-        return equations.closing(y[:m], remake(y[m:]), *jax.tree.map(lambda p, s: p + s @ off, around, slopes))
+        found = equations.closing(y[:m], remake(y[m:]), *jax.tree.map(lambda p, s: p + s @ off, around, slopes))
+        return found, found
 
-    of_r, of_aux = jax.jacfwd(closing)(jnp.zeros(m + k.size))
-    u_dot = -jnp.linalg.solve(of_r[:, :m] + of_r[:, m:] @ k_of_u, of_r[:, m:] @ k_dot)
-    moved = jnp.concatenate([u_dot, k_dot + k_of_u @ u_dot])
+    slopes_there, there = jax.jacfwd(closing, has_aux=True)(jnp.zeros(m + numbers.k.size))
+    return there, slopes_there
+
+
+@compiled
+def _root_tangent(numbers: FieldNumbers, of_r: Array, of_aux: Any, k_dot: Array) -> tuple[Array, Any]:
+    """Return the derivatives of a root, and of what else is known there, along `k_dot`."""
+    m = of_r.shape[0]
+    u_dot = -jnp.linalg.solve(of_r[:, :m] + of_r[:, m:] @ numbers.of_u, of_r[:, m:] @ k_dot)
+    moved = jnp.concatenate([u_dot, k_dot + numbers.of_u @ u_dot])
     return u_dot, jax.tree.map(lambda d: d @ moved, of_aux)
 
 

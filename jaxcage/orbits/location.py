@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .continuation import ContinuationProblem, correct, put, stacked, take, with_errors_of
+from .continuation import ContinuationProblem, correct
 from .point import UNEXPLAINED, test_functions, to_critical
 from .step_control import Points
 from .step_counts import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
@@ -71,10 +71,10 @@ class Place:
         """Return points on both sides: orbits, so many further out, or close to where it was found; None if it was
         not."""
         if beyond is not None:
-            return take(self.row, [max(self.after - beyond, 0), min(self.after + 1 + beyond, len(self.row.u) - 1)])
+            return self.row.take([max(self.after - beyond, 0), min(self.after + 1 + beyond, len(self.row.u) - 1)])
         if self.point is None:
             return None
-        both = stacked([self.point, self.point])
+        both = Points.stacked([self.point, self.point])
         return both._replace(u=self.point.u + np.outer([-2 * self.moved, 2 * self.moved], self.point.tangent))
 
 
@@ -98,7 +98,7 @@ def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> lis
         for a, b in gaps(i):
             k = a + int(np.argmax(np.diff(problem.unstable(row)[a : b + 1]) != 0))
             far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1]))))
-            middle = take(row, k)._replace(u=(row.u[k] + row.u[k + 1]) / 2)
+            middle = row.take(k)._replace(u=(row.u[k] + row.u[k + 1]) / 2)
             mine.append(Place(row, k, UNEXPLAINED, middle, far))
         found.append((row, _in_order(row, mine)))
     return found
@@ -128,7 +128,7 @@ def _solved_again(problem: ContinuationProblem, row: Points, which: np.ndarray, 
         return row
     got = correct(problem, row.u[which], row.tangent[which], steps)
     good = got.converged
-    return put(row, which[good], with_errors_of(take(got, good), take(row, which[good])))
+    return row.put(which[good], got.take(good).with_errors_of(row.take(which[good])))
 
 
 def _with_middles(
@@ -140,7 +140,7 @@ def _with_middles(
     middle, normal = one.u + chord / 2, chord / length[:, None]
     got = correct(problem, middle, normal, np.maximum(one.steps, other.steps))
     good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length / 2)
-    new = with_errors_of(take(got, good), take(row, after[good]))
+    new = got.take(good).with_errors_of(row.take(after[good]))
     return jax.tree.map(lambda x, y: np.insert(x, after[good] + 1, y, axis=0), row, new), good
 
 
@@ -153,7 +153,7 @@ def _halved(problem: ContinuationProblem, row: Points) -> Points:
         after = np.array([k for k in longest if length[k] > APART], dtype=int)
         if not after.size:
             break
-        row, good = _with_middles(problem, row, after, take(row, after), take(row, after + 1))
+        row, good = _with_middles(problem, row, after, row.take(after), row.take(after + 1))
         if not np.any(good):
             break
     return row
@@ -172,9 +172,9 @@ def _parted(problem: ContinuationProblem, row: Points, places: Sequence[Place]) 
     pairs = np.flatnonzero([a.after == b.after and far(a, b) for a, b in itertools.pairwise(places)])
     if not pairs.size:
         return row, places
-    points = stacked([p.point for p in places])
+    points = Points.stacked([p.point for p in places])
     after = np.array([places[k].after for k in pairs])
-    row, good = _with_middles(problem, row, after, take(points, pairs), take(points, pairs + 1))
+    row, good = _with_middles(problem, row, after, points.take(pairs), points.take(pairs + 1))
     shifted = [p.after + int(np.sum(pairs[good] < k)) for k, p in enumerate(places)]
     return row, [dataclasses.replace(p, after=k) for p, k in zip(places, shifted, strict=True)]
 
@@ -321,9 +321,9 @@ def _zeros(problem: ContinuationProblem, wanted: Sequence[tuple[Place, float, Po
     steps = np.repeat([place.steps for place, *_ in wanted], 2)
     other = np.flatnonzero(both.steps != steps)
     if other.size:
-        both = put(both, other, correct(problem, both.u[other], both.tangent[other], steps[other]))
+        both = both.put(other, correct(problem, both.u[other], both.tangent[other], steps[other]))
     falsi = [
-        _RegulaFalsi(problem, place.kind, within, take(both, [2 * i, 2 * i + 1]))
+        _RegulaFalsi(problem, place.kind, within, both.take([2 * i, 2 * i + 1]))
         for i, (place, within, _) in enumerate(wanted)
     ]
     for _ in range(MOST_ITERATIONS):
@@ -333,7 +333,7 @@ def _zeros(problem: ContinuationProblem, wanted: Sequence[tuple[Place, float, Po
         at = np.stack([f.aim() for _, f in active])
         got = correct(problem, at, np.stack([f.normal for _, f in active]), steps[[2 * i for i, _ in active]])
         for k, (_, f) in enumerate(active):
-            f.update(take(got, k))
+            f.update(got.take(k))
     return [f.best for f in falsi]
 
 
@@ -342,7 +342,7 @@ class _RegulaFalsi:
 
     def __init__(self, problem: ContinuationProblem, kind: str, within: float, ends: Points):
         self.signal = lambda points: _signals(problem, points)[kind]
-        self.within, self.sides = within, [take(ends, 0), take(ends, 1)]
+        self.within, self.sides = within, [ends.take(0), ends.take(1)]
         self.chord = ends.u[1] - ends.u[0]
         self.begin, self.length = ends.u[0], float(np.linalg.norm(self.chord))
         self.values = [float(x) for x in self.signal(ends)] if np.all(ends.converged) else [np.nan, np.nan]

@@ -21,7 +21,7 @@ from ..models import AbstractForcedSystem, require_speeds
 from .implicit import as_root
 from .newton import AbstractEquations, refined
 from .problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
-from .step_counts import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, with_a_solver_that_serves
+from .step_counts import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, with_fallback
 
 
 if TYPE_CHECKING:
@@ -288,7 +288,7 @@ def periodic_orbit(
     def find(method: AbstractMethod, counts: Counts) -> Orbit:
         here, begin = frozen((given, start))
         problem = make_problem(here, (), jnp.ones(0), periods, method)
-        counts = from_steps(counts, guess.steps if isinstance(guess, Orbit) else None)
+        counts = counts.near(guess.steps if isinstance(guess, Orbit) else None)
         enough = jnp.minimum(counts.last, ENOUGH)
         spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
         found, equations, u = _find(problem, counts, spinning, here, begin, spin)
@@ -298,7 +298,7 @@ def periodic_orbit(
         state, multipliers = _place(equations, u, monodromy)
         return dataclasses.replace(found, state=state, speed=given.speed, multipliers=multipliers, monodromy=monodromy)
 
-    return with_a_solver_that_serves(find, method, serves=lambda found: found.converged)
+    return with_fallback(find, method, serves=lambda found: found.converged)
 
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:

@@ -9,6 +9,7 @@ With monodromy matrix M an orbit is at a
 The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
 """
 
+import enum
 from typing import Any, Literal, get_args
 
 import equinox as eqx
@@ -99,12 +100,24 @@ def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
 Numbers = np.ndarray | Array
 
 UNEXPLAINED = "unexplained"
-OUTCOMES = ("converged", "no such point", "other kind", "tangential", "not converged", UNEXPLAINED, "given")
-"""Outcomes of the search for a point, in the order of the codes. `no such point`: Newton's method found none. `other
-kind`: the multipliers are not those of the kind asked for, as at a neutral saddle. `tangential`: the multiplier hardly
-crosses, so that the place is not a function of the design. `not converged`: half the steps put it elsewhere.
-`unexplained`: the number of unstable multipliers changes and no bifurcation is found. `given`: not solved for yet."""
-FOUND, NO_SUCH_POINT, OTHER_KIND, TANGENT, NOT_CONVERGED, NOT_EXPLAINED, GIVEN = range(len(OUTCOMES))
+
+
+class Outcome(enum.IntEnum):
+    """Outcome of the search for a point."""
+
+    FOUND = 0
+    NO_SUCH_POINT = 1
+    """Newton's method found none."""
+    OTHER_KIND = 2
+    """The multipliers are not those of the kind asked for, as at a neutral saddle."""
+    TANGENTIAL = 3
+    """The multiplier hardly crosses, so that the place is not a function of the design."""
+    NOT_CONVERGED = 4
+    """Half the steps put it elsewhere."""
+    UNEXPLAINED = 5
+    """The number of unstable multipliers changes and no bifurcation is found."""
+    GIVEN = 6
+    """It is not solved for yet."""
 
 
 class Point(eqx.Module):
@@ -140,8 +153,8 @@ class Point(eqx.Module):
     transversality: Scalar = float("nan")
     """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
     p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed on a branch."""
-    outcome: Int[Array, ""] | int = GIVEN
-    """Code: place in `OUTCOMES`."""
+    outcome: Int[Array, ""] | int = Outcome.GIVEN.value
+    """Code of the `Outcome`."""
     iterations: Int[Array, ""] | int = 0
     index: int = eqx.field(static=True, default=-1)
     """For a point on a branch: the branch's orbit before it."""
@@ -167,12 +180,12 @@ class Point(eqx.Module):
     @property
     def converged(self) -> Bool[Array, ""] | bool:
         """Whether a point of the kind asked for was found."""
-        return (self.outcome == FOUND) | (self.outcome == TANGENT)
+        return (self.outcome == Outcome.FOUND.value) | (self.outcome == Outcome.TANGENTIAL.value)
 
     @property
     def trusted(self) -> Bool[Array, ""] | bool:
         """Whether its place is a function of the design: it was found, and the multiplier crosses at a finite rate."""
-        return self.outcome == FOUND
+        return self.outcome == Outcome.FOUND.value
 
     @property
     def critical(self) -> complex:
@@ -190,15 +203,16 @@ class Point(eqx.Module):
 
     @property
     def status(self) -> str:
-        """One of `OUTCOMES`."""
-        return OUTCOMES[int(self.outcome)]
+        """`converged`, or the name of another `Outcome` in words."""
+        outcome = Outcome(int(self.outcome))
+        return "converged" if outcome == Outcome.FOUND else outcome.name.lower().replace("_", " ")
 
     def as_edge(self, kind: str) -> Edge:
         """Return it as the edge of a zone, which is `chaotic` or `synchronous-loss`."""
         return Edge(float(self.speed_rpm), float(self.error_rpm), kind, self.kind, "located")
 
     def __str__(self) -> str:
-        if int(self.outcome) == GIVEN:
+        if self.status == "given":
             return f"{self.kind} near {float(self.speed_rpm):.3f} rpm, not solved for yet"
         if not bool(self.converged):
             looked = f"; {self.looked}" if self.looked else ""

@@ -25,27 +25,25 @@ from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
 from ..sweeps import initial_states, sweep
 from .branch import Branch, follow_both_ways
-from .continuation import ContinuationProblem, orbit_curves, orbits_near, take, with_stable_steps
+from .continuation import ContinuationProblem, orbit_curves
 from .orbit import Orbit, periodic_orbit
 from .point import Point
 from .problem import SPEED, Given
 from .step_control import StepControl
 
 
-ROUND = 4
-"""Branches followed at a time."""
-ROUNDS = 8
+ROUND, ROUNDS = 4, 8
+"""Branches followed at a time, and how often."""
 PATIENCE = 150
 """Unstable orbits in a row after which a branch is not followed further."""
 ON_BRANCH = 0.03
-"""An orbit lies on a branch if it is within this distance of it, in units of the system's scale."""
+"""Largest distance of an orbit on a branch from the branch, in units of the system's scale."""
 SPREAD = 0.6
-"""Random starts are spread over this share of the system's scale in every direction."""
+"""Random initial states are spread over this share of the system's scale in every direction."""
 SAME = 1e-4
-"""Orbits are the same within this: an orbit that hardly attracts moves by a hundred times the error of its map."""
+"""Largest distance of equal orbits: an orbit that hardly attracts moves by a hundred times the error of its map."""
 NEARLY = 0.1
-"""A simulation that moves by less in its last revolution, in units of the scale, approaches an orbit. Another one is
-chaotic, and Newton's method tries only few numbers of steps from it."""
+"""A simulation that moves by less in its last revolution, in units of the scale, approaches an orbit."""
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Units of the state at a speed [rad/s]."""
@@ -53,7 +51,11 @@ Scale = Callable[[float], np.ndarray]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stable part of a branch of synchronous orbits; an end is None if the range or the branch ends there."""
+    """A stable part of a branch of synchronous orbits, with its ends, None if the range or the branch ends there.
+
+    Branches that are parts of one have the same `family`. `met` simulations settled on the stretch, `met_first` of them
+    from the system's conventional start, the first of its initial states.
+    """
 
     lower: Point | None
     upper: Point | None
@@ -61,11 +63,8 @@ class Stretch:
     upper_rpm: float
     branch: int
     family: int = 0
-    """The same number for all branches that are parts of one."""
     met: int = 0
-    """Number of simulations that settled on it."""
     met_first: int = 0
-    """Number of those that began at the system's conventional start, the first of its initial states."""
 
     @property
     def width_rpm(self) -> float:
@@ -91,15 +90,16 @@ class Stretch:
 
 @dataclasses.dataclass(frozen=True)
 class SynchronousOrbits:
-    """All branches of synchronous orbits that were met."""
+    """All branches of synchronous orbits that were met, and their stable stretches, by the lower end.
+
+    `sweep` holds the simulations from which the branches begin, too short for labels that tell chaos. `missed` of them
+    settled on orbits that lie on no branch.
+    """
 
     branches: tuple[Branch, ...]
     stretches: tuple[Stretch, ...]
-    """Stable stretches, by their lower end."""
     sweep: Sweep
-    """The simulations from which the branches begin; too short for labels that tell chaos."""
     missed: int
-    """Number of orbits that simulations settled on and that lie on no branch."""
     lower_rpm: float
     upper_rpm: float
 
@@ -124,10 +124,8 @@ class SynchronousOrbits:
         return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
 
     def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
-        """Return the orbits at `speed` [rad/s], to the accuracy of the continuation's steps.
-
-        **Returns:** for each the number of its branch, whether it is stable, its state [SI] and its multipliers.
-        """
+        """Return the orbits at `speed` [rad/s], to the accuracy of the continuation's steps: the number of the branch,
+        whether the orbit is stable, its state [SI] and its multipliers."""
         found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
         for i, b in enumerate(self.branches):
             for stable, state, multipliers in _crossings(b, speed):
@@ -144,8 +142,7 @@ class SynchronousOrbits:
 
 def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:
     """Return stability, state and multipliers where a branch passes `speed`, by linear interpolation."""
-    v = branch.value
-    found = []
+    v, found = branch.value, []
     for k in np.flatnonzero(((v[:-1] - speed) * (v[1:] - speed) < 0) | (v[:-1] == speed)):
         share = 0.0 if v[k + 1] == v[k] else (speed - v[k]) / (v[k + 1] - v[k])
         state = branch.state[k] + share * (branch.state[k + 1] - branch.state[k])
@@ -154,67 +151,11 @@ def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.
     return found
 
 
-class _Piece(NamedTuple):
-    """A stable part of one branch, its points by rising speed."""
-
-    stretch: Stretch
-    rpm: np.ndarray
-    state: np.ndarray
-
-    def state_at(self, rpm: float) -> np.ndarray:
-        return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
-
-    def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
-        """Return whether the orbit `state` at `rpm` lies on this piece."""
-        inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
-        return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
-
-
-def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
-    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
-    found = []
-    edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
-    change = np.flatnonzero(np.diff(branch.stable.astype(int)))
-    bounds = [-1, *change.tolist(), branch.value.size - 1]
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
-        if last <= first or not branch.stable[last]:
-            continue
-        points = [edges.get(first), edges.get(last)]
-        rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
-        if rpm[0] > rpm[-1]:
-            points, rpm, state = points[::-1], rpm[::-1], state[::-1]
-        low, high = (float(r if p is None else p.speed_rpm) for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
-        stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
-        found.append(_Piece(stretch, rpm, state))
-    return found
-
-
-def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
-    """Return the pieces with those joined that two branches from different starts share."""
-    whole: list[_Piece] = []
-    for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
-        for i, other in enumerate(whole):
-            a, b = other.stretch, piece.stretch
-            shared = min(a.upper_rpm, b.upper_rpm)
-            rpm = (b.lower_rpm + shared) / 2
-            if b.lower_rpm <= shared and other.holds(rpm, piece.state_at(rpm), scale(rpm * np.pi / 30)):
-                beyond = piece.rpm > other.rpm[-1]
-                top = b if b.upper_rpm > a.upper_rpm else a
-                joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
-                rpm = np.concatenate([other.rpm, piece.rpm[beyond]])
-                state = np.concatenate([other.state, piece.state[beyond]])
-                whole[i] = _Piece(joined, rpm, state)
-                break
-        else:
-            whole.append(piece)
-    return whole
-
-
 def _distinct(points: Sequence[Point]) -> tuple[Point, ...]:
     """Return points by speed, each once."""
     kept: list[Point] = []
     for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
-        apart = lambda q: max(1e-6 * p.value, p.error + q.error) if p.error + q.error >= 0 else 1e-6 * p.value
+        apart = lambda q: max(1e-6 * p.value, float(np.nan_to_num(p.error + q.error)))
         same = lambda q: q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)
         if not any(same(q) for q in kept[-6:]):
             kept.append(p)
@@ -239,8 +180,7 @@ def synchronous_orbits(
     revolutions left out; steps of the continuation, in units of 1/20 of the range; a sweep that was made before,
     instead of simulations. Simulations from the opposites of the initial states serve only to find orbits.
 
-    **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin: `missed` counts those that
-    were met but not followed; those that were not met cannot be counted.
+    **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin.
     """
     require_at_least(1, count=count)
     say = progress or (lambda what, done, of: None)
@@ -254,9 +194,9 @@ def synchronous_orbits(
     settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
     opposite = simulate(settled.speed[:: -(-settled.speed.size // count)], -1.0)
     problem = orbit_curves(Given(system, jnp.asarray((lower + upper) / 2)), SPEED, lower, upper, method)
-    if met := _met(settled):
-        middle = met[len(met) // 2]
-        problem = with_stable_steps(problem, (settled.last[tuple(middle)], float(settled.speed[middle[0]])))
+    if met := _finished(settled):
+        i, j = met[len(met) // 2]
+        problem = problem.with_stable_steps((settled.last[i, j], float(settled.speed[i])))
     orbits = _stable_orbits(problem, settled, scale)
     waiting = sorted(orbits + _stable_orbits(problem, opposite, scale), key=lambda o: o.speed)
     branches: list[Branch] = []
@@ -267,56 +207,54 @@ def synchronous_orbits(
         picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
         starts = [(waiting[i].state, waiting[i].speed) for i in picked]
         branches += [b for b in follow_both_ways(problem, starts, steps, PATIENCE) if b is not None]
-        waiting = [w for w in waiting if not any(_covers(b, w, scale(w.speed)) for b in branches)]
+        waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
     say("branches", ROUNDS, ROUNDS)
     limits = lower * 30 / np.pi, upper * 30 / np.pi
-    pieces = _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale)
-    families = _families(branches, scale)
-    there = [o for o in orbits if o.settled]
-    stretches = []
-    for piece in pieces:
-        met = [o.start for o in there if piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
-        family = families[piece.stretch.branch]
-        stretches.append(dataclasses.replace(piece.stretch, family=family, met=len(met), met_first=met.count(0)))
+    families, stretches = _families(branches, scale), []
+    for piece in _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale):
+        met = [o.start for o in orbits if o.settled and piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
+        known = {"family": families[piece.stretch.branch], "met": len(met), "met_first": met.count(0)}
+        stretches.append(dataclasses.replace(piece.stretch, **known))
     return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
 
 
+# --- orbits from simulations ---------------------------------------------------------------------------------------
+
+
 class _Settled(NamedTuple):
-    """A stable orbit that the end of a simulation led to."""
+    """A stable orbit to which the end of a simulation led, which may have come near it before Newton's method."""
 
     state: np.ndarray
     speed: float
     start: int
-    settled: bool = False
-    """Whether the simulation had come near it, before Newton's method."""
+    settled: bool
 
 
-def _met(settled: Sweep) -> list[list[int]]:
+def _finished(settled: Sweep) -> list[list[int]]:
     """Return numbers of speed and start of the simulations that ran to their end."""
     return np.argwhere(np.all(np.isfinite(settled.last), axis=-1)).tolist()
 
 
 def _stable_orbits(problem: ContinuationProblem, settled: Sweep, scale: Scale) -> list[_Settled]:
     """Return the stable orbits to which Newton's method leads from the ends of simulations, by speed."""
-    lanes = _met(settled)
+    lanes = _finished(settled)
     met = [(settled.last[i, j], float(settled.speed[i])) for i, j in lanes]
     if not met:
         return []
     problem = problem.around(met[0][1])
     moved = settled.strobe[..., -1, :] - settled.strobe[..., -2, :] if settled.strobe.shape[2] > 1 else 0.0
     near = np.max(np.abs(moved / settled.scale[:, None]), axis=-1) < NEARLY
-    points = orbits_near(problem, met, np.array([near[i, j] for i, j in lanes]))
+    points = problem.orbits_near(met, np.array([near[i, j] for i, j in lanes]))
     good = points.converged.copy()
-    good[good] = problem.unstable(take(points, good)) == 0
+    good[good] = problem.unstable(points.take(good)) == 0
     states = problem.states(points.u)
     apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
     return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
 
 
-def _covers(branch: Branch, orbit: _Settled, scale: np.ndarray) -> bool:
+def _covers(branch: Branch, speed: float, state: np.ndarray, scale: Scale) -> bool:
     """Return whether an orbit lies on a branch."""
-    apart = (np.max(np.abs(s - orbit.state) / scale) for _, s, _ in _crossings(branch, orbit.speed))
-    return any(a < ON_BRANCH for a in apart)
+    return any(np.max(np.abs(s - state) / scale(speed)) < ON_BRANCH for _, s, _ in _crossings(branch, speed))
 
 
 def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
@@ -324,11 +262,68 @@ def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
     family = list(range(len(branches)))
     for i, b in enumerate(branches):
         for end, why in zip((0, -1), b.ended, strict=True):
-            last = _Settled(b.state[end], float(b.speed[end]), 0)
             for j, other in enumerate(branches):
-                if why == "stopped" and i != j and _covers(other, last, scale(last.speed)):
+                if why == "stopped" and i != j and _covers(other, float(b.speed[end]), b.state[end], scale):
                     family = [family[j] if f == family[i] else f for f in family]
     return family
+
+
+# --- stable stretches ----------------------------------------------------------------------------------------------
+
+
+class _Piece(NamedTuple):
+    """A stable part of one branch, its points by rising speed."""
+
+    stretch: Stretch
+    rpm: np.ndarray
+    state: np.ndarray
+
+    def state_at(self, rpm: float) -> np.ndarray:
+        return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
+
+    def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
+        """Return whether the orbit `state` at `rpm` lies on this piece."""
+        inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
+        return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
+
+
+def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
+    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
+    found = []
+    edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
+    bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        if last <= first or not branch.stable[last]:
+            continue
+        points = [edges.get(first), edges.get(last)]
+        rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
+        if rpm[0] > rpm[-1]:
+            points, rpm, state = points[::-1], rpm[::-1], state[::-1]
+        low, high = (float(r if p is None else p.speed_rpm) for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
+        stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
+        found.append(_Piece(stretch, rpm, state))
+    return found
+
+
+def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
+    """Return the pieces with those joined that two branches from different starts share."""
+    whole: list[_Piece] = []
+    for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
+        for i, other in enumerate(whole):
+            a, b = other.stretch, piece.stretch
+            rpm = (b.lower_rpm + min(a.upper_rpm, b.upper_rpm)) / 2
+            if b.lower_rpm <= rpm and other.holds(rpm, piece.state_at(rpm), scale(rpm * np.pi / 30)):
+                beyond, top = piece.rpm > other.rpm[-1], b if b.upper_rpm > a.upper_rpm else a
+                joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
+                both = (np.concatenate([x, y[beyond]]) for x, y in zip(other[1:], piece[1:], strict=True))
+                whole[i] = _Piece(joined, *both)
+                break
+        else:
+            whole.append(piece)
+    return whole
+
+
+# --- one speed -----------------------------------------------------------------------------------------------------
 
 
 def coexisting_orbits(
@@ -355,9 +350,8 @@ def coexisting_orbits(
     scale = np.array([float(c) for c in system.scale(speed)])
     own = np.array([[float(c) for c in y] for y in system.starts(speed)])
     random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
-    starts = jnp.asarray(np.concatenate([own, random]))
     find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
-    found = jax.vmap(find)(starts)
+    found = jax.vmap(find)(jnp.asarray(np.concatenate([own, random])))
     strobe = lambda orbit, y: strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)(tuple(y))
     advance = compiled(jax.vmap(lambda orbit, y: jnp.stack(strobe(orbit, y).y)))
     rows = [found.state]

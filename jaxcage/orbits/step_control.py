@@ -6,8 +6,10 @@ to it is refused.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from .._errors import ArgumentError
@@ -48,6 +50,34 @@ class Points(NamedTuple):
     """Ratio of this distance to what is allowed."""
     moved: Any
     """The same distance in the unknowns' units."""
+
+    @staticmethod
+    def stacked(points: Sequence["Points"]) -> "Points":
+        """Return single points as a row."""
+        return jax.tree.map(lambda *x: np.stack(x), *points)
+
+    def take(self, which: Any) -> "Points":
+        """Return some of the points."""
+        return jax.tree.map(lambda x: x[which], self)  # of NumPy: JAX takes a millisecond for each array
+
+    def put(self, which: np.ndarray, new: "Points") -> "Points":
+        """Return the points with `new` ones in these places."""
+        whole = jax.tree.map(np.array, self)
+        jax.tree.map(lambda x, y: x.__setitem__(which, y), whole, new)
+        return whole
+
+    def with_errors_of(self, old: "Points") -> "Points":
+        """Return the points with the errors of others."""
+        return self._replace(error=old.error, excess=old.excess, moved=old.moved)
+
+    def turned(self, sign: Any) -> "Points":
+        """Return the same points, to be followed the other way if `sign` is -1."""
+        return self._replace(tangent=self.tangent * np.asarray(sign)[..., None])
+
+    def after(self, back: "Points") -> "Points":
+        """Return in a row the points of two directions from one point, from the end of `back` on."""
+        back = back.take(slice(None, 0, -1)).turned(-1.0)
+        return jax.tree.map(lambda a, b: np.concatenate([a, b]), back, self)
 
 
 class Comparison(NamedTuple):

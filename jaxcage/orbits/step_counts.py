@@ -61,6 +61,13 @@ class Counts(NamedTuple):
         """Return the i-th number."""
         return jnp.minimum(self.first * 2**i, self.last)
 
+    def near(self, steps: Any) -> "Counts":
+        """Return the numbers to try where `steps` were right nearby: half as many come first, for the error."""
+        if steps is None or isinstance(steps, Tracer):
+            return self
+        first = jnp.clip(jnp.asarray(steps, int) // 2, self.first, self.last)
+        return self._replace(first=jnp.where(self.tolerance > 0, first, self.first))
+
     @property
     def chooses(self) -> bool:
         """Whether the number of steps follows from the error."""
@@ -88,14 +95,6 @@ def by_rodas4(most: int = MOST) -> tuple[AbstractMethod, Counts]:
     return counted(None, most, "rodas4", FIRST_OF_RODAS4)
 
 
-def from_steps(counts: Counts, steps: Any) -> Counts:
-    """Return the numbers to try where `steps` were right nearby: half as many come first, so the error is known."""
-    if steps is None or isinstance(steps, Tracer):
-        return counts
-    first = jnp.clip(jnp.asarray(steps, int) // 2, counts.first, counts.last)
-    return counts._replace(first=jnp.where(counts.tolerance > 0, first, counts.first))
-
-
 T = TypeVar("T", bound=eqx.Module)
 
 
@@ -105,7 +104,7 @@ def by_steps(tree: T, steps: Any) -> T:
     return jax.tree.map(changed, tree, is_leaf=lambda x: isinstance(x, AbstractMethod))  # not parts of a method
 
 
-def with_a_solver_that_serves(
+def with_fallback(
     find: Callable[[AbstractMethod, Counts], Any],
     method: AbstractMethod | None,
     most: int = MOST,
