@@ -1,15 +1,15 @@
-"""Synchronous-loss zones: the speeds between the stable stretches of the synchronous orbit, with exact edges.
+"""Unstable ranges of the synchronous orbit, between its stable stretches, with exact edges; sources of chaotic edges.
 
-Several synchronous orbits coexist at many speeds, so what a zone is needs a rule. The **principal** stretch is the one
-on which most simulations from the conventional start (a cage: at rest on the rib) settled; stretches of its own branch
-that overlap it or follow within a window that is closed belong to it. Other stretches count where they do not overlap
-it; those that do are coexisting orbits, which a cage meets only from other starts. Zones are what is left between.
+Several synchronous orbits coexist at many speeds, so a rule defines the ranges. The **principal** stretch is the one on
+which most simulations from the conventional start (a cage: at rest on the rib) settled. Stretches of its own branch
+belong to it if they overlap it or follow within a window that is closed. Others count if they do not overlap it;
+otherwise they are coexisting orbits, which a cage meets only from other initial states. The ranges are what is left.
 
 As for chaotic zones, stretches narrower than a stated width do not count and windows narrower than it are closed, but
-only between stretches wider than the window. Else a row of slivers, some a tenth of a revolution per minute wide, would
-carry an edge far from the stretch it belongs to, to a bifurcation that every solver has elsewhere.
+only between stretches wider than the window: a row of slivers would move an edge far from the stretch it belongs to, to
+a bifurcation that every solver puts elsewhere.
 
-Edges of chaotic zones, which are statistical, are matched with bifurcations and limits of cascades.
+Edges of chaotic zones, which are statistical, are compared with bifurcations and limits of cascades.
 """
 
 import dataclasses
@@ -21,9 +21,9 @@ from .._notebook import notebook_html
 from ..analysis import Zone, Zones, closing_width
 from ..models import AbstractForcedSystem
 from ..solve import AbstractMethod
-from ._cascade import Cascade, cascade
-from ._point import Point
-from ._search import Stretch, SynchronousOrbits
+from .branch import Cascade, cascade
+from .point import Point
+from .search import Stretch, SynchronousOrbits
 
 
 CASCADE_REACH_RPM = 500.0
@@ -33,10 +33,10 @@ CASCADE_LEVELS = 4
 
 @dataclasses.dataclass(frozen=True)
 class LossZones:
-    """Synchronous-loss zones of a speed range."""
+    """Unstable ranges of the synchronous orbit between two speeds."""
 
     zones: tuple[Zone, ...]
-    """Ascending; an edge is None where the zone runs past the range."""
+    """Ascending; an edge is None if a range goes on beyond the speeds that were searched."""
     edges: dict[str, Point]
     """Edges by name: `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ..."""
     coexisting: dict[str, list[tuple[int, bool, np.ndarray, np.ndarray]]]
@@ -46,7 +46,7 @@ class LossZones:
     close_below_rpm: float
 
     def __str__(self) -> str:
-        rows = [f"Synchronous-loss zones, closed below {self.close_below_rpm:.0f} rpm"]
+        rows = [f"Unstable ranges of the synchronous orbit, closed below {self.close_below_rpm:.0f} rpm"]
         for i, zone in enumerate(self.zones, start=1):
             width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.2f} rpm wide"
             rows.append(f"  zone {i}: {zone.onset or 'below the range'} to {zone.exit or 'above the range'}, {width}")
@@ -57,7 +57,7 @@ class LossZones:
 
 @dataclasses.dataclass(frozen=True)
 class _Group:
-    """Stretches taken as one."""
+    """Stretches that count as one."""
 
     stretches: tuple[Stretch, ...]
 
@@ -70,7 +70,7 @@ class _Group:
         return max(self.stretches, key=lambda s: s.upper_rpm)
 
     def apart(self, other: "_Group") -> float:
-        """Width of the gap between two groups [rpm], negative where they overlap."""
+        """Return the width of the gap between two groups [rpm], negative if they overlap."""
         return max(other.low.lower_rpm - self.high.upper_rpm, self.low.lower_rpm - other.high.upper_rpm)
 
     @property
@@ -79,7 +79,7 @@ class _Group:
 
 
 def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
-    """Groups joined where they overlap or where the window between them is closed, narrowest window first."""
+    """Join groups that overlap or whose window is closed, narrowest window first."""
     groups = list(groups)
     while True:
         pairs = [(a.apart(b), a, b) for i, a in enumerate(groups) for b in groups[:i]]
@@ -91,10 +91,10 @@ def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
 
 
 def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -> LossZones:
-    """Zones in which the synchronous orbit is lost, from the stable stretches that were found.
+    """Return the unstable ranges of the synchronous orbit, between the stable stretches that were found.
 
     **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
-    500 rpm and at most 5 % of the highest speed. Without any stretch there is no zone: nothing is known of the orbit.
+    500 rpm and at most 5 % of the highest speed. Without any stretch nothing is known of the orbit, and there is none.
     """
     close_below_rpm = closing_width(found.sweep.rpm) if close_below_rpm is None else close_below_rpm
     if not found.stretches:
@@ -127,7 +127,7 @@ def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -
 
 
 def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
-    """Share of the simulations inside a zone that did not settle on a synchronous orbit; NaN if there are none."""
+    """Return the share of simulations in a range that did not settle on a synchronous orbit; NaN if there are none."""
     rpm = found.sweep.rpm
     inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
     return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
@@ -135,22 +135,21 @@ def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) 
 
 @dataclasses.dataclass(frozen=True)
 class Explained:
-    """Chaotic zones with the mechanisms of their edges, and what these were taken from."""
+    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades behind these."""
 
     zones: Zones
     sources: dict[str, Point | Cascade]
-    """By edge, e.g. `zone 1 exit`: what the edge coincides with. Other edges stay statistical."""
+    """Bifurcation or cascade with which an edge, e.g. `zone 1 exit`, coincides. Other edges stay statistical."""
 
 
 def explain(
     zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
 ) -> Explained:
-    """Give each chaotic edge the mechanism it coincides with, within its uncertainty and the resolution of the sweep: a
-    bar that is wider than that, for mean lives near the horizon or failed lanes, coincides with anything.
+    """Give each chaotic edge the mechanism with which it coincides, within its uncertainty and the sweep's resolution.
 
-    An onset can be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations themselves are
-    tried first, then the limits of the cascades that begin at period doublings on the calm side. Edges that coincide
-    with nothing that was located are left as they were.
+    A wider error bar, for mean lives near the horizon or failed trajectories, would coincide with anything. An onset
+    may be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations are tried first, then
+    the limits of cascades that begin at period doublings on the stable side. Other edges stay as they were.
     """
     sources: dict[str, Point | Cascade] = {}
     changed: list[Zone] = []
@@ -171,8 +170,10 @@ def explain(
 def _source(
     points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
 ) -> Point | Cascade | None:
-    """What lies within `near` of an edge at `rpm`, whose calm side is above or below it, of the points and cascades
-    that begin at them."""
+    """Return the point, or the cascade that begins at one, within `near` of an edge at `rpm`.
+
+    `calm` is 1 if the stable side is above the edge, and -1 if it is below.
+    """
     away = lambda p: abs(p.speed_rpm - rpm)
     here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
     if here:

@@ -4,7 +4,6 @@ import dataclasses
 from typing import Any, NamedTuple, cast
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -16,16 +15,27 @@ from .._form import compiled
 from .._types import Scalar
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import AbstractMethod
-from ._arclength import Corrected, Steps
-from ._branch import follow_both_ways
-from ._follower import Follower, Start, make_follower
-from ._implicit import AbstractEquations, Found, as_root, settled
-from ._located import brackets
-from ._orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, settle, sorted_multipliers
-from ._point import FOUND, NO_SUCH_POINT, NOT_CONVERGED, OTHER_KIND, TANGENT, Point, require_found, value_at
-from ._problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem
-from ._singularity import KINDS, Kind, bordered, null_vectors, singular_matrix, to_critical
-from ._steps import (
+from .branch import follow_both_ways
+from .continuation import Path, orbit_curves
+from .implicit import as_root
+from .location import sign_changes
+from .newton import AbstractEquations, Found, refined
+from .orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, simulated, sorted_multipliers
+from .point import (
+    KINDS,
+    Kind,
+    Outcome,
+    Point,
+    bordered,
+    null_vectors,
+    require_found,
+    singular_matrix,
+    to_critical,
+    value_at,
+)
+from .problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, name_of
+from .step_control import Points, StepControl
+from .step_counts import (
     BY_OTHERS,
     ENOUGH,
     MOST_OF_A_POINT,
@@ -33,23 +43,23 @@ from ._steps import (
     SETTLED,
     Counts,
     by_steps,
-    from_steps,
     other_steps,
-    that_serves,
+    with_fallback,
 )
 
 
 TANGENTIAL = 1e-2
 """A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
 ON_CIRCLE = 1e-5
+"""Largest squared distance of a critical multiplier from its place: a double one is known to the root of rounding."""
 SPUN = 200
 """Revolutions of the simulation that finds an orbit."""
-WALK = Steps(first=0.05, longest=0.25, most=250)
+WALK = StepControl(first=0.05, longest=0.25, most=250)
 """Steps along a branch on which a bifurcation is looked for."""
 
 
 class Singular(NamedTuple):
-    """What is known at the root beside the unknowns."""
+    """The monodromy matrix and null vectors of the singular matrix at a point."""
 
     monodromy: Float[Array, "dim dim"]
     right: Float[Array, " k"]
@@ -57,7 +67,7 @@ class Singular(NamedTuple):
 
 
 class PointEquations(AbstractEquations):
-    """The orbit's equations and g = 0; a branch point has two more, with an imperfection as unknown."""
+    """The orbit's equations and g = 0; for a branch point two more, with an imperfection as unknown."""
 
     problem: OrbitProblem
     left: Float[Array, " k"]
@@ -78,8 +88,11 @@ class PointEquations(AbstractEquations):
             return jnp.append(closing, g), known
         return jnp.concatenate([closing + u[n + 1] * self.left, jnp.stack([g, p @ columns[:, n]])]), known
 
+    def monodromy(self, found: Any) -> Any:
+        return found.aux.monodromy
+
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """By the change of the parameters, a unit of which is a tenth of their size."""
+        """Compare by the change of the parameters, a unit of which is a tenth of their size."""
         n = self.problem.dimension
         shift = abs(moved[..., n : n + len(self.problem.parameters)]).max(-1)
         return shift, shift / (10 * POINT)
@@ -96,24 +109,24 @@ def bifurcation(
     reach: float | int = 0.1,
     method: AbstractMethod | None = None,
 ) -> Point:
-    """The bifurcation of `kind` near `guess`, where `parameter` is free.
+    """Find the bifurcation of `kind` near `guess`, with `parameter` free.
 
-    Where Newton's method finds none, the branch of orbits through `guess` is followed both ways to the nearest.
+    If Newton's method finds none, the branch of orbits through `guess` is followed both ways to the nearest.
 
     **Arguments:**
 
     - `kind`: `period-doubling`, `Neimark-Sacker`, `fold`, or `branch-point` (pitchfork or transcritical, which
         only systems with a symmetry have).
     - `guess`: a value of the parameter [SI], whose orbit is then found by simulation; an `Orbit` or a `Point`; or a
-        pair (state, value of the parameter).
+        pair (state [SI], value of the parameter).
     - `parameter`: `"speed"`, the name of a parameter, or a function that picks it from the system.
-    - `speed`: speed [rad/s] where it is not the parameter and `guess` does not have it.
+    - `speed`: speed [rad/s], if it is not the parameter and `guess` does not have it.
     - `periods`: revolutions after which the orbit closes; by default those of `guess`, else 1.
-    - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 where that is 0); 0 turns
-        this off. It is off under `jit`, `vmap` and `grad`, where it is not known what Newton's method finds.
+    - `reach`: how far the branch is followed, as a fraction of the parameter's value (of 1 if that is 0). 0 turns
+        this off, and so do `jit`, `vmap` and `grad`, under which the result of Newton's method is not known.
 
-    **Returns:** `Point`; it does not raise if there is none, but says where it looked. Works under `jit` and `vmap`;
-    value, speed and state have derivatives of every order with respect to `system` and `speed`.
+    **Returns:** `Point`; it does not raise if there is none, but says where it looked. The function works under `jit`
+    and `vmap`; value, speed and state have derivatives of every order with respect to `system` and `speed`.
 
     **Raises:** `ValueError` for an unknown kind or parameter, or a guess without a speed.
     """
@@ -124,91 +137,115 @@ def bifurcation(
         raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
     if kind not in KINDS:
         raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
-    start, first, at, spin = _read_guess(system, guess, parameter, speed)
-    given = Given(system, jnp.asarray(first if speed is None else speed, dtype=float))
+    start = _read_guess(system, guess, parameter, speed)
+    given = Given(system, jnp.asarray(start.speed if speed is None else speed, dtype=float))
     near = guess if isinstance(guess, Orbit | Point) else None
     periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)
 
-    def point(method: AbstractMethod, counts: Counts, state: Any, speed: Any, at: Any, spin: bool) -> Any:
-        """What `_find_point` finds from there."""
-        known, state, speed, at = frozen((given, state, jnp.asarray(speed, dtype=float), jnp.asarray(at)))
-        there = Given(known.system, speed).changed(parameter, at)
-        unit = jnp.where(at == 0, 0.1, 0.1 * jnp.abs(at))
+    def newton(method: AbstractMethod, counts: Counts, begin: _Begin) -> Any:
+        """Return what `_find_point` finds from there."""
+        known, begin = frozen((given, begin))
+        there = Given(known.system, begin.speed).changed(parameter, begin.at)
+        unit = jnp.where(begin.at == 0, 0.1, 0.1 * jnp.abs(begin.at))
         problem = make_problem(there, (parameter,), unit[None], periods, method)
-        return _find_point(problem, counts, cast(Kind, kind), known, there, state, at, spin)
+        return _find_point(problem, counts, cast(Kind, kind), known, there, begin)
 
-    def find(state: Any, speed: Any, at: Any, spin: bool) -> Point:
+    def find(begin: _Begin) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:
-            counts = from_steps(counts, None if near is None else near.steps)
-            found, equations, u, known = point(method, counts, state, speed, at, spin)
+            counts = counts.near(None if near is None else near.steps)
+            found, equations, u, known = newton(method, counts, begin)
             if is_traced((given, found)):
                 u, _ = as_root(given, equations=equations, u=u, aux=known)
                 return dataclasses.replace(found, **_place(equations, u, given, found.converged))
-            return by_others(found, method, counts) if bool(found.converged) and counts.tolerance > 0 else found
+            return compared(found, method, counts) if bool(found.converged) and counts.chooses else found
 
-        return that_serves(by, method, MOST_OF_A_POINT)
+        return with_fallback(by, method, MOST_OF_A_POINT)
 
-    def by_others(found: Point, method: AbstractMethod, counts: Counts) -> Point:
-        """The point with what other steps make of it in its error."""
+    def compared(found: Point, method: AbstractMethod, counts: Counts) -> Point:
+        """Return the point with the larger error that a comparison with other steps may show."""
         steps = other_steps(found.steps)
         others = Counts(steps, steps, jnp.zeros_like(counts.tolerance))
-        other = point(method, others, found.state, found.speed, found.value, False)[0]
+        other = newton(method, others, _Begin(found.state, found.speed, found.value))[0]
         lost = found.error if kind == "branch-point" else jnp.inf  # its equations are all but singular
         apart = jnp.where(other.converged, BY_OTHERS * jnp.abs(other.value - found.value), lost)
         error = jnp.maximum(found.error, apart)
-        far = error > SETTLED * jnp.maximum(jnp.abs(found.value), jnp.abs(at) if at else 1.0)
-        return dataclasses.replace(found, error=error, outcome=jnp.where(far, NOT_CONVERGED, found.outcome))
+        far = error > SETTLED * jnp.maximum(jnp.abs(found.value), jnp.abs(start.at) if start.at else 1.0)
+        return dataclasses.replace(found, error=error, outcome=jnp.where(far, Outcome.NOT_CONVERGED, found.outcome))
 
-    found = find(start, first, at, spin)
-    if is_traced((found, given, start)) or not reach or int(found.outcome) not in (NO_SUCH_POINT, OTHER_KIND):
+    found = find(start)
+    if (
+        is_traced((found, given, start))
+        or not reach
+        or int(found.outcome) not in (Outcome.NO_SUCH_POINT, Outcome.OTHER_KIND)
+    ):
         return found
-    if spin:
-        here = Given(system, first).changed(parameter, at)
-        orbit = periodic_orbit(here.system, here.speed, int(periods), guess=start, revolutions=SPUN, method=method)
-        start = orbit.state
-    away = float(reach) * (abs(float(at)) or 1.0)
-    follower = make_follower(given, parameter, float(at) - away, float(at) + away, method, int(periods))
-    there, looked = _along_branch(follower, (np.asarray(start), float(at)), kind)
+    if start.spin:
+        here = Given(system, start.speed).changed(parameter, start.at)
+        orbit = periodic_orbit(
+            here.system, here.speed, int(periods), guess=start.state, revolutions=SPUN, method=method
+        )
+        start = start._replace(state=orbit.state)
+    there, looked = _along_branch(given, parameter, int(periods), start, kind, reach, method)
     if there is not None:
-        looked = f"{looked}, where it is near {there.parameter} = {there.value:.9g}"
-        again = find(jnp.asarray(there.state), there.speed, jnp.asarray(there.value), False)
+        again = find(_Begin(jnp.asarray(there.state), jnp.asarray(there.speed), jnp.asarray(there.value)))
         found = again if bool(again.converged) else there  # Newton's method may fail at a kink of the law
     return found if bool(found.converged) else dataclasses.replace(found, looked=looked)
 
 
-def _along_branch(follower: Follower, start: Start, kind: str) -> tuple[Point | None, str]:
-    """The nearest bifurcation of `kind` on the branch through an orbit, if there is one, and what was searched.
+class _Begin(NamedTuple):
+    """Where Newton's method for a point begins."""
+
+    state: Array
+    """State [SI]."""
+    speed: Array
+    at: Array
+    """Value of the parameter."""
+    spin: bool = False
+    """Whether the orbit at this value is to be found by simulation from the state."""
+
+
+def _along_branch(
+    given: Given,
+    parameter: Parameter,
+    periods: int,
+    begin: _Begin,
+    kind: str,
+    reach: float,
+    method: AbstractMethod | None,
+) -> tuple[Point | None, str]:
+    """Return the nearest bifurcation of `kind` on the branch through an orbit, if there is one, and what was searched.
 
     Near a superstable orbit the scalar that vanishes at the point is flat, and Newton's steps lead anywhere; the branch
     itself leads on.
     """
-    name = follower.parameter if isinstance(follower.parameter, str) else "the parameter"
-    say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if name == SPEED else f"{x:.6g}"
+    at = float(begin.at)
+    away = float(reach) * (abs(at) or 1.0)
+    problem = orbit_curves(given, parameter, at - away, at + away, method, periods)
+    say = lambda x: f"{x * 30 / np.pi:.6g} rpm" if parameter == SPEED else f"{x:.6g}"
+    name = "the parameter" if callable(parameter) else parameter
     reached: list[float] = []
 
-    def stop(points: list[Corrected]) -> bool:
-        """Past a point of the kind, or further from the guess than the other direction found one."""
-        step: Corrected = jax.tree.map(lambda *x: np.stack(x), *points[-2:])
-        far = float(abs(step.u[1, -1] - points[0].u[-1]))
-        before, after = follower.unstable(step)
-        if before != after and any(k == kind for _, k in brackets(follower, step)):
+    def passed(curve: Path) -> str:
+        """Event: a point of the kind was passed, or the other direction found one at a smaller distance."""
+        step = Points.stacked(curve.points[-2:])
+        far = float(abs(step.u[1, -1] - curve.points[0].u[-1]))
+        before, after = problem.unstable(step)
+        if before != after and any(k == kind for _, k in sign_changes(problem, step)):
             reached.append(far)
-            return True
-        return bool(reached) and far > min(reached)
+            return "stopped"
+        return "stopped" if reached and far > min(reached) else ""
 
-    (found,) = follow_both_ways(follower, [start], WALK, stop=stop)
+    (found,) = follow_both_ways(problem, [(np.asarray(begin.state), at)], WALK, events=(passed,))
     if found is None:
-        return None, f"no orbit near the guess at {name} = {say(start[1])} to follow"
+        return None, f"no orbit near the guess at {name} = {say(at)} to follow"
     low, high = (say(float(f(found.value))) for f in (np.min, np.max))
     looked = f"looked along the branch of its orbit, {name} from {low} to {high} (ends: {', '.join(found.ended)})"
     mine = [p for p in found.special if p.kind == kind and p.status == "converged"]
-    return min(mine, key=lambda p: abs(p.value - start[1]), default=None), looked
+    return min(mine, key=lambda p: abs(p.value - at), default=None), looked
 
 
-def _read_guess(
-    system: AbstractForcedSystem, guess: PointGuess, parameter: Parameter, speed: Scalar | None
-) -> tuple[Array, Any, Array, bool]:
-    """State, speed, value of the parameter, and whether the state is to be found by simulation."""
+def _read_guess(system: AbstractForcedSystem, guess: PointGuess, parameter: Parameter, speed: Scalar | None) -> _Begin:
+    """Return where Newton's method begins."""
     spin, known_speed = False, speed
     if isinstance(guess, Orbit | Point):
         state, known_speed = guess.state, guess.speed
@@ -218,7 +255,7 @@ def _read_guess(
     else:
         spin, state, at = True, None, guess
     if isinstance(guess, Point) and not is_traced((guess, at)):
-        require_found(guess, at, "guess")
+        require_found(guess, "guess")
     if wrong(Scalar, at):
         said = "must be a number, a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")
@@ -227,23 +264,25 @@ def _read_guess(
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_speeds(system, known_speed)
-    return guess_state(system, known_speed, state), known_speed, frozen(jnp.asarray(at, dtype=float)), spin
+    speed, at = jnp.asarray(known_speed, dtype=float), frozen(jnp.asarray(at, dtype=float))
+    return _Begin(guess_state(system, known_speed, state), speed, at, spin)
 
 
 @compiled
 def _find_point(
-    problem: OrbitProblem, counts: Counts, kind: Kind, given: Given, there: Given, start: Array, at: Array, spin: bool
+    problem: OrbitProblem, counts: Counts, kind: Kind, given: Given, there: Given, begin: _Begin
 ) -> tuple[Point, PointEquations, Array, Singular]:
-    """The point, without derivatives; its equations, unknowns, and what else is known there. Given are the system as it
-    is and as it is at the guess, state and parameter of the guess, and whether its orbit is to be found by simulation.
+    """Find the point, without derivatives; return its equations, its unknowns and what else is known there, too.
+
+    **Arguments:** problem and numbers of steps; kind; system as it is, and as it is at the guess; the guess.
     """
-    u0 = start / problem.scale
-    if spin:  # on the orbit itself, if there is one here
-        u0 = settle(problem, there, start, SPUN, counts) / problem.scale
+    u0 = begin.state / problem.scale
+    if begin.spin:  # on the orbit itself, if there is one here
+        u0 = simulated(problem, there, begin.state, SPUN, counts) / problem.scale
         fixed = dataclasses.replace(problem, parameters=(), units=jnp.ones(0))
-        u1, found = settled(OrbitEquations(fixed), there, u0, counts)
+        u1, found = refined(OrbitEquations(fixed), there, u0, counts)
         u0 = jnp.where(found.converged, u1, u0)
-    u0 = jnp.append(u0, at / problem.units)
+    u0 = jnp.append(u0, begin.at / problem.units)
     strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given)
     _, monodromy = problem.returned(strobe, u0[: problem.dimension])
     a = singular_matrix(kind, monodromy)
@@ -251,14 +290,14 @@ def _find_point(
     if kind == "branch-point":
         u0 = jnp.append(u0, 0.0)
     equations = PointEquations(problem, left, right, kind)
-    u, found = settled(equations, given, u0, counts, at_root=True)
+    u, found = refined(equations, given, u0, counts, at_root=True)
     u, equations = jnp.where(found.converged, u, jnp.nan), by_steps(equations, found.steps)
     return _describe(equations, u, found, given), equations, u, found.aux
 
 
 @compiled
 def _place(equations: PointEquations, u: Array, given: Given, converged: Array) -> dict[str, Array]:
-    """The parameter's value, speed and state; NaN, and their derivatives too, where there is no such point."""
+    """Return the parameter's value, speed and state; they and their derivatives are NaN if there is no such point."""
     problem = equations.problem
     keep = lambda x: x * jnp.where(converged, 1.0, jnp.nan)
     speed = jnp.asarray(problem.at(u, given).speed, dtype=float)
@@ -266,11 +305,12 @@ def _place(equations: PointEquations, u: Array, given: Given, converged: Array) 
 
 
 def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -> Point:
+    """Return all that is known of a point."""
     problem, kind = equations.problem, equations.kind
     known: Singular = found.aux
     finite = jnp.all(jnp.isfinite(known.monodromy))
     multipliers = sorted_multipliers(jnp.where(finite, known.monodromy, 0.0))
-    matches = to_critical(kind, multipliers) < jnp.sqrt(ON_CIRCLE)  # a double one is known to the root of rounding
+    matches = to_critical(kind, multipliers) < jnp.sqrt(ON_CIRCLE)
     borders = equations.left, equations.right
     rate = critical_rate(kind, problem.dimension, found.newton.jacobian, known, borders)
     at, unit = problem.values(u)[0], problem.units[0]
@@ -278,13 +318,12 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
     error = found.error * unit
     moving = error > SETTLED * jnp.maximum(jnp.abs(at), 10 * unit)
     tangential = jnp.abs(rate) * jnp.maximum(jnp.abs(u[problem.dimension]), 10.0) < TANGENTIAL
-    kept = jnp.where(moving, NOT_CONVERGED, jnp.where(tangential, TANGENT, FOUND))
-    outcome = jnp.where(found.converged, jnp.where(matches, kept, OTHER_KIND), NO_SUCH_POINT)
-    there = (outcome == FOUND) | (outcome == TANGENT)
+    kept = jnp.where(moving, Outcome.NOT_CONVERGED, jnp.where(tangential, Outcome.TANGENTIAL, Outcome.FOUND))
+    outcome = jnp.where(found.converged, jnp.where(matches, kept, Outcome.OTHER_KIND), Outcome.NO_SUCH_POINT)
+    there = (outcome == Outcome.FOUND) | (outcome == Outcome.TANGENTIAL)
     keep = lambda x: jnp.where(there, x, jnp.nan)
     direction = jnp.zeros(problem.dimension) if kind == "Neimark-Sacker" else known.right
     length = jnp.linalg.norm(direction)
-    (parameter,) = problem.parameters
     return Point(
         **_place(equations, u, given, there),
         error=error,
@@ -297,13 +336,14 @@ def _describe(equations: PointEquations, u: Array, found: Found, given: Given) -
         iterations=found.iterations,
         periods=problem.periods,
         kind=kind,
-        parameter=parameter if isinstance(parameter, str) else "parameter",
+        parameter=name_of(problem.parameters[0]),
     )
 
 
 def critical_rate(kind: Kind, n: int, jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
-    """Rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit; at a fold, where it
-    is infinite, the drift of the map along the critical direction.
+    """Return the rate d|mu| / d parameter of the critical multiplier along the orbit, in the parameter's unit.
+
+    At a fold, where it is infinite, it is the drift of the map along the critical direction.
 
     **Arguments:** kind; dimension of the state; derivative of all equations at the point; null vectors; borders.
     """
@@ -320,7 +360,10 @@ def critical_rate(kind: Kind, n: int, jacobian: Array, known: Singular, borders:
 
 
 def _branching_rate(jacobian: Array, known: Singular, borders: tuple[Array, Array]) -> Array:
-    """Branches leave along a x^2 + 2 b x y + c y^2 = 0, x along the critical direction and y the parameter."""
+    """Return the rate at a branch point.
+
+    Branches leave along a x^2 + 2 b x y + c y^2 = 0, x along the critical direction and y the parameter.
+    """
     n = known.right.size
     of_orbit, drift, g, h = jacobian[:n, :n], jacobian[:n, n], jacobian[n], jacobian[n + 1]
     left, right = borders

@@ -18,25 +18,27 @@ from .._notebook import notebook_html
 from .._types import Scalar, State
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
-from ._implicit import AbstractEquations, as_root, settled
-from ._problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
-from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves
+from .implicit import as_root
+from .newton import AbstractEquations, refined
+from .problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
+from .step_counts import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, with_fallback
 
 
 if TYPE_CHECKING:
-    from ._point import Point
+    from .point import Point
 
 ROUNDING = 1e-13
 AT_REST = 1e-3
-"""A simulation has led to an orbit where it moves by less, in units of the system's scale."""
+"""A simulation has led to an orbit if it moves by less, in units of the system's scale."""
 LIOUVILLE_TOLERANCE = 1e-3
 """Largest disagreement in log|det M| at which multipliers are trusted."""
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
-"""Parts of a revolution over which the divergence is integrated, without steps, and of steps that are a multiple."""
+"""Parts of a revolution for integrating the divergence: with a method that has no steps, and with steps that are a
+multiple of the second."""
 
 
 class OrbitEquations(AbstractEquations):
-    """P(z) = z: as many equations as unknowns, or, with a parameter of the problem free, those of a branch."""
+    """P(z) = z: as many equations as unknowns or, if a parameter of the problem is free, the equations of a branch."""
 
     problem: OrbitProblem
 
@@ -44,18 +46,21 @@ class OrbitEquations(AbstractEquations):
         return self.problem.prepare(u, given), []
 
     def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Array]:
-        """The equations, and the monodromy matrix."""
         return image - u[: self.problem.dimension], columns
 
     def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
-        """One revolution with the state's tangents and a column for each other unknown, in one kernel."""
+        """Run one revolution with the state's tangents and a column for each other unknown, in one kernel."""
         problem, n = self.problem, self.problem.dimension
         drifts = [problem.drift(u, given, i) for i in range(n, u.size)]
         image, columns = problem.returned(problem.prepare(u, given), u[:n], drifts)
         return image - u[:n], columns - jnp.eye(n, u.size), None
 
+    def monodromy(self, found: Any) -> Any:
+        n = self.problem.dimension
+        return found.jacobian[..., :n, :n] + np.eye(n)
+
     def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
-        """By the change of the map, stated with the margin that lanes have, and of its derivative over its own size."""
+        """Compare by the change of the map, with the margin that simulations have, and of its relative derivative."""
         n = self.problem.dimension
         image = abs(fine @ moved[..., None])[..., 0].max(-1)
         size = lambda m: abs(m[..., :n]).max((-2, -1))
@@ -63,7 +68,7 @@ class OrbitEquations(AbstractEquations):
 
 
 class Orbit(eqx.Module):
-    """A periodic orbit. Where none was found its numbers are NaN and `status` says so."""
+    """A periodic orbit. If none was found its numbers are NaN and `status` says so."""
 
     state: Float[Array, " dim"]
     """State at phase 0 [SI]."""
@@ -76,23 +81,23 @@ class Orbit(eqx.Module):
     residual: Float[Array, ""]
     """Largest component of P(z) - z, in units of the system's scale."""
     liouville: Float[Array, ""]
-    """log|det M| less the integral of the field's divergence over the orbit, which it must equal; both not below what
-    rounding resolves of the smallest multiplier, so that orbits with strong damping are checked by the others."""
+    """log|det M| minus the integral of the field's divergence over the orbit, which must be equal. Both are limited to
+    what rounding resolves of the smallest multiplier, so that the others check an orbit with strong damping."""
     steps: Int[Array, ""]
-    """Steps per revolution; 1 where the method has no such number."""
+    """Steps per revolution; 1 if the method has no such number."""
     error: Float[Array, ""]
     """Three times the largest component of the change of P at the orbit against half as many steps, in units of the
-    system's scale: at a grazing contact one difference of steps may be too small by chance. Infinite where there is no
-    orbit by these, NaN where the method has no number of steps."""
+    system's scale: at a grazing contact one difference of steps may be too small by chance. It is infinite if these
+    steps find no orbit, NaN if the method has no number of steps."""
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
     solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
-    """What takes these steps, or the whole method where it chooses them itself."""
+    """Solver that takes these steps, or the whole method if that chooses its steps itself."""
 
     @property
     def method(self) -> AbstractMethod:
-        """The method by which it is an orbit, with its steps."""
+        """Integration method, with its steps."""
         return self.solver if isinstance(self.solver, AbstractMethod) else FixedSteps(self.solver, self.steps)
 
     @property
@@ -136,14 +141,14 @@ if TYPE_CHECKING:
     NearOrbit: TypeAlias = Orbit | Point | tuple[StateLike, Scalar]
     """An orbit, a bifurcation of one, or a state near one with the value of the parameter."""
     PointGuess: TypeAlias = Scalar | NearOrbit
-    """A value of the parameter, or what is near the bifurcation."""
-else:  # those who are given something else say themselves what it must be
+    """A value of the parameter, or something near the bifurcation."""
+else:  # the functions check these arguments themselves
     StateLike = Guess = NearOrbit = PointGuess = object
 
 
 @jax.custom_jvp
 def sorted_multipliers(monodromy: Float[Array, "dim dim"]) -> Complex[Array, " dim"]:
-    """Eigenvalues, the largest first; differentiable to any order where they are distinct."""
+    """Return the eigenvalues, the largest first; they are differentiable to any order where they are distinct."""
     mu = jnp.linalg.eigvals(monodromy)
     return mu[jnp.argsort(-jnp.abs(mu))]
 
@@ -160,11 +165,11 @@ def _sorted_multipliers_jvp(primals: Any, tangents: Any) -> Any:
 def divergence_integral(
     strobe: StrobeMap, state: Float[Array, " dim"], periods: Int[Array, ""] | int
 ) -> Float[Array, ""]:
-    """Integral over `periods` revolutions of the field's divergence along the orbit through `state` (SI).
+    """Integrate the field's divergence over `periods` revolutions along the orbit through `state` [SI].
 
-    By Liouville's identity it is log|det M|, which checks every monodromy matrix: integration error, differentiation
-    and, in stiff systems, multipliers lost to rounding show as a disagreement. By the trapezoidal rule at the
-    integration steps, or at as many of them as is enough: on a closed orbit it converges faster than any power of them.
+    By Liouville's identity the result is log|det M|, which checks every monodromy matrix: errors of integration and of
+    differentiation and, in stiff systems, multipliers lost to rounding show as a disagreement. The trapezoidal rule, at
+    the integration steps or at enough of them, converges on a closed orbit faster than any power of the step.
     """
     parts = ADAPTIVE_PARTS
     if isinstance(strobe.method, FixedSteps):
@@ -183,8 +188,10 @@ def divergence_integral(
     return total * h
 
 
-def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts) -> Float[Array, " dim"]:
-    """State after `revolutions` from `start` and, while that is not at rest, after as many again by twice the steps."""
+def simulated(
+    problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts
+) -> Float[Array, " dim"]:
+    """Return the state after `revolutions` from `start`, and as many with twice the steps until it is at rest."""
     given = frozen(given)
     counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
 
@@ -204,11 +211,11 @@ def settle(problem: OrbitProblem, given: Given, start: Array, revolutions: Any, 
 def _find(
     problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, revolutions: Any
 ) -> tuple[Orbit, OrbitEquations, Array]:
-    """The orbit, without derivatives; its equations and unknowns."""
+    """Find the orbit, without derivatives; return its equations and unknowns, too."""
     if revolutions is not None:
-        guess = settle(problem, given, guess, revolutions, spinning)
+        guess = simulated(problem, given, guess, revolutions, spinning)
     equations = OrbitEquations(problem)
-    u, found = settled(equations, given, guess / problem.scale, counts, at_root=True)
+    u, found = refined(equations, given, guess / problem.scale, counts, at_root=True)
     converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
     u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
     n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
@@ -237,7 +244,7 @@ def _find(
 
 @compiled
 def _place(equations: OrbitEquations, u: Array, monodromy: Array) -> tuple[Array, Array]:
-    """State and multipliers of an orbit."""
+    """Return state and multipliers of an orbit."""
     finite = jnp.isfinite(monodromy)
     multipliers = jnp.where(jnp.all(finite), sorted_multipliers(jnp.where(finite, monodromy, 0.0)), jnp.nan)
     return equations.problem.state(u), multipliers
@@ -252,19 +259,19 @@ def periodic_orbit(
     revolutions: int | None = None,
     method: AbstractMethod | None = None,
 ) -> Orbit:
-    """The orbit that closes after `periods` revolutions, by damped Newton on the strobe map.
+    """Find the orbit that closes after `periods` revolutions, by damped Newton's method on the strobe map.
 
     **Arguments:**
 
     - `system`, `speed`: any forced system, and its speed [rad/s].
     - `periods`: revolutions after which the orbit closes.
     - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
-    - `revolutions`: simulate so many before Newton takes over; by default 200 without a guess and none with one.
-    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, where that finds
-        none that stays where it is with more steps, by Rodas4 (which only without `jit` and `vmap`).
+    - `revolutions`: revolutions of simulation before Newton's method; by default 200 without a guess, none with one.
+    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, if that finds no
+        orbit that stays where it is with more steps, by Rodas4 (never under `jit` and `vmap`).
 
-    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. Works under `jit` and
-    `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`.
+    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. The function works under
+    `jit` and `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`.
     """
     require_x64()
     require_at_least(1, periods=periods)
@@ -273,7 +280,7 @@ def periodic_orbit(
         require_at_least(0, revolutions=revolutions)
     given = Given(system, jnp.asarray(speed, dtype=float))
     start = guess_state(system, given.speed, guess)
-    once = revolutions is not None  # and no more than asked for
+    once = revolutions is not None  # no more revolutions than asked for
     if revolutions is None and guess is None:
         revolutions = 200
     spin = None if revolutions is None else jnp.asarray(revolutions)
@@ -281,7 +288,7 @@ def periodic_orbit(
     def find(method: AbstractMethod, counts: Counts) -> Orbit:
         here, begin = frozen((given, start))
         problem = make_problem(here, (), jnp.ones(0), periods, method)
-        counts = from_steps(counts, guess.steps if isinstance(guess, Orbit) else None)
+        counts = counts.near(guess.steps if isinstance(guess, Orbit) else None)
         enough = jnp.minimum(counts.last, ENOUGH)
         spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
         found, equations, u = _find(problem, counts, spinning, here, begin, spin)
@@ -291,11 +298,11 @@ def periodic_orbit(
         state, multipliers = _place(equations, u, monodromy)
         return dataclasses.replace(found, state=state, speed=given.speed, multipliers=multipliers, monodromy=monodromy)
 
-    return that_serves(find, method, serves=lambda found: found.converged)
+    return with_fallback(find, method, serves=lambda found: found.converged)
 
 
 def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
-    """A guess as an array, without derivative."""
+    """Return a guess as an array, without derivative."""
     if guess is None:
         guess = system.starts(speed)[0]
     wanted = f"must be a state of {system.dimension} numbers"
