@@ -8,9 +8,9 @@ from jaxtyping import Float, Shaped
 
 from .._glossary import component_names, quantity
 from ..analysis import Sweep
+from ..files import read_bytes, replacing
 from ..integrate import Trajectory
 from ..orbits import Branch
-from ._files import read_bytes, replacing
 
 
 LARGEST_TABLE = 4_000_000_000

@@ -11,10 +11,9 @@ import numpy as np
 
 from .._glossary import component_names, quantity
 from ..analysis import BearingSweep, Confirmation, Sweep
+from ..files import configuration, replacing
 from ..integrate import OUTCOMES
 from ..models import BearingModel, CageModel
-from ._files import replacing
-from ._write_config import configuration
 
 
 if TYPE_CHECKING:

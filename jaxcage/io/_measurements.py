@@ -16,10 +16,7 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
-from ._files import read_bytes
-from ._schema import ConfigError
-from ._speeds import SpeedOf, Whose, cage_rpm, split_owner
-from ._units import printable, to_si
+from ..files import ConfigError, SpeedOf, Whose, cage_rpm, printable, read_bytes, split_owner, to_si
 
 
 Quantity = Literal["whirl frequency", "orbit size", "rattles", "calm"]
