@@ -13,6 +13,7 @@ LAYERS = [
     "bearing",
     "forces",
     "models",
+    "files",
     "solve",
     "analysis",
     "sweeps",

@@ -1,9 +1,9 @@
-"""Whose speed a number means: the cage's, as everything inside does, or the shaft's, as people know it."""
+"""Speeds of the cage, used inside the library, and of the shaft, as users know them."""
 
 import re
 from typing import Literal
 
-from ._units import printable
+from .units import printable
 
 
 Whose = Literal["cage", "shaft"]
@@ -12,7 +12,7 @@ _OWNER = re.compile(r"\b(cage|shaft)\b", re.IGNORECASE)
 
 
 def split_owner(text: str) -> tuple[str, Whose | None]:
-    """`20000 rpm shaft` -> (`20000 rpm`, `shaft`); None where a text does not say whose speed it is.
+    """`20000 rpm shaft` -> (`20000 rpm`, `shaft`); None if the text does not name the owner of the speed.
 
     **Raises:** `ValueError` with half a sentence if it names both.
     """
@@ -23,7 +23,7 @@ def split_owner(text: str) -> tuple[str, Whose | None]:
 
 
 class SpeedOf(float):
-    """A speed [rpm] that says whose it is."""
+    """A speed [rpm] with its owner."""
 
     whose: Whose
 
@@ -34,12 +34,12 @@ class SpeedOf(float):
 
 
 def cage_rpm(value: float, unsaid: Whose, cage_speed_ratio: float) -> float:
-    """The cage's speed [rpm] that `value` means: the shaft's if it says so, or if `unsaid` does for it."""
+    """The cage's speed [rpm] that `value` means; `unsaid` owns a value that does not name its owner."""
     return float(value) * (cage_speed_ratio if _whose(value, unsaid) == "shaft" else 1.0)
 
 
 def shaft_rpm(value: float, unsaid: Whose, cage_speed_ratio: float) -> float:
-    """The shaft's speed [rpm] that `value` means: the cage's if it says so, or if `unsaid` does for it."""
+    """The shaft's speed [rpm] that `value` means; `unsaid` owns a value that does not name its owner."""
     return float(value) / (cage_speed_ratio if _whose(value, unsaid) == "cage" else 1.0)
 
 

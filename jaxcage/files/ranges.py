@@ -7,11 +7,11 @@ import re
 import numpy as np
 from jaxtyping import Float
 
-from ._units import NUMBER, printable, to_si
+from .units import NUMBER, printable, to_si
 
 
 DECADE = 10.0
-"""A range that spans more is even in the logarithm: nobody who says 1e4 .. 1e6 means that it is hardly below 1e5."""
+"""A range that spans more is uniform in the logarithm: 1e4 .. 1e6 does not mean that values below 1e5 are rare."""
 SIGMAS = 3.0
 """Standard deviations from the best value to either end of a tolerance."""
 _LEFT = re.compile(rf"\s*(?:({NUMBER})\s*\()?\s*({NUMBER})\s*(.*?)\s*")
@@ -21,7 +21,7 @@ _TOLERANCE = re.compile(r"\+-|±")
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """Everything between two ends is possible."""
+    """A value that lies between two ends."""
 
     lower: float
     """[SI]."""
@@ -30,11 +30,11 @@ class Range:
     given: float | None = None
     """Best guess [SI]."""
     is_normal: bool = False
-    """Whether values gather around the middle, with a third of the half width as standard deviation."""
+    """True for a normal distribution around the middle, with a third of the half width as standard deviation."""
 
     @property
     def is_logarithmic(self) -> bool:
-        """Whether all sizes are alike likely: the range has one sign and spans more than a decade."""
+        """True if the range is positive and spans more than a decade: all orders of magnitude are equally likely."""
         return self.lower > 0 and self.upper > DECADE * self.lower
 
     @property
@@ -43,7 +43,7 @@ class Range:
         return float(self.at(0.5)) if self.given is None else self.given
 
     def at(self, place: float | Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-        """Values [SI] below which the shares `place` of all values lie."""
+        """Quantiles [SI] at the probabilities `place`."""
         if self.is_normal:
             from scipy.stats import truncnorm  # takes half a second to load
 
@@ -55,7 +55,7 @@ class Range:
 
 
 def is_range(text: str) -> bool:
-    """Whether a text is meant as a range."""
+    """True if a text is meant as a range."""
     return ".." in text or _TOLERANCE.search(text) is not None
 
 

@@ -1,5 +1,5 @@
-"""`CageModel` or `BearingModel` -> nested mapping or TOML text that `load_model` reads back to the same numbers; a TOML
-file with other ranges, of which everything else stays as its writer has it, comments too.
+"""`CageModel` or `BearingModel` -> nested mapping or TOML text that `load_model` reads back to the same numbers; and a
+TOML file with other ranges, in which everything else, comments included, stays as it was written.
 """
 
 import re
@@ -10,19 +10,18 @@ from typing import Any
 import equinox as eqx
 
 from ..models import BearingModel, CageModel
-from ._files import replacing
-from ._ranges import Range
-from ._schema import ConfigError, submodules, values
+from .disk import replacing
+from .ranges import Range
+from .schema import ConfigError, submodules, values
 
 
 _TABLE = re.compile(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?")
 
 
 def configuration(model: CageModel | BearingModel) -> dict[str, Any]:
-    """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML
-    file.
+    """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML file.
 
-    **Raises:** `ConfigError` for a model with forces of its user's own, which no table can hold.
+    **Raises:** `ConfigError` for a model with laws of a user, which no table can hold.
     """
     if not isinstance(model, CageModel | BearingModel):
         raise ConfigError(
@@ -59,8 +58,8 @@ def _literal(value: float | int | str) -> str:
 
 
 def save_model(path: str | Path, model: CageModel | BearingModel) -> Path:
-    """Write `model` as a TOML file that `load_model`, or `load_whole_bearing`, reads; an earlier file stays whole if
-    that fails.
+    """Write `model` as a TOML file that `load_model`, or `load_whole_bearing`, reads; if that fails, an earlier file
+    stays as it was.
     """
     with replacing(path) as temporary:
         temporary.write_text(toml_text(configuration(model)) + "\n", encoding="utf-8")
@@ -68,7 +67,7 @@ def save_model(path: str | Path, model: CageModel | BearingModel) -> Path:
 
 
 def with_ranges(text: str, ranges: Mapping[str, tuple[Range, str]]) -> str:
-    """`text` with these ranges in the place of those it has.
+    """`text` with other ranges.
 
     **Arguments:** TOML text; label of each value, such as `support.stiffness`, with its new range and SI unit.
 

@@ -1,6 +1,4 @@
-"""What a configuration may hold, read off the fields of the modules: tables, keys, units, ranges,
-options.
-"""
+"""Tables, keys, units, ranges and options of a configuration, derived from the fields of the modules."""
 
 import dataclasses
 import math
@@ -14,20 +12,16 @@ from .._arguments import options
 from .._errors import InputError
 from .._parameters import ParameterInfo, allowed as must_be, within
 from ..forces import LAWS
-from ._ranges import Range, is_range, read_range
-from ._units import printable, shown, to_si
+from .ranges import Range, is_range, read_range
+from .units import printable, shown, to_si
 
 
 class ConfigError(InputError):
-    """A configuration that is refused; the message is one sentence that names the key and what it
-    may be.
-    """
+    """A configuration that is refused; the message is one sentence that names the key and what it may be."""
 
 
 def module_types(annotation: Any) -> tuple[type[eqx.Module], ...]:
-    """The modules that a field's annotation admits: none for a number, several where there is a
-    choice of laws.
-    """
+    """The modules that a field's annotation admits: none for a number, several for a choice of laws."""
     return tuple(m for m in options(annotation) if isinstance(m, type) and issubclass(m, eqx.Module))
 
 
@@ -69,7 +63,7 @@ def read_value(name: str, value: Any, field: dataclasses.Field) -> Any:
 
 
 class Known(float):
-    """The best guess of a value that is known within a range only."""
+    """Best guess of a value that is known within a range only."""
 
     range: Range
 

@@ -1,5 +1,5 @@
 """TOML -> `CageModel` or `BearingModel`: tables mirror the modules, every value is checked against its declaration.
-A whole bearing says `model = "bearing"`, or starts from one, `base = "nu2310"`. Of a cage:
+A file on a whole bearing contains `model = "bearing"`, or starts from one, `base = "nu2310"`. A file on a cage:
 
 base = "1a"                  # optional: start from a published case and change what is listed
 guidance_gap = "0.5 mm"      # numbers are SI, texts carry their unit
@@ -17,7 +17,6 @@ bar_mass = "4 g"
 """
 
 import dataclasses
-import math
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -27,33 +26,34 @@ import equinox as eqx
 
 from .._checks import require_x64
 from .._parameters import fields_from, must_be_given, parameter_paths
-from ..bearing import BEARINGS, PUBLISHED_CASES, Bearing, vg
+from ..bearing import BEARINGS, PUBLISHED_CASES, vg
 from ..forces import PocketImpact
 from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
-from ._files import read_bytes
-from ._ranges import Range
-from ._schema import ConfigError, Known, read_value, submodules, values
-from ._speeds import WHOSE, Whose
-from ._template import Subject, left_as_written
-from ._units import printable, shown
+from .disk import read_bytes
+from .plausibility import check_together
+from .ranges import Range
+from .schema import ConfigError, Known, read_value, submodules, values
+from .speeds import WHOSE, Whose
+from .template import Subject, left_as_written
+from .units import printable, shown
 
 
 M = TypeVar("M", CageModel, BearingModel)
 
 Ranges = dict[tuple[str, ...], tuple[Range, tuple[str, ...]]]
-"""Where a range is given -> the range, and the fields of that table that it sets."""
+"""Path of a key with a range -> the range, and the fields of that table that it sets."""
 _SHORTHANDS = {("support", "stiffness"): ("stiffness_x", "stiffness_y")}
 """Keys that set several parameters to one value."""
 _OLD = {"clearance_reading": '"as_printed"', "unbalance": '"physical"'}
-"""What a file without a reading meant while it could be left out."""
+"""Meaning of a file without a reading, while readings could be left out."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Unknown:
-    """What a file knows a range of, and no value."""
+    """A quantity of which a file gives a range and no value."""
 
     label: str
-    """As the file calls it."""
+    """Its name in the file."""
     names: tuple[str, ...]
     """Parameters that it sets, all to the same value."""
     range: Range
@@ -61,18 +61,18 @@ class Unknown:
 
 @dataclasses.dataclass(frozen=True)
 class BearingFile(Generic[M]):
-    """What a TOML file says: a model, and how its speeds are meant."""
+    """Contents of a TOML file: a model, and how its speeds are meant."""
 
     model: M
     speeds: Whose
-    """Whose speeds bare numbers of the commands are: key `speeds`; if left out the cage's, of a whole bearing the
-    shaft's."""
+    """Owner of the speeds that commands give as bare numbers: key `speeds`; by default the cage, for a whole bearing
+    the shaft."""
     unknowns: tuple[Unknown, ...]
-    """Values of which the file knows a range only."""
+    """Values of which the file gives a range only."""
     left: tuple[str, ...]
-    """Values that are still those of the template that `jaxcage init` writes, by dotted name."""
+    """Dotted names of values that are still those of the template that `jaxcage init` writes."""
     table: Mapping[str, Any]
-    """As it was read."""
+    """The nested mapping as it was read."""
 
 
 def load_model(path: str | Path) -> CageModel:
@@ -92,16 +92,16 @@ def load_whole_bearing(path: str | Path) -> BearingModel:
 
 
 def read_bearing(path: str | Path) -> BearingFile[CageModel]:
-    """All that the TOML file at `path` says of a cage.
+    """The cage that the TOML file at `path` describes, with speeds and unknowns.
 
-    **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the
-    key, what was given and what is allowed; `RuntimeError` without double precision.
+    **Raises:** `ConfigError`, a `ValueError` whose message is one sentence that names the file, the key, the value
+    given and what is allowed; `RuntimeError` without double precision.
     """
     return _read(path, model_from)
 
 
 def read_whole_bearing(path: str | Path) -> BearingFile[BearingModel]:
-    """All that the TOML file at `path` says of a whole bearing.
+    """The whole bearing that the TOML file at `path` describes, with speeds and unknowns.
 
     **Raises:** as `read_bearing`.
     """
@@ -130,7 +130,7 @@ def _table_of(path: str | Path) -> dict[str, Any]:
 
 
 def subject_of(source: str | Path | Mapping[str, Any]) -> Subject:
-    """Whether a file, or a nested mapping as read from one, is about a cage or a whole bearing.
+    """Subject of a file, or of a nested mapping as read from one: a cage or a whole bearing.
 
     **Raises:** `ConfigError` for what is neither, or no TOML file.
     """
@@ -148,9 +148,9 @@ def subject_of(source: str | Path | Mapping[str, Any]) -> Subject:
 
 
 def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> CageModel:
-    """The model that a nested mapping, as read from TOML, describes; of a range its best guess.
+    """The model that a nested mapping, as read from TOML, describes; a range counts with its best guess.
 
-    **Arguments:** the mapping; a list that takes what is known within ranges only.
+    **Arguments:** the mapping; a list to which the values known within ranges only are added.
 
     **Raises:** `ConfigError`.
     """
@@ -161,7 +161,7 @@ def model_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) 
 
 
 def whole_bearing_from(table: Mapping[str, Any], unknowns: list[Unknown] | None = None) -> BearingModel:
-    """The whole bearing that a nested mapping describes; of a range its best guess.
+    """The whole bearing that a nested mapping describes; a range counts with its best guess.
 
     **Arguments:** as `model_from`.
 
@@ -222,9 +222,7 @@ def _build(
     path: tuple[str, ...],
     ranges: Ranges,
 ) -> eqx.Module:
-    """A module of `kind` from its table; what the table leaves out comes from `start`, or from the
-    defaults.
-    """
+    """A module of `kind` from its table; values not in the table come from `start`, or from the defaults."""
     table = dict(table)
     start = _ready_made(table, start, path)
     nested, fields = submodules(kind), list(values(kind))
@@ -336,82 +334,3 @@ _READY_MADE: dict[tuple[str, str], Callable[[Any], eqx.Module]] = {
     ("lubricant", "grade"): _of_grade,
 }
 """Keys by which a table starts from a ready-made module."""
-
-
-HEAVIEST = 8900.0
-"""Density of bronze [kg/m^3]."""
-
-
-def _volume(model: CageModel | BearingModel) -> float:
-    """Of the space between shaft and housing [m^3]."""
-    b = model.bearing
-    return math.pi / 4 * float((b.outside_diameter**2 - b.bore**2) * b.width)
-
-
-def _check_rings(bearing: Bearing) -> None:
-    """**Raises:** `ConfigError` for ribs or rollers that no bearing has."""
-    mm = lambda value: 1e3 * float(value)
-    pitch, raceway = mm(bearing.pitch_diameter), mm(bearing.outer_raceway_diameter)
-    if not pitch < (rib := mm(bearing.rib_diameter)) < raceway:
-        raise ConfigError(
-            f"`bearing.rib_diameter` must lie between the pitch circle and the outer raceway, {pitch:g} and "
-            f"{raceway:g} mm, but is {rib:g} mm."
-        )
-    if raceway >= (outside := mm(bearing.outside_diameter)):
-        raise ConfigError(
-            f"`bearing.outside_diameter` must be above the outer raceway, {raceway:g} mm, but is {outside:g} mm."
-        )
-    if (length := mm(bearing.roller_length)) >= (width := mm(bearing.width)):
-        raise ConfigError(f"`bearing.roller_length` must fit into the rings, {width:g} mm, but is {length:g} mm.")
-    pocket, room = mm(bearing.roller_diameter + bearing.pocket_clearance), math.pi * pitch / bearing.n_rollers
-    if pocket >= room:
-        raise ConfigError(
-            f"`bearing.pocket_clearance` must leave a bar between pockets, which are {room:.4g} mm apart, but makes "
-            f"them {pocket:g} mm wide."
-        )
-
-
-def check_together(model: CageModel | BearingModel) -> None:
-    """What ranges of single values cannot see.
-
-    **Raises:** `ConfigError`.
-    """
-    gap, eccentricity = 1e3 * float(model.guidance_gap), 1e3 * float(model.eccentricity)
-    if eccentricity >= gap:
-        raise ConfigError(
-            f"`eccentricity` must be smaller than `guidance_gap`, but is {eccentricity:g} mm in a gap of {gap:g} mm."
-        )
-    _check_rings(model.bearing)
-    rib = 1e3 * float(model.bearing.rib_diameter)
-    if gap >= rib:
-        raise ConfigError(f"`guidance_gap` must leave room for the cage, but is {gap:g} mm in a rib of {rib:g} mm.")
-    if isinstance(model, BearingModel) and model.guidance == "inner":
-        land = 1e3 * float(model.inner_land_diameter)
-        if land <= (bore := 1e3 * float(model.bearing.bore)):
-            raise ConfigError(f"`inner_land_diameter` must be above the bore, {bore:g} mm, but is {land:g} mm.")
-        if land + gap >= rib:
-            raise ConfigError(
-                f"`inner_land_diameter` and `guidance_gap` must leave room for the cage within the outer ring's ribs, "
-                f"{rib:g} mm, but are {land:g} and {gap:g} mm."
-            )
-    mass, most = float(model.cage_mass), HEAVIEST * _volume(model)
-    if mass > most:
-        raise ConfigError(
-            f"`cage_mass` must be at most {most:.3g} kg, as of a bearing of this size full of bronze, but is "
-            f'{mass:g} kg; grams are written "60 g".'
-        )
-    if isinstance(model, BearingModel):
-        inertia, ring = float(model.cage_inertia), mass * float(model.bearing.pitch_diameter) ** 2 / 4
-        if not 0.1 * ring <= inertia <= 10 * ring:
-            raise ConfigError(
-                f"`cage_inertia` must be that of a ring, between a tenth and ten times {ring:.2g} kg m^2 for a cage of "
-                f"{1e3 * mass:g} g, but is {inertia:g} kg m^2."
-            )
-    if not math.isfinite(float(model.lubricant.dynamic_viscosity)):
-        raise ConfigError(
-            "`lubricant` must have a viscosity at its temperature, but by ASTM D341 its two points, reference and "
-            "temperature give none."
-        )
-    width, limit = 1e3 * float(model.film.land_width), 1e3 * float(model.bearing.land_width_limit)
-    if width > limit:
-        raise ConfigError(f"`film.land_width` must fit beside the rollers, in {limit:g} mm, but is {width:g} mm.")

@@ -16,10 +16,10 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
-from ._files import read_bytes
-from ._schema import ConfigError
-from ._speeds import SpeedOf, Whose, cage_rpm, split_owner
-from ._units import printable, to_si
+from .disk import read_bytes
+from .schema import ConfigError
+from .speeds import SpeedOf, Whose, cage_rpm, split_owner
+from .units import printable, to_si
 
 
 Quantity = Literal["whirl frequency", "orbit size", "rattles", "calm"]

@@ -14,17 +14,17 @@ from ..models import case, whole_bearing
 
 
 Subject = Literal["cage", "bearing"]
-"""What a file is about: the cage in its land, or the whole bearing."""
+"""Subject of a file: the cage in its land, or the whole bearing."""
 CHOSEN = ("model", "speeds", "clearance_reading", "unbalance", "kind")
-"""What the templates hold that is no number of the NU2310."""
+"""Keys of the templates that are no numbers of the NU2310."""
 
 
 @functools.cache
 def template(subject: Subject = "cage") -> str:
     """The commented TOML text that `jaxcage init` writes; `load_model`, or `load_whole_bearing`, accepts it as it is.
 
-    Dimensions stand in the text; what the paper does not print is filled in from the constants of its cases, and what
-    is worked out for the whole bearing from that.
+    Dimensions stand in the text. Constants that the paper does not print are filled in from those of its cases, and
+    derived ones of the whole bearing from them.
     """
     if subject == "cage":
         file, model = "template.toml", case("1a")
@@ -37,7 +37,7 @@ def template(subject: Subject = "cage") -> str:
 
 
 def left_as_written(table: Mapping[str, Any], subject: Subject = "cage") -> tuple[str, ...]:
-    """Values of a nested mapping that are those of the template, by dotted name: they are the NU2310's."""
+    """Dotted names of the values of a nested mapping that are still those of the template, the NU2310's."""
     return tuple(_alike(table, tomllib.loads(template(subject)), ()))
 
 
@@ -51,7 +51,7 @@ def _alike(given: Mapping[str, Any], written: Mapping[str, Any], path: tuple[str
 
 
 def _aligned(line: str) -> str:
-    """The comment behind a value in one column with the others."""
+    """`line` with its comment in the same column as the others."""
     value, sign, comment = line[2:].partition(" # ")  # the first two may be the sign of an option
     return f"{(line[:2] + value).rstrip():<34} # {comment}" if sign else line
 
@@ -71,7 +71,7 @@ def write_template(path: str | Path, subject: Subject = "cage") -> Path:
     except FileExistsError:
         raise InputError(f"File '{path}' must be a new one, but is there already and is left as it is.") from None
     except OSError as error:
-        with contextlib.suppress(OSError):  # half a file would stand in the way of the next try
+        with contextlib.suppress(OSError):  # a partial file would block the next attempt
             target.unlink()
         raise InputError(f"File '{path}' must be in a folder that can be written to, but: {error.strerror}.") from error
     return target

@@ -1,4 +1,4 @@
-"""Writing that never leaves a half-written result and never spoils an earlier one."""
+"""Reading of regular files, and writing that never leaves a partial result and never damages an earlier one."""
 
 import contextlib
 import os
@@ -12,11 +12,11 @@ from .._errors import InputError
 
 
 LARGEST = 10_000_000
-"""Bytes of a file that describes something: a hundred times what anybody writes by hand."""
+"""Largest size of a description [bytes]: a hundred times that of one written by hand."""
 
 
 def read_bytes(path: str | Path, largest: int = LARGEST) -> bytes:
-    """What a file holds, unless it is something else than a file, as a pipe or a device, which may never end.
+    """The bytes of a regular file; a pipe or a device, which may never end, is refused.
 
     **Raises:** `OSError` with the reason in its `strerror`.
     """
@@ -32,7 +32,7 @@ def read_bytes(path: str | Path, largest: int = LARGEST) -> bytes:
 
 
 def sync_folder(path: Path) -> None:
-    """Have the names in a folder reach the disk, where the system can do that."""
+    """Flush the names in a folder to the disk, if the system can do that."""
     with contextlib.suppress(OSError):
         handle = os.open(path, os.O_RDONLY)
         try:
@@ -43,15 +43,13 @@ def sync_folder(path: Path) -> None:
 
 @contextlib.contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary place beside `path` to write a file or a folder to; it takes the place of `path`
-    at the end.
+    """A temporary path beside `path` to write a file or a folder to; it replaces `path` at the end.
 
-    If the body raises, or the process dies in it, `path` is what it was. A folder cannot be
-    replaced in one step: the earlier one moves aside for an instant and comes back if the new one
-    cannot move in.
+    If the body raises, or the process dies in it, `path` stays as it was. A folder cannot be replaced in one step: the
+    earlier one is moved aside for an instant and moved back if the new one cannot take its place.
 
-    **Raises:** `OSError`, one sentence with the reason and how to go on, if the disk is full, the
-    folder read-only or the like.
+    **Raises:** `OSError`, one sentence with the reason and the remedy, if the disk is full, the folder read-only or the
+    like.
     """
     target = Path(path)
     try:
@@ -72,7 +70,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 def sync(path: Path) -> None:
-    """Have a file, or all files of a folder, reach the disk before they get their place."""
+    """Flush a file, or all files of a folder, to the disk."""
     files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path] if path.exists() else []
     for each in files:
         with open(each, "rb") as file:
@@ -82,7 +80,7 @@ def sync(path: Path) -> None:
 
 
 def reason(error: OSError) -> str:
-    """Why the system refused, in its words."""
+    """Reason of a refusal in the words of the system."""
     return error.strerror or str(error) or type(error).__name__
 
 
@@ -100,10 +98,9 @@ def _move_in(new: Path, target: Path, aside: Path) -> None:
 
 
 def check_writable(folder: str | Path) -> Path:
-    """Make `folder` and make sure that files can be written in it.
+    """Make `folder` and check, before a long computation, that files can be written in it.
 
-    **Raises:** `ValueError` with the reason, so that nobody computes for minutes to lose the
-    result.
+    **Raises:** `ValueError` with the reason.
     """
     path = Path(folder)
     try:

@@ -1,6 +1,4 @@
-"""Units at the door: text such as "0.45 mm" becomes a number in SI. pint is loaded only when a text
-is met.
-"""
+"""Text such as "0.45 mm" as a number in SI. pint is loaded with the first text."""
 
 import functools
 import re
@@ -15,14 +13,14 @@ _SIZE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 NUMBER = rf"[-+]?{_SIZE}"
 _NUMBER_AND_UNIT = re.compile(rf"\s*({NUMBER})\s*(.*?)\s*")
 _UNIT = re.compile(r"[\w°µΩ%*/^().·⁻ +-]{1,60}")
-"""What a unit is written with; pint takes a comment, a colon or a line end for nothing."""
+"""Characters of a unit; pint ignores a comment, a colon or a line end."""
 _COMMA = re.compile(r"\s*[-+]?\d*,\d")
 _DASH = re.compile(rf"\s*{_SIZE}(?:\s+[^\s\d]+)?\s+(?:-|–|to)\s+{_SIZE}")
 """Two numbers with a dash between them."""
 _TOWER = re.compile(r"[\d)]\s*(?:\^|\*\*)|\d{3}")
-"""A power of a number, or a large number: pint would work out 9**9**9 to its last digit."""
+"""A power of a number, or a large number: pint would evaluate 9**9**9 to its last digit."""
 _LIKE = {"K": "degC"}
-"""What people write; "C" alone is a coulomb."""
+"""Usual unit in place of the SI unit; "C" alone is a coulomb."""
 LONGEST = 100
 """Characters of a value that a message shows."""
 
@@ -35,15 +33,13 @@ def _registry() -> "pint.UnitRegistry":
 
 
 def to_si(text: str, unit: str) -> float:
-    """The number in `text`, e.g. "0.45 mm" or "40 degC", expressed in `unit` ("1" for a pure
-    number).
+    """The number in `text`, e.g. "0.45 mm" or "40 degC", expressed in `unit` ("1" for a pure number).
 
-    A bare number is taken to be in `unit`. Frequencies in Hz are refused where an angular speed is
-    wanted: units alone cannot tell a revolution from a radian, so write rpm or rad/s.
+    A bare number is taken to be in `unit`. Frequencies in Hz are refused where an angular speed is wanted: units alone
+    cannot tell a revolution from a radian, so write rpm or rad/s.
 
-    **Raises:** `ValueError` with half a sentence ("is ...") for a text that is not a number with a
-    unit, for a unit nobody knows, and for one of another dimension, where a radian counts as one: 3000 1/min may be
-    revolutions.
+    **Raises:** `ValueError` with half a sentence ("is ...") for a text that is not a number with a unit, for an unknown
+    unit, and for one of another dimension, where the radian counts as a dimension: 3000 1/min may be revolutions.
     """
     if _COMMA.match(text):
         raise ValueError(f'is "{printable(text)}", but numbers are written with a point and without commas')
@@ -88,13 +84,13 @@ def _base_units(unit: Any) -> set[str]:
 
 
 def printable(text: str) -> str:
-    """`text` as a message shows it: on one line, of a length that can be read, without control characters."""
+    """`text` for a message: on one line, shortened, without control characters."""
     line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text[: LONGEST + 1])
     return line if len(text) <= LONGEST else f"{line[:LONGEST]}..."
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it, whatever it is."""
+    """Any value for a message."""
     try:
         return printable(repr(value))
     except (RecursionError, ValueError):  # nested a thousand times, or of thousands of digits
