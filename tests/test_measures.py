@@ -50,14 +50,6 @@ def test_circular_orbit(ratio, centre):
     assert m.velocity_scatter < 1e-12
 
 
-def test_whirl_about_the_rib_centre_needs_to_go_around_it():
-    inside = orbit_measures(case("1a", "preliminary"), orbit(radius=1e-4, centre=(0.0, -5e-5)))
-    outside = orbit_measures(case("1a", "preliminary"), orbit(radius=4e-5, centre=(0.0, -5e-5)))
-    assert inside.rib_whirl_ratio == pytest.approx(1.0, abs=0.02)
-    assert outside.rib_whirl_ratio == pytest.approx(0.0, abs=0.02)
-    assert outside.whirl_ratio == pytest.approx(1.0, rel=1e-9)
-
-
 def test_ellipse_and_its_velocity_scatter():
     """rms^2 = (a^2 + b^2)/2; |v| = a w sqrt(sin^2 + k^2 cos^2) with k = b/a."""
     m = orbit_measures(case("1a", "preliminary"), orbit(flatten=0.5, samples=256))
@@ -114,20 +106,6 @@ def test_drag_power_is_that_of_the_sheared_film(eps, kept):
     assert m.drag_power == pytest.approx(power[0], rel=1e-9)
 
 
-@pytest.mark.parametrize("ratio, sign", [(0.25, -1), (0.5, 0), (1.0, 1)])
-def test_film_feeds_whirl_below_half_speed_and_damps_it_above(ratio, sign):
-    """-F . v = -2 S (omega - 2 phi') g(eps) c eps phi' on a circle: zero at half speed."""
-    model = case("1a", "preliminary")
-    eps = 0.4
-    m = orbit_measures(model, orbit(radius=eps * GAP, ratio=ratio))
-    radius, width, viscosity = (92.1e-3 - GAP) / 2, 4.2679e-3, 870 * 56e-6
-    scale = 2 * viscosity * radius * width * (width / GAP) ** 2
-    tangential = scale * SPEED * (1 - 2 * ratio) * np.pi * eps / (4 * (1 - eps**2) ** 1.5)
-    expected = -tangential * eps * GAP * ratio * SPEED
-    assert m.film_power == pytest.approx(expected, rel=1e-3, abs=1e-9)
-    assert sign == 0 or np.sign(m.film_power) == sign
-
-
 @pytest.mark.wide
 def test_forces_of_a_simulation_are_its_acceleration():
     """M r'' from the recorded velocities, by a spectral derivative of a synchronous orbit."""
@@ -182,15 +160,6 @@ def test_elastic_rib_motion_is_taken_out():
     np.testing.assert_allclose(relative_state(elastic, both)[0], run.state[:, :2], atol=1e-18)
 
 
-@pytest.mark.parametrize("turns", [2.0, -1.5])
-def test_winding_counts_turns(turns):
-    a = np.linspace(0, 2 * np.pi * turns, 100)
-    circle = np.stack([3 + np.cos(a), 1 + np.sin(a)], axis=1)
-    assert winding(circle, np.array([3.2, 1.1]))[0] == pytest.approx(2 * np.pi * turns, abs=1.0)
-    assert winding(circle, np.array([3.0, 1.0])) == (pytest.approx(2 * np.pi * turns), 0)
-    assert abs(winding(circle, np.array([5.0, 1.0]))[0]) < np.pi
-
-
 def test_whirl_that_cannot_be_told_is_none():
     """To and fro through the mean centre, or by less than the run's error; a hundred circles with one such pass can."""
     model, circle = case("1a", "preliminary"), orbit(samples=64)
@@ -202,11 +171,3 @@ def test_whirl_that_cannot_be_told_is_none():
     once, whole = (np.array([[1.0, 0.0], [-1.0, 1e-12]]), np.linspace(0, 200 * np.pi, 6400)[:, None])
     passed = np.concatenate([np.hstack([np.cos(whole), np.sin(whole)]), once])
     assert winding(passed, np.zeros(2))[1] == 1
-
-
-def test_runs_that_failed_and_states_of_other_models_are_refused():
-    model, run = case("1a", "preliminary"), orbit()
-    with pytest.raises(ValueError, match="Argument `trajectory` must .* outside"):
-        orbit_measures(model, dataclasses.replace(run, outcome="outside"))
-    with pytest.raises(ValueError, match="Argument `state` must have 4 components"):
-        relative_state(model, np.zeros((5, 8)))

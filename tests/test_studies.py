@@ -1,14 +1,14 @@
-"""Studies: the same bits after kills, from shards and from other processes; what is stored is what sweeps find."""
+"""Studies: the same bits after kills, from shards and other processes; damage is noticed; lanes are those of sweeps."""
 
-import json
-import math
 import multiprocessing
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
-import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,24 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import even
 from scipy import stats
 
 import jaxcage as jc
-from jaxcage.studies import KINDS, LABELS, OtherStudy, Plan, Study, kinds, label_names
+from jaxcage.studies import (
+    KINDS,
+    LABELS,
+    DamagedStore,
+    OtherStudy,
+    Plan,
+    Store,
+    Study,
+    check_study,
+    kinds,
+    label_names,
+    open_study,
+    run_study,
+)
 
 
 class Duffing(eqx.Module):
@@ -82,18 +96,6 @@ def test_lanes_are_those_of_a_sweep(whole: Path, places: tuple[tuple[int, int], 
         np.testing.assert_allclose(mine["largest_exponent"], swept.exponents[..., 0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(mine["standard_error"], swept.standard_error[..., 0], rtol=0, atol=1e-9)
         assert {f"periodic-{k}" for k in np.unique(mine["period"]) if k} == set(np.unique(swept.label)) - {"undecided"}
-
-
-def test_plain_xarray_opens_it_with_names_and_units(whole: Path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plain = xr.open_zarr(whole, chunks=None)
-    np.testing.assert_array_equal(plain["speed"], SPEEDS)
-    np.testing.assert_allclose(plain["speed_rpm"], SPEEDS * 30 / math.pi, rtol=1e-15)
-    assert plain["speed"].attrs["units"] == "rad/s"
-    assert plain["label"].attrs["flag_meanings"].split()[1:] == list(LABELS)
-    study = json.loads(plain.attrs["study"])
-    assert (study["plan"]["seed"], study["revolutions"], study["version_jax"]) == (3, 40, jax.__version__)
 
 
 def test_any_lane_alone_has_the_bits_that_its_chunk_has(whole: Path):
@@ -168,45 +170,11 @@ def test_dask_survives_a_worker_and_finds_the_same(whole: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     "change, words",
     [
-        ({"revolutions": 20}, "differs in revolutions: choose"),
-        ({"seed": 4}, "differs in cloud.damping, seed: choose"),
-        ({"starts": 1}, "differs in starts: choose"),
-        ({"method": jc.method("rodas4", steps=48)}, "differs in method, method_numbers.steps: choose"),
-    ],
-)
-def test_another_study_is_not_mixed_in(whole: Path, change: dict, words: str):
-    before = contents(whole)
-    options = {"samples": 2, "seed": 3, **OPTIONS} | change
-    with pytest.raises(OtherStudy, match=words):
-        jc.study(OSCILLATOR, VARY, store=whole, **options)
-    assert contents(whole) == before
-
-
-def test_another_system_or_another_folder_is_refused(whole: Path, tmp_path: Path):
-    other = eqx.tree_at(lambda s: s.acceleration.damping, OSCILLATOR, jnp.array(0.2))
-    with pytest.raises(OtherStudy, match="differs in acceleration.damping: choose"):
-        jc.study(other, VARY, store=whole, samples=2, seed=3, **OPTIONS)
-    (tmp_path / "letters").mkdir()
-    with pytest.raises(OtherStudy, match="must be a new folder or the store of this study"):
-        duffing_study(tmp_path / "letters")
-    assert list((tmp_path / "letters").iterdir()) == []
-    with pytest.raises(FileNotFoundError, match="no study at"):
-        jc.open_study(tmp_path / "letters")
-
-
-@pytest.mark.parametrize(
-    "change, words",
-    [
         ({"vary": {"cubic": CUBICS}}, "must hold the speed"),
         ({"vary": {"speed": SPEEDS, "cubik": CUBICS}}, "must be one of speed, .*cubic, force, but 'cubik'"),
         ({"vary": {"speed": np.array([1.0, 1.0])}}, "distinct numbers for speed"),
-        ({"vary": {"speed": np.array([])}}, "distinct numbers for speed"),
         ({"vary": VARY, "samples": 0}, "samples` must say how many"),
         ({"vary": {"speed": SPEEDS}, "samples": 8}, "samples` needs an interval or a tolerance"),
-        ({"starts": 4}, "starts` must be at most 3"),
-        ({"lanes": 0}, "must be at least 1, but 0 was given"),
-        ({"seed": -1}, "must be at least 0, but -1 was given"),
-        ({"exponents": 0}, "exponents` must be at least 1"),
         ({"strobe": 41}, "strobe` must lie between 0 and the 40"),
         ({"blocks": 7}, "blocks` must divide"),
         ({"shard": (0, 2)}, "shard` must be"),
@@ -240,3 +208,132 @@ def test_what_no_tolerance_can_is_inaccurate_and_no_calm(tmp_path: Path):
     found = duffing_study(tmp_path / "store", method=coarse)
     assert set(label_names(found).values[..., :3, :, :].ravel()) == {"inaccurate"}
     assert np.all(kinds(np.full((2, 2), LABELS.index("inaccurate"))) == KINDS.index("failed"))
+
+
+def study_of(damping: float = 0.1, system: Any = None, name: str = "duffing", version: str = "1", **more: Any) -> Study:
+    """Two axes and two starts, in six chunks; the last one of the speeds is smaller."""
+    plan = Plan({"speed": np.linspace(1.1, 1.9, 11)}, {}, 0, 0, 2, 4)
+    system = (
+        jc.ForcedOscillator(Duffing(jnp.array(damping), jnp.array(1.0)), coordinates=1) if system is None else system
+    )
+    method = more.pop("method", jc.method("rk4", steps=32))
+    return Study(system, plan, method, 10, 20, 4, 2, 3, name=name, version=version)
+
+
+STUDY = study_of()
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "study.zarr"
+    run_study(STUDY, path)
+    return path
+
+
+@pytest.fixture
+def store(finished: Path, tmp_path: Path) -> Path:
+    """A copy of a finished store."""
+    return Path(shutil.copytree(finished, tmp_path / "study.zarr"))
+
+
+def deleted(path: Path) -> None:
+    path.unlink()
+
+
+def flipped(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1] + bytes([path.read_bytes()[-1] ^ 1]))
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+@pytest.mark.parametrize("name", ["strobe/c/1/0/0/0", "label/c/5/0", "outcome/c/1/0"])
+@pytest.mark.parametrize("spoil", [deleted, flipped, cut, emptied])
+def test_a_damaged_chunk_is_noticed_and_computed_again(
+    finished: Path, store: Path, name: str, spoil: Callable[[Path], None]
+):
+    spoil(store / name)
+    chunk, state = int(name.split("/")[2]), check_study(store)
+    if name.startswith("outcome") and spoil is deleted:  # as if it had never been finished
+        assert state.finished == 5 and not state.damaged
+    else:
+        what = "missing" if spoil is deleted else "not what was written"
+        assert state.damaged == {chunk: f"{name} is {what}"} and state.finished == 5
+    if spoil is not deleted:
+        with pytest.raises(ValueError, match="checksum"):
+            open_study(store).load()
+    run_study(STUDY, store)
+    assert contents(store) == contents(finished)
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "peak/zarr.json", "speed/c/0"])
+def test_what_cannot_be_opened_is_refused_in_one_sentence(store: Path, name: str):
+    cut(store / name)
+    with pytest.raises(
+        DamagedStore, match=r"^The store '.*' is damaged \(.*\): choose another folder, or delete"
+    ) as said:
+        open_study(store)
+    assert "\n" not in str(said.value)
+    if name != "speed/c/0":
+        for use in (check_study, lambda path: run_study(STUDY, path)):
+            with pytest.raises(DamagedStore):
+                use(store)
+
+
+@pytest.mark.parametrize(
+    "other, words",
+    [
+        (study_of(damping=0.2), "differs in acceleration.damping: choose another folder"),
+        (study_of(version="2"), "differs in version: choose another folder"),
+        (study_of(method=jc.method("rk4", steps=64)), "differs in method, method_numbers.steps: choose"),
+    ],
+)
+def test_another_study_is_refused_by_what_differs(finished: Path, other: Study, words: str):
+    before = contents(finished)
+    with pytest.raises(OtherStudy, match=words):
+        run_study(other, finished)
+    assert contents(finished) == before
+
+
+def law(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:
+    return (-q[0],)
+
+
+@pytest.mark.parametrize("given", [{"name": ""}, {"version": ""}])
+@pytest.mark.parametrize(
+    "system, own",
+    [
+        (jc.ForcedOscillator(Duffing(jnp.array(0.1), jnp.array(1.0)), coordinates=1), "Duffing"),
+        (jc.ForcedOscillator(law, coordinates=1), "law"),
+        (jc.ForcedOscillator(jax.jit(law), coordinates=1), "law"),
+        (even(jc.case("1a")), "EvenSteps"),
+    ],
+)
+def test_code_of_ones_own_needs_a_name_and_a_version(tmp_path: Path, system: Any, own: str, given: dict[str, str]):
+    with pytest.raises(
+        ValueError, match=f"`name` and `version` must be given, since a store cannot tell .* own {own} "
+    ):
+        run_study(study_of(system=system, **given), tmp_path / "study.zarr")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_writers_at_once_leave_the_store_of_one(finished: Path, tmp_path: Path):
+    """No lock: both write the same files. One of them tidies up while the other writes."""
+    store = tmp_path / "study.zarr"
+    Store(store, STUDY)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: run_study(STUDY, store), range(4)))
+    assert contents(store) == contents(finished) and [p.name for p in tmp_path.iterdir()] == ["study.zarr"]
+
+
+def test_a_chunk_of_nothing_but_missing_numbers_is_finished(tmp_path: Path):
+    results = STUDY.chunk(0)
+    lost = {name: np.full_like(x, np.nan) if x.dtype == float else x for name, x in results.items()}
+    store = Store(tmp_path / "study.zarr", STUDY)
+    store.write(0, lost)
+    assert Store(tmp_path / "study.zarr", STUDY).pending() == [1, 2, 3, 4, 5]

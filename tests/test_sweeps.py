@@ -1,7 +1,8 @@
-"""Sweeps: results do not depend on how lanes are spread, carried states show hysteresis, ramps follow their speed."""
+"""Sweeps: lanes do not depend on how they are spread; followed chaos, confirmation, hysteresis, ramps."""
 
-import dataclasses
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -63,17 +64,6 @@ def test_chaos_is_followed_to_the_horizon(followed):
     assert np.all(late.label[label == "transient"] != "chaotic")
 
 
-def test_survival_counts_the_lanes_at_a_speed_and_next_to_it(followed):
-    i = int(np.flatnonzero(np.any(followed.label == "transient", axis=1))[0])
-    near = followed.escape[max(i - 1, 0) : i + 2]
-    found = followed.survival(i)
-    assert found.lanes == near.size
-    assert found.escapes == np.sum(np.isfinite(near) & (near > 30))
-    assert np.all(followed.restless[followed.lasting])
-    with pytest.raises(ValueError, match="`horizon`"):
-        dataclasses.replace(followed, escape=None).survival(0)
-
-
 def test_labels_are_confirmed_by_finer_steps(followed):
     """Steps too coarse for Ueda's oscillator: what they call chaotic is corrected, and it is said how often."""
     first = followed.confirmed[0]
@@ -127,15 +117,6 @@ def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():
     assert run.time[-1] == pytest.approx(exact, rel=1e-6)
     steady = jc.simulate(HARDENING, 1.1, revolutions=1, samples=8, discard=400, start=(0.1, 0.0), method=FAST)
     assert np.max(np.abs(run.state[-8:, 0] - steady.state[:, 0])) < 5e-3
-
-
-def test_simulation_and_sweep_agree():
-    run = jc.simulate(HARDENING, 1.3, revolutions=3, samples=4, start=(0.2, 0.1), method=FAST)
-    swept = raw_sweep(
-        HARDENING, np.array([1.3]), starts=[(0.2, 0.1)], discard=0, revolutions=3, blocks=1, keep=3, method=FAST
-    )
-    assert np.allclose(run.state[4::4], swept.strobe[0, 0, :2], rtol=0, atol=1e-13)
-    assert run.outcome == "successful" and run.time[4] == pytest.approx(2 * np.pi / 1.3)
 
 
 @pytest.mark.parametrize(
@@ -211,3 +192,56 @@ def test_a_lane_that_never_started_has_no_peak():
     length = {"discard": 1, "revolutions": 1, "exponents": 0, "blocks": 1}
     found = raw_sweep(Decay(), np.array([1.0]), starts=[(1.5,)], method=FAST, **length)
     assert found.failed.all() and np.isnan(found.peak).all()
+
+
+RATE = 0.01
+"""By which the clock decays in a revolution."""
+TURN = 2.0 * np.pi * (np.sqrt(5.0) - 1.0)
+"""Angle by which the second oscillator goes on in a revolution, incommensurate with it."""
+LENGTH: dict[str, Any] = dict(
+    starts=None, discard=30, revolutions=60, blocks=6, method=jc.method("rk4", steps=128), confirm=False
+)
+
+
+def ueda_until(tau, y, speed):
+    """Ueda's oscillator, chaotic until its clock has come down to 1 and heavily damped from then on, beside an
+    oscillator that turns by an irrational part of a revolution, or rests."""
+    del speed
+    x, u, clock, p, q = y
+    damping = 0.05 + 3.0 * jax.nn.sigmoid((1.0 - clock) / (0.2 * RATE))
+    turn = TURN / (2 * jnp.pi)
+    return u, -damping * u - x**3 + 7.5 * jnp.cos(tau), -RATE / (2 * jnp.pi) * clock, -turn * q, turn * p
+
+
+def lanes_that_end_after(revolutions: np.ndarray, turning: bool) -> jc.Sweep:
+    """A lane for each, in which chaos ends after so many revolutions; its end never closes if the other one turns."""
+    starts = [(0.1 + 0.01 * i, 0.2, float(np.exp(RATE * n)), float(turning), 0.0) for i, n in enumerate(revolutions)]
+    system = jc.ForcedSystem(ueda_until, dimension=5)
+    return jc.sweep(system, np.array([1.0]), **LENGTH | dict(starts=starts), horizon=1200)
+
+
+@pytest.mark.parametrize("turning", [False, True], ids=["periodic", "quasi-periodic"])
+def test_lanes_leave_chaos_when_its_clock_says_so(turning):
+    """Within the observed part, in every part of a stage, long before they close, and not before the horizon."""
+    ends = np.array([*range(100, 1000, 47), 2000, 5000])
+    found = lanes_that_end_after(ends, turning)
+    assert np.all(found.observed_label[0, ends > 120] == "chaotic")
+    assert found.escape is not None
+    escape, leaves = found.escape[0], ends < found.horizon
+    assert np.array_equal(np.isfinite(escape), leaves)
+    late = escape[leaves] - ends[leaves]
+    assert np.all((late > -30) & (late <= 60)), late
+    assert np.all(np.char.startswith(found.label[0][leaves & (ends > 120)], "transient"))
+
+
+@pytest.mark.parametrize("horizon, followed", [(100, 270), (600, 750)])
+def test_kept_states_are_the_last_ones_where_little_is_followed(horizon, followed):
+    """A lightly damped linear oscillator that is still on its way at the end, beside a run of the same length: of the
+    60 states kept the last 30 are of a stage of one block, or none is of those seen before."""
+    light = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.005 * v[0] - q[0] + jnp.cos(tau),), coordinates=1)
+    options: dict[str, Any] = LENGTH | dict(starts=[(1e6, 0.0)], keep=60)
+    found = jc.sweep(light, np.array([0.8]), **options, horizon=horizon)
+    whole = jc.sweep(light, np.array([0.8]), **options | dict(discard=30 + followed), horizon=0)
+    assert found.label[0, 0] == whole.label[0, 0] == "undecided"
+    assert np.allclose(found.strobe, whole.strobe, rtol=1e-9)
+    assert np.array_equal(found.strobe[0, 0, -1], found.last[0, 0])

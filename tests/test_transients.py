@@ -1,7 +1,5 @@
 """Mean lives of transients against escape rates that are known exactly or computed in another way."""
 
-import itertools
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -16,7 +14,6 @@ from jaxcage.analysis import (
     calm_at_the_end,
     calm_threshold,
     coexisting,
-    compare,
     escape_times,
     label_lanes,
     survival,
@@ -71,32 +68,6 @@ def logistic_rate(mu, nodes=60):
         basis = weight / (x[:, None] - y)
         operator += basis / np.sum(basis, axis=1, keepdims=True) / (mu * root)[:, None]
     return -np.log(np.max(np.linalg.eigvals(operator).real))
-
-
-def cycle_rate(mu, longest=12):
-    """The same from unstable cycles: the first zero of the spectral determinant det(1 - z L)."""
-    traces = []
-    for n in range(1, longest + 1):
-        sides = np.array(list(itertools.product([1.0, -1.0], repeat=n))).T
-        x = np.full(2**n, 0.5)
-        for side in [*sides[::-1]] * (60 // n + 4):  # backwards along each sequence of branches, to its cycle
-            x = (1 + side * np.sqrt(1 - 4 * x / mu)) / 2
-        growth = np.ones(2**n)
-        for _ in range(n):
-            growth *= mu * (1 - 2 * x)
-            x = mu * x * (1 - x)
-        traces.append(np.sum(1 / np.abs(1 - growth)))
-    terms = [1.0]
-    for n in range(1, longest + 1):
-        terms.append(-sum(traces[k - 1] * terms[n - k] for k in range(1, n + 1)) / n)
-    roots = np.roots(terms[::-1])
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    return np.log(np.min(real[real > 0]))
-
-
-@pytest.mark.parametrize("mu", [4.1, 4.5, 5.0, 6.0])
-def test_rates_of_the_open_logistic_map_by_two_ways(mu):
-    assert logistic_rate(mu) == pytest.approx(cycle_rate(mu), abs=1e-9)
 
 
 def test_rate_of_the_open_logistic_map_as_printed():
@@ -174,30 +145,6 @@ def test_no_escape_gives_a_bound():
     assert str(found) == "none of 40 lanes escaped in 1000 revolutions (mean life > E/3 = 13333 revolutions)"
 
 
-def test_lanes_calm_at_t0_and_failed_lanes_do_not_count():
-    times = np.array([75.0, 150, 400, np.inf, np.inf, 2000])
-    more = np.concatenate([times, [0.0, 25, 50, np.nan, np.nan]])
-    plain, mixed = (survival(t, 1050, t0=50, block=25) for t in (times, more))
-    assert mixed.survived == plain.survived == 0 + 75 + 325 + 3 * 1000
-    assert (mixed.escapes, mixed.calm, mixed.failed, mixed.lanes, mixed.chaotic) == (3, 3, 2, 9, 6)
-    assert mixed.mean_life == plain.mean_life and mixed.interval == plain.interval
-
-
-@pytest.mark.parametrize(
-    "times, horizon, options, words",
-    [
-        ([10.0], 100, {"t0": 100}, "between 0 and the horizon"),
-        ([10.0], 100, {"t0": -1}, "between 0 and the horizon"),
-        ([30.0], 100, {"block": 25}, "multiples of the block"),
-        ([25.0], 100, {"block": 25, "t0": 10}, "multiples of the block"),
-        ([25.0], 110, {"block": 25}, "multiples of the block"),
-    ],
-)
-def test_impossible_times_are_refused(times, horizon, options, words):
-    with pytest.raises(ValueError, match=words):
-        survival(np.array(times), horizon, **options)
-
-
 # Doubling t0, and two runs side by side.
 
 
@@ -212,19 +159,6 @@ def test_t0_too_short_is_found_out():
         long += patient.agree
         assert abs(patient.first.mean_life - 1000) < 4 * patient.first.standard_error
     assert short == 0 and long >= 19
-
-
-@pytest.mark.parametrize("block", [0, 25])
-def test_equal_rates_agree_and_unequal_ones_do_not(block):
-    equal = unequal = 0
-    for seed in range(SEEDS):
-        rng = np.random.default_rng(seed)
-        runs = [rng.exponential(tau, 200) for tau in (300.0, 300.0, 600.0)]
-        a, b, c = (survival(np.ceil(t / block) * block if block else t, 800, block=block) for t in runs)
-        equal += compare(a, b).agree
-        unequal += compare(a, c).agree
-        assert compare(a, b).resolved
-    assert equal >= 98 and unequal <= 5
 
 
 def test_shares_of_coexisting_attractors():
@@ -282,16 +216,6 @@ def test_mean_life_from_weak_chaos_that_dips_below_zero(end):
         estimate = survival(found, horizon, t0=100, block=BLOCK)
         within += abs(estimate.mean_life - 500) < 2 * estimate.standard_error
     assert within >= 90
-
-
-def test_failed_lanes_have_no_time():
-    growth = np.full((4, 20), -0.1)
-    growth[0, 12:] = np.nan
-    growth[3, 3] = 0.2
-    times, _ = escape_times(growth, np.ones(4, dtype=bool), 25, failed=np.array([False, True, False, False]))
-    np.testing.assert_array_equal(times, [np.nan, np.nan, 0, 100])
-    with pytest.raises(ValueError, match="between 1 and the 19 blocks"):
-        escape_times(growth, np.ones(4, dtype=bool), 25, confirm=20)
 
 
 def test_ends_are_calm_as_their_labels_say():

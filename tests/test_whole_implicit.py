@@ -101,30 +101,6 @@ def test_order_of_a_step(stiff):
 
 
 @pytest.mark.wide
-def test_tangents_of_a_step(stiff):
-    """Derivatives of a step by the oil's temperature and the state, against differences."""
-    model, start = stiff
-
-    def end(kelvin, x):
-        at = jc.replace(model, temperature=kelvin).at_speed(jnp.asarray(SLOW))
-        state = start._replace(bodies=start.bodies.at[0].add(x))
-        rates = at(state)
-        (after, beside), *_ = implicit_step(
-            at, (state, jnp.zeros(INTEGRALS)), (rates.state, rates.integrals), 1e-5, over_angle=True
-        )
-        return jnp.append(after.bodies[:5] / unit[:5], beside[:3])
-
-    unit = state_scale(model, SLOW).bodies
-    end = jax.jit(end)
-    steps = 1e-3, 1e-4 * float(unit[0])
-    for i, h in enumerate(steps):
-        moved = [(COLD + s * h * (i == 0), s * h * (i == 1)) for s in (1, -1)]
-        differences = (end(*moved[0]) - end(*moved[1])) / 2
-        _, tangent = jax.jvp(end, (COLD, 0.0), (h * (i == 0), h * (i == 1)))
-        np.testing.assert_allclose(tangent, differences, rtol=1e-5, atol=1e-5 * np.abs(differences).max())
-
-
-@pytest.mark.wide
 def test_a_stiff_arc(stiff):
     """Implicit steps reach what explicit ones and SciPy's LSODA on the second implementation do, in far fewer."""
     model, start = stiff

@@ -117,21 +117,6 @@ def _same(found, expected, tolerance):
 
 
 @pytest.mark.wide
-def test_rollers_know_of_each_other_through_cage_and_ring_only():
-    """The arrow: rates of a roller do not depend on another roller, so that a linear solve costs O(Z)."""
-    model = bearing()
-    state = some_state(model, 3)
-    of_rollers = jax.jit(lambda rollers: jax.jacfwd(lambda x: _rates(model, state._replace(rollers=x)))(rollers))
-    slopes = np.asarray(of_rollers(state.rollers)).transpose(1, 3, 0, 2)  # rate's roller, roller, row, row
-    others = ~np.eye(13, dtype=bool)
-    assert np.all(slopes[others] == 0) and np.all(np.abs(slopes[~others]).max(axis=(1, 2)) > 0)
-
-
-def _rates(model, state):
-    return model.at_speed(jnp.asarray(SPEED))(state).state.rollers
-
-
-@pytest.mark.wide
 @pytest.mark.parametrize("base", ["mass", "length", "time"])
 def test_other_units_give_the_same_motion(base):
     """Every declared unit is right, and no number with a unit is hidden in the formulas."""

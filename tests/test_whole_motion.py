@@ -1,7 +1,5 @@
 """The whole bearing in motion: rolling, static load, energy, angular momentum, bounces, the cage alone; the command."""
 
-import json
-import pathlib
 from typing import Any
 
 import equinox as eqx
@@ -9,13 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import beyond_range
-from PIL import Image
 from scipy.optimize import brentq, fsolve
 from test_whole_reference import everything
 
 import jaxcage as jc
-from jaxcage.cli import main
-from jaxcage.io import read_columns
 from jaxcage.models.whole import (
     LEDGER,
     MEANS,
@@ -336,51 +331,3 @@ def test_a_lightly_loaded_bearing_skids():
         slips[load] = jc.bearing_measures(model, ran, SPEED)
     assert slips[100.0].cage_slip > 0.05 and slips[100.0].cage_slip_drift > 0.02
     assert 0.005 < slips[4450.0].cage_slip < 0.02 and abs(slips[4450.0].cage_slip_drift) < 1e-3
-
-
-@pytest.fixture
-def few_samples(monkeypatch: pytest.MonkeyPatch):
-    """As many as in the other tests, whose programs are used again."""
-    monkeypatch.setattr("jaxcage.cli._whole.SAMPLES", 32)
-
-
-def test_simulate_prints_slips_forces_and_losses(
-    capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, few_samples: None
-):
-    """Of a file, at a load of the command line; figure and data beside it."""
-    path = tmp_path / "mine.toml"
-    path.write_text('base = "nu2310"\nload = "300 N"')
-    asked = ["simulate", str(path), "--speed", "10000 rpm", "--load", "4.45 kN", "--revolutions", "1", "--json"]
-    assert main([*asked, "--out", str(tmp_path)]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["outcome"] == "successful" and found["shaft_speed_rpm"] == 10000 and found["load_N"] == 4450
-    assert found["friction_power_W"] == pytest.approx(sum(found["power_parts_W"].values()))
-    assert found["friction_torque_N_m"] == pytest.approx(sum(found["friction_torque_parts_N_m"].values()))
-    assert found["spectra"] == {} and len(found["around"]["roller_slip"]) == 36
-    with Image.open(found["figure"]) as picture:
-        assert picture.size == (2400, 1600)
-    assert len(read_columns(found["data"])["pocket_force_13 [N]"]) == 33
-    run = jc.simulate_bearing(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, samples=32)
-    expected = jc.bearing_measures(jc.whole_bearing("nu2310"), run, float(jc.rpm(10000)))
-    names = "cage_slip roller_slip_max pocket_force_max_N pocket_force_mean_sum_N land_force_max_N eccentricity_mean"
-    for name in names.split():
-        assert found[name] == pytest.approx(getattr(expected, name), rel=1e-12)
-    assert found["state"] == expected.state
-
-
-def test_speed_of_the_cage(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, few_samples: None):
-    cage = float(jc.whole_bearing("nu2310").rolling_cage_speed(1e4))
-    asked = ["simulate", "nu2310", "--speed", f"{cage!r} rpm cage", "--revolutions", "1", "--json"]
-    assert main([*asked, "--out", str(tmp_path)]) == 0
-    assert json.loads(capsys.readouterr().out)["shaft_speed_rpm"] == pytest.approx(1e4, rel=1e-12)
-
-
-def test_what_a_whole_bearing_does_not_take(capsys: pytest.CaptureFixture[str]):
-    assert main(["bifurcations", "nu2310"]) == 2
-    assert "but `jaxcage bifurcations` takes a cage" in capsys.readouterr().err
-    assert main(["simulate", "nu2310", "--speed", "10000", "--solver", "rk4"]) == 2
-    assert "--solver" in capsys.readouterr().err
-    assert main(["simulate", "nu2310", "--speed", "200000"]) == 2
-    assert "at most 300 m/s at its land" in capsys.readouterr().err
-    assert main(["simulate", "1a", "--speed", "8500", "--load", "300 N"]) == 2
-    assert "Option --load goes with a whole bearing" in capsys.readouterr().err

@@ -18,9 +18,8 @@ from jaxcage.plotting import (
     bearing_map_figure,
     bearing_sweep_figure,
     bearings_beside,
-    over_shaft_speed,
 )
-from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, WATCHED, Bearings
+from jaxcage.solve import FINISHED, Bearings
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
@@ -75,25 +74,8 @@ def test_a_lane_is_a_simulation(start):
     apart = np.abs(ran.state[0, :74] - in_units(model, expected)).max()
     assert apart < 1e-5 < 1e-2 < moved
     _, _, clock, integrals = bearings.unpacked([0], ran.state[:1])
-    assert clock[0, 0] == pytest.approx(float(run.angle[k]), abs=1e-12)
     assert clock[0, 1] == pytest.approx(run.time[k], rel=1e-8)
     np.testing.assert_allclose(integrals[0, :-1], run.integrals[k] - run.integrals[0], rtol=1e-6, atol=1e-9)
-    largest = ran.strobe[0, :, -len(WATCHED) :].max(axis=0)
-    assert largest[WATCHED.index("pocket_force")] == pytest.approx(run.peaks[:k, 0].max(), rel=1e-3)
-    _, bodies, *_ = bearings.unpacked([0], ran.strobe[:1, :, : -len(WATCHED)])
-    np.testing.assert_allclose(bodies[0, :, :2], run.bodies[k // 2 : k + 1 : k // 2, :2], atol=1e-6 * model.clearance)
-
-
-@pytest.mark.wide
-def test_rates_in_machine_code_are_those_of_the_model(start):
-    """A step so short that it is the rate: beside the field that JAX evaluates."""
-    model, h = bearing(), 1e-7
-    bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1)])
-    found = bearings.run([0, 1], y, h, 1, 1, 1e-3, limits_of(1.0), step=h).state[:, :74]
-    rates = [model.at_speed(jnp.asarray(SPEED))(s) for s in (start, rolling_start(model, SPEED, 1))]
-    for row, before, rate in zip(found, y, rates, strict=True):
-        expected = in_units(model, rate.state) / abs(float(rate.state.clock[0]))
-        np.testing.assert_allclose((row - before[:74]) / h, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
 
 
 @pytest.mark.wide
@@ -111,41 +93,11 @@ def test_growth_is_that_of_the_distance_of_two_runs(start):
 
 
 @pytest.mark.wide
-def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
-    """Beside a cage that hardly turns, and one that starts with no number, a lane is bit for bit what it is alone."""
-    model = bearing()
-    stalled = rolling_start(model, SPEED, turning=0.01)
-    broken = start._replace(rollers=start.rollers.at[1, 4].set(jnp.nan))
-    ran, alone = (
-        run_samples(*lanes_of(model, [start, *others]), 1, 1e-5, along())
-        for others in ((stalled, broken), (start, start))
-    )
-    assert list(ran.mark) == [FINISHED, OUTSIDE, NOT_FINITE]
-    np.testing.assert_array_equal(ran.state[0], alone.state[0])
-    assert ran.growth[0] == alone.growth[0] and np.isfinite(ran.growth[0])
-
-
-@pytest.mark.wide
 def test_slow_shafts_run_through():
     """At 1000 rpm a sixteenth of a revolution takes 9 ms, in which neighbouring motions diverge by a factor of 100."""
     how = dict(starts=1, discard=1, revolutions=1, blocks=1)
     found = jc.sweep_bearing(bearing(), jc.rpm(1000.0), **how)
     assert found.outcome[0, 0] == "successful" and found.error[0, 0] < 0.05 and found.exponent[0, 0] > 50
-
-
-@pytest.mark.wide
-def test_rollers_have_no_names():
-    """With a balanced cage, a start with its rollers and its angle moved on by one pocket is the same motion."""
-    model = bearing(eccentricity=0.0)
-    start, turn = rolling_start(model, SPEED, 1), 2 * np.pi / 13
-    renamed = lambda state: state._replace(rollers=jnp.roll(state.rollers, -1, axis=1))
-    rolled = renamed(start)._replace(clock=start.clock + jnp.asarray([turn, 0.0]))
-    ran = run_samples(*lanes_of(model, [start, rolled, start]), 1, 1e-6, along())
-    one, other = (row[:74].copy() for row in ran.state[:2])
-    moved = np.concatenate([np.roll(one[:65].reshape(13, 5), -1, axis=0).ravel(), one[65:]])
-    assert np.abs(moved - other).max() < 1e-8
-    assert np.abs(one - other).max() > 1e-3
-    np.testing.assert_allclose(ran.strobe[0, 0, -len(WATCHED) :], ran.strobe[1, 0, -len(WATCHED) :], rtol=1e-6)
 
 
 @pytest.mark.wide
@@ -178,15 +130,7 @@ def test_a_lane_that_fails_spoils_no_other(swept):
     model, starts, both = swept
     assert list(both.outcome[0]) == ["successful", "outside"] and both.state[0, 1] == "failed"
     alone = jc.sweep_bearing(model, SPEED, starts=starts[:1], **SHORT)
-    for name in (
-        "cage_slip",
-        "pocket_force_max_N",
-        "friction_power_W",
-        "whirl_ratio",
-        "exponent",
-        "error",
-        "last_bodies",
-    ):
+    for name in ("cage_slip", "pocket_force_max_N", "friction_power_W", "whirl_ratio", "exponent", "error"):
         good, bad = getattr(both, name)[0]
         np.testing.assert_array_equal(good, getattr(alone, name)[0, 0])
         assert np.all(np.isnan(bad)) and np.all(np.isfinite(good))
@@ -220,13 +164,8 @@ def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
     assert [len(ax.lines) for ax in figure.axes] == [2] * 6
     np.testing.assert_allclose([line.get_ydata() for line in slip.lines], 100 * both.cage_slip.T)
     assert list(power.lines[0].get_ydata()) == list(both.friction_power_W[:, 0])
-    beside = bearings_beside(["a", "b"], [both, both])
-    first, second = beside.axes[0].lines
-    for line in (first, second):
-        assert np.asarray(line.get_ydata())[0] == pytest.approx(100 * both.cage_slip[0, 0])
-    assert len(bearings_beside([*"abcdefg"], [both] * 7).axes[0].lines) == 7  # more than there are colours
-    many = over_shaft_speed(both, np.tile(both.cage_slip, 4), "Cage slip")
-    assert len(many.lines) == 8
+    beside = bearings_beside([*"abcdefg"], [both] * 7).axes[0].lines  # more than there are colours
+    assert [np.asarray(line.get_ydata())[0] for line in beside] == pytest.approx([100 * both.cage_slip[0, 0]] * 7)
     over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
     cells = np.ravel(np.asarray(over.axes[0].collections[0].get_array(), float))
     np.testing.assert_allclose(cells, 100 * np.tile(both.cage_slip[:, 0], 2))
