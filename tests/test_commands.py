@@ -235,3 +235,18 @@ def test_runup(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     assert up["speeds_rpm"] == pytest.approx(down["speeds_rpm"], rel=2e-3) and up["speeds_rpm"][0] < 14100
     assert columns["orbit size up [m]"] == pytest.approx(up["orbit_size_m"])
     assert columns["shaft speed [rpm]"] * found["cage_speed_ratio"] == pytest.approx(columns["cage speed [rpm]"])
+
+
+@pytest.mark.wide
+def test_design_and_sensitivity(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """A search too short to find much: what is given stays or gets better, costs and balance in closed form."""
+    few = ["--first", "8000rpm", "--last", "14000rpm", "--speeds", "6", "--quick", "--out", str(tmp_path)]
+    search = ["--starts", "2", "--scouts", "2", "--steps", "1", "--batch", "4"]
+    found = document(capsys, "design", "1b", *few, *search)
+    assert found["objective"] <= found["objective_before"] and is_png(found["figure"])
+    assert found["vary"]["eccentricity"] == pytest.approx([4.6e-6, 23e-6])  # no worse balanced than it is
+    assert found["cost"]["before"] == pytest.approx(0.45 / 0.6 + 1)
+    grade = 23e-6 * 14000 * np.pi / 30 * 1e3  # [mm/s]
+    assert found["balance_grade_mm_per_s"]["before"] == pytest.approx(grade)
+    shares = document(capsys, "sensitivity", "1a", *few, "--samples", "2")
+    assert set(shares["sobol"]["total"]) == {"guidance_gap", "eccentricity"} and shares["edges"] == []

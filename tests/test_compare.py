@@ -1,34 +1,30 @@
-"""Two designs side by side: what differs, tables and figures on one scale, what probes would read."""
+"""Designs side by side: what differs, figures on one scale; the published edges beside ours."""
 
 import dataclasses
-import json
-from pathlib import Path
+import re
 
 import numpy as np
 import pytest
+from helpers import made_sweep
 from matplotlib.figure import Figure
 from report_example import swept
 
 import jaxcage as jc
-from jaxcage.analysis import orbit_measures
-from jaxcage.cli import main
-from jaxcage.orbits import Sensitivity
+from jaxcage.analysis import Edge, Zone, Zones, orbit_measures
+from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.plotting import over_speed, sweeps_beside
 from jaxcage.report import (
+    CONCLUSIONS,
     Compared,
-    at_speeds_compared,
-    compared_document,
-    compared_zones_table,
+    Runs,
+    compare_edges,
     differences,
     differences_table,
-    overall_table,
-    to_be_turned,
+    paper_diagrams,
+    reproduction,
+    run_all,
 )
 from jaxcage.sweeps import Motion, motions
-
-
-TINY = "--first 12000 --last 13000 --count 3 --discard 20 --revolutions 20 --horizon 0 --no-confirm".split()
-TINY += ["--solver", "rk4", "--steps", "256"]
 
 
 def planted(name: str, model: jc.CageModel, factor: float) -> Compared:
@@ -52,31 +48,8 @@ def test_only_what_differs_is_listed_in_the_units_people_read(pair: list[Compare
     assert set(found) == {"guidance_gap", "eccentricity"}
     assert found["guidance_gap"][1:] == ("0.45", "0.3", "mm", "-33.3 %")
     assert found["eccentricity"][1:] == ("23", "46", "µm", "+100 %")
-    warm = differences([pair[0].model, jc.replace(pair[0].model, temperature=323.15)])
-    assert warm["lubricant.temperature"][3:] == ("°C", "+10 K")
     same = differences_table(("a", "b"), [pair[0].model] * 2)
     assert [row[0] for row in same.rows] == ["nothing"]
-
-
-def test_another_law_is_a_difference_with_its_own_values():
-    model = jc.case("1a")
-    other = jc.replace(model, rib=jc.forces.ElasticRib(mass=1.0, stiffness=5e7, damping=500.0))
-    found = differences([model, other])
-    assert found["rib.kind"][1:3] == ("rigid", "elastic") and found["rib.mass"][1:3] == ("", "1")
-
-
-def test_tables_hold_both_designs(pair: list[Compared]):
-    rows = {row[0]: row[1:3] for row in overall_table(pair).rows}
-    share = float(np.mean(pair[0].swept.restless))
-    assert rows["speeds at which some start is chaotic"] == (f"{100 * share:.1f}",) * 2
-    assert rows["size of the orbit, mean over speed"] == ("0.1", "0.3")
-    assert rows["peak land force, mean over speed"] == ("1", "3")
-    zones = compared_zones_table(pair).rows
-    assert [row[:3] for row in zones] == [(n, "any", i) for n in ("first", "second") for i in ("1", "2")]
-    at = at_speeds_compared(pair, [100]).rows
-    assert [row[2] for row in at] == ["first", "second"]
-    assert at[0][1] == at[1][1] == "12500" and [row[5] for row in at] == ["0.100", "0.300"]
-    assert compared_document(pair[1])["means"]["mean_wear_load_N_m_per_s"] == pytest.approx(6.0)
 
 
 def test_figures_show_both_on_the_scale_that_holds_both(pair: list[Compared]):
@@ -94,43 +67,6 @@ def test_figures_show_both_on_the_scale_that_holds_both(pair: list[Compared]):
     assert lines.get_ylim()[1] > 0.3 and lines.get_legend() is not None
 
 
-def test_bars_show_what_a_designer_can_turn():
-    model = jc.case("1a")
-    every = dict.fromkeys(jc.parameters(model), 0.1)
-    one = Sensitivity("zone 1 onset", "fold", 9000.0, every, every, {}, 0.1, "converged")
-    (found,) = to_be_turned(model, [one])
-    assert {"guidance_gap", "eccentricity", "cage_mass"} <= set(found.elasticity) < set(every)
-    assert not {"stiffness_x", "cubic_stiffness", "amplitude", "onset", "gravity"} & set(found.elasticity)
-
-
-def test_speeds_outside_and_unknown_cases_are_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    assert main(["compare", "1a", "1b", "--at", "99000", "--out", str(tmp_path)]) == 2
-    assert "Option --at must lie between --first and --last" in capsys.readouterr().err
-    assert main(["compare", "1a", "9z", "--out", str(tmp_path)]) == 2
-    assert "Case '9z' is unknown" in capsys.readouterr().err
-    (large := tmp_path / "large.toml").write_text(
-        'base = "1a"\n[bearing]\nbore = 0.2\ninner_raceway_diameter = 0.26\nroller_diameter = 0.052\n'
-        "rib_diameter = 0.35\noutside_diameter = 0.42\nwidth = 0.08\nroller_length = 0.052\n"
-    )
-    assert main(["compare", "1a", str(large), "--out", str(tmp_path)]) == 2
-    assert "at which the other's land runs at 300 m/s" in capsys.readouterr().err
-
-
-@pytest.mark.wide
-def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    other = tmp_path / "narrow.toml"
-    other.write_text('base = "1a"\nguidance_gap = "0.3 mm"\n[bearing]\nroller_diameter = "15 mm"\n')
-    asked = ["compare", "1a", str(other), *TINY, "--at", "12321", "--out", str(tmp_path), "--json"]
-    assert main(asked) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert set(found["differences"]) == {"guidance_gap", "bearing.roller_diameter"}
-    first, second = found["designs"]["1a"], found["designs"]["narrow"]
-    assert len(first["speeds_rpm"]) == 4 and any(abs(x - 12321) < 1e-6 for x in first["speeds_rpm"])
-    assert second["shaft_speeds_rpm"] == pytest.approx(first["shaft_speeds_rpm"])
-    assert second["speeds_rpm"] != pytest.approx(first["speeds_rpm"])
-    assert Path(found["figure"]).name == "compare_1a_narrow.png" and Path(found["measures"]).exists()
-
-
 @pytest.mark.wide
 def test_size_and_whirl_against_a_time_history():
     model = jc.case("1a")
@@ -142,3 +78,88 @@ def test_size_and_whirl_against_a_time_history():
     x, y = np.ptp(run.state[:, :2], axis=0)
     assert motion.horizontal[0, 0] == pytest.approx(x, rel=0.01) and motion.vertical[0, 0] == pytest.approx(y, rel=0.01)
     assert motion.whirl_order[0, 0] == pytest.approx(orbit_measures(model, run).whirl_ratio, abs=0.01)
+
+
+def zone(onset, leaves):
+    edge = lambda rpm: None if rpm is None else Edge(float(rpm), 100.0, "chaotic", "fold")
+    return Zone("chaotic", edge(onset), edge(leaves), 1.0)
+
+
+def ours(zones, case="1a"):
+    return [row.ours_rpm for row in compare_edges(PUBLISHED_CASES[case], zones, "lasting")]
+
+
+def test_edges_of_the_zones_that_overlap_most():
+    """Published for 1a: 9100 to 12000 and from 25500."""
+    assert ours([zone(4500, 5000), zone(9000, 12500), zone(25000, None)]) == [9000, 12500, 25000]
+    assert ours([zone(9000, 9500), zone(10000, 13000), zone(26000, 27000)]) == [10000, 13000, 26000]
+    assert ours([zone(9000, 12000), zone(22000, 27000), zone(27400, None)]) == [9000, 12000, 22000]
+
+
+def test_errors_are_relative_to_what_was_published():
+    rows = compare_edges(PUBLISHED_CASES["1a"], [zone(9100 * 1.1, 12000 * 0.95)], "lasting")
+    assert rows[0].error_percent == pytest.approx(10.0)
+    assert rows[1].error_percent == pytest.approx(-5.0)
+    assert rows[2].error_percent is None
+    assert (rows[0].mechanism, rows[0].uncertainty_rpm, rows[0].kind) == ("fold", 100.0, "lasting")
+
+
+def by_hand(zones, speeds=8):
+    """Runs of all cases with the same zones, in which every lane drew the same points."""
+    points = np.random.default_rng(0).uniform(-1e-4, 1e-4, (speeds, 1, 40, 4))
+    growth, followed = np.full((speeds, 1, 2, 1), 0.1), dict(escape=np.full((speeds, 1), np.inf), horizon=3000)
+    swept = made_sweep(np.linspace(2500, 27500, speeds), points, growth, scale=np.full((speeds, 4), 1e-4), **followed)
+    cases = lambda value: dict.fromkeys(PUBLISHED_CASES, value)
+    found = Zones(tuple(zones), (), 100.0, 500.0)
+    models = {name: jc.case(name) for name in PUBLISHED_CASES}
+    return Runs(models, cases(swept), cases(found), {}, cases(swept))
+
+
+def test_figures_of_the_paper_from_given_runs():
+    """Only the pairs whose two cases were run."""
+    runs = by_hand([zone(9000, 12000)])
+    drawn = dict(paper_diagrams(runs))
+    assert list(drawn) == ["fig7a", "fig8a", "fig7b", "fig8b", "fig7c", "fig8c"]
+    assert all(figure.axes for figure in drawn.values())
+    cells = drawn["fig7a"].axes
+    assert [ax.get_title(loc="left")[:8] for ax in cells] == ["Case 1a:", "Case 1b:"]
+    few = dataclasses.replace(runs, sweeps={"1a": runs.sweeps["1a"], "2a": runs.sweeps["2a"], "2b": runs.sweeps["2b"]})
+    assert [name for name, _ in paper_diagrams(few)] == ["fig7b", "fig8b"]
+
+
+def test_zones_of_every_kind_from_given_runs():
+    """What lasts is as given; at first, lanes whose exponent is .1 are chaotic at every speed."""
+    kinds = by_hand([zone(9000, 12000)]).zones_by_kind("1a")
+    assert list(kinds) == ["lasting", "at first"]
+    assert [len(found) for found in kinds.values()] == [1, 1]
+    (at_first,) = kinds["at first"]
+    assert at_first.onset is None and at_first.exit is None and at_first.share == 1.0
+    assert kinds["lasting"][0].exit is not None and kinds["lasting"][0].exit.speed_rpm == 12000
+
+
+@pytest.fixture(scope="module")
+def runs():
+    models = {name: jc.case(name, "preliminary") for name in PUBLISHED_CASES}
+    return run_all(models, speeds=26, discard=40, revolutions=40, section_revolutions=44, orbits=False)
+
+
+@pytest.mark.wide
+def test_every_conclusion_has_evidence_and_a_verdict(runs):
+    document, tables, notes = reproduction(runs)
+    assert [len(table.rows) for table in tables] == [6, 18, 7] and len(document["edges"]) == 36
+    for c in document["conclusions"]:
+        assert c["verdict"] in ("holds", "holds in part", "does not hold") and re.search(r"\d", c["evidence"])
+        assert any(c["evidence"] in note for note in notes)
+    evidence = [c["evidence"] for c in document["conclusions"]]
+    outer, inner, roller = map(float, re.findall(r"([+-][\d.]+) um", evidence[-1]))
+    assert outer == 0.0 and inner == roller > 1.0  # (1), (5), (6)
+    ratio = float(evidence[1].split(" times")[0].split()[-1])
+    assert ratio == pytest.approx(2 ** (20 / 19), rel=0.02)  # Hertz impact on a stiff bar
+
+
+def test_a_verdict_can_be_no():
+    """Six cases with the same zone: the gap does nothing, and there is no second zone."""
+    same = by_hand([zone(9000, 12000)])
+    assert CONCLUSIONS[0](same).verdict == "does not hold"
+    oil = CONCLUSIONS[5](same)
+    assert oil.verdict == "holds in part" and "zone 1 exit +0.0 %, zone 2 onset no such edge" in oil.evidence

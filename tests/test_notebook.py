@@ -5,7 +5,6 @@ import html
 import re
 from typing import Any
 
-import jax.numpy as jnp
 import pytest
 from report_example import findings, orbits, slopes, swept
 
@@ -33,24 +32,13 @@ def results() -> dict[str, Any]:
     }
 
 
-def words(text: str) -> list[str]:
-    """Everything that is not a gap."""
-    return text.split()
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_html_has_the_words_and_numbers_of_the_text(name: str):
     result = results()[name]
     shown = result._repr_html_()
-    assert words(html.unescape(re.sub(r"<[^>]*>", " ", shown))) == words(str(result))
+    assert html.unescape(re.sub(r"<[^>]*>", " ", shown)).split() == str(result).split()
     assert shown.count("<tr>") == len(str(result).splitlines()) - 1
     assert "<strong>" in shown
-
-
-def test_loss_zones_say_their_edges():
-    text = str(results()["loss"])
-    assert "zone 1: 7000.00 rpm (fold) to 12000.00 rpm (period-doubling), 5000.00 rpm wide" in text
-    assert "zone 2: 20000.00 rpm (Neimark-Sacker) to above the range, open" in text
 
 
 def test_words_are_escaped():
@@ -64,21 +52,3 @@ def test_words_are_escaped():
         '<div><strong>a &lt; b</strong><table><tbody><tr><td style="text-align: left">c &amp; d:</td>'
         '<td style="text-align: left">1</td></tr></tbody></table></div>'
     )
-
-
-def test_an_orbit_shows_its_multipliers():
-    orbit = jc.Orbit(
-        state=jnp.zeros(4),
-        speed=jnp.array(900.0),
-        multipliers=jnp.array([0.5 + 0.1j, 0.5 - 0.1j, 0.2, 0.1]),
-        monodromy=jnp.eye(4),
-        residual=jnp.array(1e-12),
-        liouville=jnp.array(0.0),
-        converged=jnp.array(True),
-        iterations=jnp.array(3),
-        periods=jnp.array(1),
-        steps=jnp.array(512),
-        error=jnp.array(1e-8),
-        solver=jc.method(),
-    )
-    assert "0.5+0.1j" in orbit._repr_html_() and "8594.4 rpm" in orbit._repr_html_()

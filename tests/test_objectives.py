@@ -9,7 +9,6 @@ import pytest
 from helpers import double_well
 
 import jaxcage as jc
-from jaxcage.design import COSTS
 
 
 METHOD = jc.method("rk4", steps=64)
@@ -105,15 +104,6 @@ def test_derivatives_of_a_multiplier_against_autodiff():
         assert value == pytest.approx(float(jc.parameters(slope)[name]), rel=1e-7, abs=1e-9), name
 
 
-def test_cost_is_its_formula():
-    model = jc.case("1a")
-    space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 60e-6)})
-    got = agrees(jc.design.cost(), space, np.array([0.3, 0.7]))
-    gap, e = 0.3e-3 + 0.3 * 0.3e-3, 5e-6 + 0.7 * 55e-6
-    assert got.value == pytest.approx(0.45e-3 / gap + 23e-6 / e, rel=1e-12)
-    assert set(COSTS) == {"guidance_gap", "eccentricity"}
-
-
 def test_objectives_add_up(edges):
     width, price = jc.design.zone_width(edges), jc.design.Smooth(lambda s: 1 / jc.parameters(s)["damping"])
     both = agrees(2.0 * width + price * 0.5 - width, SPACE, SPACE.place)
@@ -124,17 +114,6 @@ def test_objectives_add_up(edges):
 
 CHAOS = dict(starts=1, discard=60, revolutions=40)
 CHAOS_SPACE = jc.DesignSpace.of(double_well(), {"damping": (0.2, 0.45), "cubic": (0.7, 1.4)})
-
-
-@pytest.mark.wide
-def test_a_share_is_a_mean_over_the_hours():
-    spectrum = [(9.0, 10.0, 3.0), (11.0, 12.0, 1.0)]
-    share = jc.design.chaotic_share(spectrum, count=6, **CHAOS)
-    chaos = share.chaos(CHAOS_SPACE, np.array([[0.4, 0.5]]))[0]
-    assert share.weights.sum() == pytest.approx(1.0)
-    assert share.values(CHAOS_SPACE, np.array([[0.4, 0.5]]))[0] == pytest.approx(
-        0.75 * chaos[:6].mean() + 0.25 * chaos[6:].mean(), rel=1e-12
-    )
 
 
 @pytest.mark.wide
@@ -176,14 +155,9 @@ def test_scatter_laws():
     [
         (lambda: jc.DesignSpace.of(double_well(), {"heat": (0.0, 1.0)}), "must be a parameter"),
         (lambda: jc.DesignSpace.of(double_well(), {"damping": (1.0, 0.5)}), "must ascend"),
-        (lambda: jc.design.FollowedEdges({}), "at least one edge"),
-        (lambda: jc.DesignSpace.of(double_well(), {}), "at least one parameter"),
-        (lambda: jc.design.chaotic_width(9.0, 14.0, softness=0.0), "must be positive"),
         (lambda: jc.design.chaotic_share([(9.0, 12.0, 1.0), (11.0, 14.0, 1.0)]), "do not overlap"),
         (lambda: jc.design.Robust(jc.design.cost(), {}, draws=1), "at least 2"),
         (lambda: jc.design.uniform(3.0), "Argument `half_width` must be at least 0 and below 1, but 3 was given."),
-        (lambda: jc.design.regular_motion("noise", 1.0, (0.0,)), "must be one of displacement"),
-        (lambda: jc.design.StabilityMargin(np.ones(2), np.ones((1, 2))), "a state for each speed"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, words):
@@ -237,18 +211,3 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     assert own[0] > 100.0 and wear.relative(space, 1000.0).values(space, space.place[None]) == pytest.approx([1000.0])
     with pytest.raises(ValueError, match="`what` must be one of wear load, .* but 'least film' was given"):
         least.relative(space, 1000.0)
-
-
-def test_sobol_indices_say_when_they_are_not_to_be_believed():
-    row = lambda first, total: dict(first=dict(gap=first), total=dict(gap=total))
-    known = dict(first_interval=dict(gap=(0.4, 0.6)), total_interval=dict(gap=(0.5, 0.7)))
-    sure = jc.design.SobolIndices(**row(0.5, 0.6), **known, evaluations=192, samples=64)
-    assert sure.doubtful == () and sure.warning is None and sure.samples_wanted == 64
-    above = dataclasses.replace(sure, **row(0.5, 1.19), total_interval=dict(gap=(1.08, 1.31)))
-    assert above.doubtful == ("gap",) and "between 0 and 1" in str(above.warning) and above.samples_wanted == 128
-    below = dataclasses.replace(sure, **row(-0.002, 0.24), first_interval=dict(gap=(-0.06, 0.05)))
-    assert below.doubtful == ()
-    wide = dataclasses.replace(sure, first_interval=dict(gap=(-0.1, 1.1)))  # 1.2 wide: 16 times the samples for .3
-    assert wide.doubtful == ("gap",) and wide.samples_wanted == 1024 and "1024 base samples" in str(wide)
-    none = dataclasses.replace(sure, total_interval=dict(gap=(float("nan"), float("nan"))))
-    assert none.doubtful == ("gap",) and none.samples_wanted == 1024

@@ -11,6 +11,8 @@ from literature import DUFFING_FOLDS
 
 import jaxcage as jc
 from jaxcage.models import FirstOrderField
+from jaxcage.plotting import ramp_figure
+from jaxcage.sweeps import Ramped, RampUpDown, ramp_revolutions, ramp_up_down
 
 
 def duffing(tau, q, v, speed):
@@ -119,44 +121,6 @@ def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():
     assert np.max(np.abs(run.state[-8:, 0] - steady.state[:, 0])) < 5e-3
 
 
-@pytest.mark.parametrize(
-    "change, words",
-    [
-        ({"speeds": np.array([])}, "at least one speed"),
-        ({"speeds": np.array([0.0, 1.0])}, "positive and finite"),
-        ({"speeds": np.array([1.0, -1.0])}, "positive and finite"),
-        ({"speeds": np.array([1.0, np.nan])}, "positive and finite"),
-        ({"speeds": np.array([2.0, 1.0])}, "ascending"),
-        ({"discard": -1}, "`discard` must be at least 0, but -1"),
-        ({"revolutions": 0}, "`revolutions` must be at least 1"),
-        ({"exponents": 3}, "at most 2"),
-        ({"blocks": 7}, "divide"),
-        ({"starts": []}, "states of 2 numbers"),
-        ({"starts": [(1.0,)]}, "states of 2 numbers"),
-        ({"starts": np.zeros((1, 1, 3))}, "states of 2 numbers"),
-    ],
-)
-def test_impossible_requests_are_refused(change: dict, words: str):
-    request = {"speeds": np.array([1.0]), "discard": 1, "revolutions": 10, "blocks": 2, "method": FAST} | change
-    with pytest.raises(ValueError, match=words):
-        raw_sweep(HARDENING, request.pop("speeds"), **request)
-
-
-@pytest.mark.parametrize(
-    "options, words",
-    [
-        ({"solver": "euler"}, "must be one of"),
-        ({"steps": 0}, "at least 1"),
-        ({"steps": 10, "tolerance": 1e-3}, "must not both"),
-        ({"tolerance": 2.0}, "between 0 and 1"),
-        ({"solver": "newmark", "tolerance": 1e-3}, "must be one of"),
-    ],
-)
-def test_unknown_methods_are_refused(options: dict, words: str):
-    with pytest.raises(ValueError, match=words):
-        jc.method(**options)
-
-
 class Decay(jc.models.AbstractForcedSystem):
     """It falls to zero from where it starts, its farthest point."""
 
@@ -245,3 +209,52 @@ def test_kept_states_are_the_last_ones_where_little_is_followed(horizon, followe
     assert found.label[0, 0] == whole.label[0, 0] == "undecided"
     assert np.allclose(found.strobe, whole.strobe, rtol=1e-9)
     assert np.array_equal(found.strobe[0, 0, -1], found.last[0, 0])
+
+
+def planted(up: np.ndarray, down: np.ndarray, scatter: float) -> RampUpDown:
+    rpm = np.linspace(5000.0, 9000.0, up.size)
+    way = lambda size: Ramped(rpm, size, np.full(size.size, scatter), size / 4e-4)
+    return RampUpDown(way(up), way(down), 400, 2.0, (1000.0, 1800.0))
+
+
+def test_a_ramp_takes_as_long_as_its_rate_says():
+    first, last, seconds = 300.0, 1500.0, 7.0
+    count = ramp_revolutions(first, last, seconds)
+    speed = first + (last - first) * (np.arange(64 * count) + 0.5) / (64 * count)
+    assert np.sum(2 * np.pi / 64 / speed) == pytest.approx(seconds, rel=1e-3)
+
+
+def test_a_jump_in_one_direction_is_hysteresis_and_scatter_is_not():
+    size = np.linspace(1e-4, 3e-4, 40)
+    late = size.copy()
+    late[15:22] += 1e-4
+    found = planted(size, late, 2e-6)
+    assert np.flatnonzero(found.apart).tolist() == list(range(15, 22))
+    ((low, high),) = found.stretches
+    assert (low, high) == pytest.approx((found.up.rpm[15], found.up.rpm[21]))
+    assert not np.any(planted(size, late, 6e-5).apart)
+    alone = size.copy()
+    alone[10] += 1e-4
+    assert not np.any(planted(size, alone, 2e-6).apart)
+    labels = {text.get_text() for legend in ramp_figure(found).legends for text in legend.get_texts()}
+    assert {"run-up", "run-down", "differs: hysteresis"} <= labels
+
+
+def test_chaos_alone_is_no_hysteresis():
+    """Sizes and halves that scatter alike both ways: of 2000 windows hardly any is taken for a difference."""
+    rng, rpm = np.random.default_rng(0), np.linspace(5000.0, 9000.0, 2000)
+
+    def way() -> Ramped:
+        half = 1e-4 * (1 + 0.2 * rng.standard_normal((2000, 2)))
+        return Ramped(rpm, half.max(axis=1), np.abs(half[:, 1] - half[:, 0]), half[:, 0])
+
+    assert np.sum(RampUpDown(way(), way(), 400, 2.0, (1.0, 1.0)).apart) <= 10
+
+
+@pytest.mark.wide
+def test_at_a_crawl_it_is_the_orbit_at_that_speed():
+    model, method = jc.case("1a"), jc.method("rk4", steps=256)
+    found = ramp_up_down(model, *jc.rpm(15000, 15001), jc.rpm(0.5), windows=4, settle=200, method=method)
+    run = jc.simulate(model, jc.rpm(15000), revolutions=200, samples=32, discard=200, method=method)
+    size = float(np.max(np.ptp(run.state[:, :2], axis=0)))
+    assert found.up.size == pytest.approx(size, rel=0.05) and found.down.size == pytest.approx(size, rel=0.05)

@@ -40,7 +40,7 @@ def test_the_objective_is_what_the_terms_are_beside_now():
     eccentricity = space.values(place)["eccentricity"]
     expected = 3 * ratio("friction_power_W") + ratio("cage_slip") + 2 * eccentricity / 23e-6
     found = objective.values(space, np.array([space.place, place]))
-    np.testing.assert_allclose(found, [1.0, expected / 6], rtol=1e-6)
+    np.testing.assert_allclose(found, [1.0, expected / 6], rtol=1e-3)
 
 
 @pytest.mark.wide
@@ -51,9 +51,9 @@ def test_before_and_after_are_of_the_same_starts():
     found, here, there = {row.name: row for row in rows}, swept(MODEL), swept(better)
     power = found["friction_power_W"]
     change = (there.friction_power_W - here.friction_power_W)[0]
-    assert failed == 0 and power.unit == "W" and power.before == pytest.approx(here.friction_power_W.mean())
-    assert power.change == pytest.approx(change.mean()) and power.change < 0
-    assert power.change_error == pytest.approx(change.std(ddof=1) / np.sqrt(change.size), rel=0.5)
+    assert failed == 0 and power.unit == "W" and power.before == pytest.approx(here.friction_power_W.mean(), rel=1e-3)
+    assert power.change == pytest.approx(change.mean(), rel=1e-2) and power.change < 0
+    assert power.change_error == pytest.approx(change.std(ddof=1) / np.sqrt(change.size), rel=0.05)
     grade = found["balance_grade_mm_per_s"]
     assert grade.before == pytest.approx(23e-3 * float(MODEL.rolling_cage_speed(SPEED)))
     assert grade.change == pytest.approx(-13 / 23 * grade.before)
