@@ -56,7 +56,7 @@ unwrap = inspect.unwrap
         (lambda: jc.equilibrium(CASE, -900.0), "`speed` must be positive and finite, at most .*, but -900"),
         (lambda: jc.forces.film_scale(0.1, 1.0, 0.0, 1.0), "`width` must be positive and finite, but 0.0"),
         (lambda: jc.forces.synchronous_force(tau=2**63, amplitude=1.0), "`tau` must be a number, of 64 bits"),
-        (lambda: jc.bearing.guiding_radius(92.1e-3, 0.0), "`guidance_gap` must be positive and finite"),
+        (lambda: jc.bearing.raceway_surface_speed(1.0, 0.0), "`raceway_diameter` must be positive and finite"),
     ],
 )
 def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):

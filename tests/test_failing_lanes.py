@@ -9,18 +9,16 @@ import pytest
 from helpers import even, raw_sweep, wide_but
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES, method, outcome_code
-from jaxcage.models import case
-from jaxcage.sweeps import sweep
+from jaxcage.integrate import OUTCOMES, outcome_code
 
 
-MODEL = case("1a", "preliminary")
+MODEL = jc.case("1a", "preliminary")
 RPM = np.pi / 30
 C = 0.45e-3
 HEALTHY = (0.4 * C, 0.3 * C, 0.0, 0.0)
 OTHER = (0.0, -0.5 * C, 0.0, 0.0)
 THIRD = (0.1 * C, -0.2 * C, 0.0, 0.1)
-METHOD = method("rk4", steps=256)
+METHOD = jc.method("rk4", steps=256)
 SETTINGS = dict(discard=12, revolutions=16, blocks=4, keep=8, confirm=False, horizon=0, method=METHOD)
 SPEEDS = RPM * np.array([9000.0, 15000.0])
 FIELDS = "strobe", "last", "block_growth", "peak", "outcome"
@@ -54,10 +52,10 @@ def test_bad_start_fails_alone(bad, place, confirm):
     start, outcome = BAD_STARTS[bad]
     states = [HEALTHY, OTHER, THIRD]
     settings = SETTINGS | (dict(confirm=True, horizon=3000) if confirm else {})
-    healthy = sweep(MODEL, SPEEDS, starts=states, **settings)
+    healthy = jc.sweep(MODEL, SPEEDS, starts=states, **settings)
     assert not np.any(healthy.failed)
     states[place] = start
-    mixed = sweep(MODEL, SPEEDS, starts=states, **settings)
+    mixed = jc.sweep(MODEL, SPEEDS, starts=states, **settings)
     others = np.s_[:, [i for i in range(3) if i != place]]
     assert_same_bytes(mixed, healthy, others)
     np.testing.assert_array_equal(mixed.label[others], healthy.label[others])

@@ -3,14 +3,12 @@
 Parameters, speeds and states are drawn from physical ranges. One program serves all draws of a test.
 """
 
-from unittest import mock
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range, elastic, even, in_other_units, raw_sweep, wide_but
+from helpers import beyond_range, elastic, even, in_other_units, wide_but
 from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
@@ -126,20 +124,6 @@ def test_mirrored_states_have_mirrored_forces(film, cross, design, speed, tau, s
         np.testing.assert_allclose(
             there[law], FLIP * here[law], rtol=0, equal_nan=False, atol=1e-11 * size + 1e-12, err_msg=law
         )
-
-
-@pytest.mark.wide
-@random(50)
-@given(designs, speeds, states(0.0, 1.2))
-def test_mirror_image_of_the_fixed_half_is_the_other_half(design, speed, state):
-    """The arc is fixed for rotation counter-clockwise: in a mirror it is what is missing to the whole circle."""
-    full, half = (
-        jc.replace(CASE, **{**design, "supply_pressure": 0.0, "film.model": film}) for film in ("full", "fixed_half")
-    )
-    y = in_si(full, speed, state)
-    here = forces(half, speed, 0.0, y)["film"]
-    whole, part = (forces(mirrored(m), -speed, 0.0, y * np.tile(FLIP, 2))["film"] for m in (full, half))
-    np.testing.assert_allclose(whole - part, FLIP * here, rtol=0, equal_nan=False, atol=1e-11 * np.linalg.norm(whole))
 
 
 UNITS = "mass", "length", "time"
@@ -304,34 +288,6 @@ def test_revolutions_in_other_units(kind, design, speed, cage, rib, scales):
     end = after(model, speed, start)
     found = after(rescaled(model, jnp.asarray(scales)), speed / scales[2], start)
     np.testing.assert_allclose(found, end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
-@pytest.mark.wide
-@random(15)
-@given(speeds, between(0.95, 1.05), units)
-def test_exponents_in_other_units(speed, gap, scales):
-    """Of ten revolutions, from three starts."""
-    model = jc.replace(CASE, guidance_gap=float(CASE.guidance_gap) * gap)
-    options = dict(discard=2, revolutions=10, blocks=2, keep=1, exponents=1, method=EXPLICIT)
-    here = raw_sweep(model, speed, **options)
-    with mock.patch("jaxcage.models._door.FASTEST", np.inf):
-        there = raw_sweep(rescaled(model, jnp.asarray(scales)), speed / scales[2], **options)
-    np.testing.assert_allclose(there.block_growth, here.block_growth, rtol=0, equal_nan=False, atol=1e-7)
-    np.testing.assert_allclose(there.last / there.scale, here.last / here.scale, rtol=0, equal_nan=False, atol=1e-7)
-
-
-@pytest.mark.wide
-@random(12)
-@given(between(jc.rpm(14000.0), jc.rpm(19000.0)), units)
-def test_orbits_in_other_units(speed, scales):
-    here = jc.periodic_orbit(CASE, speed, revolutions=60, method=EXPLICIT)
-    other = rescaled(CASE, jnp.asarray(scales))
-    with mock.patch("jaxcage.models._door.FASTEST", np.inf):
-        there = jc.periodic_orbit(other, speed / scales[2], revolutions=60, method=EXPLICIT)
-    assert here.status == there.status == "converged"
-    np.testing.assert_allclose(there.multipliers, here.multipliers, rtol=0, equal_nan=False, atol=1e-9)
-    place = np.repeat([scales[1], scales[1] / scales[2]], 2)
-    np.testing.assert_allclose(there.state / place, here.state, rtol=1e-9)
 
 
 # --- energy and phase volume -----------------------------------------------------------------

@@ -262,22 +262,3 @@ def test_map_of_a_system_agrees_with_a_sweep():
     assert np.any(found.too_short) and "lanes have no certain label" in str(found)
     assert found.kind.shape == (9, 8) and 0 < np.sum(found.kind == 1) < found.kind.size
     assert np.array_equal(found.top_exponent, np.max(found.largest_exponent, axis=2))
-
-
-@pytest.mark.wide
-def test_chaos_must_persist_if_asked():
-    """Starts found chaotic are judged again after more revolutions, all others stay as they were."""
-    system = jc.ForcedOscillator(Ueda(jnp.array(7.5)), coordinates=1)
-    x, y = {"speed": np.linspace(0.95, 1.15, 9)}, {"force": np.linspace(6.0, 8.0, 6)}
-    length = dict(revolutions=60, blocks=6, method=jc.method("rk4", steps=64), starts=2)
-    soon, late = (jc.label_map(system, x, y, discard=n, **length) for n in (20, 400))
-    found = jc.label_map(system, x, y, discard=20, persist=400, **length)
-    chaotic = soon.label == LABELS.index("chaotic")
-    assert np.array_equal(found.label, np.where(chaotic, late.label, soon.label))
-    assert np.array_equal(found.largest_exponent, np.where(chaotic, late.largest_exponent, soon.largest_exponent))
-    died = chaotic & (found.label != LABELS.index("chaotic"))
-    assert 0 < np.sum(died) < np.sum(chaotic)  # transients and attractors both
-    with pytest.raises(ValueError, match="`persist` must be 0 or above the 20 revolutions discarded, but is 20"):
-        jc.label_map(system, x, y, discard=20, persist=20, **length)
-    with pytest.raises(ValueError, match="Arguments `x` and `y` must have at least 2 values each, but have 9 and 1"):
-        jc.label_map(system, x, {"force": np.array([6.0])}, **length)

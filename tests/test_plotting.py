@@ -1,7 +1,6 @@
 """Figures show what they should: points, limits, units, zones at the right speeds, colours that are told apart."""
 
 import itertools
-from pathlib import Path
 
 import matplotlib
 import matplotlib.image
@@ -10,13 +9,11 @@ import pytest
 from helpers import cage_sweep
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
-from matplotlib.colors import to_hex, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones, zones
-from jaxcage.bearing import load_distribution
-from jaxcage.cli import main
 from jaxcage.orbits import Branch, Curve, Point, Sensitivity
 from jaxcage.plotting import (
     BLACK,
@@ -34,7 +31,6 @@ from jaxcage.plotting import (
     branch_diagram,
     elasticity_bars,
     exponent_strip,
-    load_bars,
     multiplier_circle,
     orbit,
     orbit_diagram,
@@ -138,16 +134,6 @@ def test_time_history_and_orbit(elastic: bool):
     assert circle.get_radius() == pytest.approx(0.45) and ax.get_aspect() == 1.0
     np.testing.assert_allclose(np.hypot(*np.asarray(path.get_xydata()).T), 0.1)
     assert np.asarray(strobe.get_xydata()) == pytest.approx(np.array([[0.1, 0.0]] * 2))
-
-
-def test_load_bars():
-    shared = load_distribution(jc.bearing.nu2310())
-    bars = [p for p in load_bars(shared).patches if isinstance(p, Rectangle)]
-    tallest = max(bars, key=lambda bar: bar.get_height())
-    assert len(bars) == 13 and tallest.get_height() == pytest.approx(float(shared.max_load))
-    assert tallest.get_x() + tallest.get_width() / 2 == pytest.approx(0, abs=1e-9)
-    loaded = [bar.get_x() + bar.get_width() / 2 for bar in bars if bar.get_height() > 0]
-    assert max(loaded) == pytest.approx(-min(loaded)) and max(loaded) < np.degrees(float(shared.half_angle))
 
 
 # Branches, multipliers, elasticities, curves.
@@ -323,12 +309,3 @@ def test_text_and_data_stand_out_from_the_paper(style: str):
     assert contrast(shown(BLACK), shown(PAPER)) > 7.0 and contrast(shown(BLACK), shown(ZONE)) > 7.0
     for colour in {c for cycle in CYCLES for c in cycle}:
         assert contrast(shown(colour), shown(PAPER)) > 2.2, colour
-
-
-@pytest.mark.parametrize("style", ["dark", "print"])
-def test_commands_draw_in_the_style_asked_for(capsys: pytest.CaptureFixture[str], tmp_path: Path, style: str):
-    assert main(["statics", "1a", "--out", str(tmp_path), "--style", style]) == 0
-    capsys.readouterr()
-    image = matplotlib.image.imread(tmp_path / "statics_1a.png")
-    assert to_hex(image[0, 0, :3]) == STYLES[style].get(PAPER, PAPER).lower()
-    assert image.shape[1] == pytest.approx(7.0 * (300 if style == "print" else 200), abs=2)

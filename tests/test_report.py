@@ -264,10 +264,3 @@ def test_figures_are_not_blank_in_either_scheme(
         drawn = np.any(np.abs(part - np.array(paper)) > 24, axis=-1)
         assert 0.005 < np.mean(drawn) < 0.9, name
         assert len(np.unique(part.reshape(-1, 3), axis=0)) > 20, name  # more than a frame
-
-
-@browser_test
-def test_it_prints(report: Path):
-    path = report.with_name("report.pdf")
-    browse(report, f"--print-to-pdf={path}", "--no-pdf-header-footer")
-    assert 4 <= len(re.findall(rb"/Type\s*/Page\b", path.read_bytes())) <= 14

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import jaxcage.integrate as ji
+import jaxcage as jc
 from jaxcage.analysis import (
     OrderSpectrum,
     dominant_orders,
@@ -18,7 +18,7 @@ def trajectory(signals, revolutions=20, samples=64, extra=0, speed=500.0):
     """Columns from functions of the phase."""
     tau = 2 * np.pi * np.arange(revolutions * samples + extra) / samples
     state = np.stack([f(tau) for f in signals], axis=1)
-    return ji.Trajectory(
+    return jc.Trajectory(
         time=tau / speed,
         tau=tau,
         state=state,

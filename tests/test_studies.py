@@ -23,15 +23,12 @@ from scipy import stats
 
 import jaxcage as jc
 from jaxcage.studies import (
-    KINDS,
-    LABELS,
     DamagedStore,
     OtherStudy,
     Plan,
     Store,
     Study,
     check_study,
-    kinds,
     label_names,
     open_study,
     run_study,
@@ -201,15 +198,6 @@ def test_samples_fill_their_distributions():
     assert np.array_equal(Plan({}, sampled, 100, 0, 1).cloud["b"], first["b"][:100])
 
 
-@pytest.mark.wide
-def test_what_no_tolerance_can_is_inaccurate_and_no_calm(tmp_path: Path):
-    """A lane beyond its tolerance is stored by its label, and on a map it counts as failed."""
-    coarse = jc.native(1e-3, error=1e-14)
-    found = duffing_study(tmp_path / "store", method=coarse)
-    assert set(label_names(found).values[..., :3, :, :].ravel()) == {"inaccurate"}
-    assert np.all(kinds(np.full((2, 2), LABELS.index("inaccurate"))) == KINDS.index("failed"))
-
-
 def study_of(damping: float = 0.1, system: Any = None, name: str = "duffing", version: str = "1", **more: Any) -> Study:
     """Two axes and two starts, in six chunks; the last one of the speeds is smaller."""
     plan = Plan({"speed": np.linspace(1.1, 1.9, 11)}, {}, 0, 0, 2, 4)
@@ -248,12 +236,8 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-def emptied(path: Path) -> None:
-    path.write_bytes(b"")
-
-
 @pytest.mark.parametrize("name", ["strobe/c/1/0/0/0", "label/c/5/0", "outcome/c/1/0"])
-@pytest.mark.parametrize("spoil", [deleted, flipped, cut, emptied])
+@pytest.mark.parametrize("spoil", [deleted, flipped, cut])
 def test_a_damaged_chunk_is_noticed_and_computed_again(
     finished: Path, store: Path, name: str, spoil: Callable[[Path], None]
 ):
@@ -329,11 +313,3 @@ def test_two_writers_at_once_leave_the_store_of_one(finished: Path, tmp_path: Pa
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda _: run_study(STUDY, store), range(4)))
     assert contents(store) == contents(finished) and [p.name for p in tmp_path.iterdir()] == ["study.zarr"]
-
-
-def test_a_chunk_of_nothing_but_missing_numbers_is_finished(tmp_path: Path):
-    results = STUDY.chunk(0)
-    lost = {name: np.full_like(x, np.nan) if x.dtype == float else x for name, x in results.items()}
-    store = Store(tmp_path / "study.zarr", STUDY)
-    store.write(0, lost)
-    assert Store(tmp_path / "study.zarr", STUDY).pending() == [1, 2, 3, 4, 5]

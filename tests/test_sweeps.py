@@ -10,7 +10,6 @@ from helpers import raw_sweep
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
-from jaxcage.models import FirstOrderField
 from jaxcage.plotting import ramp_figure
 from jaxcage.sweeps import Ramped, RampUpDown, ramp_revolutions, ramp_up_down
 
@@ -121,43 +120,6 @@ def test_ramp_follows_its_speed_and_agrees_with_steady_runs_when_slow():
     assert np.max(np.abs(run.state[-8:, 0] - steady.state[:, 0])) < 5e-3
 
 
-class Decay(jc.models.AbstractForcedSystem):
-    """It falls to zero from where it starts, its farthest point."""
-
-    @property
-    def dimension(self):
-        return 1
-
-    def at_speed(self, speed):
-        return FirstOrderField(lambda tau, y: (-0.1 * y[0],), speed)
-
-    def scale(self, speed):
-        return (jnp.ones(()),)
-
-    def starts(self, speed):
-        return ((jnp.asarray(0.8),),)
-
-    def excursion(self, y):
-        return jnp.abs(y[0])
-
-
-FALL = float(np.exp(-0.1 * 2 * np.pi))
-"""What is left after a revolution at speed 1."""
-
-
-@pytest.mark.parametrize("discard", [0, 1])
-def test_the_peak_of_a_run_counts_the_state_it_is_kept_from(discard: int):
-    run = jc.simulate(Decay(), 1.0, revolutions=2, samples=4, discard=discard, method=FAST)
-    assert run.peak == pytest.approx(0.8 * FALL**discard, rel=1e-6)
-    assert run.peak >= np.abs(run.state).max() * (1 - 1e-12)
-
-
-def test_a_lane_that_never_started_has_no_peak():
-    length = {"discard": 1, "revolutions": 1, "exponents": 0, "blocks": 1}
-    found = raw_sweep(Decay(), np.array([1.0]), starts=[(1.5,)], method=FAST, **length)
-    assert found.failed.all() and np.isnan(found.peak).all()
-
-
 RATE = 0.01
 """By which the clock decays in a revolution."""
 TURN = 2.0 * np.pi * (np.sqrt(5.0) - 1.0)
@@ -196,19 +158,6 @@ def test_lanes_leave_chaos_when_its_clock_says_so(turning):
     late = escape[leaves] - ends[leaves]
     assert np.all((late > -30) & (late <= 60)), late
     assert np.all(np.char.startswith(found.label[0][leaves & (ends > 120)], "transient"))
-
-
-@pytest.mark.parametrize("horizon, followed", [(100, 270), (600, 750)])
-def test_kept_states_are_the_last_ones_where_little_is_followed(horizon, followed):
-    """A lightly damped linear oscillator that is still on its way at the end, beside a run of the same length: of the
-    60 states kept the last 30 are of a stage of one block, or none is of those seen before."""
-    light = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.005 * v[0] - q[0] + jnp.cos(tau),), coordinates=1)
-    options: dict[str, Any] = LENGTH | dict(starts=[(1e6, 0.0)], keep=60)
-    found = jc.sweep(light, np.array([0.8]), **options, horizon=horizon)
-    whole = jc.sweep(light, np.array([0.8]), **options | dict(discard=30 + followed), horizon=0)
-    assert found.label[0, 0] == whole.label[0, 0] == "undecided"
-    assert np.allclose(found.strobe, whole.strobe, rtol=1e-9)
-    assert np.array_equal(found.strobe[0, 0, -1], found.last[0, 0])
 
 
 def planted(up: np.ndarray, down: np.ndarray, scatter: float) -> RampUpDown:

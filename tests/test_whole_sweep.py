@@ -6,15 +6,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from matplotlib.patches import Circle, FancyArrowPatch
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
-from jaxcage.analysis import around, bearing_history
 from jaxcage.integrate import SAMPLES, SPACING, STALLED, limits_of
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
 from jaxcage.plotting import (
-    bearing_figure,
     bearing_map_figure,
     bearing_sweep_figure,
     bearings_beside,
@@ -169,22 +166,6 @@ def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
     over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
     cells = np.ravel(np.asarray(over.axes[0].collections[0].get_array(), float))
     np.testing.assert_allclose(cells, 100 * np.tile(both.cage_slip[:, 0], 2))
-
-
-def test_the_bearing_is_drawn_to_scale(swept, run):
-    """Circles of the rollers' size at their places, an arrow for each force of note, at the sample of the largest."""
-    model, *_ = swept
-    history = bearing_history(model, run, SPEED)
-    figure = bearing_figure(model, run, history, around(history), {}, {})
-    drawing, (over_time,) = figure.axes[0], [ax for ax in figure.axes if ax.get_ylabel() == "Force [N]"]
-    rollers = [p for p in drawing.patches if isinstance(p, Circle)]
-    assert len(rollers) == 13 and {p.radius for p in rollers} == {500 * float(model.bearing.roller_diameter)}
-    worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
-    np.testing.assert_allclose([np.hypot(*p.center) for p in rollers], 1e3 * run.rollers[worst, 2])
-    forces = np.abs(history.pocket_force[worst])
-    arrows = [p for p in drawing.patches if isinstance(p, FancyArrowPatch)]
-    assert len(arrows) == np.sum(forces >= 0.01 * forces.max())
-    assert over_time.lines[0].get_ydata().max() == forces.max()
 
 
 def test_what_cannot_be_swept():
