@@ -1,70 +1,32 @@
 """Designs side by side: what differs, figures on one scale; the published edges beside ours."""
 
-import dataclasses
 import re
 
 import numpy as np
 import pytest
 from helpers import made_sweep
-from matplotlib.figure import Figure
-from report_example import swept
 
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones, orbit_measures
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.plotting import over_speed, sweeps_beside
 from jaxcage.report import (
     CONCLUSIONS,
-    Compared,
     Runs,
     compare_edges,
     differences,
-    differences_table,
-    paper_diagrams,
     reproduction,
     run_all,
 )
-from jaxcage.sweeps import Motion, motions
+from jaxcage.sweeps import motions
 
 
-def planted(name: str, model: jc.CageModel, factor: float) -> Compared:
-    """Chaotic from 9050 to 12050 and from 20050 rpm on, with orbits and loads `factor` times as large as the first."""
-    found = swept()
-    found = dataclasses.replace(found, strobe=factor * found.strobe)
-    size = np.full(found.outcome.shape, factor * 1e-4)
-    loads = {"wear load": np.full(found.speed.size, factor * 2.0), "peak land force": np.full(found.speed.size, factor)}
-    return Compared(name, model, found, jc.zones(found), Motion(size, size / 2, np.ones_like(size)), loads)
-
-
-@pytest.fixture(name="pair")
-def _pair() -> list[Compared]:
+def test_only_what_differs_is_listed_in_the_units_people_read():
     model = jc.case("1a")
-    other = jc.replace(model, guidance_gap=0.3e-3, eccentricity=46e-6)
-    return [planted("first", model, 1.0), planted("second", other, 3.0)]
-
-
-def test_only_what_differs_is_listed_in_the_units_people_read(pair: list[Compared]):
-    found = differences([one.model for one in pair])
+    found = differences([model, jc.replace(model, guidance_gap=0.3e-3, eccentricity=46e-6)])
     assert set(found) == {"guidance_gap", "eccentricity"}
     assert found["guidance_gap"][1:] == ("0.45", "0.3", "mm", "-33.3 %")
     assert found["eccentricity"][1:] == ("23", "46", "µm", "+100 %")
-    same = differences_table(("a", "b"), [pair[0].model] * 2)
-    assert [row[0] for row in same.rows] == ["nothing"]
-
-
-def test_figures_show_both_on_the_scale_that_holds_both(pair: list[Compared]):
-    figure = sweeps_beside([p.name for p in pair], [p.swept for p in pair], [p.zones for p in pair], (0.4, 0.4))
-    assert isinstance(figure, Figure)
-    above, below = figure.axes[:2], figure.axes[2:4]
-    for row in (above, below):
-        assert row[0].get_ylim() == row[1].get_ylim()
-    low, high = above[0].get_ylim()
-    points = 1e3 * np.concatenate([p.swept.strobe[..., 1].ravel() for p in pair])
-    assert low < points.min() and points.max() < high
-    curves = [("size [mm]", [1e3 * p.size for p in pair])]
-    lines = over_speed([p.name for p in pair], [p.rpm for p in pair], curves).axes[0]
-    assert [line.get_label() for line in lines.get_lines()] == ["first", "second"]
-    assert lines.get_ylim()[1] > 0.3 and lines.get_legend() is not None
+    assert differences([model, model]) == {}
 
 
 @pytest.mark.wide
@@ -113,28 +75,6 @@ def by_hand(zones, speeds=8):
     found = Zones(tuple(zones), (), 100.0, 500.0)
     models = {name: jc.case(name) for name in PUBLISHED_CASES}
     return Runs(models, cases(swept), cases(found), {}, cases(swept))
-
-
-def test_figures_of_the_paper_from_given_runs():
-    """Only the pairs whose two cases were run."""
-    runs = by_hand([zone(9000, 12000)])
-    drawn = dict(paper_diagrams(runs))
-    assert list(drawn) == ["fig7a", "fig8a", "fig7b", "fig8b", "fig7c", "fig8c"]
-    assert all(figure.axes for figure in drawn.values())
-    cells = drawn["fig7a"].axes
-    assert [ax.get_title(loc="left")[:8] for ax in cells] == ["Case 1a:", "Case 1b:"]
-    few = dataclasses.replace(runs, sweeps={"1a": runs.sweeps["1a"], "2a": runs.sweeps["2a"], "2b": runs.sweeps["2b"]})
-    assert [name for name, _ in paper_diagrams(few)] == ["fig7b", "fig8b"]
-
-
-def test_zones_of_every_kind_from_given_runs():
-    """What lasts is as given; at first, lanes whose exponent is .1 are chaotic at every speed."""
-    kinds = by_hand([zone(9000, 12000)]).zones_by_kind("1a")
-    assert list(kinds) == ["lasting", "at first"]
-    assert [len(found) for found in kinds.values()] == [1, 1]
-    (at_first,) = kinds["at first"]
-    assert at_first.onset is None and at_first.exit is None and at_first.share == 1.0
-    assert kinds["lasting"][0].exit is not None and kinds["lasting"][0].exit.speed_rpm == 12000
 
 
 @pytest.fixture(scope="module")

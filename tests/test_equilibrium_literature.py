@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range
 
 from jaxcage import replace, simulate
 from jaxcage.analysis import (
@@ -200,19 +199,6 @@ def test_forces_balance_at_the_equilibrium_of_the_full_model(name, rpm):
         assert abs(float(rest)) < 1e-9 * float(model.cage_mass) * 9.81
     assert 0 < float(at.eccentricity_ratio) < 0.1  # the support carries most of the weight
     assert float(at.growth_rate) < 0 and at.eigenvalues.shape == (4,)
-
-
-@pytest.mark.wide
-def test_light_support_adds_its_stiffness_to_the_eigenvalues():
-    """Without weight and film the cage is two oscillators: w^2 = K/M - (B/2M)^2."""
-    model = replace(case("1a", "preliminary"), gravity=0.0, cross_stiffness=0.0, stiffness_y=9000.0)
-    model = beyond_range(model, land_width=1e-7)
-    at = equilibrium(model, 500.0, start=jnp.array([1e-6, 2e-6]))
-    np.testing.assert_allclose(at.coordinates, 0.0, atol=1e-12)
-    mass, rate = 0.212227, 3.3136 / (2 * 0.212227)
-    np.testing.assert_allclose(at.eigenvalues.real, -rate, rtol=1e-6)
-    expected = [np.sqrt(k / mass - rate**2) for k in (9000.0, 37402.4)]
-    np.testing.assert_allclose(np.sort(np.abs(at.eigenvalues.imag))[::2], expected, rtol=1e-6)
 
 
 @pytest.mark.wide

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range, elastic, even, in_other_units, wide_but
+from helpers import beyond_range, elastic, in_other_units, wide_but
 from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
@@ -256,27 +256,6 @@ def test_turned_starts_have_turned_ends(kind, design, speed, cage, rib, angle):
     turned = np.kron(np.eye(start.size // 2), turn(angle))
     end, found = after(model, speed, start), after(model, speed, turned @ start, angle)
     np.testing.assert_allclose(found, turned @ end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
-class Mirrored(eqx.Module):
-    """Acceleration of a cage in a mirror: it turns the other way."""
-
-    model: jc.CageModel
-
-    def __call__(self, tau, q, v, speed):
-        return mirrored(self.model).at_speed(-speed).acceleration(-tau, q, v)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("film", ["positive_pressure", "full"])
-@random(20)
-@given(designs, speeds, states(0.01, 0.9))
-def test_mirrored_starts_have_mirrored_ends(film, design, speed, start):
-    model = even(system(film, design))
-    image = jc.ForcedOscillator(Mirrored(model), coordinates=2)
-    end = after(model, speed, start)
-    found = after(model, speed, start * np.tile(FLIP, 2), seen=image)
-    np.testing.assert_allclose(found, end * np.tile(FLIP, 2), rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
 
 
 @pytest.mark.wide

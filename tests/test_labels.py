@@ -59,14 +59,6 @@ def test_a_spiral_has_the_period_of_the_orbit_that_it_leads_to(turn: float, orbi
     assert found - {0} == {len(orbit)}
 
 
-def test_a_linear_oscillator_has_no_subharmonics():
-    """Lightly damped, still on its way: seen to return after 2, 3 or 5 revolutions, it was called by these."""
-    linear = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.0054 * v[0] - q[0] + jnp.cos(tau),), coordinates=1)
-    speeds = np.array([1.5, 2.0, 2.5, 4.5])
-    label = jc.sweep(linear, speeds, horizon=0, confirm=False, method=jc.method("rk4", steps=64)).label
-    assert set(label.ravel()) <= {"periodic-1", "undecided"} and "periodic-1" in label
-
-
 CIRCLE = spiral(0.618, 1.0, shrinks=1.0)
 
 

@@ -54,18 +54,6 @@ def test_width_of_a_zone(edges):
     assert here.value == pytest.approx(exact[0] - exact[1], rel=1e-9)
 
 
-def test_an_open_zone_counts_to_the_end_of_the_range_and_has_the_slope_of_its_other_edge(edges):
-    onset = jc.design.FollowedEdges({"zone 1 onset": edges.points["zone 1 onset"]}, METHOD)
-    with pytest.raises(ValueError, match="`range_rpm` must be given for zone 1, which is open: its onset alone"):
-        jc.design.zone_width(onset)
-    with pytest.raises(ValueError, match="`zone` must be one with an edge among zone 1 onset, but is 2"):
-        jc.design.zone_width(onset, 2)
-    got = agrees(jc.design.zone_width(onset, range_rpm=(5.0, 20.0)), SPACE, SPACE.place + 0.01)
-    speeds, slopes = onset.at(SPACE, SPACE.place + 0.01)
-    assert got.value == pytest.approx(20.0 - speeds[0], rel=1e-12)
-    np.testing.assert_allclose(got.slope, -slopes[0], rtol=1e-12)
-
-
 @pytest.mark.parametrize("operating", [(10.0,), (9.9, 11.0)])
 def test_distance_from_the_nearest_edge(edges, operating):
     far = jc.design.EdgeClearance(edges, operating, softness=0.05)
@@ -104,14 +92,6 @@ def test_derivatives_of_a_multiplier_against_autodiff():
         assert value == pytest.approx(float(jc.parameters(slope)[name]), rel=1e-7, abs=1e-9), name
 
 
-def test_objectives_add_up(edges):
-    width, price = jc.design.zone_width(edges), jc.design.Smooth(lambda s: 1 / jc.parameters(s)["damping"])
-    both = agrees(2.0 * width + price * 0.5 - width, SPACE, SPACE.place)
-    (a,), (b,) = width.measure(SPACE, SPACE.place[None]), price.measure(SPACE, SPACE.place[None])
-    assert both.value == pytest.approx(a.value + 0.5 * b.value, rel=1e-12)
-    np.testing.assert_allclose(both.slope, a.slope + 0.5 * b.slope, rtol=1e-12)
-
-
 CHAOS = dict(starts=1, discard=60, revolutions=40)
 CHAOS_SPACE = jc.DesignSpace.of(double_well(), {"damping": (0.2, 0.45), "cubic": (0.7, 1.4)})
 
@@ -140,14 +120,6 @@ def test_robust_mean_and_worst_of_a_parabola():
         jc.design.Robust(parabola, {"cubic": jc.design.uniform(0.1)}, draws=256, worst=1 / 256), space, place
     )
     assert worst.value == pytest.approx((0.5 + 0.15) ** 2, rel=5e-3)
-
-
-def test_scatter_laws():
-    q = (np.arange(4096) + 0.5) / 4096
-    assert jc.design.uniform(0.1)(q).std() == pytest.approx(0.1 / np.sqrt(3), rel=1e-3)
-    ray = jc.design.rayleigh()(q)
-    assert ray.mean() == pytest.approx(1.0, rel=2e-3)
-    assert ray.std() == pytest.approx(np.sqrt(4 / np.pi - 1), rel=5e-3)  # of a Rayleigh distribution with mean 1
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 import itertools
 
-import matplotlib
-import matplotlib.image
 import numpy as np
 import pytest
 from helpers import cage_sweep
@@ -13,8 +11,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
 import jaxcage as jc
-from jaxcage.analysis import Edge, Zone, Zones, zones
-from jaxcage.orbits import Branch, Curve, Point, Sensitivity
+from jaxcage.analysis import Edge, Zone, Zones
+from jaxcage.orbits import Branch, Curve, Point
 from jaxcage.plotting import (
     BLACK,
     EDGE_COLOURS,
@@ -27,16 +25,13 @@ from jaxcage.plotting import (
     START_COLOURS,
     STYLES,
     ZONE,
-    add_shaft_axes,
     branch_diagram,
-    elasticity_bars,
     exponent_strip,
     multiplier_circle,
     orbit,
     orbit_diagram,
     shade_zones,
     stability_map,
-    sweep_figure,
     time_history,
 )
 
@@ -93,27 +88,6 @@ def test_zones_are_shaded_where_they_are():
     shade_zones(ax, Zones((inner, open_end), (), 100.0, 500.0))
     np.testing.assert_allclose(spans(ax), [(8050, 8150), (8350, 8400)])
     assert ax.get_xlim() == pytest.approx((8000, 8400))
-
-
-def test_sweep_figure_has_both_panels_on_one_axis_and_no_clash():
-    sweep = cage_sweep()
-    figure = sweep_figure(sweep, zones(sweep), jc.bearing.published_case("1a"), "Case 1a")
-    above, below = figure.axes
-    assert above.get_xlim() == below.get_xlim() and spans(above) == spans(below)
-    np.testing.assert_allclose(spans(above), [(8050, 8150)])
-    figure.draw_without_rendering()
-    panel = below.get_tightbbox()
-    assert panel is not None and figure.legends[0].get_window_extent().y1 <= panel.y0
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert len(names) == len(set(names))
-
-
-def test_the_shaft_is_on_a_second_axis():
-    figure = sweep_figure(cage_sweep(), zones(cage_sweep()), None, "mine")
-    add_shaft_axes(figure, 0.4)
-    figure.draw_without_rendering()
-    axes = figure.findobj(matplotlib.axes._secondary_axes.SecondaryAxis)  # pyright: ignore
-    assert axes and axes[0].get_xlim() == pytest.approx((20000, 21000))  # pyright: ignore
 
 
 @pytest.mark.parametrize("elastic", [False, True])
@@ -201,24 +175,6 @@ def test_multipliers_along_a_branch():
     pair = [[np.cos(2.5), np.sin(2.5)], [np.cos(2.5), -np.sin(2.5)]]
     np.testing.assert_allclose(points(ax, "Neimark-Sacker (NS)"), pair)
     np.testing.assert_allclose(points(ax, "period-doubling (PD)"), [[-1, 0]])
-
-
-def test_elasticities_are_in_order_with_the_designers_two_on_top():
-    edge = lambda name, **e: Sensitivity(name, "fold", 9100.0, e, e, {}, 1.0, "converged")
-    onset = edge("zone 1 onset", load=0.01, eccentricity=-0.02, **{"oil.density": -0.3}, guidance_gap=0.1, bore=0.0)
-    exit_ = edge("zone 1 exit", load=1.25, eccentricity=0.04, **{"oil.density": 0.2}, guidance_gap=0.0004)
-    ax = elasticity_bars([onset, exit_])
-    assert [t.get_text() for t in ax.get_yticklabels()] == ["guidance gap", "eccentricity", "load", "oil density"]
-    low, high = ax.get_ylim()
-    assert low > high, "the first is on top"
-    first, second = ax.containers
-    assert [bar.get_width() for bar in first] == pytest.approx([0.1, -0.02, 0.01, -0.3])
-    assert [bar.get_width() for bar in second] == pytest.approx([0.0004, 0.04, 1.25, 0.2])
-    middle = lambda bars: np.array([bar.get_y() + bar.get_height() / 2 for bar in bars])
-    np.testing.assert_allclose((middle(first) + middle(second)) / 2, range(4), atol=1e-12)
-    ax.figure.draw_without_rendering()  # pyright: ignore[reportAttributeAccessIssue]
-    frame, texts = ax.get_window_extent(), [matplotlib.text.Text.get_window_extent(text) for text in ax.texts]
-    assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 for box in texts)
 
 
 def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, y: str = "guidance_gap") -> Curve:

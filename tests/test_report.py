@@ -8,7 +8,6 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import matplotlib.image
 import numpy as np
 import pytest
 from helpers import declared
@@ -244,23 +243,3 @@ def test_every_figure_is_shown_and_fits_and_nothing_is_loaded(measured: list[str
     assert all(width > 400 and height > 100 for _, _, width, height in found.values())
     assert float(measured[0]) <= WIDTH  # nothing sticks out to the right
     assert [name for name in measured[1].split(" ") if name and not name.startswith("data:")] == []
-
-
-@browser_test
-@pytest.mark.parametrize("scheme, options", [("light", ()), ("dark", ("--blink-settings=preferredColorScheme=0",))])
-def test_figures_are_not_blank_in_either_scheme(
-    report: Path, measured: list[str], scheme: str, options: tuple[str, ...]
-):
-    path = report.with_name(f"{scheme}.png")
-    done = browse(report, f"--screenshot={path}", *options)
-    assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []
-    image = np.rint(255 * matplotlib.image.imread(path)[..., :3]).astype(int)
-    paper = {"light": (255, 255, 255), "dark": (0x15, 0x18, 0x1D)}[scheme]
-    assert image.shape[:2] == (HEIGHT, WIDTH) and tuple(image[5, 5]) == paper
-    for name, (left, top, width, height) in boxes(measured).items():
-        if top + height > HEIGHT:
-            continue
-        part = image[int(top) : int(top + height), int(left) : int(left + width)]
-        drawn = np.any(np.abs(part - np.array(paper)) > 24, axis=-1)
-        assert 0.005 < np.mean(drawn) < 0.9, name
-        assert len(np.unique(part.reshape(-1, 3), axis=0)) > 20, name  # more than a frame

@@ -111,13 +111,6 @@ def test_quasi_periodic_circle_map_reads_zero(turn):
     assert abs(float(zero_one(circle_map(turn)))) < 0.05
 
 
-def test_weak_chaos_needs_a_long_series():
-    """Logistic map at 3.6, exponent 0.184: the limit that the module states."""
-    readings = [float(zero_one(logistic(3.6, n))) for n in (300, 1000, 3000)]
-    assert readings[0] < 0.6 and readings[2] > 0.95
-    assert readings == sorted(readings)
-
-
 def test_fixed_point_is_exactly_regular_even_with_rounding_noise():
     noise = np.random.default_rng(1).standard_normal(400)
     assert float(zero_one(np.full(400, 0.7))) == 0.0

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ from jaxcage.studies import (
     DamagedStore,
     OtherStudy,
     Plan,
-    Store,
     Study,
     check_study,
     label_names,
@@ -304,12 +302,3 @@ def test_code_of_ones_own_needs_a_name_and_a_version(tmp_path: Path, system: Any
     ):
         run_study(study_of(system=system, **given), tmp_path / "study.zarr")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_two_writers_at_once_leave_the_store_of_one(finished: Path, tmp_path: Path):
-    """No lock: both write the same files. One of them tidies up while the other writes."""
-    store = tmp_path / "study.zarr"
-    Store(store, STUDY)
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda _: run_study(STUDY, store), range(4)))
-    assert contents(store) == contents(finished) and [p.name for p in tmp_path.iterdir()] == ["study.zarr"]

@@ -15,7 +15,6 @@ from jaxcage.analysis import (
     calm_threshold,
     coexisting,
     escape_times,
-    label_lanes,
     survival,
     when_t0_doubles,
 )
@@ -206,21 +205,6 @@ def test_mean_life_from_weak_chaos_that_dips_below_zero(end):
         estimate = survival(found, horizon, t0=100, block=BLOCK)
         within += abs(estimate.mean_life - 500) < 2 * estimate.standard_error
     assert within >= 90
-
-
-def test_ends_are_calm_as_their_labels_say():
-    rng = np.random.default_rng(0)
-    around = np.exp(2j * np.pi * 0.618 * np.arange(64))
-    kinds = {
-        "periodic-2": (np.tile([[1.0, 0.0], [-1.0, 0.0]], (32, 1)), np.full(8, -0.2)),
-        "quasi-periodic": (np.stack([around.real, around.imag], axis=1), 0.002 * rng.standard_normal(8)),
-        "chaotic": (rng.random((64, 2)), rng.normal(0.15, 0.05, 8)),
-    }
-    strobe, growth = (np.stack(part) for part in zip(*kinds.values(), strict=True))
-    error = np.std(growth, axis=1, ddof=1) / 8**0.5
-    label = label_lanes(np.zeros(3, dtype=int), strobe, np.ones(2), np.mean(growth, axis=1), error)
-    assert label.tolist() == list(kinds)
-    assert calm_at_the_end(strobe, np.ones(2), growth, BLOCK).tolist() == [True, True, False]
 
 
 # The crisis of Ueda's oscillator.

@@ -10,7 +10,7 @@ from test_whole_motion import energy_and_momentum
 from test_whole_reference import KINDS, random_state
 
 import jaxcage as jc
-from jaxcage.integrate import Parts, arrow, factors, implicit_step
+from jaxcage.integrate import Parts, arrow, factors
 from jaxcage.models.whole import LEDGER, MEANS, BearingState, rolling_start, state_scale
 
 
@@ -63,18 +63,6 @@ def test_arrow_is_the_dense_jacobian(kind, over_angle):
     np.testing.assert_allclose(got, want, rtol=0, atol=1e-9 * np.abs(want).max())
 
 
-@jax.jit
-def some_steps(at, state, span, steps):
-    """State and integrals after so many implicit steps of equal length, over time."""
-
-    def one(_, carry):
-        rates = at(carry[0])
-        end, *_ = implicit_step(at, carry, (rates.state, rates.integrals), span / steps, over_angle=False)
-        return end
-
-    return jax.lax.fori_loop(0, steps, one, (state, jnp.zeros(INTEGRALS)))
-
-
 @pytest.fixture(scope="module")
 def stiff():
     """A slow shaft in cold oil, its cage near its land."""
@@ -82,22 +70,6 @@ def stiff():
     start = rolling_start(model, SLOW, cage=1)
     place = np.array([0.0, 0.97 * float(model.clearance)])
     return model, start._replace(bodies=start.bodies.at[:2].set(place))
-
-
-@pytest.mark.wide
-def test_order_of_a_step(stiff):
-    """Twice the steps make a sixteenth of the error, or less: of the state, and of the energies that are integrated
-    beside it once steps are as short as the film's damping."""
-    model, start = stiff
-    at, span = model.at_speed(jnp.asarray(SLOW)), jnp.asarray(1e-5)
-    unit, few = np.asarray(state_scale(model, SLOW).bodies), len(LEDGER)
-    exact, energies = some_steps(at, start, span, 512)
-    states, losses = [], []
-    for steps in (8, 16, 32, 64):
-        end, beside = some_steps(at, start, span, steps)
-        states.append(np.abs((end.bodies - exact.bodies) / unit).max())
-        losses.append(np.abs(beside - energies)[:few].max())
-    assert 0 < states[1] < states[0] / 12 and 0 < losses[3] < losses[2] / 12
 
 
 @pytest.mark.wide

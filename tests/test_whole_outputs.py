@@ -11,7 +11,6 @@ from test_whole_motion import SPEED, bearing
 import jaxcage as jc
 from jaxcage.analysis import (
     OrderSpectrum,
-    around,
     bearing_history,
     bearing_orders,
     bearing_spectra,
@@ -47,19 +46,6 @@ def test_pocket_forces_are_those_of_the_second_implementation(run):
         found = complex(*(history.pocket_on_cage[i] + history.land_on_cage[i]))
         assert found == pytest.approx(expected, rel=1e-8)
     assert np.abs(history.pocket_force).max() > 10
-
-
-def test_loads_carry_the_shaft(run):
-    """In the mean the inner raceway bears load and weight of the ring, and rollers in the upper half bear nothing."""
-    model, ran, history = run
-    upward = -(history.inner_load * np.sin(history.roller_angle)).sum(axis=1)
-    heavy = float(model.load + model.ring.ring_mass * model.gravity)
-    assert upward[SAMPLES:].mean() == pytest.approx(heavy, rel=0.02)
-    found = around(history, 12)
-    assert np.all(found.inner_load[1:5] == 0) and found.inner_load[8:10].min() > 1000
-    assert found.inner_sliding[8] < 0.1 * found.inner_sliding[2]
-    with pytest.raises(ValueError, match="bins"):
-        around(history, 1)
 
 
 def test_impulse_wear_and_torque_are_integrals(run):

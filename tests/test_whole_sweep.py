@@ -1,7 +1,5 @@
 """Sweeps of the whole bearing: lanes against single runs, exponents against two runs, failures, symmetry."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -95,23 +93,6 @@ def test_slow_shafts_run_through():
     how = dict(starts=1, discard=1, revolutions=1, blocks=1)
     found = jc.sweep_bearing(bearing(), jc.rpm(1000.0), **how)
     assert found.outcome[0, 0] == "successful" and found.error[0, 0] < 0.05 and found.exponent[0, 0] > 50
-
-
-@pytest.mark.wide
-def test_exponents_of_the_last_revolutions():
-    """Followed over four of 16, all else over all; means are those of a run that follows them from the beginning."""
-    options: Any = dict(starts=1, discard=0, revolutions=16, blocks=16, tolerance=1e-4)
-    few = jc.sweep_bearing(bearing(), SPEED, exponent_revolutions=4, **options)
-    every = jc.sweep_bearing(bearing(), SPEED, exponent_revolutions=16, **options)
-    shapes = [{name: x.shape[-1] for name, x in found.block_means.items()} for found in (few, every)]
-    assert shapes[0].pop("exponent") == 4 and shapes[1].pop("exponent") == 16
-    assert shapes[0] == shapes[1] and set(shapes[0].values()) == {16}
-    late = every.block_means["exponent"][..., 4:]
-    assert few.exponent[0, 0] == pytest.approx(late.mean(), abs=4 * late.std() / np.sqrt(4))
-    assert few.friction_power_W[0, 0] == pytest.approx(every.friction_power_W[0, 0], rel=0.05)
-    assert jc.io.bearing_dataset(few)["exponent_blocks"].sizes["exponent_block"] == 4
-    with pytest.raises(ValueError, match="exponent_revolutions"):
-        jc.sweep_bearing(bearing(), SPEED, exponent_revolutions=0, **options)
 
 
 @pytest.fixture(scope="module")
