@@ -1,4 +1,4 @@
-"""Designs side by side: what differs, figures on one scale; the published edges beside ours."""
+"""What differs between two designs; the published edges and conclusions beside ours."""
 
 import re
 
@@ -7,7 +7,7 @@ import pytest
 from helpers import made_sweep
 
 import jaxcage as jc
-from jaxcage.analysis import Edge, Zone, Zones, orbit_measures
+from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.bearing import PUBLISHED_CASES
 from jaxcage.report import (
     CONCLUSIONS,
@@ -17,7 +17,6 @@ from jaxcage.report import (
     reproduction,
     run_all,
 )
-from jaxcage.sweeps import motions
 
 
 def test_only_what_differs_is_listed_in_the_units_people_read():
@@ -27,19 +26,6 @@ def test_only_what_differs_is_listed_in_the_units_people_read():
     assert found["guidance_gap"][1:] == ("0.45", "0.3", "mm", "-33.3 %")
     assert found["eccentricity"][1:] == ("23", "46", "µm", "+100 %")
     assert differences([model, model]) == {}
-
-
-@pytest.mark.wide
-def test_size_and_whirl_against_a_time_history():
-    model = jc.case("1a")
-    method = jc.method("rk4", steps=1024)
-    length = dict(discard=200, revolutions=20, confirm=False, horizon=0)
-    found = jc.sweep(model, jc.rpm(14000, 15000), starts=1, method=method, **length)
-    motion = motions([model], [found])[0]
-    run = jc.simulate(model, found.speed[0], revolutions=32, samples=512, start=tuple(found.last[0, 0]), method=method)
-    x, y = np.ptp(run.state[:, :2], axis=0)
-    assert motion.horizontal[0, 0] == pytest.approx(x, rel=0.01) and motion.vertical[0, 0] == pytest.approx(y, rel=0.01)
-    assert motion.whirl_order[0, 0] == pytest.approx(orbit_measures(model, run).whirl_ratio, abs=0.01)
 
 
 def zone(onset, leaves):

@@ -1,4 +1,4 @@
-"""Spectra by orders against signals whose lines are known; the 0-1 test against maps of known kind."""
+"""Spectra by orders against signals whose lines are known."""
 
 import numpy as np
 import pytest
@@ -7,10 +7,8 @@ import jaxcage as jc
 from jaxcage.analysis import (
     OrderSpectrum,
     dominant_orders,
-    mean_square_displacement,
     order_spectrum,
     whirl_spectrum,
-    zero_one,
 )
 
 
@@ -77,61 +75,3 @@ def test_whirl_spectrum_tells_forward_from_backward():
     assert max(spectrum.at(-0.5), spectrum.at(1)) < 1e-15
     first, second = dominant_orders(spectrum)
     assert first.order == pytest.approx(0.5) and second.order == pytest.approx(-1)
-
-
-def logistic(a, n=1000, discard=2000, x=0.3):
-    values = np.empty(n + discard)
-    for i in range(n + discard):
-        x = a * x * (1 - x)
-        values[i] = x
-    return values[discard:]
-
-
-def circle_map(turn, coupling=0.8, n=1000, discard=500):
-    t, values = 0.1, np.empty(n + discard)
-    for i in range(n + discard):
-        t = t + turn - coupling / (2 * np.pi) * np.sin(2 * np.pi * t)
-        values[i] = np.cos(2 * np.pi * t)
-    return values[discard:]
-
-
-@pytest.mark.parametrize("a", [3.7, 3.9, 3.97])
-def test_chaotic_logistic_map_reads_one(a):
-    assert float(zero_one(logistic(a))) > 0.99
-
-
-@pytest.mark.parametrize("a", [3.2, 3.5, 3.55, 3.83])  # periods 2, 4, 8 and 3
-def test_periodic_logistic_map_reads_zero(a):
-    assert abs(float(zero_one(logistic(a)))) < 0.03
-
-
-@pytest.mark.parametrize("turn", [(5**0.5 - 1) / 2, 0.3028])
-def test_quasi_periodic_circle_map_reads_zero(turn):
-    assert len(np.unique(np.round(circle_map(turn), 6))) > 900  # it never closes
-    assert abs(float(zero_one(circle_map(turn)))) < 0.05
-
-
-def test_fixed_point_is_exactly_regular_even_with_rounding_noise():
-    noise = np.random.default_rng(1).standard_normal(400)
-    assert float(zero_one(np.full(400, 0.7))) == 0.0
-    assert float(zero_one(np.zeros(400))) == 0.0
-    assert float(zero_one(0.7 + 1e-14 * noise)) == 0.0
-    assert float(zero_one(1e-14 * noise, scale=1.0)) == 0.0
-    assert float(zero_one(1e-14 * noise)) > 0.9  # without a scale, noise is all there is
-
-
-def test_lanes_shift_and_scale_do_not_matter():
-    lanes = np.stack([[logistic(3.9, 400), logistic(3.5, 400)], [circle_map(0.3028, n=400)] * 2])
-    together = zero_one(lanes)
-    assert together.shape == (2, 2)
-    one_by_one = [[float(zero_one(s)) for s in row] for row in lanes]
-    np.testing.assert_allclose(together, one_by_one, atol=1e-12)
-    np.testing.assert_allclose(zero_one(1e3 - 7 * lanes), together, atol=1e-9)
-
-
-def test_displacement_equals_the_plain_sum():
-    series = logistic(3.9, 200)
-    series = series - np.mean(series)
-    walk = np.cumsum(series * np.exp(1.3j * np.arange(1, 201)))
-    plain = [np.mean(np.abs(walk[n : n + 180] - walk[:180]) ** 2) for n in range(1, 21)]
-    np.testing.assert_allclose(mean_square_displacement(series, 1.3), plain, rtol=1e-12)

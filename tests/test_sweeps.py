@@ -10,8 +10,7 @@ from helpers import raw_sweep
 from literature import DUFFING_FOLDS
 
 import jaxcage as jc
-from jaxcage.plotting import ramp_figure
-from jaxcage.sweeps import Ramped, RampUpDown, ramp_revolutions, ramp_up_down
+from jaxcage.sweeps import ramp_revolutions, ramp_up_down
 
 
 def duffing(tau, q, v, speed):
@@ -160,44 +159,11 @@ def test_lanes_leave_chaos_when_its_clock_says_so(turning):
     assert np.all(np.char.startswith(found.label[0][leaves & (ends > 120)], "transient"))
 
 
-def planted(up: np.ndarray, down: np.ndarray, scatter: float) -> RampUpDown:
-    rpm = np.linspace(5000.0, 9000.0, up.size)
-    way = lambda size: Ramped(rpm, size, np.full(size.size, scatter), size / 4e-4)
-    return RampUpDown(way(up), way(down), 400, 2.0, (1000.0, 1800.0))
-
-
 def test_a_ramp_takes_as_long_as_its_rate_says():
     first, last, seconds = 300.0, 1500.0, 7.0
     count = ramp_revolutions(first, last, seconds)
     speed = first + (last - first) * (np.arange(64 * count) + 0.5) / (64 * count)
     assert np.sum(2 * np.pi / 64 / speed) == pytest.approx(seconds, rel=1e-3)
-
-
-def test_a_jump_in_one_direction_is_hysteresis_and_scatter_is_not():
-    size = np.linspace(1e-4, 3e-4, 40)
-    late = size.copy()
-    late[15:22] += 1e-4
-    found = planted(size, late, 2e-6)
-    assert np.flatnonzero(found.apart).tolist() == list(range(15, 22))
-    ((low, high),) = found.stretches
-    assert (low, high) == pytest.approx((found.up.rpm[15], found.up.rpm[21]))
-    assert not np.any(planted(size, late, 6e-5).apart)
-    alone = size.copy()
-    alone[10] += 1e-4
-    assert not np.any(planted(size, alone, 2e-6).apart)
-    labels = {text.get_text() for legend in ramp_figure(found).legends for text in legend.get_texts()}
-    assert {"run-up", "run-down", "differs: hysteresis"} <= labels
-
-
-def test_chaos_alone_is_no_hysteresis():
-    """Sizes and halves that scatter alike both ways: of 2000 windows hardly any is taken for a difference."""
-    rng, rpm = np.random.default_rng(0), np.linspace(5000.0, 9000.0, 2000)
-
-    def way() -> Ramped:
-        half = 1e-4 * (1 + 0.2 * rng.standard_normal((2000, 2)))
-        return Ramped(rpm, half.max(axis=1), np.abs(half[:, 1] - half[:, 0]), half[:, 0])
-
-    assert np.sum(RampUpDown(way(), way(), 400, 2.0, (1.0, 1.0)).apart) <= 10
 
 
 @pytest.mark.wide
