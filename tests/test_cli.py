@@ -237,11 +237,3 @@ def test_help_version_and_errors_of_typing_load_no_jax(arguments: str, status: i
     assert lines[-1] == f"{status} []"
     if arguments == "--version":
         assert lines[0] == f"jaxcage {jaxcage.__version__}"
-
-
-def test_every_command_has_help(capsys: pytest.CaptureFixture[str]):
-    assert main(["--help"]) == 0
-    listed = capsys.readouterr().out
-    for command in COMMANDS:
-        assert command in listed and main([command, "--help"]) == 0
-        assert "--json" in capsys.readouterr().out

@@ -2,14 +2,13 @@
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from helpers import even, raw_sweep, wide_but
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES, outcome_code
+from jaxcage.integrate import OUTCOMES
 
 
 MODEL = jc.case("1a", "preliminary")
@@ -68,82 +67,39 @@ def test_bad_start_fails_alone(bad, place, confirm):
     np.testing.assert_array_equal(mixed.chaotic_share, share)
 
 
-@pytest.fixture(scope="module")
-def model() -> jc.CageModel:
-    return jc.case("1a")
-
-
 THROWS = np.array([1.0, 3.0, 10.0, 100.0])
 """Speeds [m/s] at which a cage leaves the middle: at the last one it has energy to cross the rib."""
-DIRECTIONS = np.arange(6) * np.pi / 3
 
 
-def _clearances_reached(model: jc.CageModel, speed: np.ndarray) -> np.ndarray:
-    """The eccentricity ratio at which the contact alone has taken all of a thrown cage's energy."""
-    energy = 0.5 * float(model.cage_mass) * speed**2
-    depth = (19 / 9 * energy / float(model.contact.stiffness)) ** (9 / 19)
-    return float(model.contact.onset) + depth / float(model.clearance)
-
-
-def _thrown() -> tuple[np.ndarray, Any]:
-    """Speed [m/s] and state of every throw."""
-    speed, angle = (x.ravel() for x in np.meshgrid(THROWS, DIRECTIONS, indexing="ij"))
-    rows = (np.zeros_like(speed), np.zeros_like(speed), speed * np.cos(angle), speed * np.sin(angle))
-    return speed, tuple(jnp.asarray(row) for row in rows)
+def thrown(model: jc.CageModel, method: jc.integrate.AbstractMethod) -> tuple[np.ndarray, jc.Sweep]:
+    """A revolution of cages that leave the middle in six directions, and the speed of each."""
+    speed, angle = (x.ravel() for x in np.meshgrid(THROWS, np.arange(6) * np.pi / 3, indexing="ij"))
+    starts = [(0.0, 0.0, float(v * np.cos(a)), float(v * np.sin(a))) for v, a in zip(speed, angle, strict=True)]
+    length = dict(discard=0, revolutions=1, blocks=1, exponents=0)
+    return speed, raw_sweep(model, jc.rpm(9000.0), starts=starts, method=method, **length)
 
 
 @pytest.mark.wide
-@pytest.mark.parametrize(
-    "solver, steps",
-    [
-        ("rk4", 16),
-        ("rk4", 128),
-        ("newmark", 64),
-        ("rodas3", 32),
-    ],
-)
-def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(model: jc.CageModel, solver: str, steps: int):
-    """With steps too large by far for the contact: a lane is refused, or tells how far out the farthest of its steps
-    was, which is compared with here for four of them at a time.
-    """
-    strobe = jc.strobe_map(even(model), jc.rpm(9000.0), jc.method(solver, steps=steps))
-
-    def one(y: Any, i: Any) -> Any:
-        y = strobe.part(y, i, steps).y
-        return y, jnp.hypot(y[0], y[1]) / model.clearance
-
-    def four(y: Any, i: Any) -> Any:
-        _, eps = jax.lax.scan(one, y, 4 * i + jnp.arange(4))
-        stretch = strobe.part(y, i, steps // 4)
-        return stretch.y, (jnp.max(eps), stretch.peak, outcome_code(stretch.result))
-
-    speed, y = _thrown()
-    revolution = jax.jit(jax.vmap(lambda y: jax.lax.scan(four, y, jnp.arange(steps // 4))[1]))
-    eps, told, code = (np.asarray(x) for x in revolution(y))
-    well = np.logical_and.accumulate(code == OUTCOMES.index("successful"), axis=1)
-    np.testing.assert_allclose(eps[well], told[well], rtol=1e-6)
-    assert np.all(told[well] <= 2) and not np.any(well[speed == 100.0, -1])
-    assert np.all(told[code == OUTCOMES.index("outside")] > 2)
-    crossed = np.any(~(eps <= 1), axis=1)
-    assert np.any(crossed & (speed == 10.0))  # with steps like these some do leave, and it is told
-    assert np.all(~crossed | ~well[:, -1] | (np.max(told, axis=1) > 1))
+@pytest.mark.parametrize("solver, steps", [("rk4", 16), ("rk4", 128), ("newmark", 64), ("rodas3", 32)])
+def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(solver: str, steps: int):
+    """With steps too large by far for the contact a lane is refused, or tells how far out it was."""
+    speed, found = thrown(even(MODEL), jc.method(solver, steps=steps))
+    failed, peak = found.failed[0], found.peak[0]
+    assert np.all(failed[speed == 100.0]) and np.all(peak[~failed] <= 2)
+    assert np.all(np.isnan(found.last[0][failed])) and np.all(found.label[0][failed] == "failed")
+    assert np.any(failed[speed == 10.0] | ~(peak[speed == 10.0] <= 1))  # with steps like these some leave
 
 
 @pytest.mark.wide
-def test_with_fine_steps_the_rib_turns_a_thrown_cage_back(model: jc.CageModel):
+def test_with_fine_steps_the_rib_turns_a_thrown_cage_back():
     """Nothing goes deeper than where the contact has taken all its energy; what has more than that is refused."""
-    speed, y = _thrown()
-    strobe = jc.strobe_map(model, jc.rpm(9000.0), jc.method("rk4", steps=1024))
-
-    def revolution(y: Any) -> Any:
-        stretch = strobe(y)
-        return stretch.peak, outcome_code(stretch.result)
-
-    peak, code = (np.asarray(x) for x in jax.jit(jax.vmap(revolution))(y))
-    hard, limit = speed < 100, _clearances_reached(model, speed)
-    assert np.all(limit[~hard] > 2) and not np.any(code[~hard] == OUTCOMES.index("successful"))
-    assert np.all(code[hard] == OUTCOMES.index("successful")) and np.all(peak[hard] < limit[hard])
-    assert np.all(peak[hard] > float(model.contact.onset))  # every one of them met the wall
+    speed, found = thrown(MODEL, jc.method("rk4", steps=1024))
+    failed, peak, hard = found.failed[0], found.peak[0], speed < 100
+    energy = 0.5 * float(MODEL.cage_mass) * speed**2
+    depth = (19 / 9 * energy / float(MODEL.contact.stiffness)) ** (9 / 19)
+    limit = float(MODEL.contact.onset) + depth / float(MODEL.clearance)
+    assert np.all(limit[~hard] > 2) and np.array_equal(failed, ~hard) and np.all(peak[hard] < limit[hard])
+    assert np.all(peak[hard] > float(MODEL.contact.onset))  # every one of them met the wall
     fast = speed == 10.0
     assert np.all(peak[fast] > 1 + 0.6 * (limit[fast] - 1))
 

@@ -42,35 +42,6 @@ def test_a_surrogate_finds_a_known_optimum(vary: dict[str, tuple[float, float]])
     assert found.values == pytest.approx({n: {"damping": WELL["damping"], "cubic": 1.5}[n] for n in vary}, rel=0.03)
 
 
-def test_a_surrogate_search_goes_on_where_it_stopped(tmp_path):
-    class Stopped(Exception):
-        pass
-
-    def stop(batch, values):
-        assert values.shape == (2, 8)
-        if batch == 2:
-            raise Stopped
-
-    asked = []
-
-    class Counted(jc.design.Smooth):
-        def values(self, space, places):
-            asked.append(len(places))
-            return super().values(space, places)
-
-    search = lambda **options: jc.design.surrogate_search(
-        double_well(), VARY, Counted(bowl().function), starts=2, batches=5, batch=8, **options
-    )
-    whole = search()
-    with pytest.raises(Stopped):
-        search(keep=tmp_path / "search", report=stop)
-    asked.clear()
-    assert search(keep=tmp_path / "search").optima[0].history == whole.optima[0].history
-    assert asked == [16] * 2
-    with pytest.raises(ValueError, match="but is of another one"):
-        search(keep=tmp_path / "search", seed=1)
-
-
 def test_the_best_of_many_with_noise_is_chosen_anew():
     """Noise of 2 hides a bowl; by the bowl itself the design chosen is better than what the search took for best, and
     one that is the best from the beginning stays."""

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers import declared
 from report_example import findings, swept
 
-import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.report import (
     Findings,
@@ -22,7 +20,6 @@ from jaxcage.report import (
     chaotic_verdict,
     loss_verdict,
     page,
-    parameter_rows,
     read_operating,
 )
 
@@ -109,16 +106,6 @@ def test_nothing_is_said_of_speeds_that_were_not_swept_or_failed():
 
 def test_calmest_range_is_outside_both_kinds(example: Findings):
     assert calmest(example) == pytest.approx((12050.0, 20000.0))  # chaos ends at 12050, the orbit is lost at 20000
-
-
-def test_sources_of_a_published_case():
-    rows = {row.path: row for row in parameter_rows(jc.case("1a"), None)}
-    assert len(rows) == len(list(declared(jc.case("1a"))))
-    assert (rows[("guidance_gap",)].value, rows[("guidance_gap",)].unit) == ("0.45", "mm")
-    assert rows[("guidance_gap",)].source == "paper, Table 2"
-    assert rows[("bearing", "inner_raceway_diameter")].source == "catalogue"
-    assert rows[("cage_mass",)].source == "identified, not printed"
-    assert rows[("gravity",)].source == "default"
 
 
 class Reader(html.parser.HTMLParser):

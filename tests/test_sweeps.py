@@ -77,27 +77,6 @@ def test_labels_are_confirmed_by_finer_steps(followed):
     assert np.all(sure.error[where] < rough.error[where])
 
 
-@pytest.mark.wide
-def test_lanes_that_settle_early_are_what_they_are_when_run_on():
-    """Ueda's oscillator: periodic lanes stop, with the orbit they are on to the end; chaotic ones have an exponent."""
-    speeds = np.linspace(0.8, 1.4, 40)
-    options = dict(starts=[(0.1, 0.0)], discard=200, revolutions=100, blocks=10, keep=32, confirm=False, horizon=0)
-    whole, early = (
-        jc.sweep_designs([UEDA], speeds, method=FAST, settled=settled, **options)[0] for settled in (0, 160)
-    )
-    periodic, chaotic = np.char.startswith(whole.label, "periodic"), whole.label == "chaotic"
-    assert 5 < np.sum(periodic) < 35 and np.sum(chaotic != (early.label == "chaotic")) <= 1  # one is about to escape
-    stopped = np.isnan(early.exponents[..., 0])
-    assert np.all(periodic[stopped]) and np.mean(stopped[periodic]) > 0.8
-    chaotic &= early.label == "chaotic"
-    apart, sure = whole.exponents - early.exponents, np.hypot(whole.standard_error, early.standard_error)
-    assert np.max((np.abs(apart) / sure)[chaotic]) < 3.0
-    first, rest = early.block_growth[chaotic][:, 0], early.block_growth[chaotic][:, 1:]
-    assert abs(np.mean(first) - np.mean(rest)) < 3 * np.std(rest) / np.sqrt(first.size), "no block stands out"
-    nearest = np.min(np.abs(whole.strobe[stopped] - early.last[stopped][:, None]).max(axis=-1), axis=-1)
-    assert np.max(nearest) < 1e-3
-
-
 def test_run_up_and_run_down_show_the_hysteresis_of_a_hardening_oscillator():
     """Between the folds of the hardening Duffing oscillator run-up stays on the large orbit and run-down on the small
     one; outside they agree."""
