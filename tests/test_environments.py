@@ -13,7 +13,6 @@ import pytest
 
 import jaxcage
 from jaxcage import keep_compiled_programs
-from jaxcage.cli import main
 
 
 PACKAGE = Path(jaxcage.__file__).parent
@@ -118,15 +117,3 @@ def test_a_folder_that_is_not_fit_is_left_alone(tmp_path: Path, spoil, why: str)
     spoil(place)
     with pytest.warns(RuntimeWarning, match=rf"Compiled programs are not kept in '.*' \({why}\): everything is"):
         assert keep_compiled_programs(tmp_path) is None
-
-
-def test_a_command_says_it_in_one_sentence(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-):
-    (tmp_path / "file").write_text("no folder")
-    monkeypatch.setenv("JAXCAGE_CACHE", str(tmp_path / "file"))
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        assert main(["statics", "1a", "--out", str(tmp_path / "out")]) == 0
-    said = [line for line in capsys.readouterr().err.splitlines() if "design rule" not in line]
-    assert len(said) == 1 and said[0].startswith("Warning: Compiled programs are not kept in ")

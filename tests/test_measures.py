@@ -2,14 +2,11 @@
 
 import dataclasses
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.analysis import cage_forces, film_drag_power, orbit_measures, relative_state, winding
-from jaxcage.forces import ElasticRib
+from jaxcage.analysis import cage_forces, film_drag_power, orbit_measures, winding
 from jaxcage.models import case
 
 
@@ -124,19 +121,6 @@ def test_energy_balance_of_a_synchronous_orbit():
     m = orbit_measures(model, run)
     assert m.film_power == pytest.approx(-power["film"], rel=1e-9)
     assert m.whirl_ratio == pytest.approx(1.0, abs=0.01)
-
-
-def test_elastic_rib_motion_is_taken_out():
-    rib_law = ElasticRib(*(jnp.asarray(v) for v in (1.0, 1e8, 100.0)))
-    elastic = eqx.tree_at(lambda m: m.rib, case("1a", "preliminary"), rib_law)
-    run = orbit(ratio=0.5)
-    rib = orbit(radius=3e-5, ratio=1.7, centre=(1e-5, 1e-5)).state
-    q, v = run.state[:, :2] + rib[:, :2], run.state[:, 2:] + rib[:, 2:]
-    both = np.concatenate([q, rib[:, :2], v, rib[:, 2:]], axis=1)
-    moved = orbit_measures(elastic, trajectory(run.tau, both))
-    fixed = orbit_measures(case("1a", "preliminary"), run)
-    np.testing.assert_allclose(dataclasses.astuple(moved), dataclasses.astuple(fixed), rtol=1e-8, atol=1e-12)
-    np.testing.assert_allclose(relative_state(elastic, both)[0], run.state[:, :2], atol=1e-18)
 
 
 def test_whirl_that_cannot_be_told_is_none():

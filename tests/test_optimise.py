@@ -131,16 +131,6 @@ def test_sobol_indices_of_ishigami():
         assert got.first_interval[name][0] <= got.first[name] <= got.first_interval[name][1]
 
 
-def test_sobol_indices_of_a_parameter_without_influence_are_known_to_be_zero():
-    """x_1 + x_2^2 / 2: of the variances 1/12 and 1/45, none due to a third."""
-    found = jc.design.sobol_of(lambda x: (x[0] + x[1] ** 2 / 2)[None], ("a", "b", "idle"), samples=256)
-    assert found.first["idle"] == found.total["idle"] == 0.0
-    assert found.first_interval["idle"] == found.total_interval["idle"] == (0.0, 0.0)
-    assert found.doubtful == () and found.warning is None
-    shares = np.array([1 / 12, 1 / 45]) / (1 / 12 + 1 / 45)
-    np.testing.assert_allclose([found.total["a"], found.total["b"]], shares, atol=0.02)
-
-
 def test_tolerance_budget_is_the_root_of_squares():
     elasticity = {"gap": 0.5, "mass": -2.0}
     edge = jc.orbits.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")

@@ -12,7 +12,6 @@ from test_whole_reference import SPEED, everything, random_state, right_side
 
 import jaxcage as jc
 from jaxcage.models.whole import BearingState, Traction, bar_stiffness
-from jaxcage.models.whole._raceway import contact_energy
 
 
 def bearing(**changed):
@@ -177,20 +176,6 @@ def test_traction_curve(values):
     assert float(kappa(-0.37)) == -float(kappa(0.37))
     with pytest.raises(ValueError, match="peak"):
         Traction(rest=0.06)
-
-
-def test_energy_of_a_contact_is_the_work_of_its_force():
-    from scipy.integrate import quad
-
-    from jaxcage.forces import power_10_9, smooth_plus
-
-    width = 2e-7
-    force = jax.jit(lambda x: power_10_9(smooth_plus(x, width)))
-    for overlap in (-1e-7, 0.0, 1.5e-7, 3e-6):
-        points = [p for p in (-width, width) if p < overlap]
-        expected = quad(lambda x: 1e9 * float(force(x)), -width, overlap, points=points, epsabs=0, epsrel=1e-10)[0]
-        found = 1e9 * float(contact_energy(overlap, width))
-        assert found == pytest.approx(expected, rel=1e-8)
 
 
 def test_stiffness_of_a_bar():

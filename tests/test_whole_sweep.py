@@ -9,11 +9,6 @@ from test_whole_motion import SPEED, bearing
 import jaxcage as jc
 from jaxcage.integrate import SAMPLES, SPACING, STALLED, limits_of
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
-from jaxcage.plotting import (
-    bearing_map_figure,
-    bearing_sweep_figure,
-    bearings_beside,
-)
 from jaxcage.solve import FINISHED, Bearings
 
 
@@ -132,21 +127,6 @@ def test_measures_of_a_sweep_are_those_of_a_run(swept, run):
     assert both.eccentricity_std[0, 0] == pytest.approx(expected.eccentricity_std, rel=0.1)
     for name in ("pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h"):
         assert getattr(both, name)[0, 0] == pytest.approx(getattr(expected, name), rel=0.05)
-
-
-def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
-    """A line for each start, the numbers of the sweep on it; beside another bearing the mean of those that ended."""
-    _, _, both = swept
-    figure = bearing_sweep_figure(both, "two starts")
-    slip, power = figure.axes[0], figure.axes[3]
-    assert [len(ax.lines) for ax in figure.axes] == [2] * 6
-    np.testing.assert_allclose([line.get_ydata() for line in slip.lines], 100 * both.cage_slip.T)
-    assert list(power.lines[0].get_ydata()) == list(both.friction_power_W[:, 0])
-    beside = bearings_beside([*"abcdefg"], [both] * 7).axes[0].lines  # more than there are colours
-    assert [np.asarray(line.get_ydata())[0] for line in beside] == pytest.approx([100 * both.cage_slip[0, 0]] * 7)
-    over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
-    cells = np.ravel(np.asarray(over.axes[0].collections[0].get_array(), float))
-    np.testing.assert_allclose(cells, 100 * np.tile(both.cage_slip[:, 0], 2))
 
 
 def test_what_cannot_be_swept():
