@@ -182,35 +182,6 @@ def test_film_takes_energy_out_in_a_frame_that_turns_at_half_speed(film, design,
     assert arc / (1 + eps) ** 3 * (1 - 1e-9) <= found <= arc / (1 - eps) ** 3 * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("film", wide_but(FILMS, "positive_pressure"))
-@random(50)
-@given(designs, speeds, between(0.01, 0.96), angles, between(-1.5, 1.5))
-def test_film_feeds_whirl_below_half_speed_only(film, design, speed, eps, phi, whirl):
-    """Work on a circular whirl: 2 pi r F_t, F_t = S (w - 2 whirl w) pi eps/(2 (1 - eps^2)^(3/2)) for the whole film."""
-    model = jc.replace(CASE, **{**design, "supply_pressure": 0.0, "film.smoothing": 1e-12, "film.model": film})
-    scale, c = float(model.cage_at(speed).law("film").scale), float(model.clearance)
-    radial, along = turn(phi).T
-    y = np.concatenate([eps * c * radial, eps * c * whirl * speed * along])
-    found = forces(model, speed, 0.0, y)["film"] @ y[2:]
-    share = 1.0 if film == "full" else 0.5
-    tangential = share * scale * speed * np.pi * eps / (2 * (1 - eps**2) ** 1.5)
-    work = tangential * eps * c * speed
-    np.testing.assert_allclose(found, work * (1 - 2 * whirl) * whirl, rtol=0, equal_nan=False, atol=1e-10 * work)
-
-
-@random(50)
-@given(designs, speeds, states(0.0, 1.2))
-def test_land_contact_pushes_along_the_radius_and_takes_energy_out(design, speed, state):
-    """It is stronger on the way in than at rest, weaker on the way out, and never pulls."""
-    model = jc.replace(CASE, **design)
-    y = in_si(model, speed, state)
-    moving, still = (forces(model, speed, 0.0, at)["contact"] for at in (y, y * [1, 1, 0, 0]))
-    r, v = y[:2], y[2:]
-    assert moving @ r <= 0.0 and (moving - still) @ v <= 1e-9 * np.linalg.norm(still) * np.linalg.norm(v)
-    np.testing.assert_allclose(moving[0] * r[1], moving[1] * r[0], rtol=1e-9)
-    assert (np.linalg.norm(still) > 0) == (np.hypot(*state[:2]) > 0.97)
-
-
 # --- motion ----------------------------------------------------------------------------------
 
 DEFAULT, EXPLICIT = jc.method(), jc.method("rk4", steps=512)
@@ -256,17 +227,6 @@ def test_turned_starts_have_turned_ends(kind, design, speed, cage, rib, angle):
     turned = np.kron(np.eye(start.size // 2), turn(angle))
     end, found = after(model, speed, start), after(model, speed, turned @ start, angle)
     np.testing.assert_allclose(found, turned @ end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("kind", SYSTEMS)
-@random(20)
-@given(designs, speeds, states(0.01, 0.9), states(0.0, 0.05, 0.05), units)
-def test_revolutions_in_other_units(kind, design, speed, cage, rib, scales):
-    model, start = system(kind, design), start_of(kind, cage, rib)
-    end = after(model, speed, start)
-    found = after(rescaled(model, jnp.asarray(scales)), speed / scales[2], start)
-    np.testing.assert_allclose(found, end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
 
 
 # --- energy and phase volume -----------------------------------------------------------------
