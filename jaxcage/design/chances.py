@@ -17,10 +17,10 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from .._sobol import sobol
 from ..analysis import chaotic_share, failed, restless, zones
-from ..integrate import AbstractMethod, native
 from ..io import Unknown, check_together
 from ..lanes import Progress, sweep
 from ..models import CageModel
+from ..solve import AbstractMethod, native
 
 
 DRAWS, ENSEMBLE_SPEEDS = 64, 40

@@ -19,10 +19,10 @@ from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
 from ..analysis import failed, restless
-from ..integrate import AbstractMethod, native
 from ..io import Measurement, Range, Unknown
 from ..lanes import Progress
 from ..models import CageModel
+from ..solve import AbstractMethod, native
 from .chances import ERROR, draw, run_draws
 from .loads import motions
 

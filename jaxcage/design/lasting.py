@@ -19,9 +19,9 @@ from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
-from ..integrate import AbstractMethod
 from ..lanes import Plan, Progress, Run, run_lanes
 from ..models import CageModel
+from ..solve import AbstractMethod
 
 
 NAMES = ("guidance_gap", "eccentricity")
@@ -185,7 +185,7 @@ def _escapes(
     method: AbstractMethod | None,
     progress: Progress | None,
 ) -> tuple[Float[np.ndarray, "designs starts"], int]:
-    """Revolutions after which lanes are calm, from all initial states of each design; and to where they were followed."""
+    """Revolutions after which the lanes of each design are calm; and revolutions to which they were followed."""
     designs = [replace(model, **dict(zip(names, row.tolist(), strict=True))) for row in values]
     length = {"discard": DISCARD, "revolutions": OBSERVED, "blocks": OBSERVED // LIFE_BLOCK, "horizon": horizon}
     run = Run.of(model, confirm=False, method=method, **length)

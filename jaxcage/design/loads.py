@@ -17,8 +17,8 @@ from jaxtyping import Array, Complex, Float
 
 from .._form import Form, compiled
 from ..analysis import OrderSpectrum, dominant_orders
-from ..integrate import REVOLUTION, AbstractMethod, Lanes, histories, native
 from ..models import AbstractForcedSystem, CageModel
+from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
 
 
 LAND_LOADS = {"wear load": "N m/s", "peak land force": "N", "film drag power": "W"}
@@ -124,7 +124,7 @@ def mean_of_known(values: Float[np.ndarray, "*lanes starts"]) -> Float[np.ndarra
 def land_loads(
     model: CageModel, found: xr.Dataset, method: AbstractMethod | None = None
 ) -> dict[str, Float[np.ndarray, " speeds"]]:
-    """Loads of the land (`LAND_LOADS`) at each speed of a sweep, the mean of its initial states, and their `least film`.
+    """Loads of the land (`LAND_LOADS`) at each speed of a sweep, means over the initial states, and the `least film`.
 
     **Arguments:** model and its sweep; integration method, by default `jaxcage.native()`.
     """

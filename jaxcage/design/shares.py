@@ -36,8 +36,8 @@ class SobolIndices:
     samples: int
     """Base samples."""
     scatter: float = 0.0
-    """Share of the variance that is scatter of the motion itself, by the blocks of each run: it belongs to no parameter,
-    and total indices contain it. Drift between the blocks counts as scatter."""
+    """Share of the variance that is scatter of the motion itself, by the blocks of each run. It belongs to no
+    parameter, and total indices contain it. Drift between the blocks counts as scatter."""
 
     @property
     def doubtful(self) -> tuple[str, ...]:

@@ -21,10 +21,9 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import parameters
 from ..analysis import CHAOS_THRESHOLD, failed
-from ..integrate import AbstractMethod
 from ..lanes import Plan, Progress, Run, Speeds, rpm, run_lanes
-from ..models import AbstractForcedSystem, BearingModel, rolling_start
-from ..models.whole import drawn_places
+from ..models import AbstractForcedSystem, BearingModel, drawn_places, rolling_start
+from ..solve import AbstractMethod
 from .loads import FILM, LAND_LOADS, loads_of_lanes, mean_of_known, negligible_load
 from .objective import AbstractObjective, DesignSpace, Models
 
@@ -60,7 +59,7 @@ TERMS: Mapping[str, tuple[str, ...]] = {
     "slip": ("cage_slip",),
     "balance": (BALANCE,),
 }
-"""Terms of the objective of a whole bearing: statistics, each relative to its present value; of two each counts half."""
+"""Terms of the objective of a whole bearing: statistics relative to their present values; of two each counts half."""
 BEARING_MEASURES: Mapping[str, str] = {
     **{term: names[0] for term, names in TERMS.items() if len(names) == 1 and term != "balance"},
     **{name: name for name in COMPARED},
@@ -312,8 +311,8 @@ class Balance(AbstractStatistic):
 
 
 def statistic(runs: Runs, name: str) -> AbstractObjective:
-    """The statistic of a name: a quantity of the model, `exponent`, a load of the land, the balance grade; or the sum of
-    several that are joined by +."""
+    """The statistic of a name: a quantity of the model, `exponent`, a load of the land, the balance grade; or the sum
+    of several names that are joined by +."""
     first, *others = (
         LandLoad(runs, each) if each in LAND_LOADS else Balance(runs) if each == BALANCE else Mean(runs, each)
         for each in name.split("+")
