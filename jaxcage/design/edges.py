@@ -1,4 +1,4 @@
-"""Exact objectives: widths of zones, distances from synchronous-loss edges, margins of stability.
+"""Exact objectives of a search: sums of synchronous-loss edges, distances from them, margins of stability.
 
 An edge is followed from where it was last found: Newton's method on its defining equations, along a straight line to
 the new design in as many parts as it needs. Its derivatives come from the implicit function theorem.
@@ -7,8 +7,8 @@ the new design in as many parts as it needs. Its derivatives come from the impli
 import concurrent.futures
 import dataclasses
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, overload
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -17,12 +17,11 @@ from scipy.special import logsumexp, softmax
 from .._errors import ArgumentError
 from ..orbits import LeadingMultiplier, Point, Sensitivity, leading_multiplier, sensitivity
 from ..solve import AbstractMethod
-from ._objective import AbstractExact, DesignSpace, Measured
-from ._width import SolvedEdge, ZoneWidth
+from .objective import AbstractExact, DesignSpace, Measured
 
 
 HALVINGS = 4
-"""How often the way to a new design is halved before an edge counts as lost."""
+"""Times that the way to a new design is halved before an edge counts as lost."""
 
 
 class _Anchor(NamedTuple):
@@ -49,6 +48,11 @@ class FollowedEdges:
     def names(self) -> tuple[str, ...]:
         """Names of the edges."""
         return tuple(self.points)
+
+    def status(self, speeds: Float[np.ndarray, " edges"]) -> str:
+        """`ok`, or the names of the edges that are lost."""
+        lost = [name for name, speed in zip(self.names, speeds, strict=True) if np.isnan(speed)]
+        return f"lost: {', '.join(lost)}" if lost else "ok"
 
     def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> tuple[np.ndarray, np.ndarray]:
         """Speeds [rpm] and their slopes; NaN where an edge is lost."""
@@ -102,61 +106,12 @@ class EdgeSum(AbstractExact):
     constant: float = 0.0
     """Added to the sum [rpm]."""
 
-    def __post_init__(self):
-        if missing := [name for name in self.weights if name not in self.edges.names]:
-            raise ValueError(f"Edge `{missing[0]}` must be one of {', '.join(self.edges.names)}.")
-
     def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Measured:
         weights = np.array([self.weights.get(name, 0.0) for name in self.edges.names])
         speeds, slopes = self.edges.at(space, place)
-        lost = [name for name, s, w in zip(self.edges.names, speeds, weights, strict=True) if w and np.isnan(s)]
         here = weights != 0
         value = self.constant + float(weights[here] @ speeds[here])
-        return Measured(value, weights[here] @ slopes[here], f"lost: {', '.join(lost)}" if lost else "ok")
-
-
-@overload
-def zone_width(edges: FollowedEdges, zone: int = 1, range_rpm: tuple[float, float] | None = None) -> EdgeSum: ...
-@overload
-def zone_width(edges: Mapping[str, SolvedEdge], zone: int = 1) -> ZoneWidth: ...
-def zone_width(
-    edges: FollowedEdges | Mapping[str, SolvedEdge], zone: int = 1, range_rpm: tuple[float, float] | None = None
-) -> EdgeSum | ZoneWidth:
-    """Width of a zone, exit less onset [rpm], and how it answers to the design.
-
-    **Arguments:** edges by name, `zone 1 onset` and the like, or `onset` and `exit`; number of the zone; first and last
-    speed that were looked at, for an open zone of followed edges.
-
-    **Returns:** of edges that are solved for, `ZoneWidth`: the width and its change by any parameters, with standard
-    errors. They may be `lasting_edges`, or `jaxcage.sensitivities` of synchronous-loss edges, and one of a kind with
-    one of another. Of `FollowedEdges`, an objective for searches.
-
-    A zone that is open, its onset or exit beyond the speeds that were looked at, has the slope of its other edge alone.
-    As an objective it counts to the end of that range; a `ZoneWidth` has no width then and says that it is open.
-
-    **Raises:** `ValueError` for a zone of which no edge is known, or an open one of followed edges without a range.
-    """
-    names = {end: f"zone {zone} {end}" for end in ("onset", "exit")}
-    if not isinstance(edges, FollowedEdges):
-        solved = {end: edges.get(name, edges.get(end)) for end, name in names.items()}
-        if not any(solved.values()):
-            raise _no_edge(edges, zone)
-        return ZoneWidth(solved["onset"], solved["exit"])
-    known = [end for end, name in names.items() if name in edges.names]
-    if not known:
-        raise _no_edge(edges.names, zone)
-    if len(known) == 1 and range_rpm is None:
-        raise ArgumentError(
-            "range_rpm", said=f"must be given for zone {zone}, which is open: its {known[0]} alone is known."
-        )
-    first, last = range_rpm or (0.0, 0.0)
-    ends = {"onset": (-1.0, -first), "exit": (1.0, last)}
-    weights = {names[end]: ends[end][0] for end in known}
-    return EdgeSum(edges, weights, sum((ends[end][1] for end in names if end not in known), start=0.0))
-
-
-def _no_edge(known: Iterable[str], zone: int) -> ArgumentError:
-    return ArgumentError("zone", said=f"must be one with an edge among {', '.join(known)}, but is {zone}.")
+        return Measured(value, weights[here] @ slopes[here], self.edges.status(np.where(here, speeds, 0.0)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -173,13 +128,12 @@ class EdgeClearance(AbstractExact):
 
     def at(self, space: DesignSpace, place: Float[np.ndarray, " n"]) -> Measured:
         speeds, slopes = self.edges.at(space, place)
-        lost = [name for name, s in zip(self.edges.names, speeds, strict=True) if np.isnan(s)]
         apart = speeds[None] - np.asarray(self.operating_rpm, dtype=float)[:, None]
         nearness = np.exp(-(np.abs(apart) - np.nanmin(np.abs(apart))) / self.softness)
         total = nearness.sum()
         value = self.softness * np.log(total) - np.nanmin(np.abs(apart))
         slope = np.einsum("se,en->n", -nearness / total * np.sign(apart), slopes)
-        return Measured(float(value), slope, f"lost: {', '.join(lost)}" if lost else "ok")
+        return Measured(float(value), slope, self.edges.status(speeds))
 
 
 @dataclasses.dataclass(eq=False)

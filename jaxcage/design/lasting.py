@@ -10,28 +10,30 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
+from ..lanes import Plan, Progress, Run, run_lanes
 from ..models import CageModel
 from ..solve import AbstractMethod
-from ..sweeps import Progress, sweep_designs
 
 
 NAMES = ("guidance_gap", "eccentricity")
 DESIGNS = 64
 ROUNDS = 4
-"""How often lanes are spread again, about the edge as it is known by then."""
+"""Times that lanes are spread, about the edge as it is known by then."""
 SPREAD = 0.02
 """Relative standard deviation of the parameters."""
 REACH = 2.0
 """Lanes are spread over speeds with mean lives of e^-REACH to e^REACH horizons, as far as the last round tells."""
 DISCARD, OBSERVED = 100, 300
-"""Revolutions left out, and those after which lanes that are calm are not followed."""
+"""Revolutions left out, and observed; lanes that are calm after these are not followed."""
 LIKELY = 0.001
 """Probability below which the law of escapes does not fit."""
 CERTAIN = 3.0
@@ -40,20 +42,20 @@ CERTAIN = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class LastingEdge:
-    """Where the mean life of chaos passes the horizon, and how that moves with parameters."""
+    """Speed at which the mean life of chaos passes the horizon, and its elasticities."""
 
     speed_rpm: float
     names: tuple[str, ...]
     elasticity: Float[np.ndarray, " n"]
     """Relative change of the edge by that of each parameter."""
     covariance: Float[np.ndarray, "1+n 1+n"]
-    """Of the speed [rpm], then of the elasticities."""
+    """Covariance of the speed [rpm] and the elasticities."""
     values: Float[np.ndarray, " n"]
-    """Of the parameters [SI]."""
+    """Parameters [SI]."""
     horizon: int
     middle_rpm: float
     window_rpm: float
-    """Middle of the speeds at which lanes ran in the end, and half their width."""
+    """Middle and half width of the speeds of the last round."""
     steepness: float
     """Change of the logarithm of the escape rate with speed [1/rpm]."""
     fit: Hazard
@@ -73,7 +75,7 @@ class LastingEdge:
 
     @property
     def standard_error_rpm(self) -> float:
-        """Of the speed."""
+        """Standard error of the speed."""
         return math.sqrt(self.covariance[0, 0])
 
     @property
@@ -85,7 +87,7 @@ class LastingEdge:
         """Elasticity by several parameters that change together, such as gap and eccentricity at a fixed ratio, with
         its standard error.
 
-        **Raises:** `ValueError` for a parameter that the edge was not asked about.
+        **Raises:** `ValueError` for a parameter without an elasticity.
         """
         if unknown := [name for name in names if name not in self.names]:
             raise ArgumentError("names", said=f"must be among {', '.join(self.names)}, but has '{unknown[0]}'.")
@@ -120,18 +122,18 @@ def lasting_edge(
     **Arguments:**
 
     - `model`: the design.
-    - `rpm`, `within_rpm`: where the edge is, and how uncertain that is, as a sweep says.
+    - `rpm`, `within_rpm`: speed of the edge and its uncertainty, as a sweep gives them.
     - `names`: parameters; each costs no more, but all answers become less certain.
     - `designs`: designs of each round, each at a speed of its own, from all starts of the model.
     - `horizon`: mean life of chaos at the edge [revolutions].
-    - `rounds`: how often lanes are spread again about the edge as it is known by then; all rounds count in the end.
+    - `rounds`: times that lanes are spread about the edge as it is known by then; all rounds count in the end.
     - `spread`: relative standard deviation of the parameters among the lanes.
-    - `seed`, `method`, `progress`: of the draws; as in `sweep`.
+    - `seed`: seed of the draws; `method`, `progress`: as in `sweep`.
 
     **Returns:** `LastingEdge`; its `status` says where the numbers should not be used.
 
-    **Raises:** `ValueError` for parameters that are unknown or 0, a window that is none, a horizon that is not beyond
-    what every lane runs, and where too few lanes escape to tell anything.
+    **Raises:** `ValueError` for parameters that are unknown or 0, a window that is not positive, a horizon within the
+    revolutions that every lane runs, and too few escapes.
     """
     if not within_rpm > 0:
         raise ArgumentError("within_rpm", said=f"must be positive, but {within_rpm} was given.")
@@ -183,21 +185,12 @@ def _escapes(
     method: AbstractMethod | None,
     progress: Progress | None,
 ) -> tuple[Float[np.ndarray, "designs starts"], int]:
-    """Revolutions after which lanes are calm, from all starts of each design; and to where they were followed."""
+    """Revolutions after which the lanes of each design are calm; and revolutions to which they were followed."""
     designs = [replace(model, **dict(zip(names, row.tolist(), strict=True))) for row in values]
-    speeds = rpm[:, None] * math.pi / 30
-    found = sweep_designs(
-        designs,
-        speeds,
-        discard=DISCARD,
-        revolutions=OBSERVED,
-        blocks=OBSERVED // LIFE_BLOCK,
-        confirm=False,
-        horizon=horizon,
-        method=method,
-        progress=progress,
-    )
-    return np.stack([s.escape[0] for s in found if s.escape is not None]), found[0].horizon
+    length = {"discard": DISCARD, "revolutions": OBSERVED, "blocks": OBSERVED // LIFE_BLOCK, "horizon": horizon}
+    run = Run.of(model, confirm=False, method=method, **length)
+    found = run_lanes(Plan.one_speed_each(designs, rpm * math.pi / 30), run, progress)
+    return found["escape"].values, found.attrs["horizon"]
 
 
 def _fitted(
@@ -210,38 +203,26 @@ def _fitted(
     names: Sequence[str],
     base: np.ndarray,
 ) -> LastingEdge:
-    """The edge as the lanes tell it."""
+    """The edge by a law of escapes whose logarithm is a square of the speed, or linear where that is not steep."""
     scale = np.maximum(np.std(change, axis=0), 1e-12)
     u = (rpm - edge) / window
-    of = lambda *x: hazard(times, horizon, np.column_stack([*x, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
-    fit, order = of(u, u**2), 2
-    if not _steep(fit, _root(fit, horizon)):
-        fit, order = of(u), 1
-    beta, n = fit.coefficients, len(names)
-    at = _root(fit, horizon) if order == 2 else -(beta[0] + math.log(horizon)) / beta[1]
-    powers = at ** np.arange(order + 1.0)  # log rate = sum of beta u^k + ..., and its slope by u:
-    by_slope = np.concatenate([[0.0, 1.0], 2 * powers[1:order], np.zeros(n)])
-    steep = float(by_slope @ beta)
-    speed = edge + window * at
-    slope = -window * beta[order + 1 :] / steep / scale  # rpm by relative change
-    # Derivatives of the speed, and of slope / speed, by the coefficients.
-    of_at = -np.concatenate([powers, np.zeros(n)]) / steep
-    of_steep = by_slope + (2 * beta[2] if order == 2 else 0.0) * of_at
-    of_slope = -np.outer(slope / steep, of_steep)
-    of_slope[:, order + 1 :] -= np.diag(window / steep / scale)
-    jacobian = np.vstack([window * of_at, (of_slope - np.outer(slope / speed, window * of_at)) / speed])
-    covariance = jacobian @ fit.covariance @ jacobian.T
-    return LastingEdge(speed, tuple(names), slope / speed, covariance, base, horizon, edge, window, steep / window, fit)
 
+    def solved(beta: Array) -> tuple[Array, Array]:
+        """Speed and elasticities, and the slope of the logarithm, where log rate = a + b u + c u^2 + ... is that of one
+        escape in a horizon, at the root that is nearest to 0."""
+        a, b = beta[0] + math.log(horizon), beta[1]
+        c = beta[2] if beta.size > 2 + len(names) else 0.0
+        at = -2 * a / (b + jnp.sign(b) * jnp.sqrt(b * b - 4 * a * c))
+        steep, speed = b + 2 * c * at, edge + window * at
+        return jnp.append(speed, -window * beta[-len(names) :] / steep / scale / speed), steep
 
-def _root(bent: Hazard, horizon: int) -> float:
-    """Where a law with a square in it is one escape in a horizon [windows]: nearest to 0, NaN if nowhere."""
-    roots = np.roots(bent.coefficients[2::-1] + np.array([0.0, 0.0, math.log(horizon)]))
-    real = roots[np.isreal(roots)].real
-    return float(min(real, key=abs, default=math.nan))
-
-
-def _steep(bent: Hazard, at: float) -> bool:
-    """Whether the law is at its edge half as steep as in the middle at least: near its vertex there is no edge."""
-    b, c = bent.coefficients[1:3].tolist()
-    return abs(b + 2 * c * at) > abs(b) / 2  # false for NaN
+    for powers in ([u, u**2], [u]):
+        fit = hazard(times, horizon, np.column_stack([*powers, change / scale]), block=LIFE_BLOCK, t0=DISCARD)
+        beta = jnp.asarray(fit.coefficients)
+        (found, steep), (jacobian, _) = solved(beta), jax.jacfwd(solved)(beta)
+        if abs(steep) > abs(fit.coefficients[1]) / 2:  # false for NaN; near the vertex of a square there is no edge
+            break
+    speed, *elasticity = np.asarray(found).tolist()
+    covariance = np.asarray(jacobian) @ fit.covariance @ np.asarray(jacobian).T
+    about = (base, horizon, edge, window, float(steep) / window, fit)
+    return LastingEdge(speed, tuple(names), np.array(elasticity), covariance, *about)

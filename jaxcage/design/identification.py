@@ -12,16 +12,19 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import xarray as xr
 from jaxtyping import Bool, Float
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
+from ..analysis import failed, restless
 from ..io import Measurement, Range, Unknown
+from ..lanes import Progress
 from ..models import CageModel
 from ..solve import AbstractMethod, native
-from ..sweeps import Progress, motions
-from ._ensemble import ERROR, draw, run_draws
+from .chances import ERROR, draw, run_draws
+from .loads import motions
 
 
 DRAWS = 128
@@ -166,19 +169,17 @@ def misses(
     models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
     found = run_draws(models, rpm * np.pi / 30, method, progress)
-    needed = any(m.quantity in ("orbit size", "whirl frequency") for m in measured)
-    moved = motions(models, found, method=native(error=ERROR)) if needed else []
+    lost, rattles = (np.array([of(each) for each in found]) for of in (lambda each: failed(each)[:, 0], restless))
+    if any(m.quantity in ("orbit size", "whirl frequency") for m in measured):
+        moved = motions(models, xr.concat(found, "design"), method=native(error=ERROR))
     columns = []
     for m in measured:
         i = int(np.argmin(np.abs(rpm - m.cage_rpm)))
         if m.quantity in ("rattles", "calm"):
-            rattles = np.array([s.restless[i] for s in found])
-            failed = np.array([s.failed[i, 0] for s in found])
-            columns.append(np.where(failed, np.nan, np.where(rattles == (m.quantity == "rattles"), 0.0, FAR)))
+            right = rattles[:, i] == (m.quantity == "rattles")
+            columns.append(np.where(lost[:, i], np.nan, np.where(right, 0.0, FAR)))
             continue
-        if m.quantity == "orbit size":
-            value = np.array([moves.size[i, 0] for moves in moved])
-        else:
-            value = np.array([abs(moves.whirl_order[i, 0]) for moves in moved]) * m.cage_rpm / 60
+        whirl = m.quantity == "whirl frequency"
+        value = np.abs(moved.whirl_order[:, i, 0]) * m.cage_rpm / 60 if whirl else moved.size[:, i, 0]
         columns.append(np.abs(value - m.value) / m.tolerance)
     return np.stack(columns, axis=1)

@@ -9,17 +9,18 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+import xarray as xr
 from jaxtyping import Bool, Float
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from .._sobol import sobol
-from ..analysis import Sweep, zones
+from ..analysis import chaotic_share, failed, restless, zones
 from ..io import Unknown, check_together
+from ..lanes import Progress, sweep
 from ..models import CageModel
 from ..solve import AbstractMethod, native
-from ..sweeps import Progress, sweep_designs
 
 
 DRAWS, ENSEMBLE_SPEEDS = 64, 40
@@ -219,8 +220,8 @@ def ensemble(
         tuple(info[u.names[0]].source for u in unknowns),
         place,
         np.asarray(speeds, dtype=float),
-        np.array([s.restless for s in found]),
-        np.array([s.failed[:, 0] for s in found]),
+        np.array([restless(each) for each in found]),
+        np.array([failed(each)[:, 0] for each in found]),
         tuple(_bands(found)),
         discard,
         revolutions,
@@ -236,10 +237,10 @@ def run_draws(
     discard: int = REVOLUTIONS,
     revolutions: int = REVOLUTIONS,
     blocks: int = 20,
-) -> list[Sweep]:
-    """Every design once at every speed, from its own conventional start: where the cage of one rests on its rib, that
-    of another with an earlier contact would be pressed into it, and be shot off."""
-    return sweep_designs(
+) -> list[xr.Dataset]:
+    """The sweep of each design, from its own conventional initial state: a state in which the cage of one design rests
+    on its rib would press that of another into it."""
+    found = sweep(
         models,
         speeds,
         starts=1,
@@ -253,6 +254,7 @@ def run_draws(
         method=native(error=ERROR) if method is None else method,
         progress=progress,
     )
+    return [found.isel(design=i) for i in range(len(models))]
 
 
 def chaotic_shares(
@@ -268,11 +270,11 @@ def chaotic_shares(
     flat = place.reshape(len(unknowns), -1)
     models = draw(model, unknowns, flat.T)
     found = run_draws(models, speeds, method, progress)
-    shares = [float(np.nanmean(s.chaotic_share)) if not np.all(s.failed) else 0.0 for s in found]
+    shares = [float(np.nanmean(chaotic_share(each))) if not np.all(failed(each)) else 0.0 for each in found]
     return np.array(shares).reshape(1, *place.shape[1:])
 
 
-def _bands(found: Sequence[Sweep]) -> list[Band]:
+def _bands(found: Sequence[xr.Dataset]) -> list[Band]:
     """Where the ends of the first two zones of each draw are."""
     places: dict[str, list[float]] = {f"zone {i} {end}": [] for i in (1, 2) for end in ("onset", "exit")}
     for swept in found:

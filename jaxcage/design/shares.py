@@ -1,4 +1,4 @@
-"""What parameters do to an objective over their whole range, and what a drawing's tolerances do to an edge."""
+"""Shares of an objective's variance over whole ranges of parameters, and tolerance budgets of edges and statistics."""
 
 import dataclasses
 import math
@@ -11,9 +11,11 @@ from scipy.special import ndtri
 
 from .._arguments import require_at_least
 from .._errors import ArgumentError, InputError
+from ..analysis import scatter
 from ..models import AbstractForcedSystem
 from ..orbits import Sensitivity
-from ._objective import AbstractObjective, DesignSpace
+from .objective import AbstractObjective, DesignSpace
+from .slopes import StatisticGradient
 
 
 NARROW = 0.3
@@ -33,6 +35,9 @@ class SobolIndices:
     evaluations: int
     samples: int
     """Base samples."""
+    scatter: float = 0.0
+    """Share of the variance that is scatter of the motion itself, by the blocks of each run. It belongs to no
+    parameter, and total indices contain it. Drift between the blocks counts as scatter."""
 
     @property
     def doubtful(self) -> tuple[str, ...]:
@@ -88,20 +93,24 @@ def global_sensitivity(
     **Arguments:** design; bounds [SI] by name; objective; base samples, a power of 2: samples (parameters + 2) designs
     are evaluated in one batch.
 
-    **Raises:** `ValueError` for samples that are no power of 2, or an objective that could not be had somewhere.
+    **Raises:** `ValueError` for samples that are no power of 2, or an objective that has no value somewhere.
     """
     require_at_least(0, seed=seed)
-    space = DesignSpace.of(system, vary)
+    space, every = DesignSpace.of(system, vary), []
 
     def evaluate(x: np.ndarray) -> np.ndarray:
-        found = np.array(objective.values(space, x.T))
-        if not np.all(np.isfinite(found)):
-            raise InputError(
-                f"The objective could not be had in {np.sum(~np.isfinite(found))} of {found.size} designs."
-            )
-        return found[None]
+        found = objective.by_block(space, x.T)
+        if lost := int(np.sum(~np.isfinite(found).all(axis=1))):
+            raise InputError(f"The objective must have a value in all designs, but has none in {lost} of {len(found)}.")
+        every.append(found)
+        return found.mean(axis=1)[None]
 
-    return sobol_of(evaluate, space.names, samples=samples, seed=seed)
+    shares = sobol_of(evaluate, space.names, samples=samples, seed=seed)
+    blocks = np.concatenate(every)
+    variance = float(np.var(blocks.mean(axis=1)))
+    if blocks.shape[1] == 1 or not variance > 0:
+        return shares
+    return dataclasses.replace(shares, scatter=min(1.0, float(np.mean(scatter(blocks) ** 2)) / variance))
 
 
 def sobol_of(
@@ -152,38 +161,61 @@ def _shares(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> tuple[np.ndarray
 
 @dataclasses.dataclass(frozen=True)
 class ToleranceBudget:
-    """Scatter of an edge that the scatter of parameters causes, to first order."""
+    """Scatter of an edge or a statistic that the scatter of parameters causes, to first order."""
 
-    edge: str
-    speed_rpm: float
-    deviation_rpm: dict[str, float]
-    """Standard deviation due to each parameter alone."""
+    name: str
+    unit: str
+    value: float
+    deviation: dict[str, float]
+    """Standard deviation due to each parameter, or several that change together, alone [unit]."""
+    error: dict[str, float]
+    """Standard error of each; 0 of an exact edge."""
+    elasticity: dict[str, float]
 
     @property
-    def total_rpm(self) -> float:
+    def total(self) -> float:
         """Standard deviation due to all of them, taken as independent."""
-        return float(np.sqrt(sum(d**2 for d in self.deviation_rpm.values())))
+        return math.hypot(*self.deviation.values())
+
+    @property
+    def unclear(self) -> tuple[str, ...]:
+        """Parameters whose deviation has an error, and is within twice of it."""
+        return tuple(name for name, x in self.deviation.items() if x <= 2 * self.error[name] > 0)
 
     def __str__(self) -> str:
-        order = sorted(self.deviation_rpm.items(), key=lambda item: -item[1])
-        total = self.total_rpm or 1.0  # without any scatter, nothing is a part of it
-        rows = [f"  {n:<24} +-{d:.3g} rpm, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
-        half = ndtri(0.975) * self.total_rpm
-        return "\n".join([f"{self.edge} at {self.speed_rpm:.1f} rpm: +-{half:.3g} rpm (95 %)", *rows])
+        order = sorted(self.deviation.items(), key=lambda item: -item[1])
+        total = self.total or 1.0  # without any scatter, nothing is a part of it
+        rows = [f"  {n:<24} +-{d:.3g} {self.unit}, {100 * (d / total) ** 2:.0f} % of the variance" for n, d in order]
+        half = ndtri(0.975) * self.total
+        return "\n".join([f"{self.name} {self.value:.6g} {self.unit}: +-{half:.3g} {self.unit} (95 %)", *rows])
 
 
-def tolerance_budget(edge: Sensitivity, deviation: Mapping[str, float]) -> ToleranceBudget:
-    """Scatter of an edge from its exact derivatives.
+def tolerance_budget(of: Sensitivity | StatisticGradient, deviation: Mapping[str, float]) -> ToleranceBudget:
+    """Scatter of an edge from its exact derivatives, or of a statistic from its slopes.
 
-    **Arguments:** edge; standard deviation of each parameter relative to its value (a tolerance of +-t, evenly used,
-    has t/sqrt(3)).
+    **Arguments:** edge or statistic; standard deviation of each parameter relative to its value (a tolerance of +-t,
+    evenly used, has t/sqrt(3)).
 
-    **Raises:** `ValueError` for a parameter that the edge has no derivative for, or a negative deviation.
+    **Raises:** `ValueError` for a parameter without a derivative, or a negative deviation.
     """
+    if isinstance(of, StatisticGradient):
+        names, value, unit = of.directions, of.value, of.unit
+        slope, error, elasticity = of.by_relative_change, of.by_relative_change_error, of.elasticity
+    else:
+        names, value, unit = tuple(of.elasticity), of.value_rpm, "rpm"
+        elasticity = np.array(list(of.elasticity.values()))
+        slope, error = elasticity * value, np.zeros(len(names))
     for name, d in deviation.items():
-        if name not in edge.elasticity:
-            raise InputError(f"Tolerance of `{name}` must be of one of {', '.join(edge.elasticity)}.")
+        if name not in names:
+            raise InputError(f"Tolerance of `{name}` must be of one of {', '.join(names)}.")
         if not d >= 0:
             raise InputError(f"Tolerance of `{name}` must not be negative, but {d} was given.")
-    moved = {n: abs(edge.elasticity[n]) * d * edge.value_rpm for n, d in deviation.items()}
-    return ToleranceBudget(edge.name, edge.value_rpm, moved)
+    at = {name: names.index(name) for name in deviation}
+    return ToleranceBudget(
+        of.name,
+        unit,
+        value,
+        {n: float(abs(slope[i]) * deviation[n]) for n, i in at.items()},
+        {n: float(error[i] * deviation[n]) for n, i in at.items()},
+        {n: float(elasticity[i]) for n, i in at.items()},
+    )
