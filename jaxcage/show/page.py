@@ -6,7 +6,7 @@ import datetime
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 import matplotlib
@@ -14,12 +14,15 @@ from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
 from .. import __version__
-from ..studies import Ensemble
 from .findings import Findings
 from .sections import Section, sections_of
 from .speed_axes import add_shaft_axes
 from .style import restyle
 from .tables import Table
+
+
+if TYPE_CHECKING:
+    from ..studies import Ensemble
 
 
 RASTER_DPI = 150
@@ -43,7 +46,7 @@ def page(
     *,
     table: Mapping[str, Any] | None = None,
     command: str = "",
-    chances: Ensemble | None = None,
+    chances: "Ensemble | None" = None,
     left: Sequence[str] = (),
     more: Sequence[Section] = (),
 ) -> str:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from .._parameters import parameter_info, parameters, readings_of
 from ..analysis import Zones, failed, resolution_rpm, restless
 from ..bearing import design_rule_violations
-from ..studies import Ensemble
 from .bearing_figures import load_bars
 from .chance_tables import chances_notes, chances_tables, operating_chances
 from .checks import at_speeds_table, checks_table, elasticity_tables, provenance_table, published_table, with_full_names
@@ -29,6 +28,10 @@ from .speed_axes import mark_operating, zone_strip
 from .style import new_figure
 from .tables import Beside, Column, Table, rows_table
 from .zone_tables import stretches_table, transient_tables, zone_span, zones_table
+
+
+if TYPE_CHECKING:
+    from ..studies import Ensemble
 
 
 COUNTED = ("No", "One", "Two", "Three", "Four", "Five", "Six")
@@ -56,7 +59,7 @@ class Section:
 def sections_of(
     findings: Findings,
     table: Mapping[str, Any] | None,
-    chances: Ensemble | None,
+    chances: "Ensemble | None",
     left: Sequence[str],
     more: Sequence[Section],
 ) -> list[Section]:
@@ -141,7 +144,7 @@ def _counted(n: int, what: str) -> str:
     return f"{COUNTED[n] if n < len(COUNTED) else n} {what}{'' if n == 1 else 's'}"
 
 
-def _result(findings: Findings, chances: Ensemble | None, left: Sequence[str]) -> Section:
+def _result(findings: Findings, chances: "Ensemble | None", left: Sequence[str]) -> Section:
     sweep, found, orbits = findings.sweep, findings.zones, findings.orbits
     lost, said, figures = failed(sweep), [], {}
     if orbits is not None and isinstance(found, Zones):
@@ -200,7 +203,7 @@ def _operating(findings: Findings) -> Section:
     return Section("operating", "Operating speeds", tables=tables)
 
 
-def _known(findings: Findings, chances: Ensemble) -> Section:
+def _known(findings: Findings, chances: "Ensemble") -> Section:
     """What draws from the ranges of a design do."""
     other = beside(findings)
     tables = chances_tables(findings.name, chances, other)
@@ -233,9 +236,9 @@ def _zones(findings: Findings) -> Section:
         return Section("zones", "Over speed", [said], {"sweep": (figure, caption)}, tables)
     said = (
         "Two kinds of zone are never mixed. In a synchronous-loss zone the orbit that turns with the cage is not "
-        "stable; its edges are bifurcations, solved for. In a chaotic zone some initial state leads to chaos; its edges "
-        f"are seen in a sweep and no sharper than its grid ({resolution_rpm(sweep):.0f} rpm), unless they coincide with "
-        "a bifurcation."
+        "stable; its edges are bifurcations, solved for. In a chaotic zone some initial state leads to chaos; its "
+        f"edges are seen in a sweep and no sharper than its grid ({resolution_rpm(sweep):.0f} rpm), unless they "
+        "coincide with a bifurcation."
     )
     caption = (
         "Vertical displacement once a revolution, over cage speed, from all initial states; beneath it the largest "
