@@ -30,10 +30,10 @@ from ..design import (
     tolerance_budget,
     unchanged,
 )
-from ..integrate import DEFAULT_ERROR, native
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, sensitivities, synchronous_orbits
 from ..plotting import design_figure, elasticity_bars
+from ..solve import DEFAULT_ERROR, native
 from ..sweeps import rpm, sweep
 from ._console import Say
 from ._job import Job

@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 
 from .._errors import InputError
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
-from ..integrate import AbstractMethod, FixedSteps, method, native
 from ..io import (
     BearingFile,
     Unknown,
@@ -29,10 +28,10 @@ from ..io import (
     subject_of,
     write_columns,
 )
-from ..models import FASTEST, BearingModel, CageModel, case, fastest_speed, whole_bearing
-from ..models.whole import WHOLE_BEARINGS
+from ..models import FASTEST, WHOLE_BEARINGS, BearingModel, CageModel, case, fastest_speed, whole_bearing
 from ..plotting import Style, add_shaft_axes, new_figure, restyle
 from ..report import chosen
+from ..solve import AbstractMethod, FixedSteps, method, native
 from ._console import Say, progress, say
 from ._options import WHOLE_COMMANDS, AnyOptions, CommonOptions, IntegrationOptions, Options
 from ._readers import flag

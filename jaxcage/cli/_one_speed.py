@@ -8,10 +8,10 @@ import numpy as np
 
 from .._errors import InputError, NoResult
 from ..analysis import BearingMeasures, OrbitMeasures, Sweep, cage_forces, orbit_measures
-from ..integrate import OUTCOMES, simulate
 from ..io import strobe_columns, trajectory_columns
 from ..plotting import simulation_figure, strobe_section
 from ..report import Table, chosen, number, require_some
+from ..solve import OUTCOMES, simulate
 from ..sweeps import rpm, sweep
 from ._job import Job, blocks_of, samples_per_revolution
 from ._options import PoincareOptions, SimulateOptions

@@ -8,10 +8,9 @@ import numpy as np
 
 from .._errors import InputError, NoResult
 from ..analysis import CAGE_STATES
-from ..integrate import OUTCOMES
-from ..models import BearingModel, CageModel
-from ..models.whole import CAGE_STARTS
+from ..models import CAGE_STARTS, BearingModel, CageModel
 from ..report import require_some, shares_table
+from ..solve import OUTCOMES
 from ..studies import (
     LABELS,
     WHOLE_TOLERANCE,

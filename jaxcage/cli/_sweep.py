@@ -9,10 +9,10 @@ import numpy as np
 
 from .. import report
 from ..analysis import Sweep, Zones, zones
-from ..integrate import OUTCOMES
 from ..io import save_sweep
 from ..orbits import explain, loss_zones, synchronous_orbits
 from ..plotting import sweep_figure, zoomed_diagram
+from ..solve import OUTCOMES
 from ..sweeps import rpm, sweep
 from ._chances import chances
 from ._console import say, warn_of_short

@@ -22,11 +22,11 @@ from ..analysis import (
     named_lines,
     pocket_force_distribution,
 )
-from ..integrate import BearingRun, simulate_bearing
 from ..io import SpeedOf, Whose
 from ..models import FASTEST, BearingModel
 from ..plotting import bearing_figure
 from ..report import Table, chosen, number
+from ..solve import Trajectory, native, simulate
 from ..sweeps import rpm
 from ._job import Job
 from ._one_speed import measures_table
@@ -39,6 +39,8 @@ SAMPLES = 128
 """Of a revolution of the cage: some twenty in the contact of a roller with its pocket."""
 TOLERANCE = 1e-5
 """Of a step, in units of the state's scale."""
+ERROR = 1e-2
+"""Largest error of a sixteenth of a revolution, in the same units."""
 
 
 class AtShaftSpeed(NamedTuple):
@@ -82,16 +84,15 @@ def bearing_at(job: Job[SimulateOptions], model: BearingModel) -> Report:
     document = {
         **at.document,
         **chosen(options, "revolutions discard"),
-        **chosen(run, "outcome error steps implicit_share"),
+        **chosen(run, "outcome error steps"),
         **dataclasses.asdict(found.measures),
         "pocket_force_distribution_N": pocket_force_distribution(history),
         "around": {"angle_deg": np.degrees(places.pop("angle")), **places},
         "orders": found.orders,
         "spectra": {n: [vars(line) for line in named_lines(s, found.orders)] for n, s in found.spectra.items()},
     }
-    said = f"Error between two samples: at most {run.error:.0e} of the state's scale ({run.outcome})"
-    stiff = f"; {100 * run.implicit_share:.0f} % by implicit steps" if run.implicit_share else ""
-    return Report(document, found.tables, [said + stiff])
+    said = f"Error of a sixteenth of a revolution: at most {run.error:.0e} of the state's scale ({run.outcome})"
+    return Report(document, found.tables, [said])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +102,7 @@ class Examined:
     title: str
     model: BearingModel
     revolutions: int
-    run: BearingRun
+    run: Trajectory
     history: BearingHistory
     measures: BearingMeasures
     orders: Mapping[str, float]
@@ -132,15 +133,9 @@ def examined(name: str, at: AtShaftSpeed, revolutions: int, discard: int, tolera
     **Raises:** `NoResult` if the run fails.
     """
     model, speed = at.model, at.speed
-    run = simulate_bearing(
-        model,
-        speed,
-        revolutions=revolutions,
-        discard=discard,
-        samples=SAMPLES,
-        tolerance=TOLERANCE if tolerance is None else tolerance,
-    )
-    if run.outcome not in ("successful", "inaccurate"):
+    method = native(TOLERANCE if tolerance is None else tolerance, ERROR)
+    run = simulate(model, speed, revolutions=revolutions, discard=discard, samples=SAMPLES, method=method)
+    if run.outcome != "successful":
         raise NoResult(f"The simulation at {at.shaft_rpm:g} rpm of the shaft failed ({run.outcome}).")
     history = bearing_history(model, run, speed)
     return Examined(

@@ -17,7 +17,6 @@ from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import scatter
-from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import quantity
 from .dataset import CODES, configuration_of, settings_of
@@ -58,8 +57,8 @@ class Study:
         if not 0 <= self.strobe <= self.run.revolutions * (not self.model.beside):
             raise ArgumentError(
                 "strobe",
-                said=f"must lie between 0 and the {self.run.revolutions} revolutions of a model whose revolutions repeat, "
-                f"but is {self.strobe}.",
+                said=f"must lie between 0 and the {self.run.revolutions} revolutions, and be 0 for a whole bearing, but "
+                f"is {self.strobe}.",
             )
 
     @property
@@ -257,14 +256,17 @@ def label_map(
     if speed is not None:
         require_speeds(model, speed)
     if min(len(x_value), len(y_value)) < 2:
-        raise ArgumentError("x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}.")
+        raise ArgumentError(
+            "x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}."
+        )
     fixed = {} if speed is None else {SPEED: np.array([speed])}
     grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, starts)
     grid.require_known(model)
     run = Run.of(model, **{**settings, "confirm": False, "horizon": 0})
     require_at_least(0, persist=persist)
     if persist and (persist <= run.discard or run.exponents < 1 or run.blocks < 2):
-        said = f"must be 0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks, but is {persist}."
+        allowed = f"0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks"
+        said = f"must be {allowed}, but is {persist}."
         raise ArgumentError("persist", said=said)
     say = lambda what: None if stage is None else lambda done, total: stage(what, done, total)
     every = np.arange(grid.size)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from .._errors import NoResult
 from ..analysis import Stretch, Zones, failed, outcomes, stretches, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
-from ..integrate import AbstractMethod
+from ..solve import AbstractMethod
 from ..lanes import label_map, sweep
 from ..models import AbstractForcedSystem
 from ..orbits import Curve, LossZones, Sensitivity, SynchronousOrbits, explain, loss_zones, synchronous_orbits

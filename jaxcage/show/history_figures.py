@@ -32,7 +32,7 @@ from .style import (
 
 
 if TYPE_CHECKING:
-    from ..integrate import Trajectory
+    from ..solve import Trajectory
 
 
 Forces = Mapping[str, Float[np.ndarray, "samples 2"]]

@@ -1,0 +1,400 @@
+"""Equations of motion of the whole bearing at one shaft speed.
+
+The independent variable is the cage's angle, or time. Rollers are an axis of arrays. Each contact is computed once, and
+both bodies get the same numbers of it: forces and moments inside the bearing cancel to rounding. Rates of the
+rollers contain the cage's speed, but not its acceleration: rollers are coupled only through cage and inner ring.
+
+Cage, with mass centre G at distance e from C along n = (cos theta, sin theta), t across, all outer forces F_C (weight
+too) and the moment tau_C of the contacts about C:
+    M C'' = F_C + M e (omega^2 n - omega' t),   J_G omega' = tau_C - e M g cos theta - e t.F_C.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._types import Scalar, State
+from ..forces import cos_sin
+from .contacts import (
+    Guide,
+    LandForces,
+    PocketConstants,
+    PocketForces,
+    RacewayConstants,
+    RacewayForces,
+    inner_contact,
+    land_forces,
+    magnitude,
+    outer_contact,
+    pocket_contact,
+    quadratic,
+)
+from .field import AbstractField, AbstractLinearisation
+from .whole_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_of, rollers_of
+
+
+Many = Float[Array, "*rollers"] | float | int
+"""A number of all rollers, or of one."""
+
+NEWTON_STEPS, LONGEST_STEP = 8, 1e-3
+"""Iterations for the place of a quasi-static ring, and the longest change in each, over the roller's radius."""
+STALLED = 0.05
+"""Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
+IMBALANCE = 1e-6
+"""Largest force by which a quasi-static ring may be out of balance, as a fraction of load and weight."""
+
+
+class Geometry(NamedTuple):
+    """Where things are: directions of pockets, and of rollers from both ring centres."""
+
+    pocket_cos: Many
+    pocket_sin: Many
+    lag_cos: Many
+    lag_sin: Many
+    cos: Many
+    """Of the angle of the roller about the outer ring's centre."""
+    sin: Many
+    distance: Many
+    """From the inner ring's centre [m]."""
+    inner_out: Many
+    """Direction from the inner ring's centre to the roller, along the roller's radius and across."""
+    inner_across: Many
+
+
+class Forces(NamedTuple):
+    """All contacts of the bearing at one moment; of one roller, `land` is left out."""
+
+    geometry: Geometry
+    outer: RacewayForces
+    inner: RacewayForces
+    pocket: PocketForces
+    drag_out: Many
+    drag_across: Many
+    churning: Many
+    drag_power: Many
+    land: LandForces | None = None
+
+
+class Passed(NamedTuple):
+    """What a roller passes on to cage and rings, and to the ledger; of all of them, the sums."""
+
+    x: Many
+    """Force of the cage on the roller [N]."""
+    y: Many
+    cage_moment: Many
+    """On the cage about its centre [N m]."""
+    inner_x: Many
+    """Force of the inner ring on the roller [N]."""
+    inner_y: Many
+    inner_moment: Many
+    """Of the traction about the ring's centre [N m]."""
+    outer_moment: Many
+    traction: Many
+    """Powers that are lost [W], to `drag`."""
+    raceway_damping: Many
+    pocket_friction: Many
+    pocket_damping: Many
+    drag: Many
+    normal: Many
+    """Pocket force [N]."""
+    spin: Many
+    """Over the number of rollers [rad/s]."""
+    rubbing: Many
+    """Pocket force times sliding speed [W]."""
+
+
+MOVING = 7
+"""So many of them, the first, move cage and rings."""
+
+
+class BearingAtSpeed(AbstractField):
+    """The laws of the bearing at one shaft speed, with all constants computed."""
+
+    n_rollers: int = eqx.field(static=True)
+    held: bool = eqx.field(static=True)
+    settles: bool = eqx.field(static=True)
+    """True if the inner ring is quasi-static."""
+    inner_guided: bool = eqx.field(static=True)
+    over_angle: bool = eqx.field(static=True)
+    """True if the independent variable is the cage's angle, counted in its sense; false if it is time."""
+    speed: Scalar
+    """Speed of the inner ring [rad/s]."""
+    outer_speed: Scalar
+    outer_race: RacewayConstants
+    inner_race: RacewayConstants
+    pocket: PocketConstants
+    guide: Guide
+    roller_mass: Scalar
+    roller_inertia: Scalar
+    drag: Scalar
+    churning: Scalar
+    cage_mass: Scalar
+    cage_inertia: Scalar
+    eccentricity: Scalar
+    ring_mass: Scalar
+    mounting_damping: Scalar
+    gravity: Scalar
+    load: Scalar
+    rolling_cage_speed: Scalar
+    rolling_spin: Scalar
+
+    def __call__(self, tau: Scalar, y: State) -> State:
+        """Rates of a row of the state at the cage's angle `tau`."""
+        clock = jnp.stack([jnp.asarray(tau, dtype=float), jnp.zeros(())])
+        row = jnp.stack([jnp.asarray(c, dtype=float) for c in y])
+        rates, *_ = self.rates_beside(row, clock)
+        return tuple(rates)
+
+    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+        raise NotImplementedError("A whole bearing has no linearisation: take an implicit method of diffrax.")
+
+    def rates_beside(
+        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
+    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"], Float[Array, " watched"]]:
+        """Rates of the state and of the quantities beside it over the independent variable, and what is watched."""
+        rates = self.rates(self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])))
+        pace = self.pace(rates.state.clock[0])
+        return pace * rates.state.row, pace * jnp.concatenate([rates.state.clock, rates.integrals]), rates.watched
+
+    def settled_row(
+        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
+    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"]]:
+        """A state and the quantities beside it with a quasi-static inner ring in its place."""
+        return self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])).row, beside
+
+    def pace(self, cage_speed: Scalar) -> Scalar:
+        """Factor from rates over time to rates over the independent variable."""
+        return 1 / jnp.abs(cage_speed) if self.over_angle else 1.0
+
+    def lost(self, cage_speed: Scalar, eps: Scalar) -> Array:
+        """The eccentricity ratio, or `LOST` where the cage turns too slowly for its angle to measure progress."""
+        slowest = STALLED * jnp.abs(self.rolling_cage_speed) if self.over_angle else 0.0
+        return jnp.where(jnp.abs(cage_speed) < slowest, LOST, eps)
+
+    @property
+    def places(self) -> np.ndarray:
+        """Angles of the pockets in the cage [rad]."""
+        return 2 * np.pi / self.n_rollers * np.arange(self.n_rollers)
+
+    def forces(self, state: BearingState) -> Forces:
+        """Every contact at a state."""
+        rollers, cage = Rollers(*state.rollers), Bodies(*state.bodies)
+        each = jax.vmap(self.on_roller, in_axes=(0, None, 0, 0))
+        return each(rollers, cage, *self.pockets(state.clock[0]))._replace(land=self.on_land(cage))
+
+    def pockets(self, angle: Scalar) -> tuple[Array, Array]:
+        """Cosine and sine of the pockets' angles at an angle of the cage."""
+        cos, sin = cos_sin(angle)
+        table_cos, table_sin = jnp.asarray(np.cos(self.places)), jnp.asarray(np.sin(self.places))
+        return cos * table_cos - sin * table_sin, sin * table_cos + cos * table_sin
+
+    def on_roller(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Forces:
+        """Every contact of one roller, of whom alone `rollers` are, by elementary operations."""
+        g = self._geometry(rollers, cage, pocket_cos, pocket_sin)
+        across = rollers.radius * rollers.orbit
+        ring_out = cage.ring_vx * g.cos + cage.ring_vy * g.sin
+        ring_across = cage.ring_vy * g.cos - cage.ring_vx * g.sin
+        dv_out, dv_across = rollers.radial - ring_out, across - ring_across
+        inner = inner_contact(
+            self.inner_race,
+            g.distance,
+            g.inner_out * dv_out + g.inner_across * dv_across,
+            g.inner_out * dv_across - g.inner_across * dv_out,
+            rollers.spin,
+        )
+        outer = outer_contact(self.outer_race, rollers.radius, rollers.radial, rollers.orbit, rollers.spin)
+        pocket = pocket_contact(
+            self.pocket,
+            rollers.radius * g.lag_cos - (cage.x * g.pocket_cos + cage.y * g.pocket_sin),
+            rollers.radius * g.lag_sin - (cage.y * g.pocket_cos - cage.x * g.pocket_sin),
+            rollers.radial * g.lag_cos - across * g.lag_sin - (cage.vx * g.pocket_cos + cage.vy * g.pocket_sin),
+            rollers.radial * g.lag_sin + across * g.lag_cos - (cage.vy * g.pocket_cos - cage.vx * g.pocket_sin),
+            rollers.spin,
+            cage.cage_speed,
+        )
+        fast = magnitude(rollers.radial, across)
+        drag_out, drag_across = quadratic(rollers.radial, fast, self.drag), quadratic(across, fast, self.drag)
+        churning = quadratic(rollers.spin, jnp.abs(rollers.spin), self.churning)
+        power = -(drag_out * rollers.radial + drag_across * across + churning * rollers.spin)
+        return Forces(g, outer, inner, pocket, drag_out, drag_across, churning, power)
+
+    def on_land(self, cage: Bodies) -> LandForces:
+        """The guiding land."""
+        if self.inner_guided:
+            from_land = cage.x - cage.ring_x, cage.y - cage.ring_y, cage.vx - cage.ring_vx, cage.vy - cage.ring_vy
+            return land_forces(self.guide, *from_land, cage.cage_speed, self.speed)
+        return land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
+
+    def geometry(self, state: BearingState) -> Geometry:
+        """Where all rollers are."""
+        each = jax.vmap(self._geometry, in_axes=(0, None, 0, 0))
+        return each(Rollers(*state.rollers), Bodies(*state.bodies), *self.pockets(state.clock[0]))
+
+    def _geometry(self, rollers: Rollers, cage: Bodies, pocket_cos: Scalar, pocket_sin: Scalar) -> Geometry:
+        lag_cos, lag_sin = cos_sin(rollers.lag)
+        c, s = pocket_cos * lag_cos - pocket_sin * lag_sin, pocket_sin * lag_cos + pocket_cos * lag_sin
+        out = rollers.radius - (cage.ring_x * c + cage.ring_y * s)
+        across = cage.ring_x * s - cage.ring_y * c
+        distance = jnp.sqrt(out * out + across * across)
+        return Geometry(pocket_cos, pocket_sin, lag_cos, lag_sin, c, s, distance, out / distance, across / distance)
+
+    def settled(self, state: BearingState) -> BearingState:
+        """The state with a quasi-static inner ring at rest where the contacts carry load and weight.
+
+        Newton's method starts from the ring's place; its velocity enters no contact. A dynamic ring stays as it is.
+        """
+        if not self.settles:
+            return state
+        at_rest = state.bodies.at[7:9].set(0.0)
+        placed = lambda place: state._replace(bodies=at_rest.at[5:7].set(place))
+        little = jnp.eye(2) * self.load / self.inner_race.half  # where no contact is left to hold it
+
+        def better(_: Array, place: Array) -> Array:
+            push = lambda p: self._on_ring(placed(p))
+            (xx, xy), (yx, yy) = -jax.jacfwd(push)(place) + little
+            fx, fy = push(place)
+            step = jnp.stack([yy * fx - xy * fy, xx * fy - yx * fx]) / (xx * yy - xy * yx)
+            most = LONGEST_STEP * self.inner_race.half
+            return place + step * jnp.minimum(1.0, most / jnp.sqrt(jnp.sum(step * step) + 1e-30))
+
+        return placed(jax.lax.fori_loop(0, NEWTON_STEPS, better, state.bodies[5:7]))
+
+    def _on_ring(self, state: BearingState) -> Array:
+        """All forces on the inner ring [N]."""
+        f, ring = self.forces(state), Bodies(*state.bodies)
+        g, inner = f.geometry, f.inner
+        out = inner.load * g.inner_out - inner.traction * g.inner_across
+        across = inner.load * g.inner_across + inner.traction * g.inner_out
+        x = -jnp.sum(out * g.cos - across * g.sin) - self.mounting_damping * ring.ring_vx
+        y = -jnp.sum(out * g.sin + across * g.cos) - self.mounting_damping * ring.ring_vy
+        if self.inner_guided:
+            land = self.on_land(ring)
+            x, y = x - land.x, y - land.y
+        return jnp.stack([x, y - self.load - self.ring_mass * self.gravity])
+
+    def rates(self, state: BearingState) -> Rates:
+        """Rates over time; a quasi-static ring has to be `settled`."""
+        f, rollers, cage = self.forces(state), Rollers(*state.rollers), Bodies(*state.bodies)
+        assert f.land is not None
+        alone = f._replace(land=None)
+        roller_rates, passed = jax.vmap(self.roller_rates, in_axes=(0, None, 0))(rollers, cage, alone)
+        sums = Passed(*jnp.sum(jnp.stack(passed), axis=1))
+        body_rates, integrals, imbalance = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
+        slip = jnp.max(jax.vmap(self.slip)(rollers.spin))
+        heavy = jnp.abs(self.load) + self.ring_mass * self.gravity
+        lost = jnp.where(imbalance > IMBALANCE * heavy, LOST, self.lost(cage.cage_speed, f.land.eps))
+        watched = jnp.stack([lost, jnp.max(f.pocket.normal), f.land.size, slip, f.land.eps])
+        clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
+        moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), clock)
+        return Rates(moved, jnp.stack(integrals), watched)
+
+    def slip(self, spin: Scalar) -> Array:
+        """Of a roller's spin against pure rolling."""
+        turns = self.rolling_spin != 0
+        return jnp.where(turns, 1 - spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
+
+    def roller_rates(self, rollers: Rollers, cage: Bodies, f: Forces) -> tuple[tuple[Array, ...], Passed]:
+        """Rates of one roller under its forces, and what it passes on."""
+        g, inner, outer, pocket = f.geometry, f.inner, f.outer, f.pocket
+        inner_out = inner.load * g.inner_out - inner.traction * g.inner_across
+        inner_across = inner.load * g.inner_across + inner.traction * g.inner_out
+        out = inner_out - outer.load + pocket.out * g.lag_cos + pocket.along * g.lag_sin + f.drag_out
+        across = inner_across + outer.traction + pocket.along * g.lag_cos - pocket.out * g.lag_sin + f.drag_across
+        out = out - self.roller_mass * self.gravity * g.sin
+        across = across - self.roller_mass * self.gravity * g.cos
+        moment = outer.arm * outer.traction - inner.arm * inner.traction + pocket.roller_moment + f.churning
+        per_mass = 1 / self.roller_mass
+        rates = (
+            rollers.orbit - cage.cage_speed,
+            moment / self.roller_inertia,
+            rollers.radial,
+            out * per_mass + rollers.radius * rollers.orbit * rollers.orbit,
+            (across * per_mass - 2 * rollers.radial * rollers.orbit) / rollers.radius,
+        )
+        passed = Passed(
+            x=pocket.out * g.pocket_cos - pocket.along * g.pocket_sin,
+            y=pocket.out * g.pocket_sin + pocket.along * g.pocket_cos,
+            cage_moment=pocket.cage_moment,
+            inner_x=inner_out * g.cos - inner_across * g.sin,
+            inner_y=inner_out * g.sin + inner_across * g.cos,
+            inner_moment=inner.traction * inner.race_arm,
+            outer_moment=outer.traction * outer.race_arm,
+            traction=inner.lost_in_sliding + outer.lost_in_sliding,
+            raceway_damping=inner.lost_in_damping + outer.lost_in_damping,
+            pocket_friction=pocket.lost_in_sliding,
+            pocket_damping=pocket.lost_in_damping,
+            drag=f.drag_power,
+            normal=pocket.normal,
+            spin=rollers.spin / self.n_rollers,
+            rubbing=pocket.rubbing,
+        )
+        return tuple(map(jnp.asarray, rates)), passed
+
+    def body_rates(
+        self, cage: Bodies, phase: tuple[Scalar, Scalar], sums: Passed, land: LandForces
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
+        """Rates of cage and inner ring under the sums over all rollers; rates of the integrals, as in `INTEGRATED`;
+        the force by which a quasi-static ring is out of balance.
+
+        **Arguments:** cosine and sine of the cage's angle; else as they are called.
+        """
+        mass, e, g = self.cage_mass, self.eccentricity, self.gravity
+        cos, sin = phase
+        contact_x, contact_y = land.x - sums.x, land.y - sums.y
+        moment = sums.cage_moment + land.moment
+        down = contact_y - mass * g
+        drive = moment - e * mass * g * cos - e * (cos * down - sin * contact_x)
+        if self.held:
+            turning, hold = jnp.zeros_like(drive), -drive
+        else:
+            turning, hold = drive / self.cage_inertia, jnp.zeros_like(drive)
+        swing = e * cage.cage_speed * cage.cage_speed
+        cage_x = contact_x / mass + swing * cos + e * turning * sin
+        cage_y = down / mass + swing * sin - e * turning * cos
+
+        from_land = self.inner_guided
+        ring_x = -sums.inner_x - self.mounting_damping * cage.ring_vx - (land.x if from_land else 0.0)
+        ring_y = -sums.inner_y - self.mounting_damping * cage.ring_vy - (land.y if from_land else 0.0)
+        ring_y = ring_y - self.load - self.ring_mass * g
+        ring_rates = cage.ring_vx, cage.ring_vy, ring_x / self.ring_mass, ring_y / self.ring_mass
+        imbalance = jnp.zeros_like(ring_x)
+        if self.settles:
+            imbalance = jnp.sqrt(ring_x * ring_x + ring_y * ring_y)
+            ring_rates = (jnp.zeros_like(ring_x),) * 4
+        on_inner = -sums.inner_moment + (land.land_moment if from_land else 0.0)
+        on_outer = -sums.outer_moment + (0.0 if from_land else land.land_moment)
+        mounting = self.mounting_damping * (cage.ring_vx * cage.ring_vx + cage.ring_vy * cage.ring_vy)
+        paid = -on_inner * self.speed - on_outer * self.outer_speed + hold * cage.cage_speed
+        about_origin = moment + cage.x * contact_y - cage.y * contact_x - mass * g * (cage.x + e * cos) + hold
+        integrals = (
+            paid,
+            sums.traction,
+            sums.raceway_damping,
+            sums.pocket_friction,
+            sums.pocket_damping,
+            land.lost_in_film,
+            land.lost_in_contact,
+            sums.drag,
+            mounting,
+            about_origin,
+            sums.normal,
+            land.eps,
+            land.whirl,
+            cage.cage_speed,
+            sums.spin,
+            hold,
+            sums.rubbing,
+            land.rubbing,
+            land.size,
+            -sums.x * cos,
+            -sums.x * sin,
+            -sums.y * cos,
+            -sums.y * sin,
+            land.eps * land.eps,
+        )
+        rates = cage.vx, cage.vy, cage_x, cage_y, turning, *ring_rates
+        return tuple(map(jnp.asarray, rates)), tuple(map(jnp.asarray, integrals)), imbalance

@@ -1,0 +1,171 @@
+"""One step of a method as plain scalar code, for `march`.
+
+The numbers of field, system and scale are what is fixed; the rest (structure, tableau) is the step's own.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Any, TypeGuard
+
+import diffrax as dfx
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from .._form import Form, split
+from .._types import Scalar, State
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
+from .layout import REVOLUTION
+from .program import Numbers
+from .solvers import AbstractRosenbrock, NewmarkBeta, explicit_step, rosenbrock_step
+from .steps import march_with_tangents
+
+
+KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
+Pieces = tuple[AbstractField, AbstractForcedSystem, State]
+"""What is integrated: field, system and its scale."""
+
+
+def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
+    """Whether a step of `solver` is a plain formula: ours, and explicit methods with the first stage last."""
+    if isinstance(solver, dfx.AbstractERK):
+        return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
+    return isinstance(solver, AbstractRosenbrock | NewmarkBeta)
+
+
+NEARNESS = 0.2
+"""Time to a place of abrupt change [rad], at the pace of the moment, at which steps are half as long."""
+FAR = 0.5
+"""Time [rad] from which on they are not shortened."""
+SHORTEST = 1 / 1024
+"""Of a step, what is left of it at least."""
+MORE = 8
+"""Steps are added by so many parts of a revolution's, until all lanes are through."""
+
+
+def shortened(h: Scalar, near: tuple[Scalar, Scalar] | None, phase: Scalar, end: Scalar) -> Scalar:
+    """The step from `phase`, of the size h far from abrupt changes; the last one ends at `end`, and is 0 beyond it.
+
+    It has no derivative: the mesh is what it is while the state on it is differentiated.
+    """
+    assert near is not None
+    distance, speed = near
+    short = h * distance / (distance + NEARNESS * jnp.maximum(speed - distance / FAR, 0.0))
+    short = jnp.maximum(short, SHORTEST * h)
+    left = jnp.maximum(end - phase, 0.0)
+    return jax.lax.stop_gradient(jnp.where(left < 1.0001 * short, left, short))
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def evaluated_often(structure: Form, numbers: Numbers, tau: Scalar, y: State) -> State:
+    """The field of a structure of (field, system, scale)."""
+    return structure.filled(numbers)[0](tau, y)
+
+
+class _CalledField(AbstractField):
+    """A field that a step evaluates several times, as calls of one function."""
+
+    structure: Form = eqx.field(static=True)
+    numbers: Numbers
+
+    def __call__(self, tau: Scalar, y: State) -> State:
+        return evaluated_often(self.structure, self.numbers, tau, y)
+
+    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+        return self.structure.filled(self.numbers)[0].linearise(tau, y)
+
+
+@dataclasses.dataclass(frozen=True)
+class KernelStep:
+    """One step for `march`: moved is the state; watched the largest excursion and, where steps are shortened, the
+    phase and the length of the step, by Newmark's method by how much a defect was too large; fixed the first phase, the
+    step, the phase at the end, and the numbers of (field, system, scale)."""
+
+    solver: KernelSolver
+    structure: Form
+    abrupt: bool
+    """Whether the law changes abruptly somewhere, and steps are shortened there."""
+
+    def watched(self, phase: Any) -> Numbers:
+        """What is watched, at the beginning: the excursion, the phase and the length of the step, or the defect."""
+        zero = jnp.zeros(())
+        if isinstance(self.solver, NewmarkBeta):
+            return zero, zero
+        return (zero, zero + phase, zero) if self.abrupt else (zero,)
+
+    def __call__(self, i: Any, moved: State, watched: Numbers, fixed: Numbers) -> tuple[State, Numbers]:
+        phase, h, end, *numbers = fixed
+        _, system, _ = self.structure.filled(numbers)
+        field = _CalledField(self.structure, tuple(numbers))
+        peak, *clock = watched
+        t0 = clock[0] if self.abrupt else phase + i * h
+        if isinstance(self.solver, NewmarkBeta):
+            y, excess = self.solver.advance(self.structure.filled(numbers)[0], t0, t0 + h, moved)
+            return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), jnp.maximum(clock[0], excess))
+
+        def size(rate: State) -> Scalar:
+            return shortened(h, system.abrupt(moved, rate), t0, end) if self.abrupt else h
+
+        if isinstance(self.solver, dfx.AbstractERK):
+            assert isinstance(self.solver.tableau, dfx.ButcherTableau)
+            y, step = explicit_step(self.solver.tableau, field, t0, size, moved)
+        else:
+            y, _, _, step = rosenbrock_step(self.solver.tableau, field, t0, size, moved)
+            if self.abrupt:  # no step at all divides by zero
+                y = tuple(jnp.where(step > 0, a, b) for a, b in zip(y, moved, strict=True))
+        if self.abrupt:
+            clock = [t0 + step, step]
+        return y, (jnp.maximum(peak, jnp.asarray(system.excursion(y))), *clock)  # the maximum keeps a NaN
+
+
+def kernel_step(
+    solver: KernelSolver, field: AbstractField, system: AbstractForcedSystem, scale: State
+) -> tuple[KernelStep, list[Any]]:
+    """A step and its fixed numbers behind phases and step size; system and scale have no derivative."""
+    watching = jax.tree.map(lambda x: jax.lax.stop_gradient(x) if eqx.is_array(x) else x, (system, scale))
+    structure, numbers = split((field, *watching), eqx.is_inexact_array)
+    abrupt = system.abrupt(scale, scale) is not None and not isinstance(solver, NewmarkBeta)  # its steps are equal
+    return KernelStep(solver, structure, abrupt), numbers
+
+
+def steps_through(
+    solver: KernelSolver,
+    steps: Any,
+    pieces: Pieces,
+    y: State,
+    tangents: Sequence[State] = (),
+    drifts: Sequence[Sequence[Any] | None] = (),
+    phase: Any = 0.0,
+    parts: Any = 1,
+) -> tuple[State, Scalar, dfx.RESULTS, tuple[State, ...]]:
+    """One `parts`-th of a revolution of `steps` steps, and as many more as abrupt changes of the law ask for.
+
+    **Arguments:** solver; steps of a revolution; what is integrated; state; tangent vectors, and for each of
+    them the tangents of the field's numbers, None where there are none; phase and part.
+
+    **Returns:** the state after it, the largest excursion on the way, whether the steps' own iteration converged, the
+    tangent vectors.
+    """
+    step, numbers = kernel_step(solver, *pieces)
+    count, h = steps // parts, REVOLUTION / jnp.asarray(steps, dtype=float)
+    end = phase + REVOLUTION / jnp.asarray(parts, dtype=float)
+    fixed = (jnp.asarray(phase, dtype=float), h, end, *numbers)
+    row = lambda drift: (None, None, None, *(drift or ()), *(None,) * (len(numbers) - len(drift or ())))
+    along = [row(d) for d in drifts]
+
+    def go(carry: tuple, count: Any) -> tuple:
+        y, watched, tangents = carry
+        return march_with_tangents(step, count, y, watched, fixed, tangents, along)
+
+    carry = go((tuple(y), step.watched(phase), tuple(tangents)), count)
+    if step.abrupt:
+        more = jnp.maximum(count // MORE, 1)
+        # A lane that is lost ends the loop: it is far out, or its phase is NaN.
+        through = lambda c: (c[1][1] < end) & (c[1][0] <= ESCAPE)
+        carry = jax.lax.while_loop(through, lambda c: go(c, more), carry)
+    y, (peak, *others), after = carry
+    result = dfx.RESULTS.successful
+    if isinstance(solver, NewmarkBeta):
+        result = dfx.RESULTS.where(others[0] <= 0, result, dfx.RESULTS.nonlinear_divergence)  # pyright: ignore
+    return y, peak, result, tuple(after)
