@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, Polygon
 
 from ..analysis import OrderSpectrum
+from ..analysis.rollers import Around, RollerHistory
 from ..bearing import LoadDistribution
 from ..forces import ImpactHistory
 from ..models import BearingModel
 from ..quantities import quantity
+from ..solve import Trajectory
 from .history_figures import path_in_circle
 from .style import (
     BLACK,
@@ -32,11 +34,6 @@ from .style import (
 )
 
 
-if TYPE_CHECKING:
-    from ..analysis import Around, BearingHistory
-    from ..solve import Trajectory
-
-
 MM = 1e3
 LONGEST_ARROW = 0.14
 """Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
@@ -44,7 +41,7 @@ SPECTRA = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets,
 
 
 def bearing_drawing(
-    model: BearingModel, run: "Trajectory", history: "BearingHistory", sample: int, ax: Axes | None = None
+    model: BearingModel, run: Trajectory, history: RollerHistory, sample: int, ax: Axes | None = None
 ) -> Axes:
     """Rings, rollers and cage at one sample, to scale; arrows are the forces of the rollers on the bars of the cage.
 
@@ -83,7 +80,7 @@ def bearing_drawing(
     return ax
 
 
-def _bars(model: BearingModel, run: "Trajectory", sample: int) -> list[np.ndarray]:
+def _bars(model: BearingModel, run: Trajectory, sample: int) -> list[np.ndarray]:
     """Corners of the bars between the pockets [mm], in the height that guiding surface and roller centres leave."""
     n, free = model.bearing.n_rollers, float(model.bearing.roller_diameter + model.bearing.pocket_clearance) / 2
     pitch, land = float(model.outer_radius - model.bearing.roller_diameter / 2), float(model.land_radius)
@@ -101,7 +98,7 @@ def _bars(model: BearingModel, run: "Trajectory", sample: int) -> list[np.ndarra
     ]
 
 
-def slip_around(found: "Around", ax: Axes | None = None) -> Axes:
+def slip_around(found: Around, ax: Axes | None = None) -> Axes:
     """Mean slip of the rollers, and their sliding speed on the inner ring, over the circumference."""
     ax = _around_axis(axes_or_new(ax, 7.0, 3.2), "Slip of the rollers [%]")
     other = ax.twinx()
@@ -114,7 +111,7 @@ def slip_around(found: "Around", ax: Axes | None = None) -> Axes:
     return ax
 
 
-def pocket_force_around(found: "Around", ax: Axes | None = None) -> Axes:
+def pocket_force_around(found: Around, ax: Axes | None = None) -> Axes:
     """Mean pocket force over the circumference, of rollers that drive the cage and of rollers that brake it."""
     ax = _around_axis(axes_or_new(ax, 7.0, 3.2), "Mean pocket force [N]")
     degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
@@ -147,7 +144,7 @@ def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel
     return ax
 
 
-def force_over_time(history: "BearingHistory", ax: Axes | None = None) -> Axes:
+def force_over_time(history: RollerHistory, ax: Axes | None = None) -> Axes:
     """Largest pocket force, and the land's force on the cage, over the revolutions of the cage."""
     ax = axes_or_new(ax, 7.0, 3.0)
     turns = np.abs(history.angle - history.angle[0]) / (2 * np.pi)
@@ -160,9 +157,9 @@ def force_over_time(history: "BearingHistory", ax: Axes | None = None) -> Axes:
 
 def bearing_figure(
     model: BearingModel,
-    run: "Trajectory",
-    history: "BearingHistory",
-    circumference: "Around",
+    run: Trajectory,
+    history: RollerHistory,
+    circumference: Around,
     spectra: Mapping[str, OrderSpectrum],
     orders: Mapping[str, float],
     title: str = "",

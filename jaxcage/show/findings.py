@@ -13,10 +13,10 @@ from jaxtyping import Float
 from .._errors import NoResult
 from ..analysis import Stretch, Zones, failed, outcomes, stretches, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
-from ..solve import AbstractMethod
 from ..lanes import label_map, sweep
 from ..models import AbstractForcedSystem
 from ..orbits import Curve, LossZones, Sensitivity, SynchronousOrbits, explain, loss_zones, synchronous_orbits
+from ..solve import AbstractMethod
 from .gradient_tables import edge_slopes
 from .operating import Operating
 from .parameter_axes import SPEED, Axis, follow_edges, parameter_axis

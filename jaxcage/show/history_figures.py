@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from ..quantities import component_names, quantity
+from ..solve import Trajectory
 from .style import (
     BLACK,
     BLUE,
@@ -31,15 +31,11 @@ from .style import (
 )
 
 
-if TYPE_CHECKING:
-    from ..solve import Trajectory
-
-
 Forces = Mapping[str, Float[np.ndarray, "samples 2"]]
 START_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)
 
 
-def time_history(trajectory: "Trajectory", ax: Axes | None = None) -> Axes:
+def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:
     """Horizontal and vertical displacement of the cage over time."""
     ax = axes_or_new(ax, height=3.0)
     for i, name, colour in ((0, "x_C", VERMILION), (1, "y_C", BLUE)):
@@ -48,7 +44,7 @@ def time_history(trajectory: "Trajectory", ax: Axes | None = None) -> Axes:
     return _over_time(ax, trajectory, f"Displacement [{quantity('x_C').shown_unit}]")
 
 
-def force_history(trajectory: "Trajectory", forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
+def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) component."""
     ax = axes_or_new(ax, height=3.0)
     own = cycle(OWN_COLOURS)
@@ -58,11 +54,11 @@ def force_history(trajectory: "Trajectory", forces: Forces, axis: int = 1, ax: A
     return _over_time(ax, trajectory, f"{('Horizontal', 'Vertical')[axis]} force [N]")
 
 
-def _milliseconds(trajectory: "Trajectory") -> np.ndarray:
+def _milliseconds(trajectory: Trajectory) -> np.ndarray:
     return trajectory.time * quantity("time").factor
 
 
-def _over_time(ax: Axes, trajectory: "Trajectory", ylabel: str) -> Axes:
+def _over_time(ax: Axes, trajectory: Trajectory, ylabel: str) -> Axes:
     time = _milliseconds(trajectory)
     ends = (float(time[0]), float(time[-1]) if time.size > 1 else float(time[0]) + 1.0)
     ax.set(xlabel=quantity("time").label, ylabel=ylabel, xlim=ends)
@@ -70,7 +66,7 @@ def _over_time(ax: Axes, trajectory: "Trajectory", ylabel: str) -> Axes:
     return ax
 
 
-def orbit(trajectory: "Trajectory", clearance: Float[np.ndarray, ""] | float, ax: Axes | None = None) -> Axes:
+def orbit(trajectory: Trajectory, clearance: Float[np.ndarray, ""] | float, ax: Axes | None = None) -> Axes:
     """Path of the cage centre relative to the rib in the clearance circle, with a dot at each revolution.
 
     **Arguments:** trajectory; radial clearance [m]; axes.
@@ -95,7 +91,7 @@ def path_in_circle(ax: Axes, path: Float[np.ndarray, "n 2"], radius: float, samp
 
 
 def simulation_figure(
-    trajectory: "Trajectory", forces: Forces, clearance: Float[np.ndarray, ""] | float, title: str = ""
+    trajectory: Trajectory, forces: Forces, clearance: Float[np.ndarray, ""] | float, title: str = ""
 ) -> Figure:
     """Path, time history and each force of a trajectory."""
     figure = new_figure(11.5, 6.4)

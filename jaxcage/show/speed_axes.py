@@ -23,7 +23,7 @@ BELOW = 36.0
 
 def label_speed(ax: Axes, sweep: xr.Dataset | None = None) -> Axes:
     """Name the speed axis in revolutions per minute: the speed of a sweep, or that of a cage."""
-    text = "cage speed" if sweep is None else sweep["speed"].attrs.get("long_name", "speed")
+    text = "cage speed" if sweep is None else sweep["rpm"].attrs.get("long_name", "speed")
     names = {"cage speed": CAGE, "shaft speed": SHAFT}
     ax.set_xlabel(names.get(text, f"{text[:1].upper()}{text[1:]} [rpm]"))
     ax.xaxis.set_major_formatter(StrMethodFormatter("{x:.0f}"))
