@@ -6,19 +6,21 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from .._parameters import replace
-from ..analysis import Sweep, Zone, Zones, zones
+from ..analysis import Zone, Zones, chaotic_share, resolution_rpm, zones
 from ..bearing import PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM, PublishedCase, load_distribution
 from ..forces import PocketImpact, approach_speed, impact_history
+from ..lanes import rpm, sweep
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, synchronous_orbits
-from ..plotting import mark_published, new_figure, orbit_diagram, published_edges
-from ..quantities import quantity
-from ..sweeps import rpm, sweep, sweep_designs
-from ._statics import displacements
-from ._table import Table, number
+from .diagrams import orbit_diagram
+from .quantity_tables import displacements
+from .speed_axes import add_shaft_axes, mark_published, published_edges
+from .style import new_figure
+from .tables import Column, Table, rows_table
 
 
 ZONE_RANGE_RPM = (4000.0, 27500.0)
@@ -26,7 +28,7 @@ ZONE_RANGE_RPM = (4000.0, 27500.0)
 LASTING, AT_FIRST, LOSS = "lasting", "at first", "synchronous-loss"
 """Chaos that lasts beyond the horizon; chaos while observed, lasting or not; loss of the synchronous orbit."""
 WIDE_RPM = 500.0
-"""Zones at least so wide are those that a diagram over 25000 rpm shows."""
+"""Smallest width of the zones that a diagram over 25000 rpm shows."""
 SECTION_RPM, SECTION_REVOLUTIONS = 8500.0, (4, 4000)
 """Fig. 9: speed, and first and last revolution of its strobe points."""
 PANELS = {
@@ -39,7 +41,7 @@ PANELS = {
 
 @dataclasses.dataclass(frozen=True)
 class ComparedEdge:
-    """A published edge and ours of one kind; None where there is none."""
+    """A published edge beside the computed one of one kind; None where there is none."""
 
     case: str
     edge: str
@@ -53,7 +55,7 @@ class ComparedEdge:
 
     @property
     def error_percent(self) -> float | None:
-        """Ours less published, relative to published [%]."""
+        """Difference of the computed from the published edge, relative to that [%]."""
         return None if self.ours_rpm is None else 100 * (self.ours_rpm / self.published_rpm - 1)
 
 
@@ -96,19 +98,19 @@ def _matched(published: Sequence[tuple[float, float]], found: Sequence[Zone]) ->
 
 @dataclasses.dataclass(frozen=True)
 class Runs:
-    """Sweeps and their zones by case, behind all that is compared."""
+    """Sweeps and their zones by case, from which all comparisons are made."""
 
     models: Mapping[str, CageModel]
-    sweeps: Mapping[str, Sweep]
+    sweeps: Mapping[str, xr.Dataset]
     zones: Mapping[str, Zones]
     loss: Mapping[str, LossZones]
     """Empty where the orbits were left out."""
-    sections: Mapping[str, Sweep]
+    sections: Mapping[str, xr.Dataset]
     """At the speed of fig. 9, from the paper's start, with its transient."""
 
     def zones_by_kind(self, name: str) -> dict[str, Sequence[Zone]]:
         """The zones of a case of every kind."""
-        at_first = zones(dataclasses.replace(self.sweeps[name], escape=None)).zones
+        at_first = zones(self.sweeps[name].drop_vars("escape", errors="ignore")).zones
         kinds: dict[str, Sequence[Zone]] = {LASTING: self.zones[name].zones, AT_FIRST: at_first}
         return kinds | ({LOSS: self.loss[name].zones} if name in self.loss else {})
 
@@ -131,30 +133,25 @@ def run_all(
     """Sweep every case over the published range from three starts, find its synchronous orbits, and run fig. 9."""
     say = report or (lambda what, done, total: None)
     grid, cases = rpm(*PUBLISHED_SPEED_RANGE_RPM, speeds), list(models.values())
-    by_name = lambda found: dict(zip(models, found, strict=True))
+    by_name = lambda found: {name: found.isel(design=i) for i, name in enumerate(models)}
     progress = lambda done, total: say("sweeps", done, total)
-    swept = by_name(sweep_designs(cases, grid, discard=discard, revolutions=revolutions, progress=progress))
+    swept = by_name(sweep(cases, grid, discard=discard, revolutions=revolutions, progress=progress))
     loss: dict[str, LossZones] = {}
     for i, (name, model) in enumerate(models.items() if orbits else ()):
         say(f"orbits of {name}", i, len(models))
         loss[name] = loss_zones(synchronous_orbits(model, float(grid[0]), float(grid[-1]), settled=swept[name]))
     say("strobe sections", 0, 1)
-    observed = section_revolutions - SECTION_REVOLUTIONS[0]
-    sections = sweep_designs(
-        cases,
-        np.array([rpm(SECTION_RPM)]),
-        starts=1,
-        discard=SECTION_REVOLUTIONS[0],
-        revolutions=observed,
-        blocks=max(n for n in range(1, 21) if observed % n == 0),
-        keep=observed,
-    )
+    first = SECTION_REVOLUTIONS[0]
+    observed = section_revolutions - first
+    blocks = max(n for n in range(1, 21) if observed % n == 0)
+    length = {"discard": first, "revolutions": observed, "blocks": blocks, "keep": observed}
+    sections = sweep(cases, np.array([rpm(SECTION_RPM)]), starts=1, **length)
     return Runs(models, swept, {name: zones(s) for name, s in swept.items()}, loss, by_name(sections))
 
 
 @dataclasses.dataclass(frozen=True)
 class Conclusion:
-    """A claim of the paper and what the model says of it, by rules that are written beside it."""
+    """A claim of the paper with the evidence of the model, decided by the checks that are written beside it."""
 
     claim: str
     evidence: str
@@ -201,7 +198,7 @@ def impacts(runs: Runs) -> Conclusion:
     def reach(model: CageModel) -> float:
         """Largest distance from the rib's centre, of the start that swings least [mm]."""
         found = sweep(model, rpm(16000.0), discard=300, revolutions=100, blocks=1, exponents=0, keep=1)
-        return 1e3 * float(np.nanmin(found.peak)) * float(model.clearance)
+        return 1e3 * float(found["peak"].min()) * float(model.clearance)
 
     ratio = peak(2 * clearance) / peak(clearance)
     with_, without = reach(model), reach(replace(model, amplitude=0.0))
@@ -216,7 +213,8 @@ def impacts(runs: Runs) -> Conclusion:
 def eccentricity(runs: Runs) -> Conclusion:
     def largest(e: float) -> float:
         brief: Any = dict(starts=1, discard=0, revolutions=50, blocks=1, exponents=0, keep=1)
-        return float(np.nanmean(sweep(replace(runs.models["1a"], eccentricity=e), rpm(2500, 6500, 17), **brief).peak))
+        found = sweep(replace(runs.models["1a"], eccentricity=e), rpm(2500, 6500, 17), **brief)
+        return float(found["peak"].mean())
 
     peaks = {f"{1e6 * e:.0f} um": largest(e) for e in (0.0, 23e-6, 57e-6)}
     steady = {c: runs.edge(c, "zone 2 onset") - runs.edge(c, "zone 1 exit") for c in ("2a", "2b")}
@@ -230,12 +228,12 @@ def eccentricity(runs: Runs) -> Conclusion:
 
 
 def chaos(runs: Runs) -> Conclusion:
-    """The motion may be chaotic, the inference is none: this conclusion can hold in part at most."""
+    """The motion may be chaotic, but that does not follow from the bifurcations: this can hold in part at most."""
     share = {}
     for case, found in runs.sweeps.items():
         ends = runs.edge(case, "zone 1 onset"), runs.edge(case, "zone 1 exit")
-        inside = (found.rpm >= ends[0]) & (found.rpm <= ends[1])
-        share[case] = float(np.mean(found.chaotic_share[inside] > 0)) if np.any(inside) else float("nan")
+        inside = (found["rpm"].values >= ends[0]) & (found["rpm"].values <= ends[1])
+        share[case] = float(np.mean(chaotic_share(found)[inside] > 0)) if np.any(inside) else float("nan")
     listed = ", ".join(f"{case} {100 * v:.0f} %" for case, v in share.items())
     return Conclusion(
         "4. Bifurcations differ with every parameter, and so the motion is chaotic.",
@@ -246,8 +244,8 @@ def chaos(runs: Runs) -> Conclusion:
 
 
 def sections(runs: Runs) -> Conclusion:
-    what = {case: str(s.label[0, 0]) for case, s in runs.sections.items()}
-    reach = {case: np.ptp(s.strobe[0, 0, :, 1]) for case, s in runs.sections.items()}
+    what = {case: str(s["label"].values[0, 0]) for case, s in runs.sections.items()}
+    reach = {case: np.ptp(s["strobe"].values[0, 0, :, 1]) for case, s in runs.sections.items()}
     listed = ", ".join(f"{case} {what[case]}, {1e3 * reach[case]:.3f} mm" for case in what)
     return Conclusion(
         "5. The strobe sections show that zones differ much with the parameters.",
@@ -296,51 +294,51 @@ def paper_diagrams(runs: Runs) -> Iterator[tuple[str, Figure]]:
             cells = drawn.subplots(2, 1, sharex=True)
             for case, ax in zip(pair, cells, strict=True):
                 published = PUBLISHED_CASES[case]
-                orbit_diagram(runs.sweeps[case], 1, ax, limits_rpm=limits)
-                mark_published(ax, published, text=False)
+                mark_published(orbit_diagram(runs.sweeps[case], 1, ax, limits_rpm=limits), published, text=False)
                 oil, gap = f"VG{published.viscosity_grade:g}", f"gap {published.guidance_gap_mm} mm"
                 text = f"Case {case}: {gap}, eccentricity {published.eccentricity_um:g} um, {oil}"
                 ax.set_title(f"{text}; dotted, published edges", loc="left", fontsize=10)
             cells[0].set_xlabel("")
-            cells[1].set_xlabel(quantity("speed_rpm").label)
-            yield f"{figure}{panel}", drawn
+            yield f"{figure}{panel}", add_shaft_axes(drawn, runs.sweeps[pair[0]])
 
 
 def reproduction(runs: Runs) -> tuple[dict[str, Any], list[Table], list[str]]:
-    """All that is compared: for programs, as tables, and as lines below them."""
+    """The comparison with the paper: a document, tables, and lines below them."""
     kinds = {name: runs.zones_by_kind(name) for name in runs.sweeps}
     edges = [e for n, of in kinds.items() for kind, z in of.items() for e in compare_edges(PUBLISHED_CASES[n], z, kind)]
     wide = {name: {kind: len(wide_zones(found)) for kind, found in of.items()} for name, of in kinds.items()}
     names = tuple(next(iter(kinds.values())))
-    resolution = float(next(iter(runs.sweeps.values())).resolution_rpm)
+    resolution = resolution_rpm(next(iter(runs.sweeps.values())))
     checked = [check(runs) for check in CONCLUSIONS]
     summary, notes = {}, []
     for kind in names:
         own = [e for e in edges if e.kind == kind]
         errors = [abs(e.error_percent) for e in own if e.error_percent is not None]
-        median = float(np.median(errors)) if errors else None
-        within = sum(error <= 10 for error in errors)
-        summary[kind] = {"published": len(own), "found": len(errors), "within_10_percent": within}
-        summary[kind] |= {"median_error_percent": median}
+        median, within = float(np.median(errors)) if errors else None, sum(error <= 10 for error in errors)
+        found = {"published": len(own), "found": len(errors), "within_10_percent": within}
+        summary[kind] = found | {"median_error_percent": median}
         said = "-" if median is None else f"{median:.1f} %"
         notes.append(f"{kind}: {len(errors)} of {len(own)} edges found, {within} within 10 %, median error {said}")
-    rows: dict[tuple[str, str, str], list[str]] = {}
-    for e in edges:
-        found = "none" if e.ours_rpm is None else f"{e.ours_rpm:.0f} ({e.error_percent:+.1f} %)"
-        rows.setdefault((e.case, e.edge, number(e.published_rpm)), []).append(found)
     document = {
         "resolution_rpm": resolution,
         "edges": [vars(e) | {"error_percent": e.error_percent} for e in edges],
         "summary": summary,
         "zones": wide,
-        "conclusions": [{"claim": c.claim, "evidence": c.evidence, "verdict": c.verdict} for c in checked],
+        "conclusions": [vars(c) | {"verdict": c.verdict} for c in checked],
     }
-    counted = [(name, "2", *(str(found[kind]) for kind in names)) for name, found in wide.items()]
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for e in edges:
+        cell = "none" if e.ours_rpm is None else f"{e.ours_rpm:.0f} ({e.error_percent:+.1f} %)"
+        row = rows.setdefault((e.case, e.edge), {"case": e.case, "edge": e.edge, "published": e.published_rpm})
+        row[e.kind] = cell
+    columns = [Column("published", (), digits=0), *(Column(name, ()) for name in names)]
+    counted = [{"case": name, "published": 2} | found for name, found in wide.items()]
     title = f"Published edges and ours [rpm], sweeps at {resolution:.0f} rpm"
+    verdicts = [vars(c) | {"verdict": c.verdict} for c in checked]
     tables = [
-        Table("Zones of 500 rpm and more, 4000 to 27500 rpm", ("case", "published", *names), counted),
-        Table(title, ("case", "edge", "published", *names), [(*key, *found) for key, found in rows.items()]),
-        Table("The paper's conclusions", ("claim", "verdict"), [(c.claim, c.verdict) for c in checked]),
+        rows_table("Zones of 500 rpm and more, 4000 to 27500 rpm", counted, [Column("case", ()), *columns]),
+        rows_table(title, rows.values(), [Column("case", ()), Column("edge", ()), *columns]),
+        rows_table("The paper's conclusions", verdicts, [Column("claim", ()), Column("verdict", ())]),
     ]
     evidence = [f"  {c.claim.split('.')[0].split(':')[0]}: {c.evidence}" for c in checked]
     return document, tables, ["Evidence", *evidence, *notes]

@@ -1,15 +1,13 @@
-"""House style: colours that colour-blind readers can tell apart, thin frames, light grids. No
-pyplot, no global state.
+"""Style of the figures: colours that colour-blind readers can tell apart, thin frames, light grids, no global state.
 
-The colours are Okabe and Ito's (https://jfly.uni-koeln.de/color), made for red-green blindness; the dark style lightens
-them and keeps their hues. Figures are drawn light; `restyle` gives them a dark or a print style afterwards.
+The colours are those of Okabe and Ito (https://jfly.uni-koeln.de/color), made for red-green blindness; the dark style
+lightens them and keeps their hues. Figures are drawn light; `restyle` changes them to the dark or the print style.
 """
 
 from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection
@@ -21,14 +19,12 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 
-from ..quantities import quantity
-
 
 # Okabe and Ito's palette.
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 SKY, PURPLE, BLACK, GREY = "#56B4E9", "#CC79A7", "#222222", "#8A8A8A"
 ZONE = "#F8EBC8"
-"""Light amber behind chaotic zones: the points on it keep their contrast."""
+"""Light amber behind chaotic zones, on which points keep their contrast."""
 GRID, BAND, PAPER = "#E6E6E6", "#F5F5F5", "#FFFFFF"
 RASTER_DPI = 200
 
@@ -52,7 +48,7 @@ STYLES: dict[Style, dict[str, str]] = {
     },
     "print": {BLACK: "#000000", GREY: "#555555", ZONE: "#E4E4E4", GRID: "#D4D4D4", BAND: "#F0F0F0"},
 }
-"""What each style puts in the place of the light colours; print is white paper, black ink and no amber."""
+"""Replacements of the light colours in each style; print is white paper, black ink and no amber."""
 PRINT_DPI, PRINT_LINES = 300, 1.25
 
 KIND_COLOURS = {
@@ -62,7 +58,9 @@ KIND_COLOURS = {
     "transient": ORANGE,
     "undecided": PURPLE,
 }
-"""Colour of a strobe point by what its lane does."""
+"""Colour of a strobe point by the label of its lane."""
+MOTION_COLOURS = {"circular": GREEN, "locally_periodic": BLUE, "disordered": VERMILION}
+"""Colour of a stretch of speeds by the motion of the cage's centre; other stretches are grey."""
 
 FORCE_COLOURS = {
     "film": BLUE,
@@ -73,11 +71,13 @@ FORCE_COLOURS = {
     "weight": BLACK,
 }
 OWN_COLOURS = (SKY, GREY)
-"""Forces of one's own take them in turn, and a dashed line."""
+"""A user's own forces take these in turn, with a dashed line."""
+LINE_COLOURS = (BLUE, SKY, GREEN, PURPLE, VERMILION, ORANGE)
+"""Colours of lines beside each other, such as those of initial states."""
 
 
 class Halo(withStroke):
-    """A rim of paper around a line or a text, so that it can be read on whatever it crosses."""
+    """A rim in the colour of the paper around a line or a text, so that it can be read on any background."""
 
     def __init__(self, width: float, colour: str = PAPER):
         super().__init__(linewidth=width, foreground=colour)
@@ -85,25 +85,23 @@ class Halo(withStroke):
 
 
 def lighter(colour: str, paper: str = PAPER) -> tuple[float, float, float]:
-    """Half way to the paper."""
+    """The colour half way between `colour` and the paper."""
     r, g, b = ((a + b) / 2 for a, b in zip(to_rgb(colour), to_rgb(paper), strict=True))
     return r, g, b
 
 
 def new_figure(width: float = 8.0, height: float = 5.0) -> Figure:
-    """A figure that belongs to no window and no global list: it can be made anywhere and is freed
-    with its last use.
-    """
+    """A figure that belongs to no window and no global list, and is freed with its last use."""
     return Figure(figsize=(width, height), layout="constrained", dpi=RASTER_DPI)
 
 
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> Axes:
-    """`ax`, or the only axes of a new figure."""
+    """`ax` or the only axes of a new figure, in this style."""
     return dress(new_figure(width, height).subplots() if ax is None else ax)
 
 
 def dress(ax: Axes) -> Axes:
-    """Thin frame, light grid behind the data."""
+    """Give axes a thin frame and a light grid behind the data."""
     ax.spines[["top", "right"]].set_visible(False)
     ax.spines[["left", "bottom"]].set(color=GREY, linewidth=0.8)
     ax.tick_params(color=GREY, labelsize=9)
@@ -119,22 +117,48 @@ def dots(colour: str, size: float | int) -> dict[str, Any]:
 
 
 def enlarge_dots(legend: Legend) -> Legend:
-    """Small light points are drawn large and full in the legend, so that their colours can be told
-    apart.
-    """
+    """Draw small light points large and full in the legend, so that their colours can be told apart."""
     for handle in legend.get_lines():
         if handle.get_marker() == ".":
             handle.set(markersize=7, alpha=1.0)
     return legend
 
 
-def shown(name: str, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """`values` [SI] of the glossary's quantity `name`, in the unit of its axis."""
-    return np.asarray(values) * quantity(name).factor
+def legend_above(ax: Axes, ncols: int = 4, size: float = 9) -> Legend:
+    """A legend above the frame, where it hides nothing."""
+    place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": ncols}
+    return enlarge_dots(ax.legend(**place, frameon=False, fontsize=size))
+
+
+def legend_beside(ax: Axes, size: float = 9) -> Legend:
+    """A legend to the right of the frame."""
+    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    return ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4)
+
+
+def legend_below(figure: Figure, *axes: Axes, ncols: int = 5) -> None:
+    """One legend for all axes, beneath them."""
+    entries = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    place = "outside lower center"
+    enlarge_dots(figure.legend(entries.values(), entries.keys(), loc=place, ncols=ncols, frameon=False, fontsize=9))
+
+
+def entitled(figure: Figure, title: str) -> Figure:
+    """The figure with a title at its upper left."""
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def readable(name: str) -> str:
+    """A parameter's name as words."""
+    return name.replace(".", " ").replace("_", " ")
 
 
 def padded_limits(values: np.ndarray) -> tuple[float, float]:
-    """Limits that hold every finite value with a margin; (-1, 1) if there is none."""
+    """Limits that include every finite value with a margin; (-1, 1) if there is none."""
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return -1.0, 1.0
@@ -144,10 +168,9 @@ def padded_limits(values: np.ndarray) -> tuple[float, float]:
 
 
 def restyle(figure: Figure, style: Style) -> Figure:
-    """Give a figure that is drawn another style: every colour of the house style becomes the one of `style`, colour
-    maps stay.
+    """Change the style of a drawn figure: each colour of this module becomes that of `style`; colour maps stay.
 
-    **Arguments:** a figure as the functions here draw it; `light`, `dark` or `print`.
+    **Arguments:** a figure drawn by the functions of this package; `light`, `dark` or `print`.
 
     **Returns:** the same figure.
     """
@@ -174,7 +197,7 @@ def _everything(figure: Figure) -> Iterable[Artist]:
 
 
 class _Exchange:
-    """Colours for colours; those not listed stay."""
+    """Replaces colours by others; those that are not listed stay."""
 
     def __init__(self, table: dict[str, str]):
         paper = table.get(PAPER, PAPER)
@@ -183,7 +206,7 @@ class _Exchange:
         self.table = {old.lower(): new for old, new in (half | known).items()}
 
     def of(self, colour: Any) -> Any:
-        """The colour in the place of `colour`, as transparent as that."""
+        """The new colour for `colour`, with its transparency."""
         if isinstance(colour, str) and colour in ("none", "auto"):
             return colour
         r, g, b, alpha = to_rgba(colour)
