@@ -16,6 +16,8 @@ import xarray as xr
 
 SHOWN = {"m": "mm", "rad/s": "rpm", "rad": "deg", "1": ""}
 """Units in which quantities of an SI unit are shown, unless a column says otherwise."""
+Beside = tuple[str, float] | None
+"""Speed that is shown beside the model's: `shaft` or `cage`, and its ratio to the model's."""
 NOTHING = "-"
 """Cell of a value that is not known."""
 
@@ -42,8 +44,8 @@ class Column:
     unit: str = "1"
     shown: str | None = None
     """Unit in which numbers are shown; None takes that of `SHOWN`."""
-    errors: Sequence[float] | None = None
-    """Standard errors, or uncertainties, in `unit`."""
+    errors: Sequence[float | None] | str | None = None
+    """Standard errors, or uncertainties, in `unit`; of a column for `rows_table` the key that holds them."""
     digits: int | None = None
     """Digits after the point; None takes those of the error, or four significant ones."""
     key: str = ""
@@ -62,7 +64,7 @@ class Column:
     @property
     def cells(self) -> list[str]:
         """Values as texts."""
-        errors = [None] * len(self.values) if self.errors is None else self.errors
+        errors = [None] * len(self.values) if self.errors is None or isinstance(self.errors, str) else self.errors
         return [self._cell(value, error) for value, error in zip(self.values, errors, strict=True)]
 
     def _cell(self, value: Any, error: float | None) -> str:
@@ -118,7 +120,7 @@ class Table:
         """Numbers in SI units, row by row, for a document."""
         found = [{(c.key or c.head): c.values[i] for c in self.columns} for i in range(len(self))]
         for column in self.columns:
-            if column.errors is not None:
+            if column.errors is not None and not isinstance(column.errors, str):
                 for record, error in zip(found, column.errors, strict=True):
                     record[f"{column.key or column.head}_error"] = error
         return found
@@ -151,8 +153,52 @@ def table(title: str, found: xr.Dataset, columns: Mapping[str, str | Column], er
     return Table(title, made)
 
 
-def rows_table(title: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> Table:
-    """A table of records: each column without values takes those under its key."""
+def rows_table(title: str, rows: Iterable[Mapping[str, Any]], columns: Iterable[Column]) -> Table:
+    """A table of records: each column takes the values, and the errors, under its keys."""
     found = list(rows)
-    pick = lambda column: [row.get(column.key or column.head) for row in found]
-    return Table(title, [dataclasses.replace(column, values=pick(column)) for column in columns])
+    pick = lambda key: [row.get(key) for row in found]
+
+    def filled(column: Column) -> Column:
+        errors = pick(column.errors) if isinstance(column.errors, str) else column.errors
+        return dataclasses.replace(column, values=pick(column.key or column.head), errors=errors)
+
+    return Table(title, [filled(column) for column in columns])
+
+
+def speed_columns(head: str, key: str, beside: Beside, errors: str | None = None, digits: int | None = 0) -> list[Column]:
+    """Columns for `rows_table` of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
+    own = Column(head, (), key=key, errors=errors, digits=None if errors else digits)
+    if beside is None:
+        return [own]
+    whose, ratio = beside
+    return [own, Scaled(whose, (), key=key, digits=digits or 0, ratio=ratio)]
+
+
+@dataclasses.dataclass(frozen=True)
+class Scaled(Column):
+    """A column that shows its values times a ratio."""
+
+    ratio: float = 1.0
+
+    def _cell(self, value: Any, error: float | None) -> str:
+        return super()._cell(value if value is None or isinstance(value, str) else self.ratio * float(value), error)
+
+
+def shares_table(title: str, sort: str, counts: Mapping[str, int], unit: str = "lanes") -> Table:
+    """Numbers of each sort, and their shares of all."""
+    total = sum(counts.values())
+    shares = [n / total for n in counts.values()] if total else [None] * len(counts)
+    return Table(title, [Column(sort, list(counts)), Column(unit, list(counts.values())), Column("share", shares, "1", "%", digits=1)])
+
+
+def value_table(title: str, rows: Iterable[tuple[str, Any, str]]) -> Table:
+    """A table of quantities: their words, values and SI units."""
+    found = [(what, Column("", [value], unit)) for what, value, unit in rows]
+    units = [column.unit_shown if not isinstance(column.values[0], str) else "" for _, column in found]
+    columns = [Column("quantity", [what for what, _ in found]), Column("value", [c.cells[0] for _, c in found])]
+    return Table(title, [*columns, Column("unit", units)])
+
+
+def chosen(found: object, names: str) -> dict[str, Any]:
+    """Some attributes of a result by name."""
+    return {name: getattr(found, name) for name in names.split()}

@@ -1,0 +1,230 @@
+"""Quantities that a run reports, measures of one speed, statics, and two designs beside each other, as tables."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Float
+
+from .._parameters import walk
+from ..analysis import Around, failed, named_lines, scatter
+from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
+from ..io import configuration
+from ..forces import ImpactHistory
+from .tables import SHOWN, Column, Table, rows_table, value_table
+
+
+SURE = 2.0
+"""Standard errors by which two means must differ."""
+SHARES = ("cage_slip", "roller_slip_max")
+"""Quantities without a unit that are read in per cent."""
+
+
+def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, " rows"]]:
+    """Mean of a variable at each speed over the lanes that did not fail, and its standard error.
+
+    The error comes from the scatter of all blocks; it is NaN for a variable without blocks.
+    """
+    if name == "exponent":
+        values, blocks = found["exponents"].values[..., 0], found["block_growth"].values[..., 0]
+    else:
+        values = found[name].values
+        blocks = found[f"{name}_blocks"].values if f"{name}_blocks" in found else None
+    if values.ndim == 1:
+        return values, np.full(values.shape, np.nan)
+    lost, means, errors = failed(found), [], []
+    for i, row in enumerate(values):
+        known = row[~lost[i]]
+        means.append(float(np.mean(known)) if known.size else math.nan)
+        rest = np.zeros(0) if blocks is None else blocks[i][~lost[i]].ravel()
+        errors.append(float(scatter(rest)) if rest.size > 1 else math.nan)
+    return np.array(means), np.array(errors)
+
+
+def unit_of(found: xr.Dataset, name: str) -> tuple[str, str | None]:
+    """SI unit of a variable, and the unit in which it is shown; None for the usual one."""
+    return ("1", None) if name == "exponent" else (found[name].attrs["units"], "%" if name in SHARES else None)
+
+
+def head_of(name: str, unit: str) -> str:
+    """Name of a quantity as the head of a column, without its unit."""
+    return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
+
+
+def labels_at(found: xr.Dataset) -> list[str]:
+    """The labels at each speed, each once."""
+    return [" or ".join(sorted(set(row) - {"failed"}) or ["failed"]) for row in found["label"].values.tolist()]
+
+
+def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Table:
+    """Means over the lanes that did not fail at each speed with their standard errors, and the labels."""
+    columns = [Column("speed [rpm]", found["rpm"].values.tolist(), key="speed_rpm", digits=0)]
+    for name in names:
+        (unit, shown), (mean, error) = unit_of(found, name), mean_over_starts(found, name)
+        columns.append(Column(head_of(name, unit), mean.tolist(), unit, shown, error.tolist(), key=name))
+    return Table(title, [*columns, Column("motion", labels_at(found))])
+
+
+def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]) -> Table:
+    """Means of a quantity of two designs at each speed, and where they differ beyond doubt."""
+    unit, shown = unit_of(found[0], name)
+    pairs = [mean_over_starts(each, name) for each in found]
+    (a, a_error), (b, b_error) = pairs
+    differs = np.abs(a - b) > SURE * np.nan_to_num(np.hypot(a_error, b_error))
+    at = "shaft_rpm" if "shaft_rpm" in found[0].coords else "rpm"
+    columns = [Column("shaft [rpm]", found[0][at].values.tolist(), digits=0)]
+    for case, (mean, error) in zip(cases, pairs, strict=True):
+        columns.append(Column(case, mean.tolist(), unit, shown, error.tolist()))
+    title = head_of(name, unit)
+    return Table(title[:1].upper() + title[1:], [*columns, Column("differs", ["*" if d else "" for d in differs])])
+
+
+def measures_table(title: str, measures: Any) -> Table:
+    """Measures of one run, with the words that they declare."""
+    rows: list[tuple[str, Any, str]] = []
+    for field in dataclasses.fields(measures):
+        value, unit = getattr(measures, field.name), field.metadata["unit"]
+        if isinstance(value, dict):
+            rows += [(f"of it {name.replace('_', ' ')}", part, unit) for name, part in value.items()]
+        else:
+            rows.append((field.metadata["text"], value, unit))
+    return value_table(title, rows)
+
+
+def circumference_table(found: Around) -> Table:
+    """Slip, load and pocket force of the rollers around the bearing, an eighth of the circumference in a row."""
+    eighths = [np.floor(found.angle / (2 * np.pi) * 8).astype(int) == i for i in range(8)]
+    known = lambda f, x: [float(f(x[i])) if np.isfinite(x[i]).any() else math.nan for i in eighths]
+    columns = [
+        Column("position, load at 270°", [f"{45 * i} to {45 * (i + 1)}°" for i in range(8)]),
+        Column("slip", known(np.nanmean, found.roller_slip), "1", "%", digits=2),
+        Column("inner load", known(np.nanmean, found.inner_load), "N", digits=0),
+        Column("driving", known(np.nanmean, found.driving_force), "N", digits=2),
+        Column("braking", known(np.nanmean, found.braking_force), "N", digits=2),
+        Column("largest", known(np.nanmax, found.largest_force), "N", digits=0),
+    ]
+    return Table("Rollers around the bearing: slip, load, pocket force", columns)
+
+
+def line_tables(spectra: Mapping[str, Any], orders: Mapping[str, float]) -> list[Table]:
+    """Lines of the spectra with the bearing's frequencies."""
+    words = {"cage_place": "cage's vertical position over the clearance", "pocket_force": "pockets on cage, vertical [N]"}
+    columns = [
+        Column("order of the cage's speed", (), key="order", digits=3),
+        Column("amplitude", ()),
+        Column("at the frequency of", (), key="name"),
+    ]
+    each = {name: map(vars, named_lines(found, orders)) for name, found in spectra.items()}
+    return [rows_table(f"Spectrum, {words[name]}", rows, columns) for name, rows in each.items()]
+
+
+def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
+    """Static displacement of the cage [m] for the three types of guidance."""
+    given = {
+        "guidance_gap": model.guidance_gap,
+        "pocket_clearance": model.bearing.pocket_clearance,
+        "radial_clearance": model.bearing.radial_clearance,
+        "elastic_approach": shared.elastic_approach,
+    }
+    return {guidance: float(static_cage_displacement(guidance, **given)) for guidance in get_args(Guidance)}
+
+
+def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
+    """Loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
+    bearing = model.bearing
+    rows: list[tuple[str, Any, str]] = [
+        ("largest roller load", float(shared.max_load), "N"),
+        ("shift of the shaft", float(shared.shaft_shift), "m"),
+        ("elastic approach", float(shared.elastic_approach), "m"),
+        ("half angle of the loaded zone", float(shared.half_angle), "rad"),
+        *((f"cage displacement, {g.replace('_', ' ')} guidance", y, "m") for g, y in displacements(model, shared).items()),
+        ("cage speed over shaft speed", float(bearing.cage_speed_ratio), "1"),
+    ]
+    if shaft_speed is not None:
+        surface = raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter)
+        rows += [
+            ("cage speed", float(bearing.cage_speed(shaft_speed)), "rad/s"),
+            ("surface speed of the inner raceway", float(surface), "m/s"),
+            ("centrifugal force of a roller", float(bearing.roller_centrifugal_force(shaft_speed)), "N"),
+        ]
+    return value_table(title, rows)
+
+
+IMPACT = {
+    "approach_speed": ("approach speed", "m/s"),
+    "peak_contact_force": ("peak contact force", "N"),
+    "peak_bar_force": ("peak bar force", "N"),
+    "lowest_bar_force": ("lowest bar force", "N"),
+    "contact_duration": ("time in contact", "s"),
+    "contacts": ("contacts", "1"),
+    "impulse": ("impulse of the contact force", "N s"),
+}
+"""Words and units of what is read off an impact."""
+
+
+def impact_document(history: ImpactHistory) -> dict[str, Any]:
+    """Peaks, time in contact and impulse, over the whole history: a bar that swings back may be hit again."""
+    touching, bar = np.asarray(history.contact_force) > 0, np.asarray(history.bar_force)
+    return {
+        "peak_contact_force": float(np.max(history.contact_force)),
+        "peak_bar_force": float(np.max(bar)),
+        "lowest_bar_force": float(np.min(bar)),
+        "contact_duration": float(np.sum(touching)) * float(history.time[1] - history.time[0]),
+        "contacts": int(np.sum(touching[1:] & ~touching[:-1])),
+        "impulse": float(history.impulse),
+        "ends_in_contact": bool(touching[-1]),
+    }
+
+
+def impact_table(title: str, values: Mapping[str, Any]) -> Table:
+    """An impact in words; `values` are those of its document, and the speed of approach."""
+    ends = "yes, give a longer --duration" if values["ends_in_contact"] else "no"
+    rows = [(words, values[name], unit) for name, (words, unit) in IMPACT.items()]
+    return value_table(title, [*rows, ("still in contact at the end", ends, "1")])
+
+
+def differences(models: Sequence[Any]) -> dict[str, dict[str, Any]]:
+    """Text, both values [SI], unit and relative change of each parameter or choice in which two designs differ.
+
+    The keys are dotted names of the configuration.
+    """
+    flat = [_flat(configuration(model)) for model in models]
+    declared = [{".".join(path): (path, field) for path, field in walk(model)} for model in models]
+    found: dict[str, dict[str, Any]] = {}
+    for path in dict.fromkeys([*flat[0], *flat[1]]):
+        before, after = values = [each.get(path) for each in flat]
+        if before == after:
+            continue
+        known = next((each[path][1].metadata for each in declared if path in each), {})
+        info = known.get("parameter")
+        numbers = all(isinstance(v, float | int) and math.isfinite(v) for v in values)
+        found[path] = {
+            "text": (info.text if info else known.get("text")) or path,
+            "values": values,
+            "unit": info.unit if info else "1",
+            "change": after / before - 1 if numbers and before and (not info or info.unit != "K") else None,
+        }
+    return found
+
+
+def differences_table(names: Sequence[str], found: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Every value in which two designs differ."""
+    cell = lambda value, unit: Column("", [value], unit).cells[0] if not isinstance(value, bool) else str(value)
+    rows = [
+        {"value": each["text"], "unit": SHOWN.get(each["unit"], each["unit"]), "change": each["change"]}
+        | {name: cell(value, each["unit"]) for name, value in zip(names, each["values"], strict=True)}
+        for each in found.values()
+    ]
+    columns = [Column("value", ()), *(Column(name, ()) for name in names), Column("unit", ())]
+    title = f"Differences between {' and '.join(names)}"
+    return rows_table(title, rows or [{"value": "none"}], [*columns, Column("change", (), "1", "%", digits=1)])
+
+
+def _flat(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        found |= _flat(value, (*path, key)) if isinstance(value, Mapping) else {".".join((*path, key)): value}
+    return found
