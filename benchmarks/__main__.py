@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.integrate import cores as available_cores
+from jaxcage.solve import cores as available_cores
 
 from .common import machine, made_with, markdown
 from .problem import CASE, FIRST_RPM, LAST_RPM, TARGET, Problem, make_problem, our_map, reached_error, save

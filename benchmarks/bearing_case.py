@@ -16,7 +16,7 @@ import numpy as np
 import jaxcage as jc
 from benchmarks.common import commit
 from jaxcage.io import configuration
-from jaxcage.models.whole import BearingState, Bodies, Rollers, state_scale
+from jaxcage.models import BearingState, Bodies, Rollers, state_scale
 
 
 FILE = pathlib.Path(__file__).with_suffix(".json")
@@ -61,8 +61,8 @@ def state_of(rollers: np.ndarray, bodies: np.ndarray, angle: float, time: float)
 
 def arcs(model: jc.BearingModel, rpm: float, start: BearingState) -> dict[str, Any]:
     """States at the ends of neighbouring arcs from a settled motion, and how sure they are."""
-    run = jc.simulate_bearing(
-        model, jc.rpm(rpm), revolutions=1, samples=SAMPLES, start=start, tolerance=TOLERANCE, allowed=1e-3
+    run = jc.simulate(
+        model, jc.rpm(rpm), revolutions=1, samples=SAMPLES, start=start, method=jc.native(TOLERANCE, 1e-3)
     )
     if run.outcome != "successful":
         raise RuntimeError(f"{rpm:g} rpm, {float(model.load):g} N: {run.outcome}")

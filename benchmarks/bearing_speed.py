@@ -24,7 +24,7 @@ from scipy.sparse import csr_matrix
 
 import jaxcage as jc
 from benchmarks.common import FAST_MATH, columns
-from jaxcage.models.whole import state_scale
+from jaxcage.models import state_scale
 from tests.reference import WholeBearing
 
 
@@ -123,7 +123,7 @@ def arcs(model: jc.BearingModel, speeds: np.ndarray) -> tuple[Any, ...]:
     """Arcs that the package ran at its usual tolerance: laws, begin, end, angles, scales, by speed."""
     rows = []
     for speed in speeds:
-        run = jc.simulate_bearing(model, float(speed), revolutions=1, discard=2, samples=16, tolerance=1e-4)
+        run = jc.simulate(model, float(speed), revolutions=1, discard=2, samples=16, method=jc.native(1e-4, 1e-2))
         states, scale = flat(run.rollers, run.bodies), state_scale(model, float(speed))
         theirs = WholeBearing(model, float(speed))
         size = flat(np.asarray(scale.rollers), np.asarray(scale.bodies))

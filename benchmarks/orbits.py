@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.integrate import cores as available_cores
+from jaxcage.solve import cores as available_cores
 
 from . import auto, shooting
 from .common import machine, made_with

@@ -34,8 +34,8 @@ from jaxcage.design import (
     chaotic_width,
     cost,
 )
-from jaxcage.integrate import DEFAULT_ERROR
 from jaxcage.io import read_bearing
+from jaxcage.solve import DEFAULT_ERROR
 
 
 HERE = pathlib.Path(__file__).parent

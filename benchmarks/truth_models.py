@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.integrate import AbstractMethod, native
 from jaxcage.models import CageModel, fastest_speed
+from jaxcage.solve import AbstractMethod, native
 from tests import reference
 
 

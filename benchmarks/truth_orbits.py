@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.integrate import FixedSteps
+from jaxcage.solve import FixedSteps
 from tests import reference
 
 from .truth_models import Subject, by_kind, pair

@@ -5,8 +5,7 @@
 | `bearing`    | geometry, materials, lubricant, kinematics, statics, catalogue, published cases     |
 | `forces`     | rib film, land contact, pocket impact, support, unbalance, gravity: one law a file  |
 | `models`     | the forced-system protocol, the cage in its rib                                     |
-| `integrate`  | stiff solvers as diffrax solvers, time histories, the strobe map                    |
-| `solve`      | lanes in machine code: the law traced in JAX, the loop over steps in LLVM           |
+| `solve`      | many lanes in machine code or by diffrax; time histories, the strobe map            |
 | `analysis`   | strobe sections, exponents, labels, zones, spectra, stability, measures             |
 | `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
 | `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |

@@ -5,9 +5,9 @@ from . import (
     bearing as bearing,
     design as design,
     forces as forces,
-    integrate as integrate,
     models as models,
     orbits as orbits,
+    solve as solve,
     studies as studies,
     sweeps as sweeps,
 )
@@ -25,17 +25,6 @@ from .analysis import (
 )
 from .bearing import Bearing as Bearing, Lubricant as Lubricant
 from .design import DesignSpace as DesignSpace, optimise as optimise
-from .integrate import (
-    BearingRun as BearingRun,
-    Trajectory as Trajectory,
-    bearing_over_time as bearing_over_time,
-    method as method,
-    native as native,
-    ramp as ramp,
-    simulate as simulate,
-    simulate_bearing as simulate_bearing,
-    strobe_map as strobe_map,
-)
 from .models import (
     BearingModel as BearingModel,
     CageModel as CageModel,
@@ -55,6 +44,15 @@ from .orbits import (
     periodic_orbit as periodic_orbit,
     sensitivity as sensitivity,
     synchronous_orbits as synchronous_orbits,
+)
+from .solve import (
+    Trajectory as Trajectory,
+    bearing_over_time as bearing_over_time,
+    method as method,
+    native as native,
+    ramp as ramp,
+    simulate as simulate,
+    strobe_map as strobe_map,
 )
 from .studies import label_map as label_map, open_study as open_study, study as study
 from .sweeps import (

@@ -6,7 +6,7 @@ those that it reports of its own (`AbstractForcedSystem.quantities`), with how e
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -43,8 +43,8 @@ class Quantity:
     text: str
     shown_in: str = ""
     """Unit in which it is shown, where that is not the SI unit."""
-    of: Callable[[Averages], np.ndarray] | None = None
-    """How it follows from averages."""
+    of: Callable[[Any], Any] | None = None
+    """How it follows from `Averages`, or from what the model makes of a time history."""
     overall: Literal["whole", "mean"] = "whole"
     """Value of a run: that of the averages over the whole of it, or the mean of the values of its blocks."""
 

@@ -12,8 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES, Lanes, engine_of, histories
-from jaxcage.solve import FINISHED, Engine, say_once
+from jaxcage.solve import FINISHED, OUTCOMES, Engine, Lanes, engine_of, histories, say_once
 from jaxcage.solve.object_code import object_code
 
 

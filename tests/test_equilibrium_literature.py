@@ -29,8 +29,8 @@ from jaxcage.analysis import (
     whirl_threshold,
 )
 from jaxcage.forces import ElasticRib, RibFilm, film_scale
-from jaxcage.integrate import simulate
 from jaxcage.models import case
+from jaxcage.solve import simulate
 
 
 def friswell(eps):

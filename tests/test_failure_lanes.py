@@ -12,8 +12,8 @@ import pytest
 from helpers import wide_but
 
 from jaxcage.analysis import Plan
-from jaxcage.integrate import OUTCOMES, Lanes, method
 from jaxcage.models import ForcedOscillator, case
+from jaxcage.solve import OUTCOMES, Lanes, method
 from jaxcage.sweeps import run_lanes, sweep
 
 

@@ -17,7 +17,7 @@ from helpers import wide_but
 
 import jaxcage as jc
 from jaxcage.bearing import load_distribution, nu2310
-from jaxcage.models.whole import BearingState, rolling_start, state_scale
+from jaxcage.models import BearingState, rolling_start, state_scale
 
 
 FILE = pathlib.Path(__file__).with_name("golden.json")
@@ -73,7 +73,7 @@ def _forces_on_cage() -> Numbers:
 def _forces_on_bearing() -> Numbers:
     """Rates of velocity of cage and inner ring [m/s^2], and of the cage's speed [rad/s^2], at 20 random states."""
     model, rng, rows = jc.whole_bearing("nu2310"), np.random.default_rng(2), {}
-    rate = jax.jit(lambda speed, state: model.at_speed(speed)(state).state.bodies)
+    rate = jax.jit(lambda speed, state: model.at_speed(speed).rates(state).state.bodies)
     for i in range(20):
         speed = jc.rpm(rng.uniform(4000, 20000))
         start = rolling_start(model, speed)
@@ -94,7 +94,7 @@ def _one_revolution() -> Numbers:
     1e-8 and a method of fourth order: 0.6 % from what that method gave with 1e-9, 1e-10 (cage's velocity -0.02519 m/s
     instead of -0.02535) and what the methods of today give from 1e-9 to 1e-12. They are compared by a resolved run.
     """
-    run = jc.simulate_bearing(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, tolerance=1e-11)
+    run = jc.simulate(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, method=jc.native(1e-11, 1e-2))
     return {"bodies": run.bodies[-1].tolist(), "lags": run.rollers[-1][0, [0, 6]].tolist()}
 
 

@@ -12,7 +12,7 @@ import pytest
 from helpers import even, raw_sweep
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES, outcome_code
+from jaxcage.solve import OUTCOMES, outcome_code
 
 
 def _duffing(tau: Any, q: Any, v: Any, speed: Any) -> tuple[Any]:

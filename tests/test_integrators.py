@@ -11,16 +11,16 @@ from reference import confirmed, field as second_field
 from scipy.integrate import solve_ivp
 
 from jaxcage import replace
-from jaxcage.integrate import (
+from jaxcage.models import FirstOrderField, ForcedOscillator, ForcedSystem, case
+from jaxcage.solve import (
     FixedSteps,
     NewmarkBeta,
     Rodas3,
     Rodas4,
     method,
+    rosenbrock_step,
     strobe_map,
 )
-from jaxcage.models import FirstOrderField, ForcedOscillator, ForcedSystem, case
-from jaxcage.solve import rosenbrock_step
 
 
 def stacked(state):

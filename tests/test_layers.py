@@ -14,7 +14,6 @@ LAYERS = [
     "forces",
     "models",
     "solve",
-    "integrate",
     "analysis",
     "sweeps",
     "orbits",

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-import jaxcage.integrate as ji
+import jaxcage.solve as ji
 from jaxcage.analysis import cage_forces, film_drag_power, orbit_measures, relative_state, winding
 from jaxcage.forces import ElasticRib
 from jaxcage.models import case

@@ -15,9 +15,9 @@ from literature import DUFFING_DOUBLINGS
 from reference import bifurcation as shooting
 
 import jaxcage as jc
-from jaxcage.integrate import FixedSteps, strobe_map
 from jaxcage.io import load_model, write_template
 from jaxcage.orbits import Point, SynchronousOrbits, edge_speed, sensitivity
+from jaxcage.solve import FixedSteps, strobe_map
 
 
 RPM = np.pi / 30

@@ -4,8 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxcage.integrate import method
 from jaxcage.models import ForcedOscillator, ForcedSystem
+from jaxcage.solve import method
 from jaxcage.sweeps import sweep
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import jaxcage.integrate as ji
+import jaxcage.solve as ji
 from jaxcage.analysis import OrderSpectrum, dominant_orders, order_spectrum, whirl_spectrum
 
 

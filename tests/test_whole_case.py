@@ -10,7 +10,7 @@ from reference import WholeBearing
 
 import jaxcage as jc
 from jaxcage.io import configuration, whole_bearing_from
-from jaxcage.models.whole import BearingState, Bodies, Rollers, state_scale
+from jaxcage.models import BearingState, Bodies, Rollers, state_scale
 
 
 jc.enable_x64()
@@ -78,7 +78,7 @@ def test_arcs_by_another_tolerance():
         state = stretch["states"][i]
         rollers, bodies = arrays(state)
         start = BearingState(jnp.asarray(rollers), jnp.asarray(bodies), jnp.array([state["cage_angle"], 0.0]))
-        run = jc.simulate_bearing(model, speed, revolutions=1, samples=32, start=start, tolerance=1e-5)
+        run = jc.simulate(model, speed, revolutions=1, samples=32, start=start, method=jc.native(1e-5, 1e-2))
         assert apart(stretch, (run.rollers[1], run.bodies[1]), i + 1) < 1e-3
 
 

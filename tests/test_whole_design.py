@@ -12,7 +12,7 @@ import jaxcage as jc
 from jaxcage.analysis import BearingSweep
 from jaxcage.cli import main
 from jaxcage.design import COMPARED, BearingRuns, DesignSpace, bearing_objective, before_and_after
-from jaxcage.models.whole import drawn_places
+from jaxcage.models import drawn_places
 
 
 jc.enable_x64()

@@ -5,14 +5,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from energies import contact_energy
 from helpers import in_other_units, unit_exponents
 from jax.flatten_util import ravel_pytree
 from reference import WholeBearing, gupta
 from test_whole_reference import SPEED, everything, random_state, right_side
 
 import jaxcage as jc
-from jaxcage.models.whole import BearingState, Traction, bar_stiffness
-from jaxcage.models.whole._raceway import contact_energy
+from jaxcage.models import BearingState, Traction, bar_stiffness
 
 
 def bearing(**changed):
@@ -128,7 +128,7 @@ def test_rollers_know_of_each_other_through_cage_and_ring_only():
 
 
 def _rates(model, state):
-    return model.at_speed(jnp.asarray(SPEED))(state).state.rollers
+    return model.at_speed(jnp.asarray(SPEED)).rates(state).state.rollers
 
 
 @pytest.mark.wide
@@ -160,7 +160,7 @@ def test_derivatives_by_every_parameter():
     @jax.jit
     def value(numbers):
         changed = jc.replace(model, **dict(zip(names, numbers, strict=True)))
-        return jnp.dot(ravel_pytree(changed.at_speed(jnp.asarray(SPEED))(state).state)[0], jnp.asarray(weights))
+        return jnp.dot(ravel_pytree(changed.at_speed(jnp.asarray(SPEED)).rates(state).state)[0], jnp.asarray(weights))
 
     at = jnp.stack(list(jc.parameters(model).values()))
     slopes = np.asarray(jax.jit(jax.jacfwd(value))(at))

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from energies import cage_angular_momentum, kinetic_energy, potential_energy
 from helpers import beyond_range
 from PIL import Image
 from scipy.optimize import brentq, fsolve
@@ -16,18 +17,7 @@ from test_whole_reference import everything
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.io import read_columns
-from jaxcage.models.whole import (
-    LEDGER,
-    MEANS,
-    BearingState,
-    Bodies,
-    Rollers,
-    cage_angular_momentum,
-    kinetic_energy,
-    potential_energy,
-    rolling_start,
-    state_scale,
-)
+from jaxcage.models import INTEGRATED, LEDGER, BearingState, Bodies, Rollers, rolling_start, state_scale
 
 
 SPEED = jc.rpm(10000)
@@ -62,7 +52,7 @@ def run():
     """One revolution, from a cage in the middle of its clearance to its land, by tight steps."""
     model = bearing()
     start = rolling_start(model, SPEED, cage=1)
-    return model, start, jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=3e-7)
+    return model, start, jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(3e-7, 1e-2))
 
 
 @pytest.mark.wide
@@ -88,7 +78,7 @@ KINDS = {
 def test_energy_of_other_kinds(kind):
     model = bearing(**KINDS[kind])
     start = rolling_start(model, SPEED, cage=2)
-    ran = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=3e-7)
+    ran = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(3e-7, 1e-2))
     gain = float(energy_and_momentum(model, ran.last)[0] - energy_and_momentum(model, start)[0])
     lost = sum(ran.total(name) for name in LEDGER[1:])
     assert ran.outcome == "successful"
@@ -139,7 +129,7 @@ def test_rollers_that_do_not_slip():
     cage = SPEED * (r - h_i) / (r * (1 + h_i / h_o))
     off = 1e-3 * np.cos(np.arange(13))
     start = moving(model, radius=r, orbit=omega * (1 + off), spin=-cage * r / h_o * (1 - off), cage_speed=cage)
-    ran = jc.bearing_over_time(model, SPEED, np.array([0.0, 2e-3]), start=start, tolerance=1e-8)
+    ran = jc.bearing_over_time(model, SPEED, np.array([0.0, 2e-3]), start=start, method=jc.native(1e-8, 1e-2))
     _, _, r, _, orbit = ran.rollers[-1]
     outer, inner = r + half - r_o, r_i + half - r
     h_o, h_i = half - outer / 2, half - inner / 2
@@ -152,7 +142,7 @@ def test_cage_speed_under_load_without_friction():
     """R_i omega_i/(2 (R_o - D/2)) to 1e-4, (omega_i/2)(1 - D/d_m) to 1e-3 only."""
     model = bearing(**NO_LAND, gravity=0.0, pocket_friction=0.0, eccentricity=0.0)
     start = rolling_start(model, SPEED, cage=1)
-    ran = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start)
+    ran = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start)
     spent = ran.time[-1] - ran.time[0]
     mean = (2 * np.pi + (ran.rollers[-1, 0] - ran.rollers[0, 0]).mean()) / spent
     rolling = 32.5 * SPEED / (2 * (32.5 + 16 + 0.02 - 8))
@@ -236,7 +226,7 @@ def test_bounces():
     lag[2], orbit[2] = 0.149e-3 / radius[2], speed / radius[2]
     radius[5], radial[5] = radius[5] + 8e-6, speed
     start = moving(model, spin=0.0, radius=radius, lag=lag, radial=radial, orbit=orbit)
-    ran = jc.bearing_over_time(model, 0.0, np.array([0.0, 1.4e-4]), start=start, tolerance=1e-9)
+    ran = jc.bearing_over_time(model, 0.0, np.array([0.0, 1.4e-4]), start=start, method=jc.native(1e-9, 1e-2))
     beta, _, r, back, turning = ran.rollers[-1]
     assert ran.outcome == "successful"
     along = back[2] * np.sin(beta[2]) + r[2] * turning[2] * np.cos(beta[2])
@@ -281,14 +271,14 @@ def test_held_cage_is_that_of_the_cage_model():
         _, rates = everything(held, jnp.asarray(SPEED), start)
         found = np.asarray(rates.state.bodies)
         np.testing.assert_allclose(found[:4], expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-        torque = float(rates.integrals[(*LEDGER, *MEANS).index("hold_torque")])
+        torque = float(rates.integrals[INTEGRATED.index("hold_torque")])
         assert found[4] == 0 and abs(torque) > 1e-3
 
 
 def test_steps_that_are_too_long_are_said():
     """A tolerance that lets errors through, and none allowed: the run is done and called inaccurate."""
     model = bearing()
-    ran = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, tolerance=1e-2, allowed=1e-9)
+    ran = jc.simulate(model, SPEED, revolutions=1, samples=32, method=jc.native(1e-2, 1e-9))
     assert ran.outcome == "inaccurate" and ran.error > 1e-9
     unit = state_scale(model, SPEED)
     assert float(unit.bodies[0]) == pytest.approx(0.225e-3)
@@ -297,14 +287,14 @@ def test_steps_that_are_too_long_are_said():
 def test_a_cage_at_rest_is_not_followed_over_its_angle():
     model = bearing()
     start = rolling_start(model, SPEED, turning=0.01)
-    assert jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start).outcome == "outside"
+    assert jc.simulate(model, SPEED, revolutions=1, samples=32, start=start).outcome == "outside"
     with pytest.raises(ValueError, match="speed"):
-        jc.simulate_bearing(model, 0.0, revolutions=1)
+        jc.simulate(model, 0.0, revolutions=1)
     with pytest.raises(ValueError, match="revolutions"):
-        jc.simulate_bearing(model, SPEED, revolutions=0)
+        jc.simulate(model, SPEED, revolutions=0)
     against = jc.replace(model, outer_speed=-0.67 * SPEED)  # the cage hardly turns
     with pytest.raises(ValueError, match="must make the cage turn at 0.01 of the faster ring's speed"):
-        jc.simulate_bearing(against, SPEED, revolutions=1)
+        jc.simulate(against, SPEED, revolutions=1)
 
 
 @pytest.mark.wide
@@ -313,12 +303,10 @@ def test_a_quasi_static_ring():
     dynamic, still = bearing(), bearing(**{"ring.ring_motion": "quasi_static"})
     start = rolling_start(dynamic, SPEED, cage=1)
     runs = [
-        jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-6)
+        jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-6, 1e-2))
         for model in (dynamic, still)
     ]
-    heavy = float(still.load + still.ring.ring_mass * still.gravity)
     assert [run.outcome for run in runs] == ["successful"] * 2
-    assert runs[1].largest("ring_imbalance") < 1e-9 * heavy and runs[0].largest("ring_imbalance") == 0
     x, y = np.diff([run.bodies[8:, 5:7].mean(axis=0) for run in runs], axis=0)[0]
     assert abs(x) < 0.3e-6 and abs(y) < 0.3e-6 and np.all(runs[1].bodies[:, 7:9] == 0)
     slips = [jc.bearing_measures(dynamic, run, SPEED).cage_slip for run in runs]
@@ -331,7 +319,7 @@ def test_a_lightly_loaded_bearing_skids():
     slips = {}
     for load in (100.0, 4450.0):
         model = bearing(load=load)
-        ran = jc.simulate_bearing(model, SPEED, revolutions=20, discard=10, samples=32)
+        ran = jc.simulate(model, SPEED, revolutions=20, discard=10, samples=32)
         assert ran.outcome == "successful"
         slips[load] = jc.bearing_measures(model, ran, SPEED)
     assert slips[100.0].cage_slip > 0.05 and slips[100.0].cage_slip_drift > 0.02
@@ -360,7 +348,7 @@ def test_simulate_prints_slips_forces_and_losses(
     with Image.open(found["figure"]) as picture:
         assert picture.size == (2400, 1600)
     assert len(read_columns(found["data"])["pocket_force_13 [N]"]) == 33
-    run = jc.simulate_bearing(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, samples=32)
+    run = jc.simulate(jc.whole_bearing("nu2310"), jc.rpm(10000), revolutions=1, samples=32)
     expected = jc.bearing_measures(jc.whole_bearing("nu2310"), run, float(jc.rpm(10000)))
     names = "cage_slip roller_slip_max pocket_force_max_N pocket_force_mean_sum_N land_force_max_N eccentricity_mean"
     for name in names.split():

@@ -19,7 +19,7 @@ from jaxcage.analysis import (
     named_lines,
     pocket_force_distribution,
 )
-from jaxcage.models.whole import LEDGER, MEANS, rolling_start
+from jaxcage.models import rolling_start
 
 
 pytestmark = pytest.mark.wide
@@ -31,7 +31,7 @@ def run():
     """Two revolutions from inside the clearance."""
     model = bearing()
     start = rolling_start(model, SPEED, cage=1)
-    ran = jc.simulate_bearing(model, SPEED, revolutions=2, samples=SAMPLES, start=start)
+    ran = jc.simulate(model, SPEED, revolutions=2, samples=SAMPLES, start=start)
     return model, ran, bearing_history(model, ran, SPEED)
 
 
@@ -117,7 +117,7 @@ def test_the_synchronous_force_of_a_known_one(run):
     running = lambda f: np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(time))])
     for name, f in (("x", fx), ("y", fy)):
         for part, wave in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
-            integrals[:, (*LEDGER, *MEANS).index(f"pocket_{name}_{part}")] = running(f * wave)
+            integrals[:, ran.beside.index(f"pocket_{name}_{part}")] = running(f * wave)
     x, y, error = equivalent_synchronous_force(dataclasses.replace(ran, time=time, integrals=integrals))
     assert (x, y) == (pytest.approx(7.0, rel=1e-9), pytest.approx(0.0, abs=1e-9))
     assert error == pytest.approx(0.0, abs=1e-9)

@@ -11,7 +11,7 @@ from reference import WholeBearing
 
 import jaxcage as jc
 from benchmarks import bearing_speed
-from jaxcage.models.whole import BearingState, state_scale
+from jaxcage.models import BearingState, state_scale
 
 
 SPEED = jc.rpm(10000)
@@ -55,7 +55,7 @@ def random_state(theirs, seed, reach):
 def everything(model, speed, state):
     """All forces and all rates: one program for the tests of a right side."""
     at = model.at_speed(speed)
-    return at.forces(state), at(state)
+    return at.forces(state), at.rates(state)
 
 
 def right_side(model, speed, state):
@@ -84,7 +84,7 @@ def test_a_short_arc():
     """A thirtieth of a revolution from a cage near its land: integrated over time there, over the angle here."""
     model = jc.whole_bearing("nu2310")
     start = jc.models.rolling_start(model, SPEED, cage=1)
-    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, tolerance=1e-9, start=start)
+    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-9, 1e-2))
     theirs = WholeBearing(model, SPEED)
     end = theirs.arc(float(start.clock[0]), np.asarray(start.rollers), np.asarray(start.bodies), 2 * np.pi / 32)
     unit = state_scale(model, SPEED)

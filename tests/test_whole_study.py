@@ -13,7 +13,7 @@ import xarray as xr
 import jaxcage as jc
 from jaxcage.analysis import BearingSweep
 from jaxcage.cli import main
-from jaxcage.models.whole import CAGE_STARTS
+from jaxcage.models import CAGE_STARTS
 from jaxcage.studies import Between, check_study
 
 

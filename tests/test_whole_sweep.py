@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
 from jaxcage.analysis import around, bearing_history
-from jaxcage.integrate import SAMPLES, SPACING, STALLED, limits_of
-from jaxcage.models.whole import BearingState, rolling_start, state_scale
+from jaxcage.models import INTEGRATED, bodies_of, rollers_of, rolling_start, state_scale
 from jaxcage.plotting import (
     bearing_figure,
     bearing_map_figure,
@@ -20,40 +18,34 @@ from jaxcage.plotting import (
     bearings_beside,
     over_shaft_speed,
 )
-from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, WATCHED, Bearings
+from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, Lanes
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
 
 
-def lanes_of(model, states):
-    """Lanes of one bearing at one speed, and its states in units of the scale."""
-    scale = state_scale(model, jnp.asarray(SPEED))
-    scale = scale._replace(rollers=scale.rollers[:, 0])
-    scale = jax.tree.map(lambda x: np.stack([x] * len(states), axis=-1), scale)
-    at = model.at_speed(jnp.asarray(SPEED))
-    slowest = np.full(len(states), STALLED * abs(float(at.rolling_cage_speed)))
-    bearings = Bearings(at, scale, slowest, over_angle=True)
-    return bearings, bearings.packed(np.arange(len(states)), jax.tree.map(lambda *x: np.stack(x), *states))
-
-
-def run_samples(bearings, y, samples, tolerance, direction=None):
-    """The lanes from sample to sample."""
-    tangents = None if direction is None else np.tile(direction, (len(y), 1))
-    options = dict(tangents=tangents, step=1e-4)
-    return bearings.run(np.arange(len(y)), y, SPACING, samples, samples, tolerance, limits_of(1.0), **options)
+def run_samples(model, states, samples, tolerance, direction=None, **more):
+    """Lanes of one bearing at one speed from sample to sample; their first states in units of the scale too."""
+    lanes, every = Lanes.of([model], np.full(len(states), SPEED)), np.arange(len(states))
+    y = np.array([[*state.row, *state.clock, *np.zeros(len(INTEGRATED))] for state in states])
+    y = y / lanes.begin(every, y)[0]
+    method, tangents = jc.native(tolerance), None
+    if direction is not None:
+        tangents = np.tile(direction, (len(y), 1, 1))
+    engine = lanes.engine(0 if direction is None else 1, method, 16)
+    numbers = lanes.numbers(engine, every)
+    return engine(numbers, y, samples, samples, method, tangents=tangents, **{"step": 1e-4} | more), y
 
 
 def in_units(model, state):
     """A state over its magnitudes, in one row as the engine has it."""
-    unit = state_scale(model, jnp.asarray(SPEED))
-    return np.concatenate([np.ravel((state.rollers / unit.rollers).T), state.bodies / unit.bodies])
+    return np.asarray(state.row) / np.asarray(state_scale(model, jnp.asarray(SPEED)).row)
 
 
 @pytest.fixture(scope="module")
 def start():
     """A state with contacts of all kinds: a revolution on from the cage near its lowest place."""
-    return jc.simulate_bearing(bearing(), SPEED, revolutions=1, samples=32).last
+    return jc.simulate(bearing(), SPEED, revolutions=1, samples=32).last
 
 
 def along():
@@ -65,32 +57,27 @@ def along():
 def test_a_lane_is_a_simulation(start):
     """From one state over an eighth of a revolution, both by tight steps."""
     model = bearing()
-    bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)])
-    ran = run_samples(bearings, y, 2, 1e-9, along())
-    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-9)
-    k = 2 * 32 // SAMPLES
-    expected = BearingState(jnp.asarray(run.rollers[k]), jnp.asarray(run.bodies[k]), jnp.zeros(2))
+    ran, _ = run_samples(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)], 2, 1e-9, along())
+    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-9, 1e-2))
     assert np.all(ran.mark == FINISHED) and run.outcome == "successful"
-    moved = np.abs(in_units(model, expected) - in_units(model, start)).max()
-    apart = np.abs(ran.state[0, :74] - in_units(model, expected)).max()
-    assert apart < 1e-5 < 1e-2 < moved
-    _, _, clock, integrals = bearings.unpacked([0], ran.state[:1])
-    assert clock[0, 0] == pytest.approx(float(run.angle[k]), abs=1e-12)
-    assert clock[0, 1] == pytest.approx(run.time[k], rel=1e-8)
-    np.testing.assert_allclose(integrals[0, :-1], run.integrals[k] - run.integrals[0], rtol=1e-6, atol=1e-9)
-    largest = ran.strobe[0, :, -len(WATCHED) :].max(axis=0)
-    assert largest[WATCHED.index("pocket_force")] == pytest.approx(run.peaks[:k, 0].max(), rel=1e-3)
-    _, bodies, *_ = bearings.unpacked([0], ran.strobe[:1, :, : -len(WATCHED)])
-    np.testing.assert_allclose(bodies[0, :, :2], run.bodies[k // 2 : k + 1 : k // 2, :2], atol=1e-6 * model.clearance)
+    unit = np.asarray(state_scale(model, SPEED).row)
+    moved = np.abs(run.state[4] / unit - in_units(model, start)).max()
+    assert np.abs(ran.strobe[0, :, :74] - run.state[2:5:2] / unit).max() < 1e-5 < 1e-2 < moved
+    angle, seconds, *integrals = ran.state[0, 74:]
+    assert angle == pytest.approx(float(run.angle[4]), abs=1e-12) and seconds == pytest.approx(run.time[4], rel=1e-8)
+    np.testing.assert_allclose(integrals, run.integrals[4, 2:] - run.integrals[0, 2:], rtol=1e-6, atol=1e-9)
+    largest = ran.peaks[0].max(axis=0)
+    np.testing.assert_allclose(largest[1:4], run.peaks[:4].max(axis=0)[1:4], rtol=1e-3)
 
 
 @pytest.mark.wide
 def test_rates_in_machine_code_are_those_of_the_model(start):
     """A step so short that it is the rate: beside the field that JAX evaluates."""
     model, h = bearing(), 1e-7
-    bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1)])
-    found = bearings.run([0, 1], y, h, 1, 1, 1e-3, limits_of(1.0), step=h).state[:, :74]
-    rates = [model.at_speed(jnp.asarray(SPEED))(s) for s in (start, rolling_start(model, SPEED, 1))]
+    states = [start, rolling_start(model, SPEED, 1)]
+    ran, y = run_samples(model, states, 1, 1e-3, step=h, turn=h)
+    found = ran.state[:, :74]
+    rates = [model.at_speed(jnp.asarray(SPEED)).rates(s) for s in states]
     for row, before, rate in zip(found, y, rates, strict=True):
         expected = in_units(model, rate.state) / abs(float(rate.state.clock[0]))
         np.testing.assert_allclose((row - before[:74]) / h, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
@@ -100,10 +87,11 @@ def test_rates_in_machine_code_are_those_of_the_model(start):
 def test_growth_is_that_of_the_distance_of_two_runs(start):
     """Over an eighth of a revolution, the logarithm of the tangent's length against runs a little apart."""
     model, direction, little = bearing(), along(), 1e-7
-    bearings, y = lanes_of(model, [start] * 3)
-    y[1, :74] += little * direction
-    y[2, :74] -= little * direction
-    ran = run_samples(bearings, y, 2, 1e-9, direction)
+    unit = np.asarray(state_scale(model, SPEED).row) * little * direction
+    moved = lambda sign: start._replace(
+        rollers=start.rollers + sign * rollers_of(unit), bodies=start.bodies + sign * bodies_of(unit)
+    )
+    ran, _ = run_samples(model, [start, moved(1), moved(-1)], 2, 1e-9, direction)
     apart = np.linalg.norm(ran.state[1, :74] - ran.state[2, :74])
     expected = np.log(apart / (2 * little * np.linalg.norm(direction)))
     assert abs(expected) > 0.1
@@ -117,8 +105,7 @@ def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
     stalled = rolling_start(model, SPEED, turning=0.01)
     broken = start._replace(rollers=start.rollers.at[1, 4].set(jnp.nan))
     ran, alone = (
-        run_samples(*lanes_of(model, [start, *others]), 1, 1e-5, along())
-        for others in ((stalled, broken), (start, start))
+        run_samples(model, [start, *others], 1, 1e-5, along())[0] for others in ((stalled, broken), (start, start))
     )
     assert list(ran.mark) == [FINISHED, OUTSIDE, NOT_FINITE]
     np.testing.assert_array_equal(ran.state[0], alone.state[0])
@@ -140,12 +127,12 @@ def test_rollers_have_no_names():
     start, turn = rolling_start(model, SPEED, 1), 2 * np.pi / 13
     renamed = lambda state: state._replace(rollers=jnp.roll(state.rollers, -1, axis=1))
     rolled = renamed(start)._replace(clock=start.clock + jnp.asarray([turn, 0.0]))
-    ran = run_samples(*lanes_of(model, [start, rolled, start]), 1, 1e-6, along())
+    ran, _ = run_samples(model, [start, rolled, start], 1, 1e-6, along())
     one, other = (row[:74].copy() for row in ran.state[:2])
     moved = np.concatenate([np.roll(one[:65].reshape(13, 5), -1, axis=0).ravel(), one[65:]])
     assert np.abs(moved - other).max() < 1e-8
     assert np.abs(one - other).max() > 1e-3
-    np.testing.assert_allclose(ran.strobe[0, 0, -len(WATCHED) :], ran.strobe[1, 0, -len(WATCHED) :], rtol=1e-6)
+    np.testing.assert_allclose(ran.peaks[0, 0], ran.peaks[1, 0], rtol=1e-6)
 
 
 @pytest.mark.wide
@@ -196,7 +183,7 @@ def test_a_lane_that_fails_spoils_no_other(swept):
 def run(swept):
     """The lane that does not fail by itself."""
     model, starts, _ = swept
-    return jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=starts[0])
+    return jc.simulate(model, SPEED, revolutions=1, samples=32, start=starts[0])
 
 
 def test_measures_of_a_sweep_are_those_of_a_run(swept, run):

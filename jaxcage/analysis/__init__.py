@@ -49,14 +49,14 @@ from .labels import (
     too_few_revolutions as too_few_revolutions,
 )
 from .measures import (
-    OrbitMeasures as OrbitMeasures,
+    Measured as Measured,
+    Measures as Measures,
     cage_forces as cage_forces,
+    cage_history as cage_history,
     cage_moments as cage_moments,
-    measure as measure,
     film_drag_power as film_drag_power,
-    orbit_measures as orbit_measures,
+    measures as measures,
     relative_state as relative_state,
-    winding as winding,
 )
 from .spectra import (
     OrderSpectrum as OrderSpectrum,
@@ -66,6 +66,7 @@ from .spectra import (
     spectrum_of as spectrum_of,
     whirl_spectrum as whirl_spectrum,
 )
+from .survival import Survival as Survival, survival as survival
 from .sweep import (
     LIFE_BLOCK as LIFE_BLOCK,
     UNKNOWN as UNKNOWN,
@@ -83,13 +84,12 @@ from .sweep import (
     to_decide as to_decide,
     too_short as too_short,
 )
-from .survival import Survival as Survival, survival as survival
 from .zones import (
     Edge as Edge,
+    Stretch as Stretch,
     Zone as Zone,
     Zones as Zones,
     closing_width as closing_width,
-    Stretch as Stretch,
     lives_in_words as lives_in_words,
     runs as runs,
     stretches as stretches,
@@ -100,5 +100,5 @@ from .zones import (
 check_layer(
     globals(),
     "cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
-    "orbit_measures order_spectrum stability_chart survival zones",
+    "measures order_spectrum stability_chart survival zones",
 )

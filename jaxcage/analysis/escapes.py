@@ -6,8 +6,6 @@ Limits. A lane that leaves one chaotic set for another has not escaped here, and
 may seem to have. Weak chaos needs long blocks.
 """
 
-import math
-
 import numpy as np
 from jaxtyping import Bool, Float
 

@@ -10,7 +10,7 @@ unstable orbit.
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from ..integrate import OUTCOMES
+from ..solve import OUTCOMES
 
 
 CLOSING_TOLERANCE = 1e-4

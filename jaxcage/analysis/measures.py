@@ -1,11 +1,6 @@
-"""What a cage designer reads off a trajectory: forces, whirl, scatter, film thickness, power.
+"""Measures of a time history: the quantities that its model reports, and the forces on a cage along it."""
 
-Motion is that of the cage centre relative to the rib (C - O). Averages are over time, sample by
-sample: with evenly spaced phases and whole revolutions the sum is as good as the integral.
-"""
-
-import dataclasses
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -16,8 +11,11 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from ..forces import Force
-from ..integrate import Trajectory
-from ..models import FORCES, CageModel
+from ..solve import Trajectory
+from ..models import FORCES, AbstractForcedSystem, CageModel
+from ..models.cage_quantities import QUANTITIES, CageHistory
+from ..quantities import Quantity, averaged
+from .labels import scatter
 
 
 BATCH = 256
@@ -25,18 +23,6 @@ BATCH = 256
 
 Histories = dict[str, tuple[Array, Array, Array]]
 """(F_x, F_y, moment) of each force at every sample."""
-
-def measure(unit: str, text: str) -> Any:
-    """A field with its unit and words."""
-    return dataclasses.field(metadata={"unit": unit, "text": text})
-
-
-STILL = 1e-9
-"""A centre that moves by less than this part of the clearance, or per radian, stands still."""
-AMBIGUOUS = 0.75 * np.pi
-"""Angle about a centre from sample to sample that may as well be the other way around."""
-DOUBT = 0.02
-"""Of a whirl ratio, at most: an orbit may run through its centre once in fifty revolutions."""
 
 
 def relative_state(
@@ -130,116 +116,74 @@ def film_drag_power(
     return film.n_lands * torque * speed
 
 
-def winding(
-    position: Float[np.ndarray, "n 2"], centre: Float[np.ndarray, " 2"], resolution: float = 0.0
-) -> tuple[float, int]:
-    """Angle [rad] by which the motion has gone around `centre`, counter-clockwise, and how many steps are in doubt.
+class Measured(NamedTuple):
+    """A reported quantity with its value."""
 
-    A step of about half a turn from sample to sample may as well be the other way around, and so may one that begins
-    nearer to the centre than `resolution` [m]: the orbit runs through the centre, or its samples are too far apart.
-    """
-    x, y = (position - centre).T
-    turned = np.unwrap(np.arctan2(y, x))
-    doubted = (np.abs(np.diff(turned)) > AMBIGUOUS) | (np.hypot(x, y)[:-1] < resolution)
-    return float(turned[-1] - turned[0]), int(np.sum(doubted))
+    quantity: Quantity
+    value: float
+    error: float
+    """Standard error from the scatter of revolutions, NaN where there is none."""
 
 
-@dataclasses.dataclass(frozen=True)
-class OrbitMeasures:
-    """Measures of one orbit of the cage centre in its rib; printed, a table with units."""
+class Measures(dict[str, Measured]):
+    """Quantities of a time history by name; printed, a table with units."""
 
-    whirl_ratio: float = measure("1", "whirl speed about the mean centre / cage speed")
-    """Mean angular velocity about the mean centre over the mean cage speed, positive in the sense
-    of rotation; NaN where the centre moves by less than the run's error, or runs through its mean. 1 is synchronous,
-    near 0.5 oil whirl."""
-    rib_whirl_ratio: float = measure("1", "whirl speed about the rib centre / cage speed")
-    """The same about the rib centre: 0 for an orbit that does not go around it, NaN for one that runs through it."""
-    rms: float = measure("m", "rms displacement about the mean")
-    """Root of the mean square distance from the mean centre [m]."""
-    peak_displacement: float = measure("m", "largest displacement about the mean")
-    """[m], at the samples."""
-    largest_eps: float = measure("1", "largest eccentricity ratio")
-    """At any step of the integration; above 1 the surfaces overlap."""
-    minimum_film_thickness: float = measure("m", "smallest film thickness")
-    """c (1 - eps) at the largest eps, not below 0 [m]."""
-    velocity_scatter: float = measure("1", "scatter of the centre's speed / mean speed")
-    """Standard deviation of |v| over its mean (Ghaisas et al. 2004): small is steady; 0 for a
-    circle, NaN where the centre stands still."""
-    peak_contact_force: float = measure("N", "largest land contact force")
-    """[N], at the samples."""
-    mean_contact_force: float = measure("N", "mean land contact force")
-    """Mean of |F_contact| [N]."""
-    contact_impulse: float = measure("N s", "land contact impulse per revolution")
-    """Integral of |F_contact| over the time of a revolution [N s]; wear of the lands follows it."""
-    peak_impact_force: float = measure("N", "largest impact force")
-    """[N], at the samples."""
-    impact_impulse: float = measure("N s", "impact impulse per revolution")
-    """Integral of |F_impact| over the time of a revolution [N s]; wear of the pockets follows it
-    (Archard)."""
-    drag_power: float = measure("W", "power to shear the film")
-    """Mean of `film_drag_power` [W]."""
-    film_power: float = measure("W", "power the film takes from the centre's motion")
-    """Mean of -F_film . v [W]; negative where the rotation drives the whirl through the film."""
+    def value(self, name: str) -> float:
+        """The value of a quantity [SI]."""
+        return self[name].value
 
     def __str__(self) -> str:
         lines = []
-        for field in dataclasses.fields(self):
-            unit = "" if field.metadata["unit"] == "1" else field.metadata["unit"]
-            value = getattr(self, field.name)
-            lines.append(f"{field.metadata['text']:<48s} {value:12.5g} {unit}".rstrip())
+        for quantity, value, error in self.values():
+            unit = "" if quantity.unit == "1" else quantity.unit
+            spread = f" ± {error:.1g}" if np.isfinite(error) else ""
+            lines.append(f"{quantity.text:<48s} {value:12.5g}{spread} {unit}".rstrip())
         return "\n".join(lines)
 
     _repr_html_ = notebook_html
 
 
-def orbit_measures(model: CageModel, trajectory: Trajectory) -> OrbitMeasures:
-    """Measures of a trajectory of `model`, best over whole revolutions without the transient.
+def measures(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
+    """Quantities of a time history that its model reports, best over whole revolutions without the transient.
 
     **Raises:** `ValueError` for a trajectory that failed, or of fewer than 3 samples.
     """
     require_x64()
-    if trajectory.outcome != "successful" or len(trajectory.tau) < 3:
+    allowed = ("successful", "inaccurate") if model.beside else ("successful",)
+    if trajectory.outcome not in allowed or len(trajectory.tau) < 3:
         raise ArgumentError(
             "trajectory",
             said="must be a run that succeeded, of at least 3 samples, "
             f"but this one has {len(trajectory.tau)} and ended with: {trajectory.outcome}.",
         )
+    if model.beside:
+        return _from_integrals(model, trajectory)
+    history = cage_history(model, trajectory)  # pyright: ignore[reportArgumentType]
+    return Measures({q.name: Measured(q, float(q.of(history)), np.nan) for q in QUANTITIES if q.of is not None})
+
+
+def _from_integrals(model: AbstractForcedSystem, trajectory: Trajectory) -> Measures:
+    """Quantities from integrals over each revolution and largest values in it."""
+    samples = trajectory.samples
+    each = np.diff(trajectory.integrals[::samples], axis=0)
+    largest = trajectory.peaks[: len(each) * samples].reshape(len(each), samples, -1).max(axis=1)
+    numbers = {name: np.array([float(x)]) for name, x in model.reference(float(trajectory.speed[0])).items()}
+    found = averaged(model.quantities, model.beside, model.watched, each[None], largest[None], numbers, 1.0)
+    return Measures({q.name: Measured(q, float(whole[0]), float(scatter(blocks[0]))) for q, whole, blocks in found})
+
+
+def cage_history(model: CageModel, trajectory: Trajectory) -> CageHistory:
+    """Motion of a cage along a trajectory, and the forces on it."""
     position, velocity = relative_state(model, trajectory.state)
-    speed, c = trajectory.speed, float(model.clearance)
-    weights = (1 / speed) / np.sum(1 / speed)  # samples are even in phase: time of each
-
-    def mean(f: Float[np.ndarray, " n"]) -> float:
-        return float(np.sum(weights * f))
-
-    def whirl(centre: Float[np.ndarray, " 2"]) -> float:
-        angle, doubted = winding(position, centre, float(np.fmax(STILL, trajectory.error)) * c)
-        return angle / phase if 2 * np.pi * doubted <= DOUBT * phase else float("nan")
-
-    def impulse(f: Float[np.ndarray, " n"]) -> float:
-        return float(2 * np.pi * np.mean(f / speed))
-
-    centre = np.sum(weights[:, None] * position, axis=0)
-    away = np.hypot(*(position - centre).T)
-    pace = np.hypot(*velocity.T)
-    phase = float(trajectory.tau[-1] - trajectory.tau[0])
-    paced = np.mean(pace) > STILL * c * np.mean(speed)
-    eps = np.hypot(*position.T) / c
-    largest = max(float(np.max(eps)), trajectory.peak)
-    forces = cage_forces(model, trajectory)
-    contact, impact = (np.hypot(*forces[name].T) for name in ("contact", "impact"))
-    return OrbitMeasures(
-        whirl_ratio=whirl(centre),
-        rib_whirl_ratio=whirl(np.zeros(2)),
-        rms=float(np.sqrt(mean(away**2))),
-        peak_displacement=float(np.max(away)),
-        largest_eps=largest,
-        minimum_film_thickness=max(c * (1 - largest), 0.0),
-        velocity_scatter=float(np.std(pace, ddof=1) / np.mean(pace)) if paced else float("nan"),
-        peak_contact_force=float(np.max(contact)),
-        mean_contact_force=mean(contact),
-        contact_impulse=impulse(contact),
-        peak_impact_force=float(np.max(impact)),
-        impact_impulse=impulse(impact),
-        drag_power=mean(film_drag_power(model, speed, eps)),
-        film_power=mean(-np.sum(forces["film"] * velocity, axis=1)),
+    eps = np.hypot(*position.T) / float(model.clearance)
+    return CageHistory(
+        speed=trajectory.speed,
+        phase=float(trajectory.tau[-1] - trajectory.tau[0]),
+        position=position,
+        velocity=velocity,
+        forces=cage_forces(model, trajectory),
+        drag_power=film_drag_power(model, trajectory.speed, eps),
+        clearance=float(model.clearance),
+        peak=trajectory.peak,
+        error=trajectory.error,
     )

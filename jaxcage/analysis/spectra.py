@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from .._errors import ArgumentError
-from ..integrate import Trajectory
+from ..solve import Trajectory
 
 
 Window = Literal["hann", "flattop", "boxcar"]

@@ -8,7 +8,7 @@ import xarray as xr
 from jaxtyping import Bool, Float, Shaped
 
 from .._errors import ArgumentError
-from ..integrate import OUTCOMES
+from ..solve import OUTCOMES
 from .labels import motion_size, revolutions_to_decide, too_few_revolutions
 from .survival import Survival, survival
 

@@ -15,8 +15,7 @@ from jaxtyping import Float
 from .._errors import ArgumentError
 from .._parameters import parameters
 from ..analysis import STATISTIC_UNITS, BearingSweep
-from ..models import BearingModel
-from ..models.whole import drawn_places
+from ..models import BearingModel, drawn_places
 from ..sweeps import Progress, sweep_bearings
 from ._bearing_gradient import STATISTICS
 from ._objective import AbstractObjective, DesignSpace

@@ -13,7 +13,7 @@ from scipy.special import expit
 
 from .._errors import ArgumentError
 from ..analysis import CHAOS_THRESHOLD
-from ..integrate import AbstractMethod
+from ..solve import AbstractMethod
 from ..sweeps import rpm, sweep_designs
 from ._objective import AbstractObjective, DesignSpace
 

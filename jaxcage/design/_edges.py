@@ -15,8 +15,8 @@ from jaxtyping import Float
 from scipy.special import logsumexp, softmax
 
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod
 from ..orbits import LeadingMultiplier, Point, Sensitivity, leading_multiplier, sensitivity
+from ..solve import AbstractMethod
 from ._objective import AbstractExact, DesignSpace, Measured
 from ._width import SolvedEdge, ZoneWidth
 

@@ -15,8 +15,8 @@ from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from ..analysis import Sweep
-from ..integrate import AbstractMethod
 from ..models import CageModel
+from ..solve import AbstractMethod
 from ..sweeps import averages
 from ._chaos import ChaosMeasure
 from ._objective import AbstractObjective, DesignSpace

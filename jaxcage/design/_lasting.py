@@ -17,8 +17,8 @@ from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._parameters import parameters, replace
 from ..analysis import LIFE_BLOCK, Hazard, Zone, hazard
-from ..integrate import AbstractMethod
 from ..models import CageModel
+from ..solve import AbstractMethod
 from ..sweeps import Progress, sweep_designs
 
 

@@ -9,9 +9,9 @@ from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from .._parameters import parameters
-from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, CageModel
 from ..orbits import Guess, periodic_orbit
+from ..solve import AbstractMethod, strobe_map
 from ._objective import Smooth
 
 

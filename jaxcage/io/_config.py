@@ -29,8 +29,7 @@ from .._checks import require_x64
 from .._parameters import must_be_given, parameter_paths
 from ..bearing import BEARINGS, PUBLISHED_CASES, Bearing, vg
 from ..forces import PocketImpact
-from ..models import BearingModel, CageModel, case, whole_bearing
-from ..models.whole import WHOLE_BEARINGS
+from ..models import WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
 from ._files import read_bytes
 from ._ranges import Range
 from ._schema import KINDS, ConfigError, Known, read_value, submodules, values

@@ -9,7 +9,7 @@ import xarray as xr
 from jaxtyping import Float, Shaped
 
 from ..quantities import component_names, quantity
-from ..integrate import Trajectory
+from ..solve import Trajectory
 from ._files import read_bytes, replacing
 
 

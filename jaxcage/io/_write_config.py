@@ -26,7 +26,9 @@ def configuration(model: CageModel | BearingModel) -> dict[str, Any]:
     **Raises:** `ConfigError` for a model with forces of its user's own, which no table can hold.
     """
     if not isinstance(model, CageModel | BearingModel):
-        raise ConfigError(f"Argument `model` must be a cage or a bearing to be put into a file, but is a {type(model).__name__}.")
+        raise ConfigError(
+            f"Argument `model` must be a cage or a bearing to be put into a file, but is a {type(model).__name__}."
+        )
     if isinstance(model, BearingModel):
         return {"model": "bearing"} | _table(model)
     if model.extra:

@@ -18,10 +18,16 @@
 
 from .._arguments import check_layer
 from .confirm import Confirmation as Confirmation
-from .dataset import load as load, save as save, settings_of as settings_of, stored_configuration as stored_configuration, versions as versions
+from .dataset import (
+    load as load,
+    save as save,
+    settings_of as settings_of,
+    stored_configuration as stored_configuration,
+    versions as versions,
+)
+from .grid import OIL as OIL, Grid as Grid, with_values as with_values
 from .observe import Progress as Progress
 from .plan import Plan as Plan, Speeds as Speeds, States as States, rpm as rpm
-from .grid import OIL as OIL, Grid as Grid, with_values as with_values
 from .run import run_lanes as run_lanes, run_up_down as run_up_down, sweep as sweep
 from .settings import Run as Run
 from .spread import Between as Between, Spread as Spread, Tolerance as Tolerance

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from .._cache import keep_compiled_programs
 from .._errors import ArgumentError
-from ..integrate import cores
+from ..solve import cores
 from .store import Results
 
 

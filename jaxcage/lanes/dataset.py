@@ -28,7 +28,7 @@ from jaxtyping import Float, Shaped
 
 from .._errors import InputError
 from ..analysis import LABELS, scatter
-from ..integrate import OUTCOMES, AbstractMethod
+from ..solve import OUTCOMES, AbstractMethod
 from ..models import AbstractForcedSystem
 from ..quantities import Quantity, averaged, quantity
 from .confirm import Confirmation

@@ -22,7 +22,7 @@ from .._errors import ArgumentError
 from .._parameters import pick
 from .._sobol import sobol
 from ..bearing import vg
-from ..integrate import Lanes
+from ..solve import Lanes
 from ..models import AbstractForcedSystem
 from .observe import over_lanes
 from .plan import SPEED, START, Plan

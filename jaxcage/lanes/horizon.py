@@ -95,7 +95,9 @@ def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarr
     return blocks[:, blocks.shape[1] - size * count :].reshape(len(late), count, size).mean(axis=2)
 
 
-def _put(seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]) -> None:
+def _put(
+    seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
+) -> None:
     """Put the later states in place, NaN where a lane fails; the last strobe states of those that are `open_`, which may
     close."""
     seen.last[lanes], seen.outcome[lanes] = new.last, new.outcome
@@ -127,7 +129,9 @@ def run_unsettled(run: Run, scale: Float[np.ndarray, "lanes dim"], onward: Onwar
         strobe = np.full((lanes.size, run.keep, scale.shape[1]), np.nan)
         strobe[:, run.keep - short :] = new.strobe
         growth = np.full((lanes.size, run.blocks, run.exponents), np.nan)
-        beside = {n: np.full((lanes.size, run.blocks, getattr(new, n).shape[2]), np.nan) for n in ("integrals", "largest")}
+        beside = {
+            n: np.full((lanes.size, run.blocks, getattr(new, n).shape[2]), np.nan) for n in ("integrals", "largest")
+        }
         new = dataclasses.replace(new, strobe=strobe, growth=growth, doubt=growth[:, 0].copy(), **beside)
         seen = new if seen is None else _later(seen, lanes, new)
         lanes, done = lanes[~closed & (new.outcome == 0)], until

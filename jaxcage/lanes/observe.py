@@ -14,20 +14,23 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .._form import Form, compiled
-from ..integrate import (
+from ..models import ESCAPE, AbstractForcedSystem
+from ..solve import (
     IMPLICIT,
     OUTCOMES,
     RETRIES,
+    STUCK,
     SURE,
+    TOO_MANY,
     AbstractMethod,
-    EngineInJax,
+    Engine,
+    JaxEngine,
     Lanes,
+    March,
     NativeSteps,
     codes_of,
     cores,
 )
-from ..models import ESCAPE
-from ..solve import FIRST_STEP, STUCK, TOO_MANY, Engine, March
 from .settings import Run
 
 
@@ -188,8 +191,10 @@ class _Observer:
         outcome = np.where(excursion <= self.limit, 0, OUTCOMES.index("outside"))
         outcome = np.where(finite, outcome, OUTCOMES.index("not_finite"))
         nan = lambda *shape: np.full((count, *shape), np.nan)
-        state = np.concatenate([y0 / scale, np.zeros((count, len(model.beside)))], axis=1)
-        step, stuck, error = np.full(count, FIRST_STEP), np.zeros(count, dtype=bool), np.zeros(count)
+        state = self.lanes.completed(y0)
+        units = np.concatenate([scale, np.ones((count, state.shape[1] - dim))], axis=1)
+        state = state / units
+        step, stuck, error = nan(), np.zeros(count, dtype=bool), np.zeros(count)
         tangents = np.tile(start_tangents(dim, run.exponents), (count, 1, 1))
         growth, strobe, peak = nan(run.followed * run.block, run.exponents), nan(run.keep, dim), nan()
         integrals, largest = nan(run.blocks, len(model.beside)), nan(run.blocks, len(model.watched) - 1)
@@ -200,15 +205,15 @@ class _Observer:
             alive = alive[outcome[alive] == 0]
             if not alive.size:
                 break
-            engine = self.lanes.engine(run.exponents if pushed else 0, method, samples)
             plain = self.lanes.engine(0, method, samples)
-            numbers, seen = self.lanes.numbers(engine, some[alive]), stop == end or (self.averages and begin >= run.discard)
+            engine = self.lanes.engine(run.exponents, method, samples) if pushed else plain
+            numbers = self.lanes.numbers(engine, some[alive])
+            seen = stop == end or (self.averages and begin >= run.discard)
             if begin == 0 or (self.averages and seen):
-                found = self._error(plain, self.lanes.numbers(plain, some[alive]), state[alive], method)
-                error[alive] = np.maximum(error[alive], found)
+                error[alive] = np.maximum(error[alive], self._error(plain, some[alive], state[alive], method))
             strobes = (stop - begin) * samples
             held = strobes if self.averages else max(run.keep, min(CHECKED + 1, strobes))
-            before, (_, begun) = state[alive], self.lanes.begin(some[alive], state[alive, :dim] * scale[alive])
+            before, (_, begun) = state[alive], self.lanes.begin(some[alive], (state * units)[alive])
             ran = engine(
                 numbers, before, strobes, held if seen else 1, method, step=step[alive], threads=cores(),
                 tangents=tangents[alive] if pushed and run.exponents else None, report=self._reporter(stop - begin),
@@ -225,13 +230,14 @@ class _Observer:
                 continue
             steps[alive] += ran.steps / (stop - begin) * (stop - max(begin, run.discard)) / run.revolutions
             if self.averages:
-                block, n = (begin - run.discard) // run.block, len(model.watched)
+                block = (begin - run.discard) // run.block
                 integrals[alive, block] = ran.state[:, dim:] - before[:, dim:]
-                largest[alive, block] = ran.strobe[..., -n + 1 :].max(axis=1)
-                peak[alive] = np.fmax(peak[alive], ran.strobe[..., -n].max(axis=1))
+                largest[alive, block] = ran.peaks[..., 1:].max(axis=1)
+                peak[alive] = np.fmax(peak[alive], ran.peaks[..., -1].max(axis=1))
                 recorded = ran.strobe[..., :dim] * scale[alive, None, :]
-                centres = over_lanes(self.lanes, some[alive], _centres, recorded)
-                place[alive, block * strobes : (block + 1) * strobes] = centres
+                place[alive, block * strobes : (block + 1) * strobes] = over_lanes(
+                    self.lanes, some[alive], _centres, recorded
+                )
                 continue
             strobe[alive] = ran.strobe[:, held - run.keep :]
             peak[alive] = np.maximum(ran.peak, begun)
@@ -256,7 +262,7 @@ class _Observer:
 
     @staticmethod
     def _doubt(
-        engine: Engine | EngineInJax, numbers: Any, ran: March, method: AbstractMethod
+        engine: Engine | JaxEngine, numbers: Any, ran: March, method: AbstractMethod
     ) -> Float[np.ndarray, "some exponents"]:
         """Error of the exponents per revolution that comes from the steps: three times the change of the mean growth
         over a few further revolutions by the method's reference."""
@@ -267,20 +273,28 @@ class _Observer:
         return SURE * np.abs(further(method) - further(method.reference))
 
     def _error(
-        self, engine: Engine | EngineInJax, numbers: Any, state: Float[np.ndarray, "some numbers"], method: AbstractMethod
+        self,
+        engine: Engine | JaxEngine,
+        some: Int[np.ndarray, " some"],
+        state: Float[np.ndarray, "some numbers"],
+        method: AbstractMethod,
     ) -> Float[np.ndarray, " some"]:
-        """Error of a revolution from a state: three times the distance of its end from that by the method's reference.
+        """Error of a stretch from a state: three times the distance of its end from that by the method's reference.
 
-        It is at least the tolerance, which protects against accidental agreement of the two.
+        It is at least the tolerance, which protects against accidental agreement of the two. The stretch is a
+        revolution, or as much of one as two runs can be compared over.
         """
-        dim = self.model.dimension
-        once = lambda chosen: engine(numbers, state, 1, 1, chosen, threads=cores()).state[:, :dim]
+        dim, numbers = self.model.dimension, self.lanes.numbers(engine, some)
+        turn = None
+        if self.averages:
+            turn = np.array([self.model.comparable(speed) for speed in self.lanes.speed[some].tolist()])
+        once = lambda chosen: engine(numbers, state, 1, 1, chosen, turn=turn, threads=cores()).state[:, :dim]
         apart = np.max(np.abs(once(method) - once(method.reference)), axis=1)
         return np.maximum(SURE * np.nan_to_num(apart), getattr(method, "tolerance", 0.0))
 
     def _error_of_strobes(
         self,
-        engine: Engine | EngineInJax,
+        engine: Engine | JaxEngine,
         some: Int[np.ndarray, " some"],
         strobe: Float[np.ndarray, "some held dim"],
         method: AbstractMethod,
@@ -311,6 +325,13 @@ def _mapped(f: Callable[..., Any], form: Form, several: bool, rows: Any, speed: 
         return jax.tree.map(lambda x: jnp.asarray(x, float), f(form.filled(row), speed, *arrays))
 
     return jax.vmap(lane, in_axes=(0 if several else None, 0, *(0 for _ in arrays)))(rows, speed, *arrays)
+
+
+def centres_of(
+    model: AbstractForcedSystem, speed: Float[np.ndarray, " n"], states: Float[np.ndarray, "n dim"]
+) -> Float[np.ndarray, "n 2"]:
+    """Centre of the cage from that of its land, over the clearance, at states of a model."""
+    return over_lanes(Lanes.of([model], speed), np.arange(speed.size), _centres, states[:, None])[:, 0]
 
 
 def _centres(model: Any, speed: Array, states: Array) -> Array:

@@ -15,7 +15,7 @@ from .._arguments import require_at_least, wrong
 from .._errors import ArgumentError
 from .._form import compiled
 from .._types import State
-from ..integrate import Lanes
+from ..solve import Lanes
 from ..models import AbstractForcedSystem, require_speeds
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from .._checks import require_x64
 from ..analysis import label_lanes, motion_label
-from ..integrate import OUTCOMES, AbstractMethod
+from ..solve import OUTCOMES, AbstractMethod
 from ..models import INSTEAD, AbstractForcedSystem, require_known
 from .confirm import Confirmation, Labelled, confirm as confirm_lanes, doubtful
 from .dataset import Found, dataset, exponent_error
@@ -151,5 +151,7 @@ def run_up_down(
         if progress is not None:
             progress(n + 1, speed.size)
     rows = lambda way, order: [each.isel(way=way) for each in seen][::order]
-    joined = lambda way, order: xr.concat(rows(way, order), "speed", coords="different", compat="equals").expand_dims("start", 1)
+    joined = lambda way, order: xr.concat(rows(way, order), "speed", coords="different", compat="equals").expand_dims(
+        "start", 1
+    )
     return joined(0, 1), joined(1, -1)

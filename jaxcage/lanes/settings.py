@@ -6,7 +6,7 @@ from typing import Any
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD
-from ..integrate import AbstractMethod, native
+from ..solve import AbstractMethod, native
 from ..models import AbstractForcedSystem
 
 
@@ -59,7 +59,9 @@ class Run:
         require_at_least(0, discard=self.discard, horizon=self.horizon, exponent_revolutions=self.exponent_revolutions)
         require_at_least(1, revolutions=self.revolutions, blocks=self.blocks, keep=self.keep)
         if self.revolutions % self.blocks:
-            raise ArgumentError("blocks", said=f"must divide the {self.revolutions} revolutions, but it is {self.blocks}.")
+            raise ArgumentError(
+                "blocks", said=f"must divide the {self.revolutions} revolutions, but it is {self.blocks}."
+            )
         most = model.dimension if model.samples == 1 else 1
         if not 0 <= self.exponents <= most:
             allowed = f"at most {most}" if self.exponents > 0 else "at least 0"

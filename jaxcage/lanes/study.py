@@ -17,7 +17,6 @@ from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import scatter
-from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
 from ..quantities import quantity
 from .dataset import CODES, configuration_of, settings_of
@@ -257,7 +256,9 @@ def label_map(
     if speed is not None:
         require_speeds(model, speed)
     if min(len(x_value), len(y_value)) < 2:
-        raise ArgumentError("x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}.")
+        raise ArgumentError(
+            "x", "y", said=f"must have at least 2 values each, but have {len(x_value)}, {len(y_value)}."
+        )
     fixed = {} if speed is None else {SPEED: np.array([speed])}
     grid = Grid({x_name: x_value, y_name: y_value, **fixed}, {}, 0, 0, starts)
     grid.require_known(model)

@@ -11,7 +11,10 @@
 | `_constants`      | what the paper leaves out, in sets                                               |
 | `_printed`        | a model as people read it                                                        |
 | `_user_law`       | what goes wrong in a law of the user's, in a sentence                            |
-| `whole`           | the whole bearing: rollers, pockets, cage, guiding land, inner ring              |
+| `whole`           | the whole bearing: parameters, starts, magnitudes, ready-made bearings           |
+| `whole_states`    | its state, and the quantities beside it                                          |
+| `whole_field`     | its equations of motion at one shaft speed                                       |
+| `contacts`        | its contacts: raceways, pockets, guiding land, oil                               |
 """
 
 from .._arguments import check_layer
@@ -41,11 +44,42 @@ from ._system import (
     ForcedOscillator as ForcedOscillator,
     ForcedSystem as ForcedSystem,
 )
+from .contacts import (
+    Pockets as Pockets,
+    Raceways as Raceways,
+    RollerDrag as RollerDrag,
+    Traction as Traction,
+    bar_stiffness as bar_stiffness,
+)
 from .whole import (
+    CAGE_STARTS as CAGE_STARTS,
+    WHOLE_BEARINGS as WHOLE_BEARINGS,
     BearingModel as BearingModel,
-    BearingState as BearingState,
+    BearingOverTime as BearingOverTime,
+    CagePlace as CagePlace,
+    InnerRing as InnerRing,
+    Wear as Wear,
+    drawn_places as drawn_places,
     rolling_start as rolling_start,
+    slowness as slowness,
+    state_scale as state_scale,
     whole_bearing as whole_bearing,
+)
+from .whole_field import MOVING as MOVING, BearingAtSpeed as BearingAtSpeed, Passed as Passed
+from .whole_states import (
+    BESIDE as BESIDE,
+    INTEGRATED as INTEGRATED,
+    LEDGER as LEDGER,
+    MEANS as MEANS,
+    OF_BODIES as OF_BODIES,
+    OF_ROLLER as OF_ROLLER,
+    WATCHED as WATCHED,
+    BearingState as BearingState,
+    Bodies as Bodies,
+    Rates as Rates,
+    Rollers as Rollers,
+    bodies_of as bodies_of,
+    rollers_of as rollers_of,
 )
 
 

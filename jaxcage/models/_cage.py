@@ -14,7 +14,6 @@ from .._errors import ArgumentError
 from .._parameters import parameter, reading, require_readings, with_numbers
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, is_concrete
-from ..quantities import component_names
 from ..forces import (
     AbstractForce,
     ElasticRib,
@@ -27,6 +26,7 @@ from ..forces import (
     UnbalanceReading,
     smooth_norm,
 )
+from ..quantities import component_names
 from ._cage_at_speed import FORCES, CageAtSpeed, ElasticRibLaw, RigidRibLaw
 from ._field import AbstractField, SecondOrderField
 from ._printed import printed

@@ -38,6 +38,30 @@ class AbstractForcedSystem(eqx.Module):
         """Number of state components; a second-order system has its velocities behind its coordinates."""
 
     @property
+    def beside(self) -> tuple[str, ...]:
+        """Names of the quantities that are integrated beside the state; the state does not follow from them."""
+        return ()
+
+    @property
+    def beside_start(self) -> tuple[float, ...]:
+        """Values of the quantities beside the state at the beginning of a run."""
+        return (0.0,) * len(self.beside)
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Names of the quantities whose largest values are recorded."""
+        return ("excursion",)
+
+    @property
+    def samples(self) -> int:
+        """Number of strobe states of a revolution that a sweep records."""
+        return 1
+
+    def comparable(self, speed: float) -> float:
+        """Phase [rad] over which a run is compared with a more exact one: its error is stated for such a stretch."""
+        return 2 * math.pi
+
+    @property
     def harmonics(self) -> int:
         """The highest harmonic of the revolution in the forcing, a static number; 1 by default.
 
@@ -62,21 +86,6 @@ class AbstractForcedSystem(eqx.Module):
     """Quantities that the model reports of a run, from averages of `beside` and `watched`."""
 
     @property
-    def beside(self) -> tuple[str, ...]:
-        """Names of what is integrated over time beside the state."""
-        return ()
-
-    @property
-    def watched(self) -> tuple[str, ...]:
-        """Names of the largest values that are recorded, the excursion first."""
-        return ("excursion",)
-
-    @property
-    def samples(self) -> int:
-        """Strobe states per revolution that a sweep records."""
-        return 1
-
-    @property
     def components(self) -> tuple[str, ...]:
         """Names of the state components."""
         return tuple(f"y{i}" for i in range(self.dimension))
@@ -84,6 +93,10 @@ class AbstractForcedSystem(eqx.Module):
     def other_speed(self, speed: Scalar) -> tuple[str, Scalar] | None:
         """Words for a speed that goes with the model's, and its value [rad/s]: a cage's shaft speed."""
         return None
+
+    def turning_speed(self, speed: Scalar) -> Scalar:
+        """Speed at which the phase advances, in the mean [rad/s]; the model's own unless its revolutions are others."""
+        return speed
 
     def centre(self, y: State) -> tuple[Scalar, Scalar]:
         """Centre of the cage from that of its land, over the clearance, of models that have one."""

@@ -12,7 +12,7 @@ LOSSES = {
     "raceway_damping": "damping of the raceway contacts",
     "pocket_friction": "friction in the pockets",
     "pocket_damping": "damping of the pocket contacts",
-    "film": "the film of the guiding land",
+    "film": "shearing and squeezing the film of the guiding land",
     "land_contact": "contact of cage and land",
     "drag": "drag and churning of the rollers",
     "mounting": "damping of the inner ring's mounting",
@@ -48,7 +48,9 @@ QUANTITIES: tuple[Quantity, ...] = (
         "cage slip: 1 less the mean cage speed over that of pure rolling",
         of=lambda a: 1 - 2 * np.pi * a.revolutions / a.integrals["time"] / a.numbers["rolling_cage_speed"],
     ),
-    Quantity("roller_slip_max", "", "1", "largest slip of a roller's spin against pure rolling", of=_largest("roller_slip")),
+    Quantity(
+        "roller_slip_max", "", "1", "largest slip of a roller's spin against pure rolling", of=_largest("roller_slip")
+    ),
     Quantity("pocket_force_max_N", "", "N", "largest pocket force", of=_largest("pocket_force")),
     Quantity(
         "pocket_force_peak_N",

@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 
 from .._errors import ArgumentError
 from .._form import compiled
-from ..integrate import cores
+from ..solve import cores
 from ._implicit import TOLERANCE, AbstractEquations, solve
 from ._steps import GIVEN_UP, SETTLED, Counts, by_steps
 

@@ -14,8 +14,8 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._types import Scalar
-from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import AbstractMethod
 from ._arclength import Corrected, Steps
 from ._branch import follow_both_ways
 from ._follower import Follower, Start, make_follower

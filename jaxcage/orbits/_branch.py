@@ -13,8 +13,8 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from .._types import Scalar
-from ..integrate import AbstractMethod, Rodas4
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import AbstractMethod, Rodas4
 from ._arclength import Corrected, Steps, Trace, follow, passes, take
 from ._follower import (
     Follower,

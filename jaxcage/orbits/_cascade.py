@@ -12,8 +12,8 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
 from ..analysis import Edge
-from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
 from ._arclength import ONCE, Corrected, Steps, correct, follow, settle_on
 from ._branch import Branch, describe
 from ._follower import Follower, make_follower, require_range

@@ -12,8 +12,8 @@ from jaxtyping import Bool, Complex, Float, Int
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._notebook import notebook_html
-from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
 from ._arclength import Corrected, Curves, Steps, follow, put, settle_on, stack, take
 from ._bifurcation import PointEquations
 from ._follower import eigenvalues, in_a_row, require_within, turned

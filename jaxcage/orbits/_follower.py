@@ -12,7 +12,7 @@ import numpy as np
 
 from .._errors import ArgumentError
 from .._types import Scalar
-from ..integrate import AbstractMethod
+from ..solve import AbstractMethod
 from ._arclength import Corrected, Curves, settle_on, stack, take
 from ._orbit import OrbitEquations
 from ._problem import SPEED, Given, OrbitProblem, Parameter, make_problem

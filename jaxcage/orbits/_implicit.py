@@ -28,7 +28,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .._form import compiled
 from .._types import Scalar
-from ..integrate import StrobeMap
+from ..solve import StrobeMap
 from ._problem import OrbitProblem, Prepared, frozen
 from ._steps import GIVEN_UP, Counts, by_steps
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from .._notebook import notebook_html
 from ..analysis import Zone, Zones, closing_width
-from ..integrate import AbstractMethod
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
 from ._cascade import Cascade, cascade
 from ._point import Point
 from ._search import Stretch, SynchronousOrbits

@@ -16,8 +16,8 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from .._types import Scalar, State
-from ..integrate import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
 from ._implicit import AbstractEquations, as_root, settled
 from ._problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
 from ._steps import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, from_steps, that_serves

@@ -20,8 +20,8 @@ from jaxtyping import Array, Float, Int
 from .._errors import ArgumentError
 from .._parameters import Parameter as Parameter, pick as pick
 from .._types import Scalar
-from ..integrate import AbstractMethod, StrobeMap, pushed, strobe_map
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod, StrobeMap, pushed, strobe_map
 
 
 SPEED = "speed"

@@ -22,8 +22,8 @@ from .._form import compiled
 from .._notebook import notebook_html
 from .._types import Scalar
 from ..analysis import Sweep
-from ..integrate import AbstractMethod, strobe_map
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import AbstractMethod, strobe_map
 from ..sweeps import initial_states, sweep
 from ._arclength import Steps, take
 from ._branch import Branch, follow_both_ways

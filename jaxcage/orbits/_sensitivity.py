@@ -28,8 +28,8 @@ from .._form import compiled
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
 from ..bearing import checked_before
-from ..integrate import AbstractMethod, cores
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import AbstractMethod, cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
 from ._cascade import FEIGENBAUM, Cascade
 from ._implicit import expansion, numbers_around, numbers_of

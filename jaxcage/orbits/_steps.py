@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
-from ..integrate import AbstractMethod, FixedSteps, method as make_method
+from ..solve import AbstractMethod, FixedSteps, method as make_method
 
 
 FIRST, MOST = 256, 16384

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Circle, FancyArrowPatch, Patch, Polygon
 
 from ..analysis import Around, BearingHistory, BearingSweep, BearingZone, OrderSpectrum
-from ..integrate import BearingRun
 from ..models import BearingModel
+from ..solve import Trajectory
 from ..sweeps import BearingUpDown
 from ._history import path_in_circle
 from ._style import (
@@ -41,7 +41,7 @@ MARK_COLOURS = (BLUE, SKY, GREEN, PURPLE, VERMILION, ORANGE)
 
 
 def bearing_drawing(
-    model: BearingModel, run: BearingRun, history: BearingHistory, sample: int, ax: Axes | None = None
+    model: BearingModel, run: Trajectory, history: BearingHistory, sample: int, ax: Axes | None = None
 ) -> Axes:
     """Rings, rollers and cage at one sample, to scale; arrows are the forces of the rollers on the cage's bars.
 
@@ -74,7 +74,7 @@ def bearing_drawing(
     return ax
 
 
-def _rollers(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
+def _rollers(model: BearingModel, run: Trajectory, history: BearingHistory, sample: int) -> list[Artist]:
     radius = MM * run.rollers[sample, 2]
     angle, half = history.roller_angle[sample], MM * float(model.bearing.roller_diameter) / 2
     heaviest = max(float(history.inner_load.max()), 1e-9)
@@ -85,7 +85,7 @@ def _rollers(model: BearingModel, run: BearingRun, history: BearingHistory, samp
     ]
 
 
-def _bars(model: BearingModel, run: BearingRun, sample: int) -> list[Artist]:
+def _bars(model: BearingModel, run: Trajectory, sample: int) -> list[Artist]:
     """The bars between the pockets, in the height that the guiding surface and the rollers' centres leave them."""
     centre, theta = MM * run.bodies[sample, 0:2], run.angle[sample]
     n, free = model.bearing.n_rollers, float(model.bearing.roller_diameter + model.bearing.pocket_clearance) / 2
@@ -108,7 +108,7 @@ def _bar_ends(model: BearingModel, pitch: float) -> tuple[float, float]:
     return (pitch - abs(land - pitch) * 0.6, land) if land > pitch else (land, pitch + abs(land - pitch) * 0.6)
 
 
-def _arrows(model: BearingModel, run: BearingRun, history: BearingHistory, sample: int) -> list[Artist]:
+def _arrows(model: BearingModel, run: Trajectory, history: BearingHistory, sample: int) -> list[Artist]:
     force = history.pocket_force[sample]
     longest = LONGEST_ARROW * MM * float(model.bearing.outside_diameter)
     scale = longest / max(float(np.abs(history.pocket_force).max()), 1e-9)
@@ -198,7 +198,7 @@ def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel
 
 def bearing_figure(
     model: BearingModel,
-    run: BearingRun,
+    run: Trajectory,
     history: BearingHistory,
     circumference: Around,
     spectra: Mapping[str, OrderSpectrum],

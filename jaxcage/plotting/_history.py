@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from ..quantities import quantity
-from ..integrate import Trajectory
+from ..solve import Trajectory
 from ._style import (
     BLACK,
     BLUE,

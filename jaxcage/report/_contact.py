@@ -11,9 +11,9 @@ from jaxtyping import Array, Float
 
 from .._form import compiled
 from .._types import Scalar
-from ..integrate import AbstractMethod, method as make_method, strobe_map
 from ..models import CageModel
 from ..orbits import Point
+from ..solve import AbstractMethod, method as make_method, strobe_map
 
 
 STEPS = 4096

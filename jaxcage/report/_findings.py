@@ -11,7 +11,6 @@ from jaxtyping import Int
 from .._errors import NoResult
 from ..analysis import Sweep, Zones, zones
 from ..bearing import LoadDistribution, PublishedCase, load_distribution
-from ..integrate import OUTCOMES, AbstractMethod
 from ..models import CageModel
 from ..orbits import (
     Curve,
@@ -23,6 +22,7 @@ from ..orbits import (
     loss_zones,
     synchronous_orbits,
 )
+from ..solve import OUTCOMES, AbstractMethod
 from ..sweeps import sweep
 from ._map import Axis, Exponents, follow_edges, largest_exponents, parameter_axis, speed_axis
 from ._slopes import edge_slopes

@@ -10,9 +10,9 @@ import numpy as np
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters, replace, within
-from ..integrate import AbstractMethod, cores
 from ..models import BearingModel, CageModel
 from ..orbits import Curve, Point, bifurcation, curve
+from ..solve import AbstractMethod, cores
 from ..sweeps import sweep
 from ._table import shown_unit
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from .._parameters import EXTRA, parameter_info, parameters
 from ..design import BearingGradient, StatisticGradient
-from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
+from ..solve import AbstractMethod
 from ._orbit_tables import error_cell
 from ._table import Table, chosen, number, speed
 

@@ -9,7 +9,7 @@ import functools
 import heapq
 import struct
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax.extend as jex
@@ -54,6 +54,9 @@ INTRINSICS = {
     "abs": "fabs",
 }
 CASTS = {("double", "i64"): "fptosi", ("i64", "double"): "sitofp", ("i1", "double"): "uitofp", ("i1", "i64"): "zext"}
+
+WRITTEN_OUT = 48
+"""Rows up to which the code of a loop over them is written out."""
 
 Path = tuple[tuple[Any, int], ...]
 """Masks, and the value of each for which something is needed."""
@@ -367,3 +370,90 @@ class Writer:
         """The lines written since the last call."""
         lines, self.lines = self.lines, []
         return "\n".join(lines)
+
+
+class Code(Writer):
+    """A writer of code that keeps vectors in rows of memory. A row is a number, or a value within a loop over rows."""
+
+    block = "entry"
+    """The block that is being written."""
+
+    def line(self, text: str) -> None:
+        super().line(text)
+        if text.endswith(":"):
+            self.block = text[:-1]
+
+    def at(self, row: int | Value, base: str = "%memory") -> Value:
+        if isinstance(row, Value):
+            offset = self.simple("mul", row, Value(str(self.width * 8), "i64", False)).text
+        else:
+            offset = str(row * self.width * 8)
+        return self.let(f"getelementptr i8, ptr {base}, i64 {offset}", "ptr", False)
+
+    def get(self, row: int | Value, wide: bool = True, base: str = "%memory") -> Value:
+        return self.let(f"load {self.type('double', wide)}, ptr {self.at(row, base).text}", "double", wide)
+
+    def put(self, row: int | Value, v: Value, wide: bool = True, base: str = "%memory") -> None:
+        v = self.widened(v) if wide else v
+        self.line(f"store {self.typed(v)}, ptr {self.at(row, base).text}")
+
+    def all(self, rows: Sequence[int]) -> list[Value]:
+        return [self.get(r) for r in rows]
+
+    def over(
+        self, count: int, begin: Sequence[Value], body: Callable[[Callable[[int], int | Value], list[Value]], Any]
+    ) -> list[Value]:
+        """What `body` makes of `begin`, row after row: written out if they are few, else as a loop.
+
+        `body(row, values)` returns new values; `row(k)` is the row of its number behind the k-th.
+        """
+        rest = lambda new: [] if new is None else list[Value](new)
+        values = [self.widened(v) for v in begin]
+        if count <= WRITTEN_OUT:
+            for q in range(count):
+                values = rest(body(lambda k, q=q: k + q, values))
+            return values
+        self.names += 1
+        before, loop, done = self.block, f"loop{self.names}", f"done{self.names}"
+        place = Value(f"%row{self.names}", "i64", False)
+        inside = [Value(f"{place.text}_{k}", "double", True) for k in range(len(values))]
+        outer, self.lines = self.lines, []
+        self.block = loop
+        new = rest(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside))
+        assert self.block == loop
+        lines, self.lines = self.lines, outer
+        vector = self.type("double", True)
+        self.line(f"br label %{loop}")
+        self.line(f"{loop}:")
+        self.line(f"{place.text} = phi i64 [ 0, %{before} ], [ {place.text}_next, %{loop} ]")
+        for old, start, after in zip(inside, values, new, strict=True):
+            self.line(f"{old.text} = phi {vector} [ {start.text}, %{before} ], [ {after.text}, %{loop} ]")
+        self.lines += lines
+        self.line(f"{place.text}_next = add i64 {place.text}, 1")
+        self.line(f"{place.text}_more = icmp slt i64 {place.text}_next, {count}")
+        self.line(f"br i1 {place.text}_more, label %{loop}, label %{done}")
+        self.line(f"{done}:")
+        return new
+
+    def shared(self, k: int) -> Value:
+        """A fixed number that is the same in all lanes."""
+        at = self.let(f"getelementptr double, ptr %shared, i64 {k}", "ptr", False)
+        return self.let(f"load double, ptr {at.text}", "double", False)
+
+    def log2(self, x: Value) -> Value:
+        """The binary logarithm of a positive number, within 0.09."""
+        bits = self.convert("bitcast", self.convert("fptrunc", x, "float"), "i32")
+        return self.sub(self.mul(self.convert("sitofp", bits, "double"), number(2.0**-23)), number(127.0))
+
+    def exp2(self, x: Value) -> Value:
+        """Two to the power x, within 6 %; the inverse of `log2`."""
+        bits = self.convert("fptosi", self.mul(self.add(x, number(127.0)), number(2.0**23)), "i32")
+        return self.convert("fpext", self.convert("bitcast", bits, "float"), "double")
+
+    def store_if(self, mask: Value, x: Value, base: str, index: Value) -> None:
+        """x to base[index] in the lanes where the mask holds."""
+        at = self.let(f"getelementptr double, ptr {base}, {self.typed(index)}", "ptr", True)
+        v, m = self.type("double", True), self.type("i1", True)
+        name = f"@llvm.masked.scatter.v{self.width}f64.v{self.width}p0"
+        self.declarations.add(f"declare void {name}({v}, <{self.width} x ptr>, {m})")
+        self.line(f"call void {name}({self.typed(self.widened(x))}, {self.typed(at)}, {self.typed(mask)})")

@@ -7,249 +7,19 @@ a revolution the strobe state is stored, and tangent vectors are orthonormalised
 does depends neither on its neighbours nor on the number of threads.
 """
 
-import dataclasses
-import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-import diffrax as dfx
 import numpy as np
 
-from .ir import Value, Writer, is_variable, number
+from .ir import Code, Value, is_variable, number
+from .layout import REVOLUTION, Field, Layout, Tableau, fixed_numbers, layout_of
+from .step_control import Tried, limited_step, next_step, squared_error, step_to_strobe
 
 
-REVOLUTION = 2 * math.pi
-PAIRS: dict[str, tuple[type[dfx.AbstractERK] | None, int]] = {
-    "tsit5": (dfx.Tsit5, 5),
-    "dopri5": (dfx.Dopri5, 5),
-    "bosh3": (dfx.Bosh3, 3),
-    "dopri8": (dfx.Dopri8, 8),
-    "rodas4": (None, 4),
-}
-"""Embedded explicit pairs by name, with their order; and an implicit method."""
-SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.9, 0.2, 6.0
-"""Step sizes change by the safety factor times what the error asks for, within these factors."""
-WRITTEN_OUT = 48
-"""Rows up to which the code of a loop over them is written out."""
-TANGENT_TOLERANCE = 10.0
-"""Tolerance of tangent vectors relative to their length, as a multiple of that of the state."""
-NEAREST = 1e-4
-"""Time to an abrupt change of the law [rad] below which steps are not shortened any further."""
 FINISHED, OUTSIDE, NOT_FINITE, STUCK, TOO_MANY, DIVERGED = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 """Marks of lanes that leave: all revolutions done; far outside what the model holds for; step size below the smallest
 one because the state is not finite, or because the error cannot be met; too many steps in a revolution; an iteration
 that did not converge, which this loop has none of."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Layout:
-    """Rows of a lane's numbers in the working memory of a vector, by name: first row, number of rows."""
-
-    rows: dict[str, tuple[int, int]]
-
-    @classmethod
-    def of(cls, **sizes: int) -> "Layout":
-        rows, at = {}, 0
-        for name, size in sizes.items():
-            rows[name], at = (at, size), at + size
-        return cls(rows)
-
-    def __getitem__(self, name: str) -> range:
-        return range(self.rows[name][0], self.end(name))
-
-    @property
-    def total(self) -> int:
-        return sum(size for _, size in self.rows.values())
-
-    def end(self, name: str) -> int:
-        """The row after the last one of `name`."""
-        return sum(self.rows[name])
-
-
-class Tableau(NamedTuple):
-    """Coefficients of an embedded pair whose last stage is the first of the next step."""
-
-    phase: list[float]
-    stages: list[list[float]]
-    error: list[float]
-    order: int
-
-    @property
-    def implicit(self) -> bool:
-        """Whether a step is one program of its own (`Field.step`)."""
-        return not self.error
-
-    @classmethod
-    def named(cls, name: str) -> "Tableau":
-        solver, order = PAIRS[name]
-        if solver is None:
-            return cls([0.0, 1.0], [], [], order)
-        t: Any = solver.tableau
-        floats = lambda row: [float(x) for x in row]
-        phase, stages, error = [0.0, *floats(t.c)], [[], *map(floats, t.a_lower)], floats(t.b_error)
-        if not t.fsal:
-            phase, stages, error = [*phase, 1.0], [*stages, floats(t.b_sol)], [*error, 0.0]
-        return cls(phase, stages, error, order)
-
-
-class Field(NamedTuple):
-    """The programs of a system, traced, and what the loop is to do with their numbers."""
-
-    prelude: Any
-    """fixed numbers -> what the rates need of them."""
-    rates: Any
-    """phase, state and tangents, fixed numbers, results of the prelude -> rates; or what writes the code of rates
-    itself (`Rollers`)."""
-    excursion: Any | None
-    """phase, state, fixed numbers -> excursion; None where the code of rates stores what is watched behind the rates,
-    the excursion first."""
-    abrupt: Any | None
-    """phase, state, rates, fixed numbers -> distance from an abrupt change of the law and speed towards it; None where
-    the law has none."""
-    dimension: int
-    tangents: int
-    wide: tuple[bool, ...]
-    """Which of the fixed numbers differ from lane to lane."""
-    step: Any | None = None
-    """phase, length of the step, state and tangents, fixed numbers -> the same at its end, and their estimated errors;
-    for an implicit method."""
-    beside: int = 0
-    """Numbers that are integrated beside the state, behind the tangents: their errors do not control the steps."""
-    watched: int = 1
-    """Numbers whose largest values are kept; where there are more than the excursion, from one strobe to the next."""
-    phased: bool = False
-    """Whether a lane's phase at a strobe follows from their number, and from the second fixed number."""
-    own_turn: bool = False
-    """Whether the first fixed number is how far a lane goes from strobe to strobe, instead of a revolution."""
-    relative: bool = True
-    """Whether errors are measured relative to the state and to one, or in units of the scale alone."""
-    careful: bool = True
-    """Whether the errors of tangent vectors control the steps too."""
-
-    @property
-    def moving(self) -> int:
-        """Numbers that are integrated."""
-        return self.dimension * (1 + self.tangents) + self.beside
-
-    @property
-    def span(self) -> int:
-        """Numbers that the code of rates stores."""
-        return self.moving + (0 if self.excursion is not None else self.watched)
-
-    @property
-    def recorded(self) -> int:
-        """Numbers of a strobe state: the state and, where there are any, what is integrated beside it and the largest
-        of what is watched."""
-        return self.dimension + (self.beside + self.watched if self.excursion is None else 0)
-
-
-def layout_of(field: Field, stages: int) -> Layout:
-    """Rows of the working memory: those that are stored when a lane leaves come first, then those that are loaded with
-    it, then those that are set to zero."""
-    return Layout.of(
-        state=field.moving,
-        step=1,
-        peak=field.watched,
-        steps=1,
-        mark=1,
-        fixed=sum(field.wide),
-        phase=1,
-        error=1,
-        revolution=1,
-        first_step=1,
-        lane=1,
-        rate=field.span * stages,
-        stage=field.moving,
-        again=field.span,
-        made=len(field.prelude.jaxpr.outvars) if field.prelude else 0,
-    )
-
-
-class Code(Writer):
-    """A writer of code that keeps vectors in rows of memory. A row is a number, or a value within a loop over rows."""
-
-    block = "entry"
-    """The block that is being written."""
-
-    def line(self, text: str) -> None:
-        super().line(text)
-        if text.endswith(":"):
-            self.block = text[:-1]
-
-    def at(self, row: int | Value, base: str = "%memory") -> Value:
-        if isinstance(row, Value):
-            offset = self.simple("mul", row, Value(str(self.width * 8), "i64", False)).text
-        else:
-            offset = str(row * self.width * 8)
-        return self.let(f"getelementptr i8, ptr {base}, i64 {offset}", "ptr", False)
-
-    def get(self, row: int | Value, wide: bool = True, base: str = "%memory") -> Value:
-        return self.let(f"load {self.type('double', wide)}, ptr {self.at(row, base).text}", "double", wide)
-
-    def put(self, row: int | Value, v: Value, wide: bool = True, base: str = "%memory") -> None:
-        v = self.widened(v) if wide else v
-        self.line(f"store {self.typed(v)}, ptr {self.at(row, base).text}")
-
-    def all(self, rows: Sequence[int]) -> list[Value]:
-        return [self.get(r) for r in rows]
-
-    def over(
-        self, count: int, begin: Sequence[Value], body: Callable[[Callable[[int], int | Value], list[Value]], Any]
-    ) -> list[Value]:
-        """What `body` makes of `begin`, row after row: written out if they are few, else as a loop.
-
-        `body(row, values)` returns new values; `row(k)` is the row of its number behind the k-th.
-        """
-        rest = lambda new: [] if new is None else list[Value](new)
-        values = [self.widened(v) for v in begin]
-        if count <= WRITTEN_OUT:
-            for q in range(count):
-                values = rest(body(lambda k, q=q: k + q, values))
-            return values
-        self.names += 1
-        before, loop, done = self.block, f"loop{self.names}", f"done{self.names}"
-        place = Value(f"%row{self.names}", "i64", False)
-        inside = [Value(f"{place.text}_{k}", "double", True) for k in range(len(values))]
-        outer, self.lines = self.lines, []
-        self.block = loop
-        new = rest(body(lambda k: self.simple("add", place, Value(str(k), "i64", False)) if k else place, inside))
-        assert self.block == loop
-        lines, self.lines = self.lines, outer
-        vector = self.type("double", True)
-        self.line(f"br label %{loop}")
-        self.line(f"{loop}:")
-        self.line(f"{place.text} = phi i64 [ 0, %{before} ], [ {place.text}_next, %{loop} ]")
-        for old, start, after in zip(inside, values, new, strict=True):
-            self.line(f"{old.text} = phi {vector} [ {start.text}, %{before} ], [ {after.text}, %{loop} ]")
-        self.lines += lines
-        self.line(f"{place.text}_next = add i64 {place.text}, 1")
-        self.line(f"{place.text}_more = icmp slt i64 {place.text}_next, {count}")
-        self.line(f"br i1 {place.text}_more, label %{loop}, label %{done}")
-        self.line(f"{done}:")
-        return new
-
-    def shared(self, k: int) -> Value:
-        """A fixed number that is the same in all lanes."""
-        at = self.let(f"getelementptr double, ptr %shared, i64 {k}", "ptr", False)
-        return self.let(f"load double, ptr {at.text}", "double", False)
-
-    def log2(self, x: Value) -> Value:
-        """The binary logarithm of a positive number, within 0.09."""
-        bits = self.convert("bitcast", self.convert("fptrunc", x, "float"), "i32")
-        return self.sub(self.mul(self.convert("sitofp", bits, "double"), number(2.0**-23)), number(127.0))
-
-    def exp2(self, x: Value) -> Value:
-        """Two to the power x, within 6 %; the inverse of `log2`."""
-        bits = self.convert("fptosi", self.mul(self.add(x, number(127.0)), number(2.0**23)), "i32")
-        return self.convert("fpext", self.convert("bitcast", bits, "float"), "double")
-
-    def store_if(self, mask: Value, x: Value, base: str, index: Value) -> None:
-        """x to base[index] in the lanes where the mask holds."""
-        at = self.let(f"getelementptr double, ptr {base}, {self.typed(index)}", "ptr", True)
-        v, m = self.type("double", True), self.type("i1", True)
-        name = f"@llvm.masked.scatter.v{self.width}f64.v{self.width}p0"
-        self.declarations.add(f"declare void {name}({v}, <{self.width} x ptr>, {m})")
-        self.line(f"call void {name}({self.typed(self.widened(x))}, {self.typed(at)}, {self.typed(mask)})")
 
 
 def march_ir(field: Field, pair: str, width: int) -> str:
@@ -268,18 +38,6 @@ def march_ir(field: Field, pair: str, width: int) -> str:
     parts = [*made, rates, *implicit, _refill(rows, width), _loop(field, rows, tableau, width)]
     declarations = sorted(set().union(*(declared for _, declared in parts)))
     return "\n".join([*(text for text, _ in parts), *declarations, '!0 = !{!"branch_weights", i32 1, i32 30}', ""])
-
-
-def fixed_numbers(w: Code, field: Field, rows: Layout, program: Any, first: int) -> list[Value]:
-    """The fixed numbers of a program, which stand behind its first arguments; those that it does not read are 0."""
-    read = [*(v for e in program.jaxpr.eqns for v in e.invars), *program.jaxpr.outvars]
-    used = {v for v in read if is_variable(v)}
-    values, wide_row, shared = [], iter(rows["fixed"]), 0
-    for v, wide in zip(program.jaxpr.invars[first:], field.wide, strict=False):
-        row, at = next(wide_row) if wide else 0, shared
-        shared += not wide
-        values.append((w.get(row) if wide else w.shared(at)) if v in used else number(0.0))
-    return values
 
 
 def _made(w: Code, field: Field, rows: Layout) -> list[Value]:
@@ -495,18 +253,8 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
     turn = w.get(row["fixed"]) if field.own_turn else number(REVOLUTION)
     runs = w.both(w.compare("ge", lane, zero), w.compare("eq", mark, zero))
     arguments = lambda program, leading: [*leading, *fixed_numbers(w, field, rows, program, len(leading))]
-    limited = h
-    if field.abrupt is not None:
-        near = w.all([*range(row["state"], row["state"] + n), *range(row["rate"], row["rate"] + n)])
-        (distance, speed), w.block = w.program(
-            field.abrupt, arguments(field.abrupt, [since_zero(phase), *near]), w.block
-        )
-        time = w.larger(w.div(distance, w.add(speed, number(1e-9))), number(NEAREST))
-        limited = w.smaller(w.widened(time), h)
-    left = w.sub(turn, phase)
-    ends = w.compare("ge", w.mul(limited, number(1.0001)), left)
-    halves = w.compare("gt", w.mul(limited, number(2.0)), left)
-    step = w.select(ends, left, w.select(halves, w.mul(left, number(0.5)), limited))
+    limited = h if field.abrupt is None else limited_step(w, field, rows, lambda: since_zero(phase), h)
+    step, ends, halves = step_to_strobe(w, limited, w.sub(turn, phase))
     if tableau.implicit:
         at = w.typed(w.widened(since_zero(phase))), w.typed(w.widened(step))
         w.line(f"call void @implicit({at[0]}, {at[1]}, ptr %memory, ptr %shared)")
@@ -520,44 +268,11 @@ def _loop(field: Field, rows: Layout, tableau: Tableau, width: int) -> tuple[str
 
         w.over(moving, (), argument)
         rates(w.add(phase, w.mul(step, number(tableau.phase[i]))), row["stage"], at_stage(i))
-    terms = [(w.mul(step, number(e)), j) for j, e in enumerate(tableau.error) if e != 0.0]
-
-    def estimate(at: Any, first: int) -> Value:
-        """Error of a number by its place among those that are integrated."""
-        if tableau.implicit:
-            return w.get(at(first + row["again"]))
-        return w.add(*(w.mul(e, w.get(at(first + at_stage(j)))) for e, j in terms))
-
-    def worst(at: Any, error: list[Value]) -> list[Value]:
-        sizes = (w.call("fabs", w.get(at(row[x]))) for x in ("state", "stage"))
-        unit = w.mul(w.add(one, w.larger(*sizes)), tolerance) if field.relative else tolerance
-        relative = w.div(estimate(at, 0), unit)
-        return [w.call("maximum", error[0], w.mul(relative, relative))]
-
-    (error,) = w.over(n, [zero], worst)
-    for first_of in range(n, n * (1 + field.tangents), n) if field.careful else ():
-
-        def sums(at: Any, old: list[Value], first_of: int = first_of) -> list[Value]:
-            new, wrong = w.get(at(row["stage"] + first_of)), estimate(at, first_of)
-            return [w.add(old[0], w.mul(new, new)), w.add(old[1], w.mul(wrong, wrong))]
-
-        length, wrong = w.over(n, [number(1e-300), zero], sums)
-        allowed = w.mul(tolerance, number(TANGENT_TOLERANCE))
-        error = w.call("maximum", error, w.div(wrong, w.mul(length, w.mul(allowed, allowed))))
-    error = w.larger(w.smaller(error, number(1e12)), number(1e-12))  # a NaN becomes the largest error
+    error = squared_error(w, field, rows, tableau, step, tolerance)
     fine = w.compare("le", error, one)
     moves = w.both(fine, runs)
-    # The factors are powers of the squared error: 0.7/order of this step and -0.4/order of the last one.
     bits, last = w.log2(error), w.get(row["error"])
-    power = 0.5 / tableau.order
-    grown = w.sub(w.mul(last, number(0.4 * power)), w.mul(bits, number(0.7 * power)))
-    factor = w.add(w.select(fine, grown, w.mul(bits, number(-power))), number(math.log2(SAFETY)))
-    factor = w.smaller(factor, w.select(fine, number(math.log2(MOST_FACTOR)), number(-0.2)))
-    factor = w.exp2(w.larger(factor, number(math.log2(LEAST_FACTOR))))
-    proposed = w.mul(step, factor)
-    shorter = w.simple("or", ends, halves)  # than what the error asked for
-    proposed = w.select(w.both(fine, shorter), w.larger(proposed, limited), proposed)
-    proposed = w.smaller(proposed, largest)
+    proposed = next_step(w, tableau.order, Tried(step, limited, ends, halves, fine, bits, last), largest)
     w.put(row["step"], w.select(runs, proposed, h))
     w.put(row["error"], w.select(moves, w.larger(bits, number(-16.0)), last))
     over = w.both(moves, ends)

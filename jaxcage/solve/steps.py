@@ -245,19 +245,15 @@ def _on_cpu(count: Array, *numbers: Array, how: How) -> list[Array]:
 
 
 @functools.lru_cache(maxsize=256)
-def code_of(
-    step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int, once: int = 0
-) -> tuple[str, tuple[int, ...]] | None:
+def code_of(step: Any, sizes: Sizes, wide: tuple[bool, ...], width: int) -> tuple[str, tuple[int, ...]] | None:
     """The name by which XLA knows the machine code of a step, and which of the fixed numbers it reads; None where there
-    is no such code, which a warning says. `once` is the number of results of a step that moves nothing and is taken
-    once."""
-    begun = sizes.moved + sizes.watched
-    moving = begun or once
+    is no such code, which a warning says."""
+    moving = sizes.moved + sizes.watched
     program = program_of(step, sizes)
-    read = tuple(i - 1 - begun for i in program.needed if i > begun)
+    read = tuple(i - 1 - moving for i in program.needed if i > moving)
     try:
-        ir = loop_ir(program, moving, [(k, wide[k]) for k in read], width, not begun)
-        ir = f"{ir}\n{handler_ir(1 + begun + len(read), moving)}"
+        ir = loop_ir(program, moving, [(k, wide[k]) for k in read], width)
+        ir = f"{ir}\n{handler_ir(1 + moving + len(read), moving)}"
     except (UnknownOperation, UnknownInterface) as unknown:
         say_once(str(unknown))
         return None
@@ -266,14 +262,13 @@ def code_of(
     return name, read
 
 
-def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int, once: bool) -> str:
+def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: int) -> str:
     """`march(inputs, outputs)`: the loop over steps of a program (number of the step, numbers) -> the first `moving`.
 
-    Inputs are a pair of counts, of steps and of lanes; the numbers that move, if the program is not taken `once`; and
-    the others that are `read`, each with its place behind those and whether lanes have one each. There are `width`
+    Inputs are a pair of counts, of steps and of lanes; the numbers that move; and the others that
+    are `read`, each with its place behind those and whether lanes have one each. There are `width`
     lanes at least: the last vector of them overlaps the one before it.
     """
-    begins = 0 if once else moving
     w = Writer(width)
     pointer = lambda base, k: w.let(
         f"load ptr, ptr {w.let(f'getelementptr ptr, ptr {base}, i64 {k}', 'ptr', False).text}", "ptr", False
@@ -283,10 +278,10 @@ def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: 
     lanes_at = w.let(f"getelementptr i32, ptr {count_at.text}, i64 1", "ptr", False)
     count, lanes = (w.let(f"load i32, ptr {x.text}", "i32", False) for x in (count_at, lanes_at))
     count, lanes = (w.convert("sext", x, "i64") for x in (count, lanes))
-    inputs = [pointer("%in", 1 + k) for k in range(begins + len(read))]
+    inputs = [pointer("%in", 1 + k) for k in range(moving + len(read))]
     outputs = [pointer("%out", k) for k in range(moving)]
     shared = {
-        k: w.let(f"load double, ptr {inputs[begins + j].text}", "double", False)
+        k: w.let(f"load double, ptr {inputs[moving + j].text}", "double", False)
         for j, (k, wide) in enumerate(read)
         if not wide
     }
@@ -297,24 +292,25 @@ def loop_ir(program: Any, moving: int, read: Sequence[tuple[int, bool]], width: 
     start = w.call("smin", Value("%from", "i64", False), last)
     at = lambda base: w.let(f"getelementptr double, ptr {base.text}, i64 {start.text}", "ptr", False)
     load = lambda base: w.let(f"load {vector}, ptr {at(base).text}, align 8", "double", True)
-    begun = [load(x) for x in inputs[:begins]]
-    own = {k: load(inputs[begins + j]) for j, (k, wide) in enumerate(read) if wide}
+    begun = [load(x) for x in inputs[:moving]]
+    own = {k: load(inputs[moving + j]) for j, (k, wide) in enumerate(read) if wide}
     w.line(f"%some = icmp sgt i64 {count.text}, 0")
-    w.line("br label %step" if once else "br i1 %some, label %step, label %store")
+    w.line("br i1 %some, label %step, label %store")
     before = w.taken()
 
-    state = [Value(f"%s{k}", "double", True) for k in range(begins)]
+    state = [Value(f"%s{k}", "double", True) for k in range(moving)]
     step_number = w.convert("sitofp", Value("%i", "i64", False), "double")
-    fixed = [shared.get(k, own.get(k, number(0.0))) for k in range(len(program.jaxpr.invars) - 1 - begins)]
+    fixed = [shared.get(k, own.get(k, number(0.0))) for k in range(len(program.jaxpr.invars) - 1 - moving)]
     results, latch = w.program(program, [step_number, *state, *fixed], "step")
     results = [w.widened(x) for x in results]
     body = w.taken()
     phis = "\n".join(
         f"  {s.text} = phi {vector} [ {b.text}, %vector ], [ {r.text}, %{latch} ]"
-        for s, b, r in zip(state, begun, results, strict=not once)
+        for s, b, r in zip(state, begun, results, strict=True)
     )
-    early = lambda k: "" if once else f"[ {begun[k].text}, %vector ], "
-    ends = "\n".join(f"  %e{k} = phi {vector} {early(k)}[ {r.text}, %{latch} ]" for k, r in enumerate(results))
+    ends = "\n".join(
+        f"  %e{k} = phi {vector} [ {begun[k].text}, %vector ], [ {r.text}, %{latch} ]" for k, r in enumerate(results)
+    )
     for k, x in enumerate(outputs):
         w.line(f"store {vector} %e{k}, ptr {at(x).text}, align 8")
     after = w.taken()
@@ -442,70 +438,3 @@ batching.primitive_batchers[march_p] = _batch
 ad.primitive_jvps[march_p] = _jvp
 mlir.register_lowering(march_p, mlir.lower_fun(_inside_jax, multiple_results=True))
 mlir.register_lowering(march_p, mlir.lower_fun(_on_cpu, multiple_results=True), platform="cpu")
-
-
-# --- functions of every lane ---------------------------------------------------------------------------------------
-
-each_p = jex.core.Primitive("each")
-each_p.multiple_results = True
-
-
-def lanewise(
-    f: Callable[[Numbers, Numbers], Sequence[Any]], results: int, shared: Sequence[Array], lanes: Sequence[Array]
-) -> tuple[Array, ...]:
-    """The results of f(shared, lane) in every lane: shared scalars, arrays of one axis."""
-    few = len(shared)
-    return tuple(each_p.bind(*shared, *lanes, f=lambda *x: f(x[:few], x[few:]), results=results))
-
-
-def _each_abstract(*numbers: Any, f: Any, results: int) -> list[Any]:
-    return [max(numbers, key=lambda x: len(x.shape))] * results
-
-
-def _each_inside_jax(*numbers: Array, f: Any, results: int) -> list[Array]:
-    shape = max((x.shape for x in numbers), key=len)
-    return [jnp.broadcast_to(x, shape) for x in _in_lanes(f, numbers)]
-
-
-def _each_on_cpu(*numbers: Array, f: Any, results: int) -> list[Array]:
-    shape = max((x.shape for x in numbers), key=len)
-    lanes = math.prod(shape)
-    step = lambda i, moved, watched, fixed: (f(*fixed), ())
-    sizes, wide = Sizes(0, 0, len(numbers)), tuple(bool(x.shape) for x in numbers)
-    found = code_of(step, sizes, wide, min(WIDTH, 1 << (lanes.bit_length() - 1)), results)
-    if found is None:
-        return _each_inside_jax(*numbers, f=f, results=results)
-    name, read = found
-    given = [numbers[k].reshape((lanes,) if wide[k] else ()) for k in read]
-    call = jax.ffi.ffi_call(name, [jax.ShapeDtypeStruct((lanes,), float)] * results)
-    return [x.reshape(shape) for x in call(jnp.array([1, lanes], jnp.int32), *given)]
-
-
-def _each_batch(args: Sequence[Any], dims: Sequence[Any], *, f: Any, results: int) -> Any:
-    mapped = [d is not None for d in dims]
-    size = next(x.shape[d] for x, d, m in zip(args, dims, mapped, strict=True) if m)
-    args = [jnp.moveaxis(x, d, 0) if m else x for x, d, m in zip(args, dims, mapped, strict=True)]
-    return each_p.bind(*_spread(args, mapped, size), f=f, results=results), [0] * results
-
-
-def _each_jvp(primals: Sequence[Any], tangents: Sequence[Any], *, f: Any, results: int) -> Any:
-    known = [not isinstance(d, ad.Zero) for d in tangents]
-    n = len(primals)
-
-    def along(*x: Any) -> list[Any]:
-        dots = iter(x[n:])
-        moved = [next(dots) if k else jnp.zeros_like(c) for c, k in zip(x[:n], known, strict=True)]
-        values, slopes = jax.jvp(lambda *y: tuple(map(jnp.asarray, f(*y))), tuple(x[:n]), tuple(moved))
-        return [*values, *slopes]
-
-    # A number that all lanes share may change by lanes, and the other way round.
-    out = each_p.bind(*primals, *(d for d, k in zip(tangents, known, strict=True) if k), f=along, results=2 * results)
-    return out[:results], out[results:]
-
-
-each_p.def_impl(lambda *args, f, results: jax.jit(functools.partial(each_p.bind, f=f, results=results))(*args))
-each_p.def_abstract_eval(_each_abstract)
-batching.primitive_batchers[each_p] = _each_batch
-ad.primitive_jvps[each_p] = _each_jvp
-mlir.register_lowering(each_p, mlir.lower_fun(_each_inside_jax, multiple_results=True))
-mlir.register_lowering(each_p, mlir.lower_fun(_each_on_cpu, multiple_results=True), platform="cpu")

@@ -16,9 +16,9 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from .._sobol import sobol
 from ..analysis import Sweep, zones
-from ..integrate import AbstractMethod, native
 from ..io import Unknown, check_together
 from ..models import CageModel
+from ..solve import AbstractMethod, native
 from ..sweeps import Progress, sweep_designs
 
 

@@ -17,9 +17,9 @@ from jaxtyping import Bool, Float
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
-from ..integrate import AbstractMethod, native
 from ..io import Measurement, Range, Unknown
 from ..models import CageModel
+from ..solve import AbstractMethod, native
 from ..sweeps import Progress, motions
 from ._ensemble import ERROR, draw, run_draws
 

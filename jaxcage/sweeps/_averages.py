@@ -10,8 +10,8 @@ from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
 from .._form import Form, compiled
-from ..integrate import REVOLUTION, AbstractMethod, Lanes, histories, native
 from ..models import AbstractForcedSystem
+from ..solve import REVOLUTION, AbstractMethod, Lanes, histories, native
 
 
 SAMPLES = 512

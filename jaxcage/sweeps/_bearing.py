@@ -13,25 +13,25 @@ from .._arguments import require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from ..analysis import BearingRecord, BearingSweep, summed_up
-from ..integrate import (
-    OUTCOMES,
-    SAMPLES,
-    SPACING,
-    STALLED,
-    alike,
-    codes_of,
-    comparable,
-    cores,
-    limits_of,
-    slowness,
+from ..models import (
+    CAGE_STARTS,
+    INTEGRATED,
+    OF_BODIES,
+    WATCHED,
+    BearingModel,
+    BearingState,
+    CagePlace,
+    bodies_of,
+    rollers_of,
+    rolling_start,
 )
-from ..models import BearingModel, BearingState, rolling_start
-from ..models.whole import CAGE_STARTS, BearingAtSpeed, CagePlace, state_scale
-from ..solve import INTEGRATED, WATCHED, Bearings, March
+from ..solve import OUTCOMES, Lanes, March, alike, codes_of, cores, native
 from ._lanes import Progress
 from ._speed import checked_speeds, require_lengths, versions
 
 
+SAMPLES = 16
+"""Strobe states of a revolution."""
 CHUNK = 512
 """Lanes that are run at a time: their states at every sample of a block are kept until it is over."""
 PER_HOUR = 1e9 * 3600
@@ -40,8 +40,6 @@ LEAD = 10
 """Revolutions in which a tangent vector turns to the direction of fastest growth, before its growth counts."""
 EXPONENT = 80
 """Revolutions over which the exponent is followed, if there are as many: the others take half the time."""
-FINER = 1 / 32
-"""A tolerance so many times as large makes steps of fifth order about half as long."""
 SURE = 3.0
 """The stated error, as a multiple of the difference to the run by shorter steps."""
 Starts = int | Sequence[BearingState] | Sequence[CagePlace]
@@ -75,7 +73,7 @@ def sweep_bearing(
     - `exponents`: 1 for the largest Lyapunov exponent, 0 for none.
     - `exponent_revolutions`: it is followed over the last of the observed revolutions, over at least so many if there
         are, in whole blocks (two or more).
-    - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.whole.state_scale`.
+    - `tolerance`: largest estimated error of a step, in units of `jaxcage.models.state_scale`.
     - `allowed`: largest measured error. Once in each block a stretch of 1/16 of a revolution, of slow shafts a shorter
         one, is run a second time with about twice the steps; a lane that three times the difference says is off by
         more is `inaccurate`. Slow is a shaft with which that stretch would be more than 50 periods of a loaded roller's
@@ -126,30 +124,30 @@ def sweep_bearings(
     speed = checked_speeds(speeds)
     models = list(models)
     require_bearings(models, starts, discard, revolutions, blocks, exponents)
-    table = _Table(models, speed, starts)
-    lanes, block = table.which.size, revolutions // blocks
+    begin = _initial_states(alike(models, "models", "bearings"), speed, starts)
+    lanes, block = len(begin), revolutions // blocks
+    each = lanes // len(models)
+    lane_speed = np.tile(np.repeat(speed, each // speed.size), len(models))
+    table = Lanes.of(models, lane_speed, np.repeat(np.arange(len(models)), each))
     done = _counted(progress, lanes, discard + revolutions)
     require_at_least(1, exponent_revolutions=exponent_revolutions)
     followed = min(blocks, max(2, -(-exponent_revolutions // block))) if exponents else 0
-    parts = [
-        _followed(
-            *table.taken(np.arange(i, min(i + CHUNK, lanes))), discard, [block] * blocks, followed, tolerance, done
-        )
-        for i in range(0, lanes, CHUNK)
-    ]
+    parts = []
+    for i in range(0, lanes, CHUNK):
+        some = np.arange(i, min(i + CHUNK, lanes))
+        parts.append(_followed(table.at(some), begin[some], discard, [block] * blocks, followed, tolerance, done))
     found = jax.tree.map(lambda *x: np.concatenate(x), *parts)
     found["outcome"] = np.where(
         (found["outcome"] == 0) & ~(found["error"] <= allowed), OUTCOMES.index("inaccurate"), found["outcome"]
     )
     settings = {"tolerance": str(tolerance), "allowed": str(allowed), **versions()}
-    each = lanes // len(models)
     sweeps = []
     for i, model in enumerate(models):
         mine = jax.tree.map(lambda x: x[i * each : (i + 1) * each], found)
         sweeps.append(
             summed_up(
                 speed,
-                table.rolling[i * each : (i + 1) * each],
+                np.asarray(model.rolling_cage_speed(lane_speed[:each])),
                 float(PER_HOUR * model.wear.volume(1.0)),
                 BearingRecord(**mine),
                 block=block,
@@ -206,69 +204,44 @@ def _counted(progress: Progress | None, lanes: int, revolutions: int) -> Callabl
     return add
 
 
+def _initial_states(
+    models: list[BearingModel], speed: np.ndarray, starts: Starts
+) -> Float[np.ndarray, "lanes numbers"]:
+    """States of all lanes with the quantities beside them: designs, then speeds, then starts."""
+    begun = CAGE_STARTS[:starts] if isinstance(starts, int) else starts
+    rest = np.array(models[0].beside_start)
+
+    def begin_with(model: BearingModel, start: BearingState | CagePlace) -> np.ndarray:
+        beside = np.tile(rest, (speed.size, 1))
+        if isinstance(start, BearingState):
+            beside[:, :2] = np.asarray(start.clock)
+            rows = np.tile(np.asarray(start.row), (speed.size, 1))
+        else:
+            rows = np.asarray(_starts(model, jnp.asarray(speed), jnp.asarray(start, dtype=float)))
+        return np.concatenate([rows, beside], axis=1)
+
+    states = [np.stack([begin_with(model, start) for start in begun], axis=1) for model in models]
+    return np.stack(states).reshape(-1, states[0].shape[-1])
+
+
 @eqx.filter_jit
-def _laws(model: BearingModel, speeds: Float[Array, " speeds"]) -> tuple[BearingAtSpeed, BearingState]:
-    def scale(speed: Array) -> BearingState:
-        whole = state_scale(model, speed)
-        return whole._replace(rollers=whole.rollers[:, 0])
-
-    return jax.vmap(model.at_speed)(speeds), jax.vmap(scale)(speeds)
-
-
-@eqx.filter_jit
-def _starts(model: BearingModel, speeds: Float[Array, " speeds"], place: Float[Array, " 4"]) -> BearingState:
-    return jax.vmap(lambda speed: rolling_start(model, speed, place=place))(speeds)
-
-
-class _Table:
-    """Laws, magnitudes and initial states of all lanes: designs, then speeds, then starts."""
-
-    def __init__(self, models: list[BearingModel], speed: np.ndarray, starts: Starts):
-        """**Raises:** `ValueError` for designs that differ in more than their numbers."""
-        models = alike(models, "models", "bearings")
-        begun = CAGE_STARTS[:starts] if isinstance(starts, int) else starts
-        self.which = np.repeat(np.arange(len(models)), speed.size * len(begun))
-        self.at_speed = np.tile(np.repeat(np.arange(speed.size), len(begun)), len(models))
-        self.lane_speed = speed[self.at_speed]
-        several = jnp.asarray(np.append(speed, 1.1 * speed[0]))  # the last one shows what depends on speed
-        laws = [_laws(model, several) for model in models]
-        self.at, self.scale = jax.tree.map(lambda *x: np.stack(x), *laws)  # designs, then speeds
-        self.own = [len(models) > 1 or bool(x[0, 0] != x[0, -1]) for x in jax.tree.leaves(self.at)]
-        self.rolling = self.at.rolling_cage_speed[self.which, self.at_speed]
-        at_all = lambda x: np.broadcast_to(np.asarray(x), (speed.size, *np.shape(x)))
-
-        def begin_with(model: BearingModel, start: BearingState | CagePlace) -> BearingState:
-            if isinstance(start, BearingState):
-                return jax.tree.map(at_all, start)
-            return _starts(model, jnp.asarray(speed), jnp.asarray(start, dtype=float))
-
-        rows = lambda *x: np.stack(x, axis=1).reshape(-1, *x[0].shape[1:])  # speeds, then starts
-        states = [jax.tree.map(rows, *(begin_with(model, start) for start in begun)) for model in models]
-        self.begin = jax.tree.map(lambda *x: np.concatenate(x), *states)
-
-    def taken(self, lanes: np.ndarray) -> tuple[BearingAtSpeed, BearingState, BearingState]:
-        """Laws and magnitudes of some lanes, lanes last; states, lanes first."""
-        which, at_speed = self.which[lanes], self.at_speed[lanes]
-        leaves, tree = jax.tree.flatten(self.at)
-        leaves = [x[which, at_speed] if mine else x[0, 0] for x, mine in zip(leaves, self.own, strict=True)]
-        scale = jax.tree.map(lambda x: np.moveaxis(x[which, at_speed], 0, -1), self.scale)
-        begin = jax.tree.map(lambda x: np.asarray(x[lanes]), self.begin)
-        return jax.tree.unflatten(tree, [np.asarray(x, dtype=float) for x in leaves]), scale, begin
+def _starts(model: BearingModel, speeds: Float[Array, " speeds"], place: Float[Array, " 4"]) -> Array:
+    return jax.vmap(lambda speed: rolling_start(model, speed, place=place).row)(speeds)
 
 
 class _Course:
-    """Lanes on their way: their states in units of the scale, and how those ended that could not go on."""
+    """Lanes in units of the scale, and how those ended that failed."""
 
-    def __init__(self, at: BearingAtSpeed, scale: BearingState, begin: BearingState, tolerance: float):
-        count = begin.bodies.shape[0]
-        every = np.arange(count)
-        rolling = np.broadcast_to(np.asarray(at.rolling_cage_speed, dtype=float), count)
-        self.slow = np.broadcast_to(np.asarray(slowness(at, scale)), count)
-        self.bearings = Bearings(at, scale, STALLED * np.abs(rolling), over_angle=True, threads=cores())
-        self.state, self.limits = self.bearings.packed(every, begin), limits_of(self.slow)
-        self.tolerance, self.step = tolerance, np.full(count, self.limits.first)
+    def __init__(self, lanes: Lanes, begin: Float[np.ndarray, "lanes numbers"], tolerance: float):
+        count, self.every = len(begin), np.arange(len(begin))
+        self.lanes, self.method = lanes, native(tolerance)
+        self.scale, _ = lanes.begin(self.every, begin)
+        self.state, self.step = begin / self.scale, np.full(count, np.nan)
+        model, speeds = lanes.system, np.unique(lanes.speed)
+        each = np.array([model.comparable(speed) for speed in speeds])
+        self.comparable = each[np.searchsorted(speeds, lanes.speed)]
         self.outcome, self.tangents = np.zeros(count, dtype=np.int32), None
-        self.numbers = self.bearings.units.shape[1]
+        self.numbers = model.dimension
 
     def aim(self) -> None:
         """Give every lane a tangent vector in no special direction, the same in all of them."""
@@ -291,10 +264,11 @@ class _Course:
             done((lanes - count) * strobes)
             count = lanes
 
-        given = None if self.tangents is None else self.tangents[some]
-        ran = self.bearings.run(
-            some, self.state[some], SPACING, strobes, keep, self.tolerance, self.limits,
-            step=self.step[some], tangents=given, report=tell,
+        given = None if self.tangents is None else self.tangents[some, None]
+        engine = self.lanes.engine(0 if given is None else 1, self.method, SAMPLES)
+        ran = engine(
+            self.lanes.numbers(engine, some), self.state[some], strobes, keep, self.method,
+            step=self.step[some], tangents=given, threads=cores(), report=tell,
         )  # fmt: skip
         self.state[some], self.step[some] = ran.state, ran.step
         if self.tangents is not None:
@@ -306,18 +280,17 @@ class _Course:
         """Error of a stretch from here, from the same by shorter steps, in units of the scale; 0 of lost lanes."""
         some, error = self.alive, np.zeros(len(self.state))
         if some.size:
-            stretch = comparable(self.slow)[some]
-            once = lambda tolerance: self.bearings.run(
-                some, self.state[some], stretch, 1, 1, tolerance, self.limits, step=self.step[some]
-            ).state[:, : self.numbers]
-            error[some] = SURE * np.max(np.abs(once(self.tolerance) - once(FINER * self.tolerance)), axis=1)
+            engine = self.lanes.engine(0, self.method, SAMPLES)
+            given = self.lanes.numbers(engine, some), self.state[some], 1, 1
+            options: Any = dict(turn=self.comparable[some], step=self.step[some], threads=cores())
+            once = lambda method: engine(*given, method, **options).state[:, : self.numbers]
+            error[some] = SURE * np.max(np.abs(once(self.method) - once(self.method.reference)), axis=1)
         return error
 
 
 def _followed(
-    at: BearingAtSpeed,
-    scale: BearingState,
-    begin: BearingState,
+    lanes_of: Lanes,
+    begin: Float[np.ndarray, "lanes numbers"],
     discard: int,
     blocks: list[int],
     followed: int,
@@ -328,7 +301,7 @@ def _followed(
 
     Tangent vectors are followed over so many of the last blocks, and for `LEAD` revolutions before.
     """
-    course = _Course(at, scale, begin, tolerance)
+    course = _Course(lanes_of, begin, tolerance)
     lanes, dim = len(course.state), course.numbers
     first = len(blocks) - followed
     early = max(0, first - -(-LEAD // blocks[0])) if followed else len(blocks)
@@ -339,7 +312,6 @@ def _followed(
         course.aim()
     if lead:
         course.go(lead * SAMPLES, 1, done)
-    per_clearance = np.broadcast_to(np.asarray(at.guide.land.per_clearance, dtype=float), lanes)
     integrals, growths, places, errors, peaks, steps = [], [], [], [], [], []
     for i, block in enumerate(blocks):
         if 0 < early == i:
@@ -350,10 +322,11 @@ def _followed(
         place, peak = np.full((lanes, samples, 2), np.nan), np.full((lanes, len(WATCHED)), np.nan)
         growth, tried = np.full(lanes, np.nan), np.full(lanes, np.nan)
         if ran is not None:
-            _, bodies, *_ = course.bearings.unpacked(some, ran.strobe[..., : -len(WATCHED)])
-            centre = bodies[..., :2] - bodies[..., 5:7] if at.inner_guided else bodies[..., :2]
-            place[some] = centre * per_clearance[some, None, None]
-            peak[some] = np.max(ran.strobe[..., -len(WATCHED) :], axis=1)
+            bodies = bodies_of(ran.strobe[..., :dim] * course.scale[some, None, :dim])
+            clearance = course.scale[some, None, dim - OF_BODIES, None]
+            centre = bodies[..., :2] - bodies[..., 5:7] if lanes_of.system.guidance == "inner" else bodies[..., :2]
+            place[some] = centre / clearance
+            peak[some] = np.max(ran.peaks, axis=1)
             growth[some] = ran.growth.sum(axis=(1, 2)) if course.tangents is not None else 0.0
             tried[some] = ran.steps
         integrals.append((course.state[:, dim + 1 :] - before).T)
@@ -362,7 +335,7 @@ def _followed(
         places.append(place)
         peaks.append(peak[:, 1:].T)
         steps.append(tried)
-    rollers, bodies, clock, _ = course.bearings.unpacked(np.arange(lanes), course.state)
+    last = course.state * course.scale
     total = np.stack(integrals, axis=-1)  # quantities, lanes, blocks
     return {
         "integrals": dict(zip(("time", *INTEGRATED), total, strict=True)),
@@ -372,7 +345,7 @@ def _followed(
         "error": np.max(errors, axis=0),
         "steps": np.sum(steps, axis=0) / sum(blocks),
         "outcome": course.outcome,
-        "rollers": rollers,
-        "bodies": bodies,
-        "angle": clock[:, 0],
+        "rollers": rollers_of(last[:, :dim]),
+        "bodies": bodies_of(last[:, :dim]),
+        "angle": last[:, dim],
     }

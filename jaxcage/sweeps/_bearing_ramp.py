@@ -11,8 +11,7 @@ from .._arguments import require_above_zero, require_at_least
 from .._errors import ArgumentError
 from ..analysis import BearingSweep
 from ..analysis._zones import runs
-from ..models import BearingModel, BearingState, rolling_start
-from ..models.whole import CAGE_STARTS
+from ..models import CAGE_STARTS, BearingModel, BearingState, rolling_start
 from ._bearing import sweep_bearing
 
 

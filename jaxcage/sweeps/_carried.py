@@ -8,8 +8,8 @@ from jaxtyping import Array, Float
 from .._checks import require_x64
 from .._types import State
 from ..analysis import Sweep
-from ..integrate import AbstractMethod, Lanes, native
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod, Lanes, native
 from ._lanes import Progress, run_lanes
 from ._speed import assemble, checked_speeds, initial_states, make_plan, settings_of
 

@@ -11,20 +11,23 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..analysis import Observation, Plan, start_tangents
-from ..integrate import (
+from ..models import ESCAPE
+from ..solve import (
     IMPLICIT,
     OUTCOMES,
     RETRIES,
+    STUCK,
     SURE,
+    TOO_MANY,
     AbstractMethod,
-    EngineInJax,
+    Engine,
+    JaxEngine,
     Lanes,
+    March,
     NativeSteps,
     codes_of,
     cores,
 )
-from ..models import ESCAPE
-from ..solve import FIRST_STEP, STUCK, TOO_MANY, Engine, March
 
 
 CHECKED = 8
@@ -126,10 +129,10 @@ def _once(
     keep, m = plan.keep, plan.exponents
     plain, pushed = lanes.engine(0, method), lanes.engine(m, method)
     numbers = lanes.numbers(pushed, some)
-    state, step, peak = y0 / scale, np.full(some.size, FIRST_STEP), np.full(some.size, np.nan)
+    state, step, peak = y0 / scale, np.full(some.size, np.nan), np.full(some.size, np.nan)
     alive = np.flatnonzero(admitted)
 
-    def follow(engine: Engine | EngineInJax, count: int, **more: Any) -> March:
+    def follow(engine: Engine | JaxEngine, count: int, **more: Any) -> March:
         nonlocal alive
         done = 0
 
@@ -179,7 +182,7 @@ def _once(
 
 
 def _doubt(
-    engine: Engine | EngineInJax, numbers: Any, ran: March, method: AbstractMethod
+    engine: Engine | JaxEngine, numbers: Any, ran: March, method: AbstractMethod
 ) -> Float[np.ndarray, "exponents some"]:
     """Error of the exponents per revolution that comes from the steps: three times the change of the mean growth over
     a few further revolutions by the method's reference."""
@@ -191,7 +194,7 @@ def _doubt(
 
 
 def _error(
-    engine: Engine | EngineInJax,
+    engine: Engine | JaxEngine,
     numbers: Any,
     start: Float[np.ndarray, "some dim"] | None,
     strobe: Float[np.ndarray, "some held dim"] | None,

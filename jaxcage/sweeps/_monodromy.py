@@ -7,9 +7,8 @@ from jaxtyping import Array, Float, Int
 
 from .._checks import require_x64
 from .._errors import ArgumentError
-from ..integrate import AbstractMethod, Lanes, cores, native
 from ..models import AbstractForcedSystem
-from ..solve import FINISHED
+from ..solve import FINISHED, AbstractMethod, Lanes, cores, native
 
 
 def monodromy(

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from ..analysis import OrderSpectrum, Sweep, dominant_orders
-from ..integrate import AbstractMethod, Lanes, histories, native
 from ..models import CageModel
+from ..solve import AbstractMethod, Lanes, histories, native
 
 
 SAMPLES = 32

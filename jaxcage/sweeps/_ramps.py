@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float
 from .._errors import ArgumentError, NoResult
 from ..analysis import relative_state
 from ..analysis._zones import runs
-from ..integrate import AbstractMethod, Trajectory, ramp
 from ..models import CageModel
+from ..solve import AbstractMethod, Trajectory, ramp
 
 
 SAMPLES = 32

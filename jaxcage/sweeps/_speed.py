@@ -19,8 +19,8 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._types import State
 from ..analysis import LONGEST_PERIOD, Confirmation, Observation, Plan, Sweep, closing_period
-from ..integrate import AbstractMethod, Lanes, native
 from ..models import INSTEAD, AbstractForcedSystem, require_known, require_speeds
+from ..solve import AbstractMethod, Lanes, native
 from ._confirm import Labelled, confirm as confirm_lanes, doubtful
 from ._lanes import Progress, run_lanes
 from ._lasting import follow

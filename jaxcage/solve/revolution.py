@@ -4,16 +4,31 @@ Simulation, sweeps, exponents, orbits and gradients all advance through it, so t
 once. It is differentiable (forward mode) with respect to state, speed and every parameter of the system.
 """
 
+from collections.abc import Sequence
+
 import diffrax as dfx
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._checks import require_x64
+from .._form import split
 from .._types import Scalar, State
-from ..models import AbstractField, AbstractForcedSystem, require_speeds
-from ._method import DEFAULT_SOLVER, DEFAULT_STEPS, REVOLUTION, AbstractMethod, Stretch, make_fixed, result_at
-from ._results import RESULTS
+from ..models import ESCAPE, AbstractField, AbstractForcedSystem, require_speeds
+from .kernel import REVOLUTION, can_be_kernel, steps_through
+from .method import (
+    DEFAULT_SOLVER,
+    DEFAULT_STEPS,
+    AbstractMethod,
+    FixedSteps,
+    Moved,
+    Stretch,
+    Tangents,
+    make_fixed,
+    moved_by,
+    result_at,
+)
+from .outcomes import RESULTS, outcome_code
 
 
 class StrobeMap(eqx.Module):
@@ -49,3 +64,29 @@ def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMeth
     chosen = make_fixed(DEFAULT_SOLVER, DEFAULT_STEPS) if method is None else method
     speed = jnp.asarray(speed, dtype=float)
     return StrobeMap(system.at_speed(speed), system, system.scale(speed), chosen)
+
+
+Drift = Sequence[Scalar | None]
+"""Tangents of the numbers of a field, in the order of its leaves; None where there is none."""
+
+
+def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Drift | None]) -> Moved:
+    """A lane one revolution on, with tangent vectors along which the field changes too.
+
+    **Arguments:** strobe map; state; tangent vectors (in units of the state), and for each of them the tangents of the
+    field's numbers, None where there are none.
+    """
+    method = strobe.method
+    if isinstance(method, FixedSteps) and can_be_kernel(method.solver):
+        pieces = (strobe.field, strobe.system, strobe.scale)
+        y, peak, result, after = steps_through(method.solver, method.steps, pieces, y, tangents, drifts)
+        return Moved(y, after, peak, outcome_code(result_at(result, y, peak, ESCAPE)))
+    form, row = split(strobe.field, eqx.is_inexact_array)
+
+    def advance(start: tuple[State, list[Array]]) -> Stretch:
+        y, row = start
+        return eqx.tree_at(lambda s: s.field, strobe, form.filled(row))(y)
+
+    zero = list(map(jnp.zeros_like, row))
+    filled = [[z if d is None else d for z, d in zip(zero, drift or zero, strict=True)] for drift in drifts]
+    return moved_by(advance, (y, row), list(zip(tangents, filled, strict=True)))

@@ -1,8 +1,8 @@
 """Equations of motion of the whole bearing at one shaft speed.
 
-Rollers are an axis of arrays. One routine works out each contact, and both bodies get the same numbers of it: forces
-and moments inside the bearing cancel to rounding. Rates of the rollers contain the cage's speed, but not its
-acceleration, so that rollers know of each other only through cage and inner ring.
+The independent variable is the cage's angle, or time. Rollers are an axis of arrays. Each contact is computed once, and
+both bodies get the same numbers of it: forces and moments inside the bearing cancel to rounding. Rates of the
+rollers contain the cage's speed, but not its acceleration: rollers are coupled only through cage and inner ring.
 
 Cage, with mass centre G at distance e from C along n = (cos theta, sin theta), t across, all outer forces F_C (weight
 too) and the moment tau_C of the contacts about C:
@@ -17,30 +17,35 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..._types import Scalar
-from ...forces import Land
-from ...forces._phase import cos_sin
-from ._contacts import (
+from .._types import Scalar, State
+from ..forces._phase import cos_sin
+from ._field import AbstractField, AbstractLinearisation
+from .contacts import (
+    Guide,
+    LandForces,
     PocketConstants,
     PocketForces,
     RacewayConstants,
     RacewayForces,
     inner_contact,
+    land_forces,
+    magnitude,
     outer_contact,
     pocket_contact,
+    quadratic,
 )
-from ._drag import magnitude, quadratic
-from ._guide import Guide, LandForces, land_forces
-from ._model import BearingModel
-from ._raceway import hunt_crossley
-from ._state import BearingState, Bodies, Rates, Rollers
+from .whole_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_of, rollers_of
 
 
 Many = Float[Array, "*rollers"] | float | int
-"""Of all rollers, or of one."""
+"""A number of all rollers, or of one."""
 
-NEWTON_STEPS, LONGEST_STEP = 5, 1e-3
-"""For the place of a quasi-static ring, and how far each goes at most, over the roller's radius."""
+NEWTON_STEPS, LONGEST_STEP = 8, 1e-3
+"""Iterations for the place of a quasi-static ring, and the longest change in each, over the roller's radius."""
+STALLED = 0.05
+"""Speed of the cage over that of pure rolling below which its angle is no measure of progress."""
+IMBALANCE = 1e-6
+"""Largest force by which a quasi-static ring may be out of balance, as a fraction of load and weight."""
 
 
 class Geometry(NamedTuple):
@@ -106,16 +111,18 @@ MOVING = 7
 """So many of them, the first, move cage and rings."""
 
 
-class BearingAtSpeed(eqx.Module):
-    """The bearing's laws with everything that does not change worked out once."""
+class BearingAtSpeed(AbstractField):
+    """The laws of the bearing at one shaft speed, with all constants computed."""
 
     n_rollers: int = eqx.field(static=True)
     held: bool = eqx.field(static=True)
     settles: bool = eqx.field(static=True)
-    """Whether the inner ring is quasi-static."""
+    """True if the inner ring is quasi-static."""
     inner_guided: bool = eqx.field(static=True)
+    over_angle: bool = eqx.field(static=True)
+    """True if the independent variable is the cage's angle, counted in its sense; false if it is time."""
     speed: Scalar
-    """Of the inner ring [rad/s]."""
+    """Speed of the inner ring [rad/s]."""
     outer_speed: Scalar
     outer_race: RacewayConstants
     inner_race: RacewayConstants
@@ -135,52 +142,38 @@ class BearingAtSpeed(eqx.Module):
     rolling_cage_speed: Scalar
     rolling_spin: Scalar
 
-    @classmethod
-    def of(cls, model: BearingModel, speed: Scalar) -> "BearingAtSpeed":
-        """Work out the constants of `model` at the shaft speed `speed` [rad/s]."""
-        bearing, races, c = model.bearing, model.raceways, model.clearance
-        half = bearing.roller_diameter / 2
-        shared = (
-            bearing.raceway_stiffness,
-            hunt_crossley(races.raceway_damping),
-            races.raceway_smoothing,
-            model.traction.curve,
-        )
-        contact, film, drag = model.contact, model.film, model.drag
-        density = drag.oil_share * model.lubricant.density
-        length = bearing.roller_length
-        return cls(
-            n_rollers=bearing.n_rollers,
-            held=model.cage_rotation == "held",
-            settles=model.ring.ring_motion == "quasi_static",
-            inner_guided=model.guidance == "inner",
-            speed=speed,
-            outer_speed=model.outer_speed,
-            outer_race=RacewayConstants(half, model.outer_radius, model.outer_speed, *shared),
-            inner_race=RacewayConstants(half, model.inner_radius, speed, *shared),
-            pocket=PocketConstants(half, bearing.pocket_clearance, model.pockets),
-            guide=Guide(
-                film=film.at(model, speed),
-                contact=contact.at(model, speed),
-                land=Land(c, 1 / c, contact.onset, contact.smoothing / c, film.smoothing / c),
-                friction=model.land_friction,
-                saturation_speed=model.pockets.saturation_speed,
-                arm=model.land_radius if model.guidance == "outer" else -model.land_radius,
-            ),
-            roller_mass=bearing.roller_mass,
-            roller_inertia=bearing.roller_mass * half**2 / 2,
-            drag=drag.drag_coefficient * density * half * length,
-            churning=drag.churning_coefficient * density * half**4 * length / 2,
-            cage_mass=model.cage_mass,
-            cage_inertia=model.cage_inertia,
-            eccentricity=model.eccentricity,
-            ring_mass=model.ring.ring_mass,
-            mounting_damping=model.ring.mounting_damping,
-            gravity=model.gravity,
-            load=model.load,
-            rolling_cage_speed=model.rolling_cage_speed(speed),
-            rolling_spin=model.rolling_spin(speed),
-        )
+    def __call__(self, tau: Scalar, y: State) -> State:
+        """Rates of a row of the state at the cage's angle `tau`."""
+        clock = jnp.stack([jnp.asarray(tau, dtype=float), jnp.zeros(())])
+        row = jnp.stack([jnp.asarray(c, dtype=float) for c in y])
+        rates, *_ = self.rates_beside(row, clock)
+        return tuple(rates)
+
+    def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
+        raise NotImplementedError("A whole bearing has no linearisation: take an implicit method of diffrax.")
+
+    def rates_beside(
+        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
+    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"], Float[Array, " watched"]]:
+        """Rates of the state and of the quantities beside it over the independent variable, and what is watched."""
+        rates = self.rates(self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])))
+        pace = self.pace(rates.state.clock[0])
+        return pace * rates.state.row, pace * jnp.concatenate([rates.state.clock, rates.integrals]), rates.watched
+
+    def settled_row(
+        self, row: Float[Array, " dim"], beside: Float[Array, " beside"]
+    ) -> tuple[Float[Array, " dim"], Float[Array, " beside"]]:
+        """A state and the quantities beside it with a quasi-static inner ring in its place."""
+        return self.settled(BearingState(rollers_of(row), bodies_of(row), beside[:2])).row, beside
+
+    def pace(self, cage_speed: Scalar) -> Scalar:
+        """Factor from rates over time to rates over the independent variable."""
+        return 1 / jnp.abs(cage_speed) if self.over_angle else 1.0
+
+    def lost(self, cage_speed: Scalar, eps: Scalar) -> Array:
+        """The eccentricity ratio, or `LOST` where the cage turns too slowly for its angle to measure progress."""
+        slowest = STALLED * jnp.abs(self.rolling_cage_speed) if self.over_angle else 0.0
+        return jnp.where(jnp.abs(cage_speed) < slowest, LOST, eps)
 
     @property
     def places(self) -> np.ndarray:
@@ -250,9 +243,9 @@ class BearingAtSpeed(eqx.Module):
         return Geometry(pocket_cos, pocket_sin, lag_cos, lag_sin, c, s, distance, out / distance, across / distance)
 
     def settled(self, state: BearingState) -> BearingState:
-        """The state with a quasi-static inner ring where the contacts carry load and weight, and at rest.
+        """The state with a quasi-static inner ring at rest where the contacts carry load and weight.
 
-        Newton's method from where the ring is; its velocity enters no contact. Of a dynamic ring, the state as it is.
+        Newton's method starts from the ring's place; its velocity enters no contact. A dynamic ring stays as it is.
         """
         if not self.settles:
             return state
@@ -283,8 +276,8 @@ class BearingAtSpeed(eqx.Module):
             x, y = x - land.x, y - land.y
         return jnp.stack([x, y - self.load - self.ring_mass * self.gravity])
 
-    def __call__(self, state: BearingState) -> Rates:
-        """Rates over time, of a quasi-static ring those of a state that is `settled`."""
+    def rates(self, state: BearingState) -> Rates:
+        """Rates over time; a quasi-static ring has to be `settled`."""
         f, rollers, cage = self.forces(state), Rollers(*state.rollers), Bodies(*state.bodies)
         assert f.land is not None
         alone = f._replace(land=None)
@@ -292,10 +285,12 @@ class BearingAtSpeed(eqx.Module):
         sums = Passed(*jnp.sum(jnp.stack(passed), axis=1))
         body_rates, integrals, imbalance = self.body_rates(cage, cos_sin(state.clock[0]), sums, f.land)
         slip = jnp.max(jax.vmap(self.slip)(rollers.spin))
-        peaks = jnp.stack([jnp.max(f.pocket.normal), f.land.size, slip, imbalance, f.land.eps])
+        heavy = jnp.abs(self.load) + self.ring_mass * self.gravity
+        lost = jnp.where(imbalance > IMBALANCE * heavy, LOST, self.lost(cage.cage_speed, f.land.eps))
+        watched = jnp.stack([lost, jnp.max(f.pocket.normal), f.land.size, slip, f.land.eps])
         clock = jnp.stack([cage.cage_speed, jnp.ones_like(cage.cage_speed)])
         moved = BearingState(jnp.stack(roller_rates), jnp.stack(body_rates), clock)
-        return Rates(moved, jnp.stack(integrals), peaks)
+        return Rates(moved, jnp.stack(integrals), watched)
 
     def slip(self, spin: Scalar) -> Array:
         """Of a roller's spin against pure rolling."""
@@ -342,7 +337,7 @@ class BearingAtSpeed(eqx.Module):
     def body_rates(
         self, cage: Bodies, phase: tuple[Scalar, Scalar], sums: Passed, land: LandForces
     ) -> tuple[tuple[Array, ...], tuple[Array, ...], Array]:
-        """Rates of cage and inner ring under the sums over all rollers; what is integrated, as in `LEDGER` and `MEANS`;
+        """Rates of cage and inner ring under the sums over all rollers; rates of the integrals, as in `INTEGRATED`;
         the force by which a quasi-static ring is out of balance.
 
         **Arguments:** cosine and sine of the cage's angle; else as they are called.
@@ -399,6 +394,7 @@ class BearingAtSpeed(eqx.Module):
             -sums.x * sin,
             -sums.y * cos,
             -sums.y * sin,
+            land.eps * land.eps,
         )
         rates = cage.vx, cage.vy, cage_x, cage_y, turning, *ring_rates
         return tuple(map(jnp.asarray, rates)), tuple(map(jnp.asarray, integrals)), imbalance

@@ -14,19 +14,34 @@ from jaxtyping import Array, Int
 
 from .._errors import ArgumentError
 from .._types import Scalar, State
-from ..models import ESCAPE, AbstractField, AbstractForcedSystem, ScaledField, divide, multiply
-from ..solve import with_tangents
-from ._explicit import ClassicalRK4
-from ._kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
-from ._newmark import NewmarkBeta
-from ._results import RESULTS, outcome_code
-from ._rosenbrock import Rodas3, Rodas4
+from ..models import (
+    ESCAPE,
+    AbstractField,
+    AbstractForcedSystem,
+    AbstractLinearisation,
+    ScaledField,
+    divide,
+    multiply,
+)
+from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
+from .layout import PAIRS
+from .outcomes import RESULTS, outcome_code
+from .solvers import ClassicalRK4, NewmarkBeta, Rodas3, Rodas4
+from .steps import with_tangents
 
 
 FIRST_STEPS = 64
 """The first of adaptive steps is a revolution over so many."""
 SHARPER = 1e-2
 """Tolerance of the run that measures errors, as a fraction of the tolerance."""
+DEFAULT_TOLERANCE = 1e-6
+DEFAULT_ERROR = 3e-3
+"""Largest error of a revolution, in units of the system's scale (for a cage: clearances)."""
+DEFAULT_PAIR = "tsit5"
+IMPLICIT = "rodas4"
+"""Method of lanes that take too many or too short steps by an explicit one."""
+FINER = 16.0
+"""Factor between the tolerances of a run and of the one that confirms it."""
 
 
 class Stretch(NamedTuple):
@@ -117,7 +132,7 @@ class AbstractMethod(eqx.Module):
 
 def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
     """What to say of a state that a solver returned with one of diffrax's results."""
-    finite = jnp.isfinite(sum(jnp.abs(c) for c in y))
+    finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
     if result is dfx.RESULTS.successful:  # what is known to be well is not promoted: that takes ten small programs
@@ -168,6 +183,49 @@ def _by_solver(solver: Any, count: Any, h: Scalar, pieces: Pieces, y: State, pha
     y, peak, result, _ = jax.lax.fori_loop(0, count, step, start)
     y = unscale(y)
     return Stretch(y, peak, result_at(result, y, peak, ESCAPE))
+
+
+class BesideField(AbstractField):
+    """The field of a model whose quantities beside the state are integrated too: a state is (state, those), arrays."""
+
+    field: Any
+
+    def __call__(self, tau: Scalar, y: Any) -> Any:
+        rates, beside, _ = self.field.rates_beside(*y)
+        return rates, beside
+
+    def linearise(self, tau: Scalar, y: Any) -> AbstractLinearisation:
+        raise ArgumentError("method", said="must be `method(solver, tolerance=...)` of diffrax for a whole bearing.")
+
+    def watch(self, y: Any) -> Array:
+        """Values of the quantities that are watched."""
+        return self.field.rates_beside(*y)[2]
+
+
+class Beside(AbstractForcedSystem):
+    """A model with the quantities that are integrated beside its state."""
+
+    system: AbstractForcedSystem
+
+    @property
+    def dimension(self) -> int:
+        return self.system.dimension
+
+    def at_speed(self, speed: Scalar) -> BesideField:
+        return BesideField(self.system.at_speed(speed))
+
+    def scale(self, speed: Scalar) -> Any:
+        return jnp.stack(self.system.scale(speed)), jnp.ones(len(self.system.beside))
+
+    def starts(self, speed: Scalar) -> Any:
+        return tuple((jnp.stack(y), jnp.array(self.system.beside_start)) for y in self.system.starts(speed))
+
+    def excursion(self, y: Any) -> Scalar:
+        return self.system.excursion(tuple(y[0]))
+
+    def parts(self, row: Array) -> tuple[Array, Array]:
+        """A row of numbers as state and quantities beside it."""
+        return row[: self.dimension], row[self.dimension :]
 
 
 class FixedSteps(AbstractMethod):
@@ -237,6 +295,11 @@ class AdaptiveSteps(AbstractMethod):
         parts: Int[Array, ""] | int,
     ) -> Stretch:
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
+        watches = isinstance(field, BesideField)
+        saved, norm = dfx.SubSaveAt(t1=True), optx.rms_norm
+        if watches:  # at each step, and errors of the state alone control the steps
+            seen = dfx.SubSaveAt(steps=True, fn=lambda t, y, args: field.watch(multiply(y, scale)))
+            saved, norm = (saved, seen), lambda y: jnp.max(jnp.abs(y[0]))
         solution = dfx.diffeqsolve(
             _term(self.solver),
             self.solver,
@@ -245,15 +308,74 @@ class AdaptiveSteps(AbstractMethod):
             dt0=jnp.minimum(REVOLUTION / FIRST_STEPS, length),
             y0=divide(y, scale),
             args=ScaledField(field, scale),
-            stepsize_controller=dfx.PIDController(rtol=self.rtol, atol=self.atol, pcoeff=0.3, icoeff=0.4),
+            stepsize_controller=dfx.PIDController(self.rtol, self.atol, pcoeff=0.3, icoeff=0.4, norm=norm),
+            saveat=dfx.SaveAt(subs=saved),
             adjoint=dfx.ForwardMode(),
             max_steps=self.max_steps,
             throw=False,
         )
         assert solution.ys is not None
+        if watches:
+            ends, watched = solution.ys
+            y = field.field.settled_row(*multiply(tuple(c[-1] for c in ends), scale))
+            peaks = jnp.max(jnp.where(jnp.isfinite(watched), watched, -jnp.inf), axis=0)
+            return Stretch(y, peaks, result_at(solution.result, y, peaks[0], ESCAPE))
         y = multiply(tuple(c[-1] for c in solution.ys), scale)
         excursion = jax.lax.stop_gradient(jnp.asarray(system.excursion(y), dtype=float))
         return Stretch(y, excursion, result_at(solution.result, y, excursion, ESCAPE))
+
+
+class NativeSteps(AbstractMethod):
+    """Whole revolutions in machine code, by an embedded explicit pair with a step size of its own for each lane.
+
+    Within JAX's programs, and for a law that cannot be translated, Tsitouras' method in diffrax stands for it.
+    """
+
+    tolerance: float = eqx.field(static=True)
+    """Largest estimated error of a step, relative to the state and to the system's scale."""
+    error: float = eqx.field(static=True)
+    """Largest measured error of a revolution, in units of the scale."""
+    pair: str = eqx.field(static=True)
+
+    @property
+    def allowed(self) -> float:
+        return self.error
+
+    @property
+    def in_jax(self) -> AdaptiveSteps:
+        solver = Rodas4() if self.pair == IMPLICIT else dfx.Tsit5()
+        return AdaptiveSteps(solver, self.tolerance, self.tolerance)
+
+    @property
+    def reference(self) -> "NativeSteps":
+        return NativeSteps(SHARPER * self.tolerance, self.error, self.pair)
+
+    @property
+    def implicit(self) -> "NativeSteps":
+        """The same by the implicit method, for stiff laws."""
+        return NativeSteps(self.tolerance, self.error, IMPLICIT)
+
+    def advance(
+        self,
+        field: AbstractField,
+        system: AbstractForcedSystem,
+        scale: State,
+        y: State,
+        phase: Scalar,
+        parts: Int[Array, ""] | int,
+    ) -> Stretch:
+        return self.in_jax.advance(field, system, scale, y, phase, parts)
+
+    def finer(self, times: int = 1) -> "NativeSteps":
+        """The same with tolerances 16 times smaller, `times` over."""
+        factor = FINER**-times
+        return NativeSteps(factor * self.tolerance, factor * self.error, self.pair)
+
+    def __str__(self) -> str:
+        return (
+            f"machine code, {self.pair} with a tolerance of {self.tolerance:.2g}, error of a revolution at most "
+            f"{self.error:.2g}"
+        )
 
 
 # `scan_kind="lax"`: outside `diffeqsolve`, diffrax's own solvers are differentiable in forward mode only with this.
@@ -309,3 +431,24 @@ def method(solver: str = DEFAULT_SOLVER, steps: int | None = None, tolerance: fl
     if not 0 < tolerance < 1:
         raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
     return AdaptiveSteps(_ADAPTIVE[solver](), tolerance, tolerance)
+
+
+def native(
+    tolerance: float = DEFAULT_TOLERANCE, error: float = DEFAULT_ERROR, pair: str = DEFAULT_PAIR
+) -> AbstractMethod:
+    """Machine code, compiled from the traced law.
+
+    **Arguments:** largest estimated error of a step, relative to the state and to the system's scale; largest measured
+    error of a revolution in units of the scale, beyond which a lane is run again with smaller tolerances; method, an
+    embedded explicit pair (`tsit5`, `dopri5`, `bosh3`, `dopri8`) or the L-stable `rodas4`, which lanes take by
+    themselves that an explicit one serves badly.
+
+    **Raises:** `ValueError` for numbers that are not positive, and an unknown pair.
+    """
+    if not 0 < tolerance < 1:
+        raise ArgumentError("tolerance", said=f"must lie between 0 and 1, but {tolerance} was given.")
+    if not error > 0:
+        raise ArgumentError("error", said=f"must be positive, but {error} was given.")
+    if pair not in PAIRS:
+        raise ArgumentError("pair", said=f"must be one of {', '.join(PAIRS)}, but '{pair}' was given.")
+    return NativeSteps(tolerance, error, pair)

@@ -1,13 +1,13 @@
-"""How an integration ended: diffrax's outcomes and our own, each a sentence with the cure."""
+"""Results of an integration, and how it ended: diffrax's outcomes and our own, each a sentence with the cure."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import diffrax as dfx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ..solve import DIVERGED, FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
+from .loop import DIVERGED, FINISHED, NOT_FINITE, OUTSIDE, STUCK, TOO_MANY
 
 
 class RESULTS(dfx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
@@ -74,3 +74,29 @@ def result_of(code: Int[Array, ""]) -> RESULTS:
     for name, i in _KNOWN.items():
         result = RESULTS.where(code == i, getattr(RESULTS, name), result)
     return result
+
+
+class March(NamedTuple):
+    """Results of a run of lanes."""
+
+    state: Float[np.ndarray, "lanes numbers"]
+    """State at the end in units of the scale, and behind it the values of what is integrated beside it."""
+    tangents: Float[np.ndarray, "lanes tangents dim"]
+    step: Float[np.ndarray, " lanes"]
+    """Step size to go on with [rad]."""
+    peaks: Float[np.ndarray, "lanes parts watched"]
+    """Largest values of what is watched: between the strobe states that are kept or, if it is the excursion alone, of
+    the whole run (parts = 1)."""
+    steps: Float[np.ndarray, " lanes"]
+    """Number of steps tried."""
+    mark: Float[np.ndarray, " lanes"]
+    """How each lane ended, as in `loop`; 0 if it was not run."""
+    strobe: Float[np.ndarray, "lanes keep numbers"]
+    """The last strobe states, the latest last, as `state` is."""
+    growth: Float[np.ndarray, "lanes revolutions tangents"]
+    """Logarithm of the growth of each tangent vector in each revolution."""
+
+    @property
+    def peak(self) -> Float[np.ndarray, " lanes"]:
+        """Largest value of the first quantity that is watched: the excursion."""
+        return np.fmax.reduce(self.peaks[..., 0], axis=1)

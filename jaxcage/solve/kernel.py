@@ -5,7 +5,6 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 
 import dataclasses
 import functools
-import math
 from collections.abc import Sequence
 from typing import Any, TypeGuard
 
@@ -17,13 +16,12 @@ import jax.numpy as jnp
 from .._form import Form, split
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, AbstractLinearisation
-from ..solve import Numbers, march_with_tangents, rosenbrock_step
-from ._explicit import explicit_step
-from ._newmark import NewmarkBeta
-from ._rosenbrock import AbstractRosenbrock
+from .layout import REVOLUTION
+from .program import Numbers
+from .solvers import AbstractRosenbrock, NewmarkBeta, explicit_step, rosenbrock_step
+from .steps import march_with_tangents
 
 
-REVOLUTION = 2 * math.pi
 KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
 Pieces = tuple[AbstractField, AbstractForcedSystem, State]
 """What is integrated: field, system and its scale."""

@@ -1,4 +1,4 @@
-"""The strobe map of many lanes inside JAX: what serves for every method that is not machine code."""
+"""The engine inside JAX, for methods and laws that have no machine code."""
 
 import concurrent.futures
 from collections.abc import Callable, Sequence
@@ -12,10 +12,9 @@ from jaxtyping import Array, Float, Int
 
 from .._form import Form, compiled, split
 from ..models import AbstractForcedSystem, divide, multiply
-from ..solve import March
-from ._method import AbstractMethod, moved_by
-from ._results import MARKS, OUTCOMES
-from ._strobe import strobe_map
+from .method import REVOLUTION, AbstractMethod, Beside, moved_by
+from .outcomes import MARKS, OUTCOMES, March
+from .revolution import StrobeMap
 
 
 UNIT, MOST = 8, 256
@@ -29,24 +28,28 @@ def _strobe(
     method: AbstractMethod,
     own: Sequence[Array],
     shared: Sequence[Array],
-    y: Float[Array, "lanes dim"],
+    y: Float[Array, "lanes numbers"],
     tangents: Float[Array, "lanes tangents dim"],
     i: Int[Array, " lanes"],
-    parts: int,
+    parts: int | Float[Array, " lanes"],
 ) -> tuple[Array, Array, Array, Array]:
-    """Lanes over the i-th of so many parts of a revolution, in units of their scales."""
+    """Lanes over the i-th of a number of parts of a revolution, in units of their scales."""
 
-    def lane(own: Sequence[Array], y: Array, tangents: Array, i: Array) -> tuple[Array, Array, Array, Array]:
+    def lane(own: Any, y: Array, tangents: Array, i: Array, parts: Any) -> tuple[Array, Array, Array, Array]:
         speed, *numbers = own
         system = form.filled(numbers if several else shared)
-        strobe = strobe_map(system, speed, method)
-        state = lambda row: multiply(tuple(row), strobe.scale)
+        wrapped = Beside(system) if system.beside else system
+        strobe = StrobeMap(wrapped.at_speed(speed), wrapped, wrapped.scale(speed), method)
+        state = lambda row: multiply(wrapped.parts(row) if system.beside else tuple(row), strobe.scale)
         moved = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
-        row = lambda z: jnp.stack(divide(z, strobe.scale))
+        joined = jnp.concatenate if system.beside else jnp.stack
+        row = lambda z: joined(divide(z, strobe.scale))
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
-        return row(moved.y), after, jnp.asarray(moved.peak), moved.outcome
+        return row(moved.y), after, jnp.atleast_1d(moved.peak), moved.outcome
 
-    return jax.vmap(lane)(list(own), y, tangents, i)
+    if isinstance(parts, int):
+        return jax.vmap(lambda *x: lane(*x, parts))(list(own), y, tangents, i)
+    return jax.vmap(lane)(list(own), y, tangents, i, parts)
 
 
 def _orthonormalised(
@@ -67,16 +70,17 @@ def _orthonormalised(
     return done, np.log(lengths)
 
 
-class EngineInJax:
-    """The revolutions of a system inside JAX, with so many tangent vectors; called as the engine in machine code is."""
+class JaxEngine:
+    """The revolutions of a model inside JAX, with a number of tangent vectors; called as the engine in machine code."""
 
     def __init__(self, system: AbstractForcedSystem, tangents: int, several: bool, samples: int = 1):
         """`samples` is the number of strobe states of a revolution."""
         self._form, _ = split(system, eqx.is_inexact_array)
         self._several, self._tangents, self._samples = several, tangents, samples
+        self._recorded = len(system.watched) if system.beside else 0
 
     def numbers(self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]) -> Any:
-        """What lanes have of their own, and what all share."""
+        """The numbers that lanes have of their own, and those that all share."""
         own = [np.asarray(speeds), *(map(np.asarray, rows) if self._several else ())]
         return own, [] if self._several else [jnp.asarray(x) for x in rows]
 
@@ -88,33 +92,35 @@ class EngineInJax:
     def __call__(
         self,
         numbers: Any,
-        state: Float[np.ndarray, "lanes dim"],
+        state: Float[np.ndarray, "lanes numbers"],
         strobes: int,
         keep: int,
         method: AbstractMethod,
+        *,
+        begin: Any = 0,
+        turn: Any = None,
         tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
         step: Any = None,
         threads: int = 1,
         report: Callable[[int], None] = lambda done: None,
-        begin: Any = 0,
     ) -> March:
-        """Run lanes from states in units of their scales, beginning with the `begin`-th sample of a revolution, the
-        same for all of them or each its own."""
+        """Run lanes as `Engine` does; the solver chooses its first step itself."""
         own, shared = numbers
         lanes, dim = state.shape
         chosen, y, m = method.in_jax, state.copy(), self._tangents
         t = np.zeros((lanes, 0, dim)) if tangents is None else tangents.copy()
         strobe, growth = np.full((lanes, keep, dim), np.nan), np.full((lanes, strobes, m), np.nan)
-        peak, mark = np.zeros(lanes), np.zeros(lanes)
-        size = min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
-
+        peaks = np.full((lanes, keep, self._recorded), np.nan) if self._recorded else np.zeros((lanes, 1, 1))
+        mark, size = np.zeros(lanes), min(MOST, -(-lanes // (UNIT * threads)) * UNIT)
         first = np.broadcast_to(np.asarray(begin, dtype=int), lanes)
+        parts = None if turn is None else np.broadcast_to(REVOLUTION / np.asarray(turn, dtype=float), lanes)
 
         def chunk(some: Int[np.ndarray, " some"], k: int) -> list[np.ndarray]:
             filled = np.concatenate([some, np.repeat(some[-1:], size - some.size)])
             given = [jnp.asarray(x[filled]) for x in own], shared, jnp.asarray(y[filled]), jnp.asarray(t[filled])
             i = jnp.asarray((first[filled] + k) % self._samples)
-            out = _strobe(self._form, self._several, chosen, *given, i, self._samples)
+            some_parts = self._samples if parts is None else jnp.asarray(parts[filled])
+            out = _strobe(self._form, self._several, chosen, *given, i, some_parts)
             return [np.asarray(x)[: some.size] for x in out]
 
         with concurrent.futures.ThreadPoolExecutor(threads) as pool:
@@ -122,17 +128,18 @@ class EngineInJax:
                 alive = np.flatnonzero(mark == 0)
                 if not alive.size:
                     break
-                parts = np.split(alive, range(size, alive.size, size))
-                found = list(pool.map(lambda some, k=k: chunk(some, k), parts))
-                y1, t1, peaks, codes = (np.concatenate(x) for x in zip(*found, strict=True))
-                lost = codes != 0
+                some = np.split(alive, range(size, alive.size, size))
+                found = list(pool.map(lambda some, k=k: chunk(some, k), some))
+                y1, t1, peak, codes = (np.concatenate(x) for x in zip(*found, strict=True))
+                lost, place = codes != 0, k % keep if self._recorded else 0
                 mark[alive[lost]] = [MARKS[OUTCOMES[code]] for code in codes[lost]]
-                peak[alive] = np.maximum(peak[alive], peaks)
+                peaks[alive, place] = peak if self._recorded else np.maximum(peaks[alive, 0], peak)
                 alive, y1, t1 = alive[~lost], y1[~lost], t1[~lost]
                 y[alive], strobe[alive, k % keep] = y1, y1
                 if m and alive.size:
                     t[alive], growth[alive, k] = _orthonormalised(t1)
                 report(int(lanes * (k + 1) / strobes))
         mark[mark == 0] = MARKS["successful"]
-        turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
-        return March(y, t, np.zeros(lanes), peak, np.zeros(lanes), mark, turned, growth)
+        latest_last = lambda x: np.roll(x, -strobes % keep, axis=1)
+        peaks = latest_last(peaks) if self._recorded else peaks
+        return March(y, t, np.zeros(lanes), peaks, np.zeros(lanes), mark, latest_last(strobe), growth)

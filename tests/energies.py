@@ -2,12 +2,11 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array
 
-from ...forces._phase import cos_sin
-from ._field import BearingAtSpeed
-from ._raceway import contact_energy
-from ._state import BearingState, Bodies, Rollers
+from jaxcage.forces._phase import cos_sin
+from jaxcage.models import BearingAtSpeed, BearingState, Bodies, Rollers
 
 
 def kinetic_energy(at: BearingAtSpeed, state: BearingState) -> Array:
@@ -61,3 +60,22 @@ def cage_angular_momentum(at: BearingAtSpeed, state: BearingState) -> Array:
     """About the outer ring's centre [N m s]."""
     x, y, vx, vy = mass_centre(at, state)
     return jnp.asarray(at.cage_mass * (x * vy - y * vx) + at.cage_inertia * Bodies(*state.bodies).cage_speed)
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
+
+
+def contact_energy(overlap: float, width: float, exponent: float = 10 / 9) -> Array:
+    """Integral of p^exponent over the overlap, p being the overlap cut off smoothly: the energy stored over stiffness.
+
+    Closed form beyond `width`, a quadrature before it.
+    """
+    within = jnp.clip((overlap + width) / (2 * width), 0.0, 1.0)  # the part of [-width, width] that is covered
+    nodes, weights = 0.5 * (1 + _NODES), 0.5 * _WEIGHTS
+    onset = jnp.zeros_like(within)
+    for node, weight in zip(nodes, weights, strict=True):
+        # Nodes gather where contact begins: t = within u^2, as the integrand goes like t^(4 exponent).
+        t = within * node * node
+        onset = onset + weight * 2 * node * within * (t**4 * (t * (t - 3) + 2.5)) ** exponent
+    more = jnp.maximum(overlap, width) ** (exponent + 1) - width ** (exponent + 1)
+    return (2 * width) ** (exponent + 1) * onset + more / (exponent + 1)

@@ -1,6 +1,6 @@
-"""What goes on inside the whole bearing along a run: loads and forces of each roller, over time and around the bearing.
+"""Rollers of a whole bearing along a time history: their loads, forces and slips, over time and around the bearing.
 
-Samples of a run are states; the forces at them are worked out again by the laws that moved them.
+Samples of a history are states; the forces at them are worked out again by the laws that moved them.
 """
 
 import dataclasses
@@ -12,17 +12,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._arguments import require_above_zero
 from .._errors import ArgumentError
 from .._types import Scalar
-from ..integrate import BearingRun
-from ..models.whole import BearingModel, BearingState
-from ._bearing_measures import from_land, samples_of
+from ..models import BearingModel, BearingState
+from ..solve import Trajectory
 from .spectra import OrderSpectrum, Peak, dominant_orders, spectrum_of
 
 
 SHARES = (0.5, 0.9, 0.99, 0.999)
-"""Of the time, for the distribution of the pocket forces."""
+"""Shares of the time, for the distribution of the pocket forces."""
 LINES = 5
 """Lines of a spectrum that are named."""
 BATCH = 512
@@ -30,14 +28,14 @@ BATCH = 512
 
 
 @dataclasses.dataclass(frozen=True)
-class BearingHistory:
-    """Every roller, cage and land at the samples of a run. SI units."""
+class RollerHistory:
+    """Every roller, cage and land at the samples of a time history. SI units."""
 
     time: Float[np.ndarray, " n"]
     angle: Float[np.ndarray, " n"]
-    """Of the cage [rad]."""
+    """Angle of the cage [rad]."""
     samples: int
-    """Per revolution of the cage."""
+    """Samples of a revolution of the cage."""
     roller_angle: Float[np.ndarray, "n rollers"]
     """Place on the circumference, counter-clockwise from the x axis [rad]."""
     pocket_force: Float[np.ndarray, "n rollers"]
@@ -72,18 +70,18 @@ def _at_samples(model: BearingModel, speed: Scalar, states: BearingState) -> tup
     return jax.lax.map(one, states, batch_size=BATCH)
 
 
-def bearing_history(model: BearingModel, run: BearingRun, speed: float) -> BearingHistory:
-    """Forces, loads and slips of every roller at the samples of a run at the shaft speed `speed` [rad/s]."""
-    require_above_zero(speed=speed)
-    clock = np.stack([run.angle, run.time], axis=1)
-    states = BearingState(jnp.asarray(run.rollers), jnp.asarray(run.bodies), jnp.asarray(clock))
-    found = tuple(map(np.asarray, _at_samples(model, jnp.asarray(float(speed)), states)))
+def roller_history(model: BearingModel, run: Trajectory) -> RollerHistory:
+    """Forces, loads and slips of every roller at the samples of a time history at one shaft speed."""
+    speed = float(run.speed[0])
+    states = BearingState(*map(jnp.asarray, (run.rollers, run.bodies, run.integrals[:, :2])))
+    found = tuple(map(np.asarray, _at_samples(model, jnp.asarray(speed), states)))
+    place = run.bodies[:, 0:2] - (run.bodies[:, 5:7] if model.guidance == "inner" else 0.0)
     pocket, inner, outer, inner_sliding, outer_sliding, on_cage, land = found
     n = model.bearing.n_rollers
-    return BearingHistory(
+    return RollerHistory(
         time=run.time,
         angle=run.angle,
-        samples=samples_of(run),
+        samples=run.samples,
         roller_angle=run.angle[:, None] + 2 * np.pi / n * np.arange(n) + run.rollers[:, 0],
         pocket_force=pocket,
         inner_load=inner,
@@ -93,13 +91,13 @@ def bearing_history(model: BearingModel, run: BearingRun, speed: float) -> Beari
         outer_sliding=outer_sliding,
         pocket_on_cage=on_cage,
         land_on_cage=land,
-        place=from_land(model, run) / float(model.clearance),
+        place=place / float(model.clearance),
     )
 
 
 @dataclasses.dataclass(frozen=True)
 class Around:
-    """Means over time of what happens at a place of the circumference; NaN where no roller was."""
+    """Means over time at each place of the circumference; NaN where no roller was."""
 
     angle: Float[np.ndarray, " bins"]
     """Middle of each part of the circumference, counter-clockwise from the x axis, 0 to 2 pi; the load points to
@@ -108,16 +106,16 @@ class Around:
     inner_sliding: Float[np.ndarray, " bins"]
     """[m/s]."""
     inner_load: Float[np.ndarray, " bins"]
-    """Of a roller there [N]."""
+    """Load of a roller there [N]."""
     driving_force: Float[np.ndarray, " bins"]
     """Mean pocket force by which a roller there drives the cage, times without contact counted as zero [N]."""
     braking_force: Float[np.ndarray, " bins"]
-    """The same of a roller that holds the cage back."""
+    """The same for a roller that holds the cage back."""
     largest_force: Float[np.ndarray, " bins"]
     """Largest pocket force at a sample."""
 
 
-def around(history: BearingHistory, bins: int = 36) -> Around:
+def around(history: RollerHistory, bins: int = 36) -> Around:
     """Slips, loads and pocket forces over the circumference, from all rollers as they pass.
 
     **Arguments:** history; parts of the circumference.
@@ -145,7 +143,7 @@ def around(history: BearingHistory, bins: int = 36) -> Around:
         )
 
 
-def pocket_force_distribution(history: BearingHistory) -> dict[str, float]:
+def pocket_force_distribution(history: RollerHistory) -> dict[str, float]:
     """Share of the time in which a pocket is in contact, and forces [N] not exceeded in given shares of that time."""
     force = np.abs(history.pocket_force)
     weight = np.broadcast_to(np.gradient(history.time)[:, None], force.shape)
@@ -159,11 +157,11 @@ def pocket_force_distribution(history: BearingHistory) -> dict[str, float]:
     return found
 
 
-def bearing_orders(model: BearingModel, run: BearingRun, speed: float) -> dict[str, float]:
+def bearing_orders(model: BearingModel, run: Trajectory) -> dict[str, float]:
     """Frequencies that a bearing is known by, over that of the cage: means over the run."""
     cage = run.total("cage_speed") / (run.time[-1] - run.time[0])
     spin = run.total("roller_spin") / (run.time[-1] - run.time[0])
-    ring, n = speed / cage, model.bearing.n_rollers
+    ring, n = float(run.speed[0]) / cage, model.bearing.n_rollers
     return {
         "cage": 1.0,
         "twice cage": 2.0,
@@ -174,7 +172,7 @@ def bearing_orders(model: BearingModel, run: BearingRun, speed: float) -> dict[s
     }
 
 
-def bearing_spectra(history: BearingHistory) -> dict[str, OrderSpectrum]:
+def bearing_spectra(history: RollerHistory) -> dict[str, OrderSpectrum]:
     """Amplitude spectra, by orders of the cage's speed: of the cage's vertical place over the clearance, and of the
     vertical force of all pockets on the cage [N].
 

@@ -1,0 +1,410 @@
+"""The engine: many lanes, each a design at a speed, run from strobe state to strobe state.
+
+`engine_of` makes the engine of a model: machine code, or JAX's own loop (`jax_engine`) for methods and laws that have
+none. Both take and return the same arrays.
+"""
+
+import copy
+import ctypes
+import functools
+import os
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from .._errors import ArgumentError
+from .._form import split
+from ..models import AbstractForcedSystem, BearingModel, slowness
+from .fields import SAMPLED, Numbers, room_for, traced_field
+from .ir import UnknownOperation, say_once
+from .jax_engine import JaxEngine
+from .layout import REVOLUTION, Field, Layout, Tableau, layout_of
+from .loop import march_ir
+from .method import IMPLICIT, AbstractMethod, NativeSteps
+from .object_code import function
+from .outcomes import March
+
+
+WIDTH = 8
+"""Lanes of a vector."""
+FIRST_STEP = 0.05
+"""Step that is tried first [rad]."""
+FEWEST_STEPS, MOST_STEPS, MOST_AT = 4, 20_000.0, 1e-6
+"""Limits of the number of steps from strobe to strobe; the period of the forcing's highest harmonic has two at least.
+The second is for tolerances from the third on; smaller ones take more steps."""
+SMALLEST_STEP = 1e-10
+"""Step below which a lane is given up [rad]."""
+BEARING_STEPS = (REVOLUTION / 20_000, REVOLUTION / 200, REVOLUTION / 4e6)
+"""First, longest and shortest step of a whole bearing [rad of the cage]."""
+BEARING_MOST = 80_000.0
+"""Most steps of a whole bearing in a revolution, in the mean; more with slow shafts."""
+TIME_STEPS, TIME_MOST = (1e-5, 1.0, 1e-10), 200_000.0
+"""The same over time, in units of the time from strobe to strobe; most steps in that time."""
+LARGEST_WRITTEN_OUT = 64
+"""Dimension up to which an implicit step, whose linear solve is written out, has machine code."""
+WAKES = 0.1
+"""Seconds between looks at threads that run."""
+SURE = 3.0
+"""The stated error, as a multiple of the difference of two runs."""
+RETRIES = 3
+"""A lane whose error is too large is run again at most so many times, each with a tolerance 16 times smaller."""
+CHUNK = 4096
+"""Lanes that are run at a time, where a strobe state is kept of each sample."""
+
+
+class Runner:
+    """The compiled loop of a field, called with lanes."""
+
+    def __init__(self, field: Field, pair: str, width: int = WIDTH):
+        self.field, self._width = field, width
+        self.rows: Layout = layout_of(field, len(Tableau.named(pair).phase))
+        whole, place = ctypes.c_int64, ctypes.c_void_p
+        kind = ctypes.CFUNCTYPE(None, place, whole, whole, whole, *[place] * 6)
+        self._march = kind(function(march_ir(field, pair, width), "march"))
+
+    def __call__(
+        self,
+        numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
+        state: Float[np.ndarray, "lanes numbers"],
+        strobes: int,
+        keep: int,
+        settings: Float[np.ndarray, " 4"],
+        step: Float[np.ndarray, " lanes"] | float,
+        tangents: Float[np.ndarray, "lanes tangents dim"] | None,
+        threads: int,
+        report: Callable[[int], None],
+    ) -> March:
+        """Run lanes; `settings` are tolerance, longest and shortest step, and most steps from strobe to strobe."""
+        lanes, field, rows = len(state), self.field, self.rows
+        n, moving = field.dimension, field.moving
+        loaded = np.zeros((rows.end("fixed"), lanes))
+        loaded[:n], loaded[moving - field.beside : moving] = state[:, :n].T, state[:, n:].T
+        if field.tangents:
+            assert tangents is not None
+            loaded[n : moving - field.beside] = tangents.reshape(lanes, -1).T
+        loaded[rows["step"][0]] = step
+        loaded[rows["peak"]] = 0.0 if field.excursion is not None else -np.inf
+        wide, shared = numbers
+        loaded[rows.end("mark") :] = wide
+        stored = np.zeros((rows.end("mark"), lanes))
+        strobe = np.full((lanes, keep, field.recorded), np.nan)
+        growth = np.full((lanes, strobes, field.tangents), np.nan)
+        queue = np.zeros(2, dtype=np.int64)
+        arrays = (queue, np.asarray(settings, dtype=float), np.append(shared, 0.0), loaded, stored, strobe, growth)
+        at = [x.ctypes.data for x in arrays]
+        run = lambda: self._march(at[0], lanes, strobes, keep, *at[1:])
+        _run_threads(run, min(threads, -(-lanes // self._width)), queue, lambda: report(min(int(queue[0]), lanes)))
+        part = lambda name: stored[rows[name][0]]
+        turned = np.roll(strobe, -strobes % keep, axis=1)  # the latest last
+        numbers_of, peaks = n + field.beside, part("peak")[:, None, None]
+        if field.recorded > numbers_of:
+            peaks = turned[..., numbers_of:]
+        with np.errstate(divide="ignore"):
+            grown = 0.5 * np.log(growth)
+        end = np.concatenate([stored[:n], stored[moving - field.beside : moving]])
+        return March(
+            state=end.T.copy(),
+            tangents=stored[n : moving - field.beside].T.reshape(lanes, field.tangents, n),
+            step=part("step"),
+            peaks=peaks,
+            steps=part("steps"),
+            mark=part("mark"),
+            strobe=turned[..., :numbers_of],
+            growth=grown,
+        )
+
+
+class Engine:
+    """The compiled revolutions of a model, with a number of tangent vectors."""
+
+    def __init__(
+        self,
+        system: AbstractForcedSystem,
+        tangents: int = 0,
+        several: bool = False,
+        pair: str = "tsit5",
+        samples: int = 1,
+    ):
+        """**Arguments:** model; tangent vectors; true if lanes have designs of their own; method by its name in
+        `PAIRS`; strobe states of a revolution.
+
+        **Raises:** `UnknownOperation` for a law with an operation that has no translation, or arrays of numbers.
+        """
+        tableau = Tableau.named(pair)
+        self.numbers, self._samples, self._pair, self._order = Numbers(system, several), samples, pair, tableau.order
+        self.field = traced_field(system, self.numbers.form, self.numbers.wide, tangents, samples > 1, tableau.implicit)
+        self._largest = REVOLUTION / max(FEWEST_STEPS, 2 * system.harmonics)
+        self._bearing, self._over_time = isinstance(system, BearingModel), not getattr(system, "over_angle", True)
+        self._runners = {WIDTH: Runner(self.field, pair, WIDTH)}
+
+    @staticmethod
+    def picked(numbers: Any, lanes: Any) -> Any:
+        """The numbers of some lanes."""
+        return numbers[0][:, lanes], numbers[1]
+
+    def __call__(
+        self,
+        numbers: tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]],
+        state: Float[np.ndarray, "lanes numbers"],
+        strobes: int,
+        keep: int,
+        method: Any,
+        *,
+        begin: Any = 0,
+        turn: Any = None,
+        tangents: Float[np.ndarray, "lanes tangents dim"] | None = None,
+        step: Float[np.ndarray, " lanes"] | float | None = None,
+        threads: int = 1,
+        report: Callable[[int], None] = lambda done: None,
+    ) -> March:
+        """Run lanes from states in units of their scales, the values of what is integrated beside them behind.
+
+        **Arguments:** numbers of the lanes; states; strobe states to run to, and to keep; a method with a tolerance;
+        which sample of a revolution the first state is, of all lanes or of each; phase from strobe to strobe (over
+        time: time) if it is not a revolution over its samples, of all lanes or of each; tangent vectors in units of the
+        scale; first step, of all lanes or of each, NaN where the engine chooses; threads; a function that is called
+        with the number of lanes done.
+        """
+        turned = REVOLUTION / self._samples if turn is None else turn
+        if self.field.own_turn:
+            own = np.empty((SAMPLED, len(state)))
+            own[0], own[1] = turned, begin
+            numbers = np.concatenate([own, numbers[0]]), numbers[1]
+        first, *limits = self._limits(numbers, float(np.max(turned)), method.tolerance)
+        # A vector of one lane is faster than one of eight that holds one.
+        width = 1 if self._bearing and len(state) == 1 else WIDTH
+        if width not in self._runners:
+            self._runners[width] = Runner(self.field, self._pair, width)
+        settings = np.array([method.tolerance, *limits])
+        step = first if step is None else np.where(np.isnan(step), first, step)
+        return self._runners[width](numbers, state, strobes, keep, settings, step, tangents, threads, report)
+
+    def _limits(self, numbers: Any, turn: float, tolerance: float) -> tuple[float, float, float, float]:
+        """First, longest and shortest step, and most steps from strobe to strobe."""
+        more = max(1.0, MOST_AT / tolerance) ** (1 / self._order)
+        if not self._bearing:
+            return FIRST_STEP, self._largest, SMALLEST_STEP, MOST_STEPS * more
+        if self._over_time:
+            first, longest, shortest = (turn * x for x in TIME_STEPS)
+            return first, longest, shortest, TIME_MOST * more
+        wide, shared = iter(numbers[0][SAMPLED:]), iter(numbers[1])
+        at, _, scale = self.numbers.form.filled([next(wide if w else shared) for w in self.numbers.wide])
+        slow = float(np.max(slowness(scale[2], scale[3], at.rolling_cage_speed)))
+        return *BEARING_STEPS, BEARING_MOST * turn / REVOLUTION * slow * more
+
+
+def _run_threads(run: Callable[[], None], count: int, queue: np.ndarray, report: Callable[[], None]) -> None:
+    """`run` in threads of its own, interrupted by Ctrl-C within a moment: the flag in `queue` empties it."""
+    pool = [threading.Thread(target=run, daemon=True) for _ in range(count)]
+    try:
+        for each in pool:
+            each.start()
+        for each in pool:
+            while each.is_alive():
+                each.join(WAKES)
+                report()
+    except BaseException:
+        queue[1] = 1
+        for each in pool:
+            each.join()
+        raise
+
+
+_engines: dict[Any, Engine | JaxEngine] = {}
+
+
+def engine_of(
+    system: AbstractForcedSystem, tangents: int, several: bool, method: AbstractMethod, samples: int = 1
+) -> Engine | JaxEngine:
+    """The engine of a model and a method, which is made once.
+
+    **Arguments:** model; tangent vectors; true if lanes have designs of their own; method; strobe states of a
+    revolution. A warning names an operation without machine code.
+    """
+    pair = method.pair if isinstance(method, NativeSteps) and has_machine_code(system, method) else None
+    key = (split(system, eqx.is_inexact_array)[0], tangents, several, pair, samples)
+    if key not in _engines and pair is not None:
+        try:
+            _engines[key] = Engine(system, tangents, several, pair, samples)
+        except UnknownOperation as operation:
+            say_once(str(operation))
+    return _engines.setdefault(key, JaxEngine(system, tangents, several, samples))
+
+
+def has_machine_code(system: AbstractForcedSystem, method: NativeSteps) -> bool:
+    """False for implicit steps of large systems, and for a quasi-static ring, which moves with all rollers."""
+    large = system.dimension > LARGEST_WRITTEN_OUT
+    settles = isinstance(system, BearingModel) and system.ring.ring_motion == "quasi_static"
+    return not settles and not (large and method.pair == IMPLICIT)
+
+
+def alike(designs: Sequence[Any], name: str, kind: str) -> list[Any]:
+    """Designs with all numbers as arrays: a parameter may be a Python number in one and an array in another.
+
+    **Raises:** `ValueError` for designs that differ in more than their numbers.
+    """
+    number = lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x
+    found = [jax.tree.map(number, design) for design in designs]
+    rests = [eqx.filter(design, eqx.is_array, inverse=True) for design in found]
+    if any(not eqx.tree_equal(rest, rests[0]) for rest in rests):
+        raise ArgumentError(name, said=f"must hold {kind} that differ in their numbers only.")
+    return found
+
+
+def cores() -> int:
+    """Processor cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+class Lanes:
+    """Lanes by number: which design and which speed each has."""
+
+    def __init__(
+        self,
+        designs: AbstractForcedSystem,
+        count: int,
+        which: Int[np.ndarray, " lanes"],
+        speed: Float[np.ndarray, " lanes"],
+    ):
+        """`designs` is a system, or `count` of them with their arrays stacked."""
+        number = lambda x: jnp.asarray(x, dtype=float) if eqx.is_inexact_array_like(x) else x
+        self.form, rows = split(jax.tree.map(number, designs), eqx.is_inexact_array)
+        self.several, self.which, self.speed = count > 1, which, speed
+        self._rows = [np.asarray(x) for x in rows]
+        self._every, self._place = (which, speed), np.arange(speed.size)
+        self._numbers: dict[type, Any] = {}
+
+    @classmethod
+    def of(
+        cls,
+        systems: Sequence[AbstractForcedSystem],
+        speed: Float[np.ndarray, " lanes"],
+        which: Int[np.ndarray, " lanes"] | None = None,
+    ) -> "Lanes":
+        """**Raises:** `ValueError` for systems that differ in more than their numbers."""
+        which = np.zeros(speed.size, int) if which is None else which
+        if len(systems) == 1:
+            return cls(systems[0], 1, which, speed)
+        stacked = lambda *x: jnp.stack(x) if eqx.is_array(x[0]) else x[0]
+        return cls(jax.tree.map(stacked, *alike(systems, "systems", "systems")), len(systems), which, speed)
+
+    def at(self, some: Int[np.ndarray, " some"]) -> "Lanes":
+        """Some of the lanes."""
+        few = copy.copy(self)
+        few.which, few.speed, few._place = self.which[some], self.speed[some], self._place[some]
+        return few
+
+    @functools.cached_property
+    def system(self) -> AbstractForcedSystem:
+        """One of the designs."""
+        return self.form.filled([jnp.asarray(x[0] if self.several else x) for x in self._rows])
+
+    def rows(self, lanes: Int[np.ndarray, " some"]) -> list[Any]:
+        """Numbers of the designs of some lanes, or those that all have."""
+        return [x[self.which[lanes]] for x in self._rows] if self.several else self._rows
+
+    def numbers(self, engine: Engine | JaxEngine, some: Int[np.ndarray, " some"]) -> Any:
+        """The numbers of some lanes as the engine takes them; they are worked out once for all lanes."""
+        if type(engine) not in self._numbers:
+            which, speed = self._every
+            rows = [x[which] for x in self._rows] if self.several else self._rows
+            self._numbers[type(engine)] = engine.numbers(speed, rows)
+        return engine.picked(self._numbers[type(engine)], self._place[some])
+
+    def engine(self, tangents: int, method: AbstractMethod, samples: int = 1) -> Engine | JaxEngine:
+        """What runs these lanes with so many tangent vectors."""
+        return engine_of(self.system, tangents, self.several, method, samples)
+
+    def completed(self, y: Float[np.ndarray, "some dim"]) -> Float[np.ndarray, "some numbers"]:
+        """States with the values of what is integrated beside them at the beginning of a run behind."""
+        beside = np.array(self.system.beside_start, dtype=float)
+        return np.concatenate([y, np.broadcast_to(beside, (len(y), beside.size))], axis=1)
+
+    def begin(
+        self, some: Int[np.ndarray, " some"], y: Float[np.ndarray, "some numbers"]
+    ) -> tuple[Float[np.ndarray, "some numbers"], Float[np.ndarray, " some"]]:
+        """Scale of each of some lanes, 1 for what is integrated beside the state, and excursion of its state."""
+        count = some.size
+        room = room_for(count)
+        filled = np.concatenate([some, np.broadcast_to(some[-1:], room - count)])
+        states = np.concatenate([y, np.broadcast_to(y[-1:], (room - count, y.shape[1]))])
+        dim = self.system.dimension
+        scale, excursion = _scales(self.form, self.several)(self.speed[filled], self.rows(filled), states[:, :dim])
+        ones = np.ones((count, y.shape[1] - dim))
+        return np.concatenate([np.asarray(scale)[:count], ones], axis=1), np.asarray(excursion)[:count]
+
+
+@functools.lru_cache(maxsize=32)
+def _scales(form: Any, several: bool) -> Any:
+    """Scales and excursions of lanes, by speed, numbers of the system and state."""
+
+    def of(speed: Any, row: Any, y: Any) -> tuple[Any, Any]:
+        system = form.filled(row)
+        return jnp.stack([jnp.asarray(s, float) for s in system.scale(speed)]), jnp.asarray(system.excursion(tuple(y)))
+
+    return jax.jit(jax.vmap(of, in_axes=(0, 0 if several else None, 0)))
+
+
+def histories(
+    lanes: Lanes,
+    y0: Float[np.ndarray, "lanes dim"],
+    samples: int,
+    revolutions: int,
+    method: AbstractMethod,
+) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
+    """States of lanes at so many phases of each of some revolutions, the first where they begin, in SI units; and the
+    largest error of a revolution [scale]. NaN where one begins nowhere, or fails. A lane whose error is larger than the
+    method allows is run again with finer steps."""
+    seen, error = _histories(lanes, y0, samples, revolutions, method)
+    for retry in range(1, RETRIES + 1):
+        todo = np.flatnonzero(error > method.allowed)
+        if not todo.size:
+            break
+        seen[todo], error[todo] = _histories(lanes.at(todo), y0[todo], samples, revolutions, method.finer(retry))
+    return seen, error
+
+
+def _histories(
+    lanes: Lanes, y0: Float[np.ndarray, "lanes dim"], samples: int, revolutions: int, method: AbstractMethod
+) -> tuple[Float[np.ndarray, "lanes samples dim"], Float[np.ndarray, " lanes"]]:
+    """The same by one method."""
+    count, total = lanes.speed.size, samples * revolutions
+    seen, error = np.full((count, total, y0.shape[1]), np.nan), np.full(count, np.nan)
+    for first in range(0, count, CHUNK // samples + 1):
+        some = np.arange(first, min(first + CHUNK // samples + 1, count))
+        some = some[np.all(np.isfinite(y0[some]), axis=1)]
+        if not some.size:
+            continue
+        scale, _ = lanes.begin(some, y0[some])
+        engine = lanes.engine(0, method, samples)
+        numbers = lanes.numbers(engine, some)
+        ran = engine(numbers, y0[some] / scale, total, total, method, threads=cores())
+        states = np.concatenate([(y0[some] / scale)[:, None], ran.strobe], axis=1)
+        error[some] = sampled_error(engine, numbers, states, samples, method).max(axis=1)
+        seen[some] = states[:, :-1] * scale[:, None, :]
+    return seen, error
+
+
+def sampled_error(
+    engine: Engine | JaxEngine,
+    numbers: Any,
+    states: Float[np.ndarray, "lanes n dim"],
+    samples: int,
+    method: AbstractMethod,
+) -> Float[np.ndarray, "lanes revolutions"]:
+    """Error of each revolution: the sum of those of its parts, each three times the distance of its end from that by
+    the method's reference, and the tolerance at least. Of states in units of the scale, the first at phase 0."""
+    count, n = states.shape[0], states.shape[1] - 1
+    repeated = engine.picked(numbers, np.repeat(np.arange(count), n))
+    begin = np.tile(np.arange(n) % samples, count)
+    starts = states[:, :-1].reshape(count * n, -1)
+    sharper = engine(repeated, starts, 1, 1, method.reference, threads=cores(), begin=begin).state
+    apart = SURE * np.max(np.abs(sharper.reshape(count, n, -1) - states[:, 1:]), axis=2)
+    padded = np.pad(apart, ((0, 0), (0, -n % samples)))
+    return np.maximum(padded.reshape(count, -1, samples).sum(axis=2), getattr(method, "tolerance", 0.0))

@@ -1,0 +1,387 @@
+"""Programs of a model for the integration loop, traced in JAX: its rates, excursion and steps, and their numbers."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from .._form import Form, split
+from ..forces._phase import cos_sin
+from ..models import (
+    BESIDE,
+    MOVING,
+    OF_BODIES,
+    OF_ROLLER,
+    WATCHED,
+    AbstractForcedSystem,
+    Bodies,
+    Passed,
+    Rollers,
+    ScaledField,
+    multiply,
+)
+from .ir import Code, UnknownOperation, Value, is_variable, number
+from .layout import Field, Layout, fixed_numbers
+from .program import Program, Sizes, program_of
+from .solvers import RODAS4, rosenbrock_step
+
+
+SAMPLED = 2
+"""Fixed numbers of a field with several strobe states to a revolution: the angle between two, and which is the first.
+"""
+PASSED, NORMAL = len(Passed._fields), Passed._fields.index("normal")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Rates:
+    """Rates of a state and of tangent vectors, in units of the scale."""
+
+    form: Form
+    dimension: int
+    tangents: int
+    skip: int
+    """Fixed numbers that are not the law's."""
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        field, _, scale = self.form.filled(fixed[self.skip :])
+        n = self.dimension
+        go = lambda y: tuple(jnp.asarray(c, float) for c in ScaledField(field, scale)(phase, y))
+        if not self.tangents:
+            return go(moved), ()
+        pushed = [jax.jvp(go, (moved[:n],), (moved[i : i + n],)) for i in range(n, len(moved), n)]
+        return (*pushed[0][0], *(c for _, each in pushed for c in each)), ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Step:
+    """A step of the Rosenbrock method and its estimated error, in units of the scale: moved are its length, the state
+    and tangent vectors."""
+
+    form: Form
+    dimension: int
+    tangents: int
+    skip: int
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        field, _, scale = self.form.filled(fixed[self.skip :])
+        n, (h, *rest) = self.dimension, moved
+
+        def go(y: Any) -> Any:
+            y1, error, *_ = rosenbrock_step(RODAS4, ScaledField(field, scale), phase, lambda _: h, y)
+            return tuple(jnp.asarray(c, float) for c in (*y1, *error))
+
+        y = tuple(rest[:n])
+        values = go(y)
+        pushed = [jax.jvp(go, (y,), (tuple(rest[i : i + n]),))[1] for i in range(n, len(rest), n)]
+        ends = (*values[:n], *(c for each in pushed for c in each[:n]))
+        return (*ends, *values[n:], *(c for each in pushed for c in each[n:])), ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Excursion:
+    """How far a state, in units of the scale, is towards the edge of what the model holds for."""
+
+    form: Form
+    skip: int
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        _, system, scale = self.form.filled(fixed[self.skip :])
+        return (system.excursion(multiply(moved, scale)),), ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Abrupt:
+    """Distance of a state from an abrupt change of the law, and the speed with which it comes there."""
+
+    form: Form
+    skip: int
+
+    def __call__(self, phase: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        _, system, scale = self.form.filled(fixed[self.skip :])
+        n = len(moved) // 2
+        return system.abrupt(multiply(moved[:n], scale), multiply(moved[n:], scale)), ()
+
+
+def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
+    """A program as one of the fixed numbers alone, and one that takes that one's results behind the fixed numbers."""
+    jaxpr = program.jaxpr
+    known, early = {*jaxpr.invars[1 + moving :], *jaxpr.constvars}, []
+    for e in jaxpr.eqns:
+        if all(v in known for v in e.invars if is_variable(v)):
+            early.append(e)
+            known.update(e.outvars)
+    placed = set(map(id, early))
+    late = [e for e in jaxpr.eqns if id(e) not in placed]
+    wanted = {v for e in late for v in e.invars if is_variable(v)} | {v for v in jaxpr.outvars if is_variable(v)}
+    numbers = []
+    for e in reversed(early):
+        if e.outvars[0] in wanted and e.outvars[0].aval.dtype != np.dtype(float):  # masks and integers are made again
+            late = [e, *late]
+            wanted |= {v for v in e.invars if is_variable(v)}
+        else:
+            numbers.append(e)
+    made = [v for e in reversed(numbers) for v in e.outvars if v in wanted]
+    needed, first = set(made), []
+    for e in numbers:
+        if needed & set(e.outvars):
+            first.append(e)
+            needed |= {v for v in e.invars if is_variable(v)}
+    prelude = jaxpr.replace(invars=jaxpr.invars[1 + moving :], eqns=first[::-1], outvars=made)
+    rest = jaxpr.replace(invars=[*jaxpr.invars, *made], eqns=late)
+    return Program(prelude, program.consts, []), Program(rest, program.consts, [])
+
+
+def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
+    """What is integrated at a speed, and its numbers."""
+    return split((system.at_speed(speed), system, system.scale(speed)), eqx.is_inexact_array)
+
+
+def room_for(lanes: int) -> int:
+    """The next power of 8: programs inside JAX are compiled for few numbers of lanes."""
+    return 8 ** max(1, -(-(lanes - 1).bit_length() // 3))
+
+
+class Numbers:
+    """The numbers of a field, as they follow from a system's and a speed."""
+
+    def __init__(self, system: AbstractForcedSystem, several: bool):
+        self._form, row = split(system, eqx.is_inexact_array)
+        self.several = several
+        self.form = _pieces(system, jnp.asarray(1.0))[0]
+
+        def of(speed: Any, row: Sequence[Any]) -> list[Any]:
+            return [jnp.asarray(x, float) for x in _pieces(self._form.filled(row), speed)[1]]
+
+        traced = jax.make_jaxpr(lambda speed: of(speed, row))(1.0).jaxpr
+        if any(v.aval.shape for v in traced.outvars):
+            raise UnknownOperation("array")
+        moved = set(traced.invars)
+        for e in traced.eqns:
+            if any(is_variable(v) and v in moved for v in e.invars):
+                moved.update(e.outvars)
+        self.wide = tuple(several or (is_variable(v) and v in moved) for v in traced.outvars)
+        self._over = jax.jit(lambda speeds, rows: jax.vmap(of, in_axes=(0, 0 if several else None))(speeds, rows))
+
+    def __call__(
+        self, speeds: Float[np.ndarray, " lanes"], rows: Sequence[Any]
+    ) -> tuple[Float[np.ndarray, "wide lanes"], Float[np.ndarray, " shared"]]:
+        """The numbers that differ from lane to lane, and those that all lanes share."""
+        count = len(speeds)
+        room = room_for(count)
+        pad = lambda x: np.concatenate([x, np.broadcast_to(x[-1:], (room - count, *x.shape[1:]))])
+        filled = [pad(np.asarray(x)) for x in rows] if self.several else list(rows)
+        found = [np.asarray(x) for x in self._over(pad(speeds), filled)]
+        wide = [x[:count] for x, w in zip(found, self.wide, strict=True) if w]
+        shared = [x[0] for x, w in zip(found, self.wide, strict=True) if not w]
+        return np.array(wide).reshape(len(wide), count), np.array(shared, dtype=float)
+
+
+def traced_field(
+    system: AbstractForcedSystem,
+    form: Form,
+    wide: tuple[bool, ...],
+    tangents: int,
+    sampled: bool = False,
+    implicit: bool = False,
+) -> Field:
+    """The programs of a system, with a strobe state for each revolution or, if it is `sampled`, several."""
+    if system.beside:
+        return bearing_field(form, (True,) * SAMPLED + wide, system.dimension, tangents)
+    n, skip = system.dimension, SAMPLED * sampled
+    wide = (True,) * skip + wide
+    trace = lambda step, moving: program_of(step, Sizes(moving, 0, len(wide)))
+    prelude, rates = _hoisted(trace(_Rates(form, n, tangents, skip), n * (1 + tangents)), n * (1 + tangents))
+    ones = tuple(jnp.ones(()) for _ in range(n))
+    abrupt = None if system.abrupt(ones, ones) is None else trace(_Abrupt(form, skip), 2 * n)
+    step = trace(_Step(form, n, tangents, skip), 1 + n * (1 + tangents)) if implicit else None
+    return Field(
+        prelude, rates, trace(_Excursion(form, skip), n), abrupt, n, tangents, wide, step=step, own_turn=sampled,
+        phased=sampled,
+    )  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class _Roller:
+    """Rates of a roller, and what it passes on to the bodies.
+
+    Moved are cosine and sine of the pocket's angle in the cage, those of the cage's angle, the numbers of the roller
+    and the bodies, and the tangents of both. Results are rates and the first `MOVING` of `Passed`, the tangents of
+    these, the rest of `Passed`, and the slip.
+    """
+
+    form: Form
+    tangents: int
+
+    def __call__(self, i: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        (cos_j, sin_j, cos, sin), numbers = moved[:4], moved[4:]
+        at, _, scale = self.form.filled(fixed[SAMPLED:])
+        units = (*scale[:OF_ROLLER], *scale[-OF_BODIES:])
+        pocket = cos * cos_j - sin * sin_j, sin * cos_j + cos * sin_j
+        size = OF_ROLLER + OF_BODIES
+
+        def go(y: Any) -> tuple[Any, Any]:
+            y = [a * u for a, u in zip(y, units, strict=True)]
+            rollers, cage = Rollers(*y[:OF_ROLLER]), Bodies(*y[OF_ROLLER:])
+            rates, passed = at.roller_rates(rollers, cage, at.on_roller(rollers, cage, *pocket))
+            pace = at.pace(cage.cage_speed)
+            rates = [pace * x / u for x, u in zip(rates, units, strict=False)]
+            return _floats((*rates, *passed[:MOVING])), _floats((*passed[MOVING:], at.slip(rollers.spin)))
+
+        return _with_tangents(go, numbers, size, self.tangents), ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Bodies:
+    """Rates of cage and ring, of the quantities beside the state, and what is watched.
+
+    Moved are cosine and sine of the cage's angle, the numbers of the bodies and the sums over all rollers that move
+    them, the tangents of both, the other sums, and the largest pocket force and slip.
+    """
+
+    form: Form
+    tangents: int
+
+    def __call__(self, i: Any, moved: Any, watched: Any, fixed: Any) -> Any:
+        (cos, sin), numbers = moved[:2], moved[2:]
+        at, _, scale = self.form.filled(fixed[SAMPLED:])
+        units = scale[-OF_BODIES:]
+        size = OF_BODIES + MOVING
+        numbers, rest, (normal, slip) = (
+            numbers[: size * (1 + self.tangents)],
+            numbers[size * (1 + self.tangents) : -2],
+            numbers[-2:],
+        )
+
+        def go(y: Any) -> tuple[Any, Any]:
+            cage = Bodies(*(a * u for a, u in zip(y, units, strict=False)))
+            land = at.on_land(cage)
+            rates, integrals, _ = at.body_rates(cage, (cos, sin), Passed(*y[OF_BODIES:], *rest), land)
+            pace = at.pace(cage.cage_speed)
+            rates = [pace * x / u for x, u in zip(rates, units, strict=True)]
+            beside = [pace * x for x in (cage.cage_speed, 1.0, *integrals)]
+            lost = at.lost(cage.cage_speed, land.eps)
+            return _floats(rates), _floats((*beside, lost, normal, land.size, slip, land.eps))
+
+        return _with_tangents(go, numbers, size, self.tangents), ()
+
+
+def _floats(numbers: Any) -> tuple[Any, ...]:
+    return tuple(jnp.asarray(x, dtype=float) for x in numbers)
+
+
+def _with_tangents(go: Callable[[Any], Any], numbers: Any, size: int, tangents: int) -> tuple[Any, ...]:
+    """Values of `go`, their tangents along the vectors behind the first `size` numbers, and what is seen."""
+    y, out = tuple(numbers[:size]), []
+    values, seen = go(y)
+    for k in range(1, 1 + tangents):
+        along = tuple(numbers[k * size : (k + 1) * size])
+        out += jax.jvp(lambda y: go(y)[0], (y,), (along,))[1]
+    return (*values, *out, *seen)
+
+
+class RollersCode(NamedTuple):
+    """The programs of a bearing, which write the code of its rates as a loop over the rollers."""
+
+    rollers: int
+    roller: Program
+    bodies: Program
+    angle: Program
+    """Cosine and sine of the cage's angle."""
+
+    def code(self, field: Field, rows: Layout, width: int) -> tuple[str, set[str]]:
+        """The function `rates`: of state, tangents and what is integrated beside at `place`, stored at `out`."""
+        w = Code(width)
+        z, size, tangents = self.rollers, field.dimension, field.tangents
+        load = lambda first, count: [w.get(first + k, base="%place") for k in range(count)]
+        own = [load(z * OF_ROLLER + size * t, OF_BODIES) for t in range(1 + tangents)]
+        phase = w.get(size * (1 + tangents), base="%place")
+        (cos, sin), w.block = w.program(self.angle, [number(0.0), phase], w.block)
+        places = 2 * np.pi / z * np.arange(z)
+        table = ", ".join(f"double {number(x).text}" for pair in zip(np.cos(places), np.sin(places)) for x in pair)
+        # Of values and of tangents MOVING sums each, then the other sums, then the largest force and slip.
+        moving, others = MOVING * (1 + tangents), PASSED - MOVING
+        begin = w.block
+        w.line("br label %roller")
+        w.line("roller:")
+        names = [f"%sum{k}" for k in range(moving + others + 2)]
+        sums = [Value(name, "double", True) for name in names]
+        j = Value("%j", "i64", False)
+        at = w.simple("mul", j, Value("2", "i64", False))
+        cos_at = w.let(f"getelementptr double, ptr @places, i64 {at.text}", "ptr", False)
+        sin_at = w.let(f"getelementptr double, ptr {cos_at.text}, i64 1", "ptr", False)
+        place = [w.let(f"load double, ptr {x.text}", "double", False) for x in (cos_at, sin_at)]
+        first = w.simple("mul", j, Value(str(OF_ROLLER), "i64", False))
+        row = lambda k: w.simple("add", first, Value(str(k), "i64", False))
+        numbers: list[Value] = []
+        for t in range(1 + tangents):
+            numbers += [w.get(row(size * t + k), base="%place") for k in range(OF_ROLLER)] + own[t]
+        arguments = [number(0.0), *place, cos, sin, *numbers]
+        fixed = fixed_numbers(w, field, rows, self.roller, len(arguments))
+        results, w.block = w.program(self.roller, [*arguments, *fixed], w.block)
+        rates, passed = [], []
+        for t in range(1 + tangents):
+            part = results[t * (OF_ROLLER + MOVING) : (t + 1) * (OF_ROLLER + MOVING)]
+            rates.append(part[:OF_ROLLER])
+            passed += part[OF_ROLLER:]
+        *rest, slip = results[(1 + tangents) * (OF_ROLLER + MOVING) :]
+        for t, part in enumerate(rates):
+            for k, x in enumerate(part):
+                w.put(row(size * t + k), x, base="%out")
+        new = [w.add(s, w.widened(x)) for s, x in zip(sums, [*passed, *rest], strict=False)]
+        largest = zip(sums[-2:], (rest[NORMAL - MOVING], slip), strict=True)
+        new += [w.larger(w.widened(x), s) for s, x in largest]
+        latch = w.block
+        w.line("%j_next = add i64 %j, 1")
+        w.line(f"%more = icmp slt i64 %j_next, {z}")
+        w.line("br i1 %more, label %roller, label %bodies")
+        w.line("bodies:")
+        lines, w.lines = w.lines, []
+        vector = w.type("double", True)
+        start = lambda k: f"splat (double {number(-np.inf if k >= moving + others else 0.0).text})"
+        phis = [f"  %j = phi i64 [ 0, %{begin} ], [ %j_next, %{latch} ]"]
+        phis += [
+            f"  {name} = phi {vector} [ {start(k)}, %{begin} ], [ {x.text}, %{latch} ]"
+            for k, (name, x) in enumerate(zip(names, new, strict=True))
+        ]
+        where = lines.index("roller:") + 1
+        w.lines = [*lines[:where], *phis, *lines[where:]]
+        numbers = []
+        for t in range(1 + tangents):
+            numbers += own[t] + new[t * MOVING : (t + 1) * MOVING]
+        arguments = [number(0.0), cos, sin, *numbers, *new[moving:]]
+        fixed = fixed_numbers(w, field, rows, self.bodies, len(arguments))
+        results, w.block = w.program(self.bodies, [*arguments, *fixed], w.block)
+        for t in range(1 + tangents):
+            for k in range(OF_BODIES):
+                w.put(size * t + z * OF_ROLLER + k, results[t * OF_BODIES + k], base="%out")
+        for k, x in enumerate(results[(1 + tangents) * OF_BODIES :]):
+            w.put(size * (1 + tangents) + k, x, base="%out")
+        head = (
+            f"@places = internal constant [{2 * z} x double] [{table}]\n"
+            f"define internal void @rates({vector} %phase, ptr noalias %place, ptr noalias %memory, "
+            "ptr noalias %shared, ptr noalias %out) noinline {\nentry:\n"
+        )
+        return head + w.taken() + "\n  ret void\n}\n", w.declarations
+
+
+def bearing_field(form: Form, wide: tuple[bool, ...], dimension: int, tangents: int) -> Field:
+    """The programs of a whole bearing: the forces on a roller are traced once, as a function of that roller, cage and
+    ring; the code runs it for each roller in turn and adds up what the rollers pass on."""
+    at, *_ = form.filled([1.0] * (len(wide) - SAMPLED))
+    trace = lambda step, moved: program_of(step, Sizes(moved, 0, len(wide)))
+    cosine = lambda i, moved, watched, fixed: (cos_sin(moved[0]), ())
+    rollers = RollersCode(
+        at.n_rollers,
+        trace(_Roller(form, tangents), 4 + (OF_ROLLER + OF_BODIES) * (1 + tangents)),
+        trace(_Bodies(form, tangents), 2 + (OF_BODIES + MOVING) * (1 + tangents) + PASSED - MOVING + 2),
+        program_of(cosine, Sizes(1, 0, 0)),
+    )
+    return Field(
+        None, rollers, None, None, dimension, tangents, wide, beside=len(BESIDE), watched=len(WATCHED), own_turn=True,
+        relative=False, careful=False,
+    )  # fmt: skip

@@ -1,0 +1,383 @@
+"""Time histories at constant speed and through a speed ramp, and of a whole bearing over time."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from .._arguments import require_at_least, shown
+from .._checks import require_x64
+from .._errors import ArgumentError
+from .._notebook import notebook_html
+from .._types import Scalar, State
+from ..models import (
+    INSTEAD,
+    AbstractForcedSystem,
+    BearingModel,
+    BearingOverTime,
+    BearingState,
+    bodies_of,
+    require_known,
+    require_speeds,
+    rollers_of,
+)
+from .engine import CHUNK, RETRIES, SURE, Lanes, cores, has_machine_code
+from .kernel import REVOLUTION
+from .method import IMPLICIT, AbstractMethod, FixedSteps, NativeSteps, native
+from .outcomes import INACCURATE, OUTCOMES, codes_of
+
+
+TOLERANCE = 1e-8
+"""Tolerance of time histories by default: an error in one sample grows from there to the next."""
+BEARING_TOLERANCE, BEARING_ERROR = 1e-5, 1e-2
+"""The same for a whole bearing, and the largest measured error of a stretch that can be compared."""
+MOST_PARTS = 1000
+"""Most parts from sample to sample in which errors are measured."""
+SERVED_BADLY = [OUTCOMES.index(name) for name in ("dt_min_reached", "max_steps_reached")]
+
+
+@dataclasses.dataclass(frozen=True)
+class Trajectory:
+    """States at equally spaced phases, or at given times.
+
+    A model with quantities beside its state has a sample at the end of the last revolution too.
+    """
+
+    time: Float[np.ndarray, " n"]
+    """Time from the first sample [s]."""
+    tau: Float[np.ndarray, " n"]
+    """Phase [rad], 0 at the beginning of the run (before any discarded revolutions); a whole bearing: cage angle."""
+    state: Float[np.ndarray, "n dim"]
+    """State in SI units; NaN from the sample after a failure."""
+    speed: Float[np.ndarray, " n"]
+    """Speed at each sample [rad/s]."""
+    samples: int
+    """Samples per revolution."""
+    peak: float
+    """Largest excursion of the first sample and at any step after it, between the samples too; for a cage eps."""
+    outcome: str
+    """`successful`, or the name of what went wrong."""
+    error: float = math.nan
+    """Largest error of a stretch that can be compared with a more exact run (a cage: a revolution), in units of the
+    model's scale (a cage: clearances): the sum of the changes of the ends of its parts. NaN for a trajectory that no
+    integration has made."""
+    beside: tuple[str, ...] = ()
+    """Names of the quantities that are integrated beside the state."""
+    integrals: Float[np.ndarray, "n beside"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    """Their values from the beginning [SI]."""
+    watched: tuple[str, ...] = ()
+    """Names of the quantities whose largest values are recorded."""
+    peaks: Float[np.ndarray, "parts watched"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    """Largest values between two samples."""
+    steps: float = math.nan
+    """Mean number of steps of a revolution."""
+
+    @property
+    def rpm(self) -> Float[np.ndarray, " n"]:
+        """Speed in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    @property
+    def angle(self) -> Float[np.ndarray, " n"]:
+        """Angle of the cage of a whole bearing [rad]."""
+        return self.integrals[:, self.beside.index("angle")]
+
+    @property
+    def rollers(self) -> Float[np.ndarray, "n 5 rollers"]:
+        """Rollers of a whole bearing: lag, spin, radius and its rate, orbital speed, as in `models.Rollers` [SI]."""
+        return rollers_of(self.state)
+
+    @property
+    def bodies(self) -> Float[np.ndarray, "n 9"]:
+        """Cage and inner ring of a whole bearing, as in `models.Bodies` [SI]."""
+        return bodies_of(self.state)
+
+    @property
+    def last(self) -> BearingState:
+        """The last state of a whole bearing."""
+        return BearingState(*map(jnp.asarray, (self.rollers[-1], self.bodies[-1], self.integrals[-1, :2])))
+
+    def total(self, name: str) -> float:
+        """The integral of a quantity over the whole trajectory, by its name in `beside`."""
+        i = self.beside.index(name)
+        return float(self.integrals[-1, i] - self.integrals[0, i])
+
+    def largest(self, name: str) -> float:
+        """The largest value of a quantity, by its name in `watched`."""
+        return float(np.max(self.peaks[:, self.watched.index(name)]))
+
+    def __str__(self) -> str:
+        return (
+            f"Trajectory of {self.time.size / self.samples:g} revolutions, {self.samples} samples each, "
+            f"{self.rpm[0]:.0f} to {self.rpm[-1]:.0f} rpm, {self.outcome}, largest excursion {self.peak:.3f}, "
+            f"error of a revolution at most {self.error:.0e}"
+        )
+
+    _repr_html_ = notebook_html
+
+
+def _start(system: AbstractForcedSystem, speed: float, start: State | BearingState | None) -> np.ndarray:
+    """The first state, with the quantities beside it behind."""
+    rest, dim = np.array(system.beside_start, dtype=float), system.dimension
+    if isinstance(start, BearingState):
+        y0, clock = np.asarray(start.row), np.asarray(start.clock)
+        rest[:2] = clock
+    else:
+        y0 = np.array(system.starts(jnp.asarray(speed))[0] if start is None else start, dtype=float)
+    if y0.shape != (dim,):
+        raise ArgumentError("start", said=f"must be a state of {dim} numbers, but has {y0.size}.")
+    if not np.all(np.isfinite(y0)):
+        raise ArgumentError("start", said=f"must be finite numbers, but {shown(start)} was given.")
+    return np.concatenate([y0, rest])
+
+
+def require_counts(revolutions: int, samples: int, discard: int) -> None:
+    """**Raises:** `ValueError` for counts that no history can have."""
+    require_at_least(1, revolutions=revolutions, samples=samples)
+    require_at_least(0, discard=discard)
+
+
+def _require_fits(method: AbstractMethod, system: AbstractForcedSystem, samples: int) -> None:
+    """**Raises:** `ValueError` for a method that does not go with the model or the samples."""
+    if isinstance(method, FixedSteps) and system.beside:
+        raise ArgumentError("method", said="must control its steps, as `native` does, but has a fixed number of them.")
+    if isinstance(method, FixedSteps) and method.steps % samples:
+        raise ArgumentError(
+            "samples", said=f"must divide the {method.steps} steps per revolution of the method, but is {samples}."
+        )
+
+
+class _Ran(NamedTuple):
+    """Strobe states by one method."""
+
+    states: Float[np.ndarray, "1+parts numbers"]
+    """[SI]; NaN after a failure."""
+    peaks: Float[np.ndarray, "parts watched"]
+    """Largest values in each part; of a model that records the excursion alone, at the first of those run at once."""
+    errors: Float[np.ndarray, " stretches"]
+    code: int
+    steps: float
+    """Steps tried."""
+
+
+class _Course(NamedTuple):
+    """Parts of a run, each a lane of its own at its own speed."""
+
+    lanes: Lanes
+    samples: int
+    """Parts of a revolution."""
+    turn: Float[np.ndarray, " parts"] | None
+    """Phase (or time) of each part; None if they are equal parts of a revolution."""
+    stretch: int
+    """Parts over which an error is stated."""
+
+    def turn_of(self, part: Any) -> Any:
+        """Phase of some parts."""
+        return None if self.turn is None else self.turn[part]
+
+
+def _run(course: _Course, start: np.ndarray, method: AbstractMethod) -> _Ran:
+    """The parts one after the other."""
+    lanes, samples = course.lanes, course.samples
+    n, speed, dim = lanes.speed.size, lanes.speed, lanes.system.dimension
+    every, begin = np.arange(n), np.arange(n) % samples
+    engine = lanes.engine(0, method, 1 if lanes.system.beside else samples)
+    numbers = lanes.numbers(engine, every)
+    even = course.turn is None or np.allclose(course.turn, course.turn[0], rtol=1e-9, atol=0)
+    scale, (excursion, *_) = lanes.begin(every, np.broadcast_to(start, (n, start.size)))
+    y, peaks = np.full((n + 1, start.size), np.nan), np.full((n, len(lanes.system.watched)), np.nan)
+    y[0], code = start, 0 if excursion <= 1 or lanes.system.beside else OUTCOMES.index("outside")
+    step, done, steps = None, 0, 0.0
+    while done < n and code == 0:  # a revolution at a time if its speed does not change
+        some = samples if even and done + samples <= n and speed[done + samples - 1] == speed[done] else 1
+        at, turn = engine.picked(numbers, every[done : done + 1]), course.turn_of(done)
+        first = y[done : done + 1] / scale[done]
+        ran = engine(at, first, some, some, method, step=step, begin=begin[done : done + 1], turn=turn)
+        y[done + 1 : done + 1 + some], code = ran.strobe[0] * scale[done], int(codes_of(ran.mark)[0])
+        step, steps = ran.step if ran.step[0] else step, steps + float(ran.steps[0])
+        peaks[done : done + ran.peaks.shape[1]], done = ran.peaks[0], done + some
+    if done == 0:
+        y[0] = np.nan  # it may not start there
+    ends = np.flatnonzero(np.all(np.isfinite(y[1:]), axis=1))
+    apart = np.zeros(n)
+    for some in np.split(ends, range(CHUNK, ends.size, CHUNK)) if ends.size else ():
+        at, starts = engine.picked(numbers, some), y[some] / scale[some]
+        options: dict[str, Any] = dict(threads=cores(), begin=begin[some], turn=course.turn_of(some))
+        again = engine(at, starts, 1, 1, method.reference, **options).state
+        apart[some] = SURE * np.max(np.abs(again - y[some + 1] / scale[some])[:, :dim], axis=1)
+    padded = np.pad(apart, (0, -n % course.stretch)).reshape(-1, course.stretch)
+    errors = np.maximum(padded.sum(axis=1), getattr(method, "tolerance", 0.0))
+    return _Ran(y, peaks, errors, code, steps)
+
+
+def _tried(course: _Course, start: np.ndarray, method: AbstractMethod) -> _Ran:
+    """The run by the method, or by a finer one where its error is too large, or an implicit one where that serves."""
+    again = [method.finer(k) for k in range(1, RETRIES + 1)] if math.isfinite(method.allowed) else []
+    if isinstance(method, NativeSteps) and method.pair != IMPLICIT:
+        if has_machine_code(course.lanes.system, method.implicit):
+            again += [method.implicit, *(method.implicit.finer(k) for k in range(1, RETRIES + 1))]
+    served = lambda ran: ran.code not in SERVED_BADLY and not np.any(ran.errors > method.allowed)
+    first = ran = _run(course, start, method)
+    while not served(ran) and again:
+        ran = _run(course, start, again.pop(0))
+    return ran if served(ran) else first
+
+
+def _outcome(ran: _Ran, stretch: int, allowed: float) -> tuple[np.ndarray, int]:
+    """States, NaN behind a stretch whose error is too large, and how the run ended."""
+    states, code = ran.states.copy(), ran.code
+    if np.any(bad := ran.errors > allowed):
+        states[int(np.argmax(bad)) * stretch + 1 :] = np.nan
+        code = code or INACCURATE
+    return states, code
+
+
+def _chosen(system: AbstractForcedSystem, method: AbstractMethod | None) -> AbstractMethod:
+    default = native(BEARING_TOLERANCE, BEARING_ERROR) if system.beside else native(TOLERANCE)
+    return default if method is None else method
+
+
+def simulate(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    *,
+    revolutions: int,
+    samples: int = 64,
+    discard: int = 0,
+    start: State | BearingState | None = None,
+    method: AbstractMethod | None = None,
+) -> Trajectory:
+    """Time history at one speed.
+
+    **Arguments:** model; speed [rad/s] (of a whole bearing: of its shaft); revolutions recorded and discarded before
+    (of a whole bearing: of its cage); samples per revolution (they must divide the steps per revolution of a method
+    with fixed steps); initial state, by default the model's first start; integration method, by default
+    `jaxcage.native(1e-8)`, of a whole bearing `jaxcage.native(1e-5, 1e-2)`.
+
+    **Returns:** `Trajectory`; a run that fails, or is `inaccurate`, is NaN from there on and says why in `outcome`. A
+    whole bearing whose cage comes to rest, or leaves its land, is `outside`: `bearing_over_time` follows it over time.
+
+    **Raises:** `ValueError` for a speed that is not positive, or impossible counts.
+    """
+    require_x64()
+    require_known("simulate", INSTEAD, system, speed, start)
+    options: dict[str, Any] = dict(revolutions=revolutions, samples=samples, discard=discard)
+    return ramp(system, speed, speed, **options, start=start, method=method)  # one that does not rise
+
+
+def ramp(
+    system: AbstractForcedSystem,
+    first: Scalar,
+    last: Scalar,
+    *,
+    revolutions: int,
+    samples: int = 64,
+    discard: int = 0,
+    start: State | BearingState | None = None,
+    method: AbstractMethod | None = None,
+) -> Trajectory:
+    """Time history of a true speed ramp: the speed changes continuously, by the same amount in every revolution.
+
+    Within a revolution the speed rises in `samples` steps. The tangential force M e dw/dt of the unbalance is left out:
+    its ratio to M e w^2 is the relative change of speed in one radian.
+
+    **Arguments:** model; first and last speed [rad/s]; number of revolutions of the whole ramp; `discard`:
+    revolutions at the first speed before it, which are left out; the rest as in `simulate`.
+
+    **Returns:** `Trajectory` with the speed of each sample.
+    """
+    require_x64()
+    require_known("ramp", INSTEAD, system, first, last, start)
+    low, high = float(first), float(last)
+    require_speeds(system, (low, high))
+    require_counts(revolutions, samples, discard)
+    chosen = _chosen(system, method)
+    _require_fits(chosen, system, samples)
+    rise = (high - low) / revolutions
+    numbers = np.arange(-discard, revolutions)
+    rises = np.where(numbers < 0, 0.0, rise)
+    first_of = low + rise * np.maximum(numbers, 0)
+    comparable = min(system.comparable(low), system.comparable(high))
+    parts = min(max(1, math.ceil(REVOLUTION / samples / comparable - 1e-9)), MOST_PARTS)  # from sample to sample
+    places = samples * parts
+    speeds = (first_of[:, None] + rises[:, None] * ((np.arange(places) + 0.5) / places)).ravel()
+    turn = np.full(speeds.size, REVOLUTION / places) if system.beside else None
+    stretch = max(1, round(comparable * places / REVOLUTION))
+    course = _Course(Lanes.of([system], speeds), places, turn, stretch)
+    ran = _tried(course, _start(system, low, start), chosen)
+    states, code = _outcome(ran, stretch, chosen.allowed)
+
+    grid, dim = np.arange(samples) / samples, system.dimension
+    speed = (first_of[:, None] + rise * grid).ravel()[discard * samples :]
+    tau = REVOLUTION * (np.arange(first_of.size)[:, None] + grid).ravel()[discard * samples :]
+    spent = REVOLUTION / samples / (speed[:-1] + 0.5 * rise / samples)
+    time, states = np.concatenate([[0.0], np.cumsum(spent)]), states[discard * places :: parts]
+    if system.beside:
+        tau, speed = np.append(tau, tau[-1] + REVOLUTION / samples), np.append(speed, high)
+        time = states[:, dim + system.beside.index("time")]
+    else:
+        states = states[:-1]
+    excursion = course.lanes.begin(np.arange(0, speeds.size, places), ran.states[:-1:places])[1]
+    peak = float(np.fmax.reduce([*ran.peaks[discard * places :, -1], *excursion[discard:]]))
+    return Trajectory(
+        time,
+        tau,
+        states[:, :dim],
+        speed,
+        samples,
+        peak,
+        OUTCOMES[code],
+        float(ran.errors.max()),
+        beside=system.beside,
+        integrals=states[:, dim:],
+        watched=system.watched,
+        peaks=np.fmax.reduce(ran.peaks[discard * places :].reshape(-1, parts, len(system.watched)), axis=1),
+        steps=ran.steps / first_of.size,
+    )
+
+
+def bearing_over_time(
+    model: BearingModel,
+    speed: Scalar,
+    times: Float[np.ndarray, " n"],
+    *,
+    start: State | BearingState | None = None,
+    method: AbstractMethod | None = None,
+) -> Trajectory:
+    """Time history of a whole bearing with time as independent variable: for starting, coasting and free flight.
+
+    **Arguments:** model; shaft speed [rad/s]; ascending times of the samples [s], the first that of `start`; initial
+    state and integration method as in `simulate`.
+
+    **Returns:** `Trajectory`; its errors are those from sample to sample, its steps those of the whole run.
+
+    **Raises:** `ValueError` for times that do not ascend.
+    """
+    require_x64()
+    spans, value = np.diff(np.asarray(times, dtype=float)), float(speed)
+    if spans.size < 1 or not np.all(spans > 0):
+        raise ArgumentError("times", said="must be two or more that grow.")
+    system, chosen = BearingOverTime.of(model), _chosen(model, method)
+    _require_fits(chosen, system, 1)
+    course = _Course(Lanes.of([system], np.full(spans.size, value)), spans.size, spans, 1)
+    ran = _tried(course, _start(system, value, start), chosen)
+    states, code = _outcome(ran, 1, chosen.allowed)
+    dim = system.dimension
+    return Trajectory(
+        states[:, dim + 1],
+        states[:, dim],
+        states[:, :dim],
+        np.full(spans.size + 1, value),
+        spans.size,
+        float(np.fmax.reduce(ran.peaks[:, -1])),
+        OUTCOMES[code],
+        float(ran.errors.max()),
+        beside=system.beside,
+        integrals=states[:, dim:],
+        watched=system.watched,
+        peaks=ran.peaks,
+        steps=ran.steps,
+    )
