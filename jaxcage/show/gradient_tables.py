@@ -7,28 +7,29 @@ from typing import Any
 
 from .._parameters import EXTRA, parameter_info, parameters
 from ..design import LastingEdge, MeanGradient, SolvedEdge, ZoneWidth, zone_width
-from ..integrate import AbstractMethod
 from ..models import CageModel
 from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
+from ..solve import AbstractMethod
 from .tables import Beside, Column, Table, chosen, number, rows_table, speed_columns
 
 
 FIRST = ("guidance_gap", "eccentricity")
 """Parameters whose rows are always on top."""
 FIXED_RHO = "gap at fixed rho"
+"""Change of the gap with which the eccentricity grows, so that rho = e/C_r stays.
+
+With the printed unbalance, 2 M rho omega^2, that leaves the excitation alone: what remains of the gap's effect is that
+of clearance, film and land. With the physical one it does not.
+"""
 TURNED = ("drawing", "catalogue", "oil", "operating")
 """Kinds of parameters that a designer or a user chooses."""
-ONSET, EXIT = "zone 1 onset", "zone 1 exit"
-EXPECTED = (ONSET, EXIT, "zone 2 onset")
+EXPECTED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
 
 
-def at_fixed_rho(elasticity: Mapping[str, float]) -> float:
-    """Elasticity by the gap if the eccentricity grows with it, so that rho = e/C_r stays.
-
-    With the printed unbalance, 2 M rho omega^2, that leaves the excitation alone: what remains of the gap's effect is
-    that of clearance, film and land. With the physical one it does not.
-    """
-    return sum(elasticity[name] for name in FIRST) if set(FIRST) <= set(elasticity) else math.nan
+def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Parameters alone, and gap and eccentricity together."""
+    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
+    return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
 
 
 def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
@@ -58,24 +59,25 @@ def edge_slopes(
 
 
 def slope_record(name: str, slope: Sensitivity) -> dict[str, Any]:
-    """The gradient of an edge or width [rpm per SI unit] for a document."""
-    names = "kind error_rpm steps trusted status transversality derivative elasticity"
-    at = {"speed_rpm": slope.value_rpm, "elasticity_gap_at_fixed_rho": at_fixed_rho(slope.elasticity)}
-    return {"name": name, **at, **chosen(slope, names)}
+    """The gradient of an edge or a width [rpm per SI unit] for tables and documents."""
+    fixed = sum(slope.elasticity.get(n, math.nan) for n in FIRST)
+    at = {"name": name, "speed_rpm": slope.value_rpm, "elasticity_gap_at_fixed_rho": fixed}
+    return at | chosen(slope, "kind error_rpm steps trusted status transversality derivative elasticity homogeneity")
 
 
 def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Beside = None) -> Table:
     """Relative change of each edge by that of the parameters that are always on top."""
-    rows = [slope_record(edge, slope) | slope.elasticity for edge, slope in slopes.items()]
+    rows = [slope_record(edge, slope) for edge, slope in slopes.items()]
+    shown = [row | {n: row["elasticity"].get(n) for n in FIRST} for row in rows]
     columns = [
         Column("edge", (), key="name"),
         Column("by", (), key="kind"),
         *speed_columns("speed [rpm]", "speed_rpm", beside, "error_rpm"),
         *(Column(n.replace("_", " "), (), key=n, digits=4) for n in FIRST),
-        Column(FIXED_RHO, (), key="elasticity_gap_at_fixed_rho", digits=4),
         Column("status", ()),
     ]
-    return rows_table(f"Elasticities of the exact edges of {name}", rows, columns)
+    table = rows_table(f"Elasticities of the exact edges of {name}", shown, columns, "edges")
+    return dataclasses.replace(table, data=rows)
 
 
 def gradient_table(name: str, model: CageModel, slope: Sensitivity) -> Table:
@@ -83,51 +85,29 @@ def gradient_table(name: str, model: CageModel, slope: Sensitivity) -> Table:
 
     All is about the speed of the cage; that of the shaft also moves with all that enters their ratio.
     """
-    change = slope.elasticity
-    moving = sorted(
-        (n for n in slope.derivative if slope.derivative[n] != 0.0 or n in FIRST),
-        key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])),
-    )
-    info, value = parameter_info(model), parameters(model)
+    change, info, value = slope.elasticity, parameter_info(model), parameters(model)
+    moving = [n for n in slope.derivative if slope.derivative[n] != 0.0 or n in FIRST]
+    moving.sort(key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])))
     rows: list[dict[str, Any]] = [
         {"parameter": n, "value": float(value[n]), "unit": "" if info[n].unit == "1" else info[n].unit}
         | {"slope": slope.derivative[n], "elasticity": change[n]}
         for n in moving
     ]
-    if set(FIRST) <= set(change):
-        rows.insert(len(FIRST), {"parameter": FIXED_RHO, "elasticity": at_fixed_rho(change)})
+    rows.insert(len(FIRST), {"parameter": FIXED_RHO, "elasticity": sum(change.get(n, math.nan) for n in FIRST)})
     columns = [Column(head, ()) for head in ("parameter", "value", "unit")]
     columns += [Column("rpm of the cage per unit", (), key="slope"), Column("elasticity", (), digits=6)]
-    at = f"{number(slope.value_rpm, float(slope.error_rpm))} rpm of the cage, {slope.kind}"
+    title = f"{slope.name.capitalize()} of {name}: {number(slope.value_rpm, float(slope.error_rpm))} rpm, {slope.kind}"
     still = len(slope.derivative) - len(moving)
-    rest = f"; {still} other parameters do not move it" if still else ""
-    return rows_table(f"{slope.name.capitalize()} of {name}: {at}{rest}", rows, columns)
+    return rows_table(title + (f"; {still} other parameters do not move it" if still else ""), rows, columns)
 
 
 def missing_notes(edges: Mapping[str, Sensitivity]) -> list[str]:
-    """One line for each edge that one would expect and that is not there, or not to be trusted."""
+    """Edges that one would expect and that are not there or not to be trusted, and how good the gradients are."""
     notes = [f"There is no {name} in the range." for name in EXPECTED if name not in edges]
     notes += [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
-    if not all(name in edges and edges[name].trusted for name in (ONSET, EXIT)):
-        notes.append("Without both edges zone 1 has no width.")
-    return notes
-
-
-def homogeneity(edges: Mapping[str, Sensitivity]) -> dict[str, float | None]:
-    """Largest relative residual by which the gradients break the scaling that units impose."""
-    trusted = [edge.homogeneity for edge in edges.values() if edge.trusted]
-    return {base: max((abs(h[base]) for h in trusted), default=None) for base in ("mass", "length", "time")}
-
-
-def sources_document(i: int, explained: Explained, slopes: Mapping[str, Sensitivity]) -> dict[str, Any]:
-    """Bifurcations or cascades that the edges of a chaotic zone coincide with, and their gradients."""
-    found: dict[str, Any] = {}
-    for end in ("onset", "exit"):
-        source, name = explained.sources.get(f"zone {i} {end}"), f"chaotic zone {i} {end}"
-        points = [float(p.speed_rpm) for p in source.points] if isinstance(source, Cascade) else None
-        found[f"{end}_cascade_rpm"] = points
-        found[f"{end}_gradient"] = slope_record(name, slopes[name]) if name in slopes else None
-    return found
+    residuals = [abs(r) for e in edges.values() if e.trusted for r in e.homogeneity.values()]
+    worst = f"{max(residuals):.1e}" if residuals else "-"
+    return [*notes, f"Gradients against the scaling of units, largest relative residual: {worst}"]
 
 
 def source_notes(explained: Explained) -> list[str]:
@@ -144,116 +124,65 @@ def source_notes(explained: Explained) -> list[str]:
     return notes
 
 
-def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Parameters alone, and gap and eccentricity together."""
-    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
-    return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
+def _error_columns(names: Iterable[str], digits: int | None = None) -> list[Column]:
+    return [Column(n.replace("_", " "), (), key=n, errors=f"{n}_error", digits=digits) for n in _asked(names)]
 
 
-def _with_errors(found: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    return {n: value for n, (value, _) in found.items()} | {f"{n} error": error for n, (_, error) in found.items()}
-
-
-def lasting_records(edges: Mapping[str, LastingEdge]) -> list[dict[str, Any]]:
-    """Edges of lasting chaos and their elasticities, with standard errors, for a document."""
-    return [
-        {
-            "name": name,
-            **chosen(edge, "speed_rpm standard_error_rpm horizon status"),
-            "elasticity": {n: dict(zip(("value", "error"), edge.sum_of(*of))) for n, of in _asked(edge.names).items()},
-            "escapes": edge.fit.escapes,
-            "lanes": edge.fit.lanes,
-        }
-        for name, edge in edges.items()
-    ]
+def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) -> dict[str, float]:
+    return {f"{n}{end}": factor * x for n, pair in found.items() for end, x in zip(("", "_error"), pair, strict=True)}
 
 
 def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, beside: Beside = None) -> Table:
     """Edges of lasting chaos, and their elasticities."""
-    asked = _asked(next(iter(edges.values())).names)
+    names = next(iter(edges.values())).names
     rows = [
-        {"edge": each, **chosen(edge, "speed_rpm standard_error_rpm status")}
+        {"name": each, **chosen(edge, "speed_rpm standard_error_rpm horizon status")}
         | {"escapes": f"{edge.fit.escapes} of {edge.fit.lanes}"}
-        | _with_errors({n: edge.sum_of(*of) for n, of in asked.items()})
+        | _with_errors({n: edge.sum_of(*of) for n, of in _asked(names).items()})
         for each, edge in edges.items()
     ]
-    columns = [
-        Column("edge", ()),
-        *speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm"),
-        *(Column(n.replace("_", " "), (), key=n, errors=f"{n} error") for n in asked),
-        Column("escapes", ()),
-        Column("status", ()),
-    ]
+    columns = [Column("edge", (), key="name")]
+    columns += speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm")
+    columns += [*_error_columns(names), Column("escapes", ()), Column("status", ())]
     title = f"Elasticities of the edges of {name} at which the mean life of chaos passes {horizon} revolutions"
-    return rows_table(title, rows, columns)
+    return rows_table(title, rows, columns, "edges")
 
 
-def widths_of(edges: Mapping[str, SolvedEdge]) -> dict[str, ZoneWidth]:
-    """Widths of all zones of which an edge is known, by `zone 1` and the like."""
-    zones = dict.fromkeys(name.rpartition(" ")[0] for name in edges)
-    return {zone: zone_width(edges, int(zone.rpartition(" ")[2])) for zone in zones}
-
-
-def width_records(widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> list[dict[str, Any]]:
-    """Widths, and the change of each by 1 % more of a parameter [rpm]; None where an edge is not to be trusted."""
-    found = []
-    for name, width in widths.items():
-        changes = {n: width.change(*of) for n, of in _asked(names).items()} if width.trusted else {}
-        by = {n: {"value": 0.01 * value, "error": 0.01 * error} for n, (value, error) in changes.items()}
-        values = chosen(width, "width_rpm standard_error_rpm") if width.trusted else {}
-        found.append({"name": name, **values, "rpm_by_1_percent": by or None, **chosen(width, "open status")})
-    return found
-
-
-def width_table(title: str, widths: Mapping[str, ZoneWidth], names: Sequence[str]) -> Table:
-    """Widths, and what 1 % more of a parameter adds."""
+def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str]) -> Table:
+    """Widths of all zones of which an edge is known, and what 1 % more of a parameter adds."""
     rows = []
-    for record in width_records(widths, names):
-        by = record["rpm_by_1_percent"] or {}
-        changes = _with_errors({n: (each["value"], each["error"]) for n, each in by.items()})
-        rows.append(record | ({"width_rpm": "open"} if record["open"] else {}) | changes)
-    columns = [
-        Column("zone", (), key="name"),
-        Column("width [rpm]", (), key="width_rpm", errors="standard_error_rpm"),
-        *(Column(n.replace("_", " "), (), key=n, errors=f"{n} error", digits=1) for n in _asked(names)),
-        Column("status", ()),
-    ]
-    return rows_table(f"{title}, and what 1 % more of a parameter adds [rpm]", rows, columns)
+    for zone in dict.fromkeys(name.rpartition(" ")[0] for name in edges):
+        width: ZoneWidth = zone_width(edges, int(zone.rpartition(" ")[2]))
+        row = {"name": zone, **chosen(width, "open status")}
+        if width.trusted:
+            row |= chosen(width, "width_rpm standard_error_rpm")
+            row |= _with_errors({n: width.change(*of) for n, of in _asked(names).items()}, 0.01)
+        rows.append(row)
+    columns = [Column("zone", (), key="name"), Column("width", (), key="width_rpm", errors="standard_error_rpm")]
+    columns += [*_error_columns(names, 1), Column("status", ())]
+    return rows_table(f"{title}, and what 1 % more of a parameter adds [rpm]", rows, columns, "widths")
 
 
 def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
-    """Means with their errors, and a table of the elasticities of each, the largest first."""
-    rows = [{"name": name, **chosen(each, "value value_error unit explained")} for name, each in found.statistics.items()]
-    columns = [
-        Column("statistic", (), key="name"),
-        Column("mean", (), key="value", errors="value_error"),
-        Column("unit", ()),
-        Column("explained", (), "1", "%", digits=0),
-    ]
-    moved = []
+    """Elasticities of means with their errors, the largest first, and the means."""
+    rows, moved = [], []
     for name, each in found.statistics.items():
-        order = sorted(range(len(each.directions)), key=lambda i: -abs(each.elasticity[i]))
-        moved += [
-            {"name": name if first == 0 else "", "by": each.directions[i].replace("_", " ").replace("+", ", ")}
-            | {"elasticity": float(each.elasticity[i]), "error": float(each.elasticity_error[i])}
-            for first, i in enumerate(order)
-            if each.value
-        ]
-    by = [Column("statistic", (), key="name"), Column("by", ()), Column("elasticity", (), errors="error")]
-    return [rows_table(f"{title}: elasticities", moved, by), rows_table(f"{title}: means", rows, columns)]
-
-
-def mean_gradient_document(found: MeanGradient) -> dict[str, Any]:
-    """Derivatives by the logarithm of each direction, elasticities, and slopes by single parameters."""
-    rows = {}
-    for name, each in found.statistics.items():
-        by: dict[str, Any] = {}
-        for i, direction in enumerate(each.directions):
-            told = chosen(each, "elasticity elasticity_error by_relative_change by_relative_change_error")
-            by[direction] = {what: values[i] for what, values in told.items()}
+        by = {
+            direction: dict(zip(("elasticity", "error"), pair, strict=True))
+            for direction, *pair in zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
+        }
+        for direction in by:
             if "+" not in direction:
-                slope = zip(("slope_per_SI_unit", "slope_error_per_SI_unit"), found.slope(name, direction))
-                by[direction] |= dict(slope)
-        rows[name] = chosen(each, "unit value value_error drift drift_error settled explained") | {"by": by}
-    length = chosen(found.runs, "starts discard revolutions")
-    return chosen(found, "pairs failed inaccurate spread") | length | {"parameters": found.values, "statistics": rows}
+                by[direction] |= dict(zip(("slope", "slope_error"), found.slope(name, direction), strict=True))
+        names = "unit value value_error drift drift_error settled explained"
+        rows.append({"name": name, **chosen(each, names), "by": by})
+        order = sorted(by, key=lambda n: -abs(by[n]["elasticity"])) if each.value else []
+        words = lambda direction: direction.replace("_", " ").replace("+", ", ")
+        moved += [{"statistic": name, "by": words(n)} | by[n] for n in order]
+    elasticity = Column("elasticity", (), errors="error")
+    columns = [Column("statistic", (), key="name"), Column("mean", (), key="value", errors="value_error")]
+    columns += [Column("unit", ()), Column("explained", (), "1", "%", digits=0), Column("settled", ())]
+    return [
+        rows_table(f"Elasticities, {title}", moved, [Column("statistic", ()), Column("by", ()), elasticity]),
+        rows_table(f"Means, {title}", rows, columns, "statistics"),
+    ]

@@ -1,6 +1,5 @@
 """Quantities that a run reports, measures of one speed, statics, and two designs beside each other, as tables."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
@@ -10,9 +9,9 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._parameters import walk
-from ..analysis import Around, failed, named_lines, scatter
+from ..analysis import Around, Measures, OrderSpectrum, failed, named_lines, scatter
 from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
-from ..io import configuration
+from ..files import configuration
 from ..forces import ImpactHistory
 from .tables import SHOWN, Column, Table, rows_table, value_table
 
@@ -82,43 +81,31 @@ def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]
     return Table(title[:1].upper() + title[1:], [*columns, Column("differs", ["*" if d else "" for d in differs])])
 
 
-def measures_table(title: str, measures: Any) -> Table:
-    """Measures of one run, with the words that they declare."""
-    rows: list[tuple[str, Any, str]] = []
-    for field in dataclasses.fields(measures):
-        value, unit = getattr(measures, field.name), field.metadata["unit"]
-        if isinstance(value, dict):
-            rows += [(f"of it {name.replace('_', ' ')}", part, unit) for name, part in value.items()]
-        else:
-            rows.append((field.metadata["text"], value, unit))
-    return value_table(title, rows)
+def measures_table(title: str, found: Measures) -> Table:
+    """Quantities of one run with their standard errors."""
+    rows = [(quantity.text, value, quantity.unit) for quantity, value, _ in found.values()]
+    return value_table(title, rows, [error for _, _, error in found.values()])
 
 
 def circumference_table(found: Around) -> Table:
     """Slip, load and pocket force of the rollers around the bearing, an eighth of the circumference in a row."""
     eighths = [np.floor(found.angle / (2 * np.pi) * 8).astype(int) == i for i in range(8)]
     known = lambda f, x: [float(f(x[i])) if np.isfinite(x[i]).any() else math.nan for i in eighths]
-    columns = [
-        Column("position, load at 270°", [f"{45 * i} to {45 * (i + 1)}°" for i in range(8)]),
-        Column("slip", known(np.nanmean, found.roller_slip), "1", "%", digits=2),
-        Column("inner load", known(np.nanmean, found.inner_load), "N", digits=0),
-        Column("driving", known(np.nanmean, found.driving_force), "N", digits=2),
-        Column("braking", known(np.nanmean, found.braking_force), "N", digits=2),
-        Column("largest", known(np.nanmax, found.largest_force), "N", digits=0),
-    ]
+    columns = [Column("position, load at 270°", [f"{45 * i} to {45 * (i + 1)}°" for i in range(8)])]
+    columns.append(Column("slip", known(np.nanmean, found.roller_slip), "1", "%", digits=2))
+    for name, f in (("inner load", np.nanmean), ("driving force", np.nanmean), ("braking force", np.nanmean)):
+        columns.append(Column(name, known(f, getattr(found, name.replace(" ", "_"))), "N", digits=1))
+    columns.append(Column("largest force", known(np.nanmax, found.largest_force), "N", digits=0))
     return Table("Rollers around the bearing: slip, load, pocket force", columns)
 
 
-def line_tables(spectra: Mapping[str, Any], orders: Mapping[str, float]) -> list[Table]:
+def line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
     """Lines of the spectra with the bearing's frequencies."""
     words = {"cage_place": "cage's vertical position over the clearance", "pocket_force": "pockets on cage, vertical [N]"}
-    columns = [
-        Column("order of the cage's speed", (), key="order", digits=3),
-        Column("amplitude", ()),
-        Column("at the frequency of", (), key="name"),
-    ]
+    columns = [Column("order of the cage's speed", (), key="order", digits=3), Column("amplitude", ())]
+    columns.append(Column("at the frequency of", (), key="name"))
     each = {name: map(vars, named_lines(found, orders)) for name, found in spectra.items()}
-    return [rows_table(f"Spectrum, {words[name]}", rows, columns) for name, rows in each.items()]
+    return [rows_table(f"Spectrum, {words[name]}", rows, columns, f"spectrum_{name}") for name, rows in each.items()]
 
 
 def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
@@ -153,74 +140,53 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
     return value_table(title, rows)
 
 
-IMPACT = {
-    "approach_speed": ("approach speed", "m/s"),
-    "peak_contact_force": ("peak contact force", "N"),
-    "peak_bar_force": ("peak bar force", "N"),
-    "lowest_bar_force": ("lowest bar force", "N"),
-    "contact_duration": ("time in contact", "s"),
-    "contacts": ("contacts", "1"),
-    "impulse": ("impulse of the contact force", "N s"),
-}
-"""Words and units of what is read off an impact."""
+def impact_table(title: str, history: ImpactHistory, approach_speed: float) -> tuple[Table, dict[str, Any]]:
+    """Peaks, time in contact and impulse of an impact over its whole history, as a table and for a document.
 
-
-def impact_document(history: ImpactHistory) -> dict[str, Any]:
-    """Peaks, time in contact and impulse, over the whole history: a bar that swings back may be hit again."""
-    touching, bar = np.asarray(history.contact_force) > 0, np.asarray(history.bar_force)
-    return {
-        "peak_contact_force": float(np.max(history.contact_force)),
-        "peak_bar_force": float(np.max(bar)),
-        "lowest_bar_force": float(np.min(bar)),
-        "contact_duration": float(np.sum(touching)) * float(history.time[1] - history.time[0]),
-        "contacts": int(np.sum(touching[1:] & ~touching[:-1])),
-        "impulse": float(history.impulse),
-        "ends_in_contact": bool(touching[-1]),
-    }
-
-
-def impact_table(title: str, values: Mapping[str, Any]) -> Table:
-    """An impact in words; `values` are those of its document, and the speed of approach."""
-    ends = "yes, give a longer --duration" if values["ends_in_contact"] else "no"
-    rows = [(words, values[name], unit) for name, (words, unit) in IMPACT.items()]
-    return value_table(title, [*rows, ("still in contact at the end", ends, "1")])
-
-
-def differences(models: Sequence[Any]) -> dict[str, dict[str, Any]]:
-    """Text, both values [SI], unit and relative change of each parameter or choice in which two designs differ.
-
-    The keys are dotted names of the configuration.
+    A bar that swings back may be hit again.
     """
+    touching, bar = np.asarray(history.contact_force) > 0, np.asarray(history.bar_force)
+    duration = float(np.sum(touching)) * float(history.time[1] - history.time[0])
+    rows = {
+        "approach_speed": ("approach speed", approach_speed, "m/s"),
+        "peak_contact_force": ("peak contact force", float(np.max(history.contact_force)), "N"),
+        "peak_bar_force": ("peak bar force", float(np.max(bar)), "N"),
+        "lowest_bar_force": ("lowest bar force", float(np.min(bar)), "N"),
+        "contact_duration": ("time in contact", duration, "s"),
+        "contacts": ("contacts", int(np.sum(touching[1:] & ~touching[:-1])), "1"),
+        "impulse": ("impulse of the contact force", float(history.impulse), "N s"),
+        "ends_in_contact": ("still in contact at the end", bool(touching[-1]), "1"),
+    }
+    return value_table(title, rows.values()), {key: value for key, (_, value, _) in rows.items()}
+
+
+def differences(models: Sequence[Any]) -> list[dict[str, Any]]:
+    """Dotted name, text, both values [SI], unit and relative change of each parameter or choice in which two designs
+    differ."""
     flat = [_flat(configuration(model)) for model in models]
-    declared = [{".".join(path): (path, field) for path, field in walk(model)} for model in models]
-    found: dict[str, dict[str, Any]] = {}
+    about = {".".join(path): field.metadata for model in models for path, field in walk(model)}
+    found = []
     for path in dict.fromkeys([*flat[0], *flat[1]]):
         before, after = values = [each.get(path) for each in flat]
         if before == after:
             continue
-        known = next((each[path][1].metadata for each in declared if path in each), {})
-        info = known.get("parameter")
+        info = about.get(path, {}).get("parameter")
+        row = {"name": path, "text": (info.text if info else about.get(path, {}).get("text")) or path, "values": values}
         numbers = all(isinstance(v, float | int) and math.isfinite(v) for v in values)
-        found[path] = {
-            "text": (info.text if info else known.get("text")) or path,
-            "values": values,
-            "unit": info.unit if info else "1",
-            "change": after / before - 1 if numbers and before and (not info or info.unit != "K") else None,
-        }
+        change = after / before - 1 if numbers and before and (info is None or info.unit != "K") else None
+        found.append(row | {"unit": info.unit if info else "1", "change": change})
     return found
 
 
-def differences_table(names: Sequence[str], found: Mapping[str, Mapping[str, Any]]) -> Table:
+def differences_table(names: Sequence[str], models: Sequence[Any]) -> Table:
     """Every value in which two designs differ."""
-    cell = lambda value, unit: Column("", [value], unit).cells[0] if not isinstance(value, bool) else str(value)
-    rows = [
-        {"value": each["text"], "unit": SHOWN.get(each["unit"], each["unit"]), "change": each["change"]}
-        | {name: cell(value, each["unit"]) for name, value in zip(names, each["values"], strict=True)}
-        for each in found.values()
-    ]
-    columns = [Column("value", ()), *(Column(name, ()) for name in names), Column("unit", ())]
-    title = f"Differences between {' and '.join(names)}"
-    return rows_table(title, rows or [{"value": "none"}], [*columns, Column("change", (), "1", "%", digits=1)])
+    rows = differences(models)
+    for row in rows:
+        cells = Column("", [x if x is None or isinstance(x, float) else str(x) for x in row["values"]], row["unit"]).cells
+        row |= dict(zip(names, cells, strict=True)) | {"shown": SHOWN.get(row["unit"], row["unit"])}
+    columns = [Column("value", (), key="text"), *(Column(name, ()) for name in names), Column("unit", (), key="shown")]
+    columns.append(Column("change", (), "1", "%", digits=1))
+    return rows_table(f"Differences between {' and '.join(names)}", rows, columns, "differences", empty="nothing")
 
 
 def _flat(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> dict[str, Any]:

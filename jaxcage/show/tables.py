@@ -50,6 +50,8 @@ class Column:
     """Digits after the point; None takes those of the error, or four significant ones."""
     key: str = ""
     """Name in a document; the head if it is left out."""
+    nothing: str = NOTHING
+    """Cell of a value that is not known."""
 
     @property
     def unit_shown(self) -> str:
@@ -69,9 +71,9 @@ class Column:
 
     def _cell(self, value: Any, error: float | None) -> str:
         if value is None or isinstance(value, str):
-            return value or NOTHING
+            return value or self.nothing
         if not math.isfinite(float(value)):
-            return NOTHING
+            return self.nothing
         if isinstance(value, bool | np.bool_):
             return "yes" if value else "no"
         if isinstance(value, int | np.integer) and self.unit_shown == SHOWN.get(self.unit, self.unit):
@@ -104,6 +106,10 @@ class Table:
 
     title: str
     columns: Sequence[Column]
+    key: str = ""
+    """Name under which the records stand in a document; without one they do not."""
+    data: Sequence[Mapping[str, Any]] | None = None
+    """The records, where they hold more than the columns show."""
 
     @property
     def heads(self) -> list[str]:
@@ -117,7 +123,9 @@ class Table:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Numbers in SI units, row by row, for a document."""
+        """Numbers in SI units, or in the unit of the head, row by row, for a document."""
+        if self.data is not None:
+            return [dict(row) for row in self.data]
         found = [{(c.key or c.head): c.values[i] for c in self.columns} for i in range(len(self))]
         for column in self.columns:
             if column.errors is not None and not isinstance(column.errors, str):
@@ -153,25 +161,20 @@ def table(title: str, found: xr.Dataset, columns: Mapping[str, str | Column], er
     return Table(title, made)
 
 
-def rows_table(title: str, rows: Iterable[Mapping[str, Any]], columns: Iterable[Column]) -> Table:
-    """A table of records: each column takes the values, and the errors, under its keys."""
-    found = list(rows)
-    pick = lambda key: [row.get(key) for row in found]
+def rows_table(
+    title: str, rows: Iterable[Mapping[str, Any]], columns: Iterable[Column], key: str = "", empty: str = "none"
+) -> Table:
+    """A table of records, which stand in a document under `key`: each column takes the values, and the errors, under
+    its keys. Without a record there is a row that says `empty`."""
+    found, columns = list(rows), list(columns)
+    shown = found or [{columns[0].key or columns[0].head: empty}]
+    pick = lambda key: [row.get(key) for row in shown]
 
     def filled(column: Column) -> Column:
         errors = pick(column.errors) if isinstance(column.errors, str) else column.errors
         return dataclasses.replace(column, values=pick(column.key or column.head), errors=errors)
 
-    return Table(title, [filled(column) for column in columns])
-
-
-def speed_columns(head: str, key: str, beside: Beside, errors: str | None = None, digits: int | None = 0) -> list[Column]:
-    """Columns for `rows_table` of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
-    own = Column(head, (), key=key, errors=errors, digits=None if errors else digits)
-    if beside is None:
-        return [own]
-    whose, ratio = beside
-    return [own, Scaled(whose, (), key=key, digits=digits or 0, ratio=ratio)]
+    return Table(title, [filled(column) for column in columns], key, found)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,22 +184,31 @@ class Scaled(Column):
     ratio: float = 1.0
 
     def _cell(self, value: Any, error: float | None) -> str:
-        return super()._cell(value if value is None or isinstance(value, str) else self.ratio * float(value), error)
+        return super()._cell(value if value is None or isinstance(value, str) else self.ratio * float(value), None)
 
 
-def shares_table(title: str, sort: str, counts: Mapping[str, int], unit: str = "lanes") -> Table:
+def speed_columns(
+    head: str, key: str, beside: Beside, errors: str | None = None, digits: int = 0, nothing: str = NOTHING
+) -> list[Column]:
+    """Columns for `rows_table` of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
+    own = Column(head, (), key=key, errors=errors, digits=None if errors else digits, nothing=nothing)
+    return [own] if beside is None else [own, Scaled(beside[0], (), key=key, digits=digits, ratio=beside[1])]
+
+
+def shares_table(title: str, sort: str, counts: Mapping[str, int]) -> Table:
     """Numbers of each sort, and their shares of all."""
     total = sum(counts.values())
-    shares = [n / total for n in counts.values()] if total else [None] * len(counts)
-    return Table(title, [Column(sort, list(counts)), Column(unit, list(counts.values())), Column("share", shares, "1", "%", digits=1)])
+    shares = Column("share", [n / total for n in counts.values()], "1", "%", digits=1)
+    return Table(title, [Column(sort, list(counts)), Column("number", list(counts.values())), shares])
 
 
-def value_table(title: str, rows: Iterable[tuple[str, Any, str]]) -> Table:
-    """A table of quantities: their words, values and SI units."""
-    found = [(what, Column("", [value], unit)) for what, value, unit in rows]
-    units = [column.unit_shown if not isinstance(column.values[0], str) else "" for _, column in found]
-    columns = [Column("quantity", [what for what, _ in found]), Column("value", [c.cells[0] for _, c in found])]
-    return Table(title, [*columns, Column("unit", units)])
+def value_table(title: str, rows: Iterable[tuple[str, Any, str]], errors: Sequence[float] | None = None) -> Table:
+    """A table of quantities: their words, values and SI units, and standard errors."""
+    found = list(rows)
+    each = [Column("", [value], unit, errors=[e]) for (_, value, unit), e in zip(found, errors or [math.nan] * len(found))]
+    units = ["" if isinstance(column.values[0], str) else column.unit_shown for column in each]
+    words = Column("quantity", [what for what, _, _ in found])
+    return Table(title, [words, Column("value", [c.cells[0] for c in each]), Column("unit", units, nothing="")])
 
 
 def chosen(found: object, names: str) -> dict[str, Any]:
