@@ -99,5 +99,5 @@ def test_numbers_that_no_formula_takes_are_refused():
     """Found by random calls: a whole number beyond 64 bits, and a gap that divides by nothing."""
     with pytest.raises(ValueError, match="`tau` must be a number, of 64 bits if it is whole"):
         jc.forces.synchronous_force(tau=2**63, amplitude=1.0)
-    with pytest.raises(ValueError, match="`guidance_gap` must be positive and finite"):
-        jc.bearing.guiding_radius(92.1e-3, 0.0)
+    with pytest.raises(ValueError, match="`raceway_diameter` must be positive and finite"):
+        jc.bearing.raceway_surface_speed(1.0, 0.0)

@@ -314,7 +314,7 @@ def test_exponents_in_other_units(speed, gap, scales):
     model = jc.replace(CASE, guidance_gap=float(CASE.guidance_gap) * gap)
     options = dict(discard=2, revolutions=10, blocks=2, keep=1, exponents=1, method=EXPLICIT)
     here = raw_sweep(model, speed, **options)
-    with mock.patch("jaxcage.models._door.FASTEST", np.inf):
+    with mock.patch("jaxcage.models.cage.FASTEST", np.inf):
         there = raw_sweep(rescaled(model, jnp.asarray(scales)), speed / scales[2], **options)
     np.testing.assert_allclose(there.block_growth, here.block_growth, rtol=0, equal_nan=False, atol=1e-7)
     np.testing.assert_allclose(there.last / there.scale, here.last / here.scale, rtol=0, equal_nan=False, atol=1e-7)
@@ -326,7 +326,7 @@ def test_exponents_in_other_units(speed, gap, scales):
 def test_orbits_in_other_units(speed, scales):
     here = jc.periodic_orbit(CASE, speed, revolutions=60, method=EXPLICIT)
     other = rescaled(CASE, jnp.asarray(scales))
-    with mock.patch("jaxcage.models._door.FASTEST", np.inf):
+    with mock.patch("jaxcage.models.cage.FASTEST", np.inf):
         there = jc.periodic_orbit(other, speed / scales[2], revolutions=60, method=EXPLICIT)
     assert here.status == there.status == "converged"
     np.testing.assert_allclose(there.multipliers, here.multipliers, rtol=0, equal_nan=False, atol=1e-9)

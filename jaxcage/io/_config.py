@@ -26,13 +26,13 @@ from typing import Any, Generic, TypeVar, get_args
 import equinox as eqx
 
 from .._checks import require_x64
-from .._parameters import must_be_given, parameter_paths
+from .._parameters import fields_from, must_be_given, parameter_paths
 from ..bearing import BEARINGS, PUBLISHED_CASES, Bearing, vg
 from ..forces import PocketImpact
-from ..models import WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
+from ..models import NEEDED, WHOLE_BEARINGS, BearingModel, CageModel, case, whole_bearing
 from ._files import read_bytes
 from ._ranges import Range
-from ._schema import KINDS, ConfigError, Known, read_value, submodules, values
+from ._schema import ConfigError, Known, read_value, submodules, values
 from ._speeds import WHOSE, Whose
 from ._template import Subject, left_as_written
 from ._units import printable, shown
@@ -260,25 +260,21 @@ def _build_chosen(
     table = dict(table)
     kind = options[0]
     if len(options) > 1:
-        names = [name for name, law in KINDS.items() if law in options]
-        given = table.pop("kind", None if start is None else kind_name(start))
+        names = [law.kind for law in options]
+        given = table.pop("kind", getattr(start, "kind", None))
         if given not in names:
             given = "missing" if given is None else shown(given)
             raise ConfigError(f"`{_dotted(path, 'kind')}` must be one of {', '.join(names)}, but is {given}.")
-        kind = KINDS[given]
+        kind = options[names.index(given)]
     return _build(kind, table, start if isinstance(start, kind) else None, path, ranges)
-
-
-def kind_name(module: eqx.Module) -> str:
-    """Name of a law in a configuration."""
-    return next(name for name, law in KINDS.items() if type(module) is law)
 
 
 def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[str, ...]) -> eqx.Module:
     if "oscillator" in submodules(kind):
         arguments.setdefault("oscillator", PocketImpact())
     without = [f.name for f in dataclasses.fields(kind) if f.default is f.default_factory is dataclasses.MISSING]
-    missing = [_dotted(path, name) for name in without if name not in arguments]
+    each = [name for field in without for name in (NEEDED if field == "forces" else (field,))]
+    missing = [_dotted(path, name) for name in each if name not in arguments and "forces" not in arguments]
     if missing:
         example = "nu2310" if kind is BearingModel else "1a"
         hint = "" if path else f', unless `base = "{example}"` or the like gives the rest'
@@ -288,7 +284,7 @@ def _construct(kind: type[eqx.Module], arguments: dict[str, Any], path: tuple[st
         before = " and ".join(_OLD[f.name] for f in readings)
         raise ConfigError(f"{said}; before, a file without {'them' if len(readings) > 1 else 'it'} meant {before}.")
     try:
-        return kind(**arguments)
+        return kind(**fields_from(kind, arguments))
     except ValueError as error:
         raise ConfigError(f"Table `{_dotted(path) or 'top level'}`: {error}") from error
 

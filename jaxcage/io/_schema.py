@@ -13,18 +13,9 @@ import equinox as eqx
 from .._arguments import options
 from .._errors import InputError
 from .._parameters import ParameterInfo, allowed as must_be, within
-from ..forces import ElasticRib, RigidRib, RollerPassImpact, SynchronousImpact
+from ..forces import LAWS
 from ._ranges import Range, is_range, read_range
 from ._units import printable, shown, to_si
-
-
-KINDS: dict[str, type[eqx.Module]] = {
-    "synchronous": SynchronousImpact,
-    "roller_pass": RollerPassImpact,
-    "rigid": RigidRib,
-    "elastic": ElasticRib,
-}
-"""Names in a configuration for the laws between which a table chooses with `kind`."""
 
 
 class ConfigError(InputError):
@@ -41,10 +32,15 @@ def module_types(annotation: Any) -> tuple[type[eqx.Module], ...]:
 
 
 def submodules(kind: type[eqx.Module]) -> dict[str, tuple[type[eqx.Module], ...]]:
-    """Field name -> the modules it admits, for the fields of `kind` that are tables."""
-    hints = typing.get_type_hints(kind)
-    found = {field.name: module_types(hints[field.name]) for field in dataclasses.fields(kind)}
-    return {name: options for name, options in found.items() if options}
+    """Table name -> the modules it admits, for the fields of `kind` that are tables, and for its laws."""
+    hints, found = typing.get_type_hints(kind), {}
+    for field in dataclasses.fields(kind):
+        if field.name == "forces":
+            for law in LAWS:
+                found[law.law_name] = (*found.get(law.law_name, ()), law)
+        elif options := module_types(hints[field.name]):
+            found[field.name] = options
+    return found
 
 
 def values(kind: type[eqx.Module]) -> Iterator[dataclasses.Field]:

@@ -10,7 +10,6 @@ from typing import Any
 import equinox as eqx
 
 from ..models import BearingModel, CageModel
-from ._config import kind_name
 from ._files import replacing
 from ._ranges import Range
 from ._schema import ConfigError, submodules, values
@@ -42,9 +41,8 @@ def _table(module: eqx.Module) -> dict[str, Any]:
     plain = lambda f: float(getattr(module, f.name)) if "parameter" in f.metadata else getattr(module, f.name)
     table: dict[str, Any] = {f.name: plain(f) for f in fields}
     for name, options in submodules(type(module)).items():
-        below = getattr(module, name)
-        kind = {"kind": kind_name(below)} if len(options) > 1 else {}
-        table[name] = kind | _table(below)
+        if (below := getattr(module, name, None)) is not None:
+            table[name] = ({"kind": below.kind} if len(options) > 1 else {}) | _table(below)
     return table
 
 

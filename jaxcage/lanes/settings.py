@@ -6,8 +6,8 @@ from typing import Any
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD
-from ..solve import AbstractMethod, native
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod, native
 
 
 @dataclasses.dataclass(frozen=True)

@@ -150,8 +150,8 @@ def check_study(path: str | Path) -> StoreState:
 def open_study(path: str | Path) -> xr.Dataset:
     """The results of a study so far, read from disk when they are used.
 
-    Lanes that have not been run are NaN with the label and outcome `pending`. Reading a chunk that does not agree with its
-    checksum is a `ValueError` of zarr's; running the study again computes it again.
+    Lanes that have not been run are NaN with the label and outcome `pending`. Reading a chunk that does not agree with
+    its checksum is a `ValueError` of zarr's; running the study again computes it again.
 
     **Raises:** `FileNotFoundError`; `DamagedStore`, a `ValueError`, if it cannot be opened.
     """

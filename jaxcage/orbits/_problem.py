@@ -8,7 +8,7 @@ derivative with respect to any number of design parameters costs no more than on
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import equinox as eqx
 import jax
@@ -17,7 +17,6 @@ import jax.numpy as jnp
 from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
-from .._errors import ArgumentError
 from .._parameters import Parameter as Parameter, pick as pick
 from .._types import Scalar
 from ..models import AbstractForcedSystem

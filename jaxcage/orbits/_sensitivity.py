@@ -27,7 +27,6 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from .._parameters import get, parameter_dimensions, parameter_paths, parameters
-from ..bearing import checked_before
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import AbstractMethod, cores
 from ._bifurcation import TANGENTIAL, Singular, critical_rate
@@ -107,8 +106,7 @@ def _expand(problem: OrbitProblem, given: Given, u: Float[Array, " n"]) -> _Expa
 def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> AbstractForcedSystem:
     """d(weight . k) / d system."""
     row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed)))[0]
-    with checked_before():
-        _, pull = eqx.filter_vjp(row, given.system)
+    _, pull = eqx.filter_vjp(row, given.system)
     return pull(weight)[0]
 
 

@@ -10,9 +10,9 @@ from matplotlib.transforms import offset_copy
 from scipy.optimize import isotonic_regression
 
 from .._errors import ArgumentError
-from ..quantities import component_names, quantity
 from ..analysis import Sweep
 from ..orbits import Branch, Point
+from ..quantities import component_names, quantity
 from ._orbit_diagram import label_speed, orbit_diagram
 from ._style import (
     BLACK,

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from ..quantities import quantity
 from ..analysis import Sweep, Zones
+from ..quantities import quantity
 from ._marks import shade_zones
 from ._orbit_diagram import exponent_strip, label_speed, legend_below, orbit_diagram
 from ._shaft import add_shaft_axes

@@ -8,8 +8,8 @@ from jaxtyping import Complex
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
-from ..quantities import quantity
 from ..orbits import Branch, Point
+from ..quantities import quantity
 from ._branches import mark_of, move_apart, words
 from ._style import BLACK, BLUE, GREY, Halo, axes_or_new
 

@@ -5,9 +5,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
-from ..quantities import component_names, quantity
 from ..analysis import CHAOS_THRESHOLD, Sweep, Zones
 from ..bearing import PublishedCase
+from ..quantities import component_names, quantity
 from ._marks import mark_published, shade_zones
 from ._style import (
     BLACK,

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from .._errors import ArgumentError
-from ..quantities import quantity
 from ..orbits import Curve
+from ..quantities import quantity
 from ._branches import mark_of, runs
 from ._elasticities import readable
 from ._orbit_diagram import label_speed

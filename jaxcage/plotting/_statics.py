@@ -5,9 +5,9 @@ of the paper's fig. 5.
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..quantities import quantity
 from ..bearing import LoadDistribution
 from ..forces import ImpactHistory
+from ..quantities import quantity
 from ._style import BLUE, GREY, VERMILION, axes_or_new, shown
 
 

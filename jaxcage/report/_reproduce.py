@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..quantities import quantity
 from .._parameters import replace
 from ..analysis import Sweep, Zone, Zones, zones
 from ..bearing import PUBLISHED_CASES, PUBLISHED_SPEED_RANGE_RPM, PublishedCase, load_distribution
@@ -16,6 +15,7 @@ from ..forces import PocketImpact, approach_speed, impact_history
 from ..models import CageModel
 from ..orbits import LossZones, loss_zones, synchronous_orbits
 from ..plotting import mark_published, new_figure, orbit_diagram, published_edges
+from ..quantities import quantity
 from ..sweeps import rpm, sweep, sweep_designs
 from ._statics import displacements
 from ._table import Table, number

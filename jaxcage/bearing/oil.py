@@ -1,8 +1,8 @@
 """Viscosity of the oil at its temperature.
 
-The paper heads its last column "dynamic viscosity exponent (Pa s)" and prints VG56, VG78 and VG32.
-Two of them are not ISO grades and VG is not in Pa s: it is read here as the kinematic viscosity in
-mm^2/s at 40 C, so that VG56 has 870 kg/m^3 * 56 mm^2/s = 0.04872 Pa s.
+The paper heads its last column "dynamic viscosity exponent (Pa s)" and prints VG56, VG78 and VG32. Two of them are not
+ISO grades and VG is not in Pa s: it is read here as the kinematic viscosity in mm^2/s at 40 C, so that VG56 has
+870 kg/m^3 * 56 mm^2/s = 0.04872 Pa s.
 """
 
 from typing import Any
@@ -12,11 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
+from .._arguments import is_concrete, require_above_zero
 from .._errors import ArgumentError
 from .._parameters import ROUNDING, parameter
 from .._types import Scalar
-from ._validate import is_concrete, require_positive
 
 
 CELSIUS_40 = 313.15
@@ -36,13 +35,11 @@ def walther_viscosity(
 ) -> Array:
     """Kinematic viscosity by ASTM D341 (Walther): lg lg(nu/nu_0 + 0.7) is linear in lg T.
 
-    The constants of the line come from the two points, so the value at `temperature_1` is
-    `viscosity_1` whatever the second point is. The form holds above 2 mm^2/s, where the further
-    terms of the standard vanish.
+    The constants of the line come from the two points, so the value at `temperature_1` is `viscosity_1` whatever the
+    second point is. The form holds above 2 mm^2/s, where the further terms of the standard vanish.
 
-    **Arguments:** temperatures [K], viscosities [m^2/s]; `reference` is nu_0 = 1 mm^2/s [m^2/s],
-    the unit inside the double logarithm, an argument so that it can be differentiated and rescaled
-    like every dimensional constant.
+    **Arguments:** temperatures [K], viscosities [m^2/s]; `reference` is nu_0 = 1 mm^2/s [m^2/s], the unit inside the
+    double logarithm, an argument so that it can be differentiated and rescaled like every dimensional constant.
 
     **Returns:** kinematic viscosity [m^2/s].
     """
@@ -74,7 +71,6 @@ class Lubricant(eqx.Module):
             raise ArgumentError(
                 "temperature_2", said=f"must differ from `temperature_1`, but both are {float(first):g} K."
             )
-
         points = self.viscosity_1, self.viscosity_2
         if is_concrete(first, second, *points):
             hotter = np.asarray(second) > np.asarray(first)
@@ -104,7 +100,7 @@ class Lubricant(eqx.Module):
         return jnp.asarray(self.density * self.kinematic_viscosity)
 
     def doubts(self) -> list[str]:
-        """A sentence where the oil is thinner than its law holds for, none elsewhere; concrete values."""
+        """A list with one sentence if the oil is thinner than its law allows, else empty; concrete values."""
         viscosity = float(self.kinematic_viscosity)
         if viscosity >= THINNEST * (1 - ROUNDING):
             return []
@@ -117,16 +113,14 @@ class Lubricant(eqx.Module):
 def vg(grade: Scalar, temperature: Scalar = CELSIUS_40) -> Lubricant:
     """A mineral oil of viscosity index about 95 by its grade, e.g. 56: its mm^2/s at 40 C.
 
-    The second point, at 100 C, is 7.54 mm^2/s (grade/56)^0.644: a power law through the viscosities
-    at 100 C that solve ASTM D2270 for an index of 95 (5.29, 6.64, 7.52, 8.53, 9.35 and 11.07 mm^2/s
-    for grades 32, 46, 56, 68, 78 and 100), which it meets within 1.1 %. At 40 C, the default, the
-    second point has no influence. Density 870 kg/m^3.
+    The second point, at 100 C, is 7.54 mm^2/s (grade/56)^0.644: a power law through the viscosities at 100 C that solve
+    ASTM D2270 for an index of 95 (5.29, 6.64, 7.52, 8.53, 9.35 and 11.07 mm^2/s for grades 32, 46, 56, 68, 78 and 100),
+    which it meets within 1.1 %. At 40 C, the default, the second point has no influence. Density 870 kg/m^3.
 
     **Arguments:** grade [mm^2/s at 40 C], operating temperature [K].
     """
-    require_above_zero(temperature=temperature)
-    known = require_positive("grade", grade)
-    given: Any = np.asarray(known) if is_concrete(known) else known  # no programs for what NumPy can do
+    require_above_zero(grade=grade, temperature=temperature)
+    given: Any = np.asarray(grade, dtype=float) if is_concrete(grade) else grade  # NumPy compiles no program
     return Lubricant(
         density=870.0,
         viscosity_1=1e-6 * given,

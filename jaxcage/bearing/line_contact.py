@@ -59,8 +59,8 @@ def series_stiffness(inner: Scalar, outer: Scalar) -> Array:
 def _inner_share(total: Array, inner: Array, outer: Array, centrifugal: Array) -> Array:
     """Share of the inner contact in the total approach of a loaded roller.
 
-    Solves x + delta_o(x)/total = 1. The left side is convex and increasing, and the start is at or
-    above the root, so that Newton's method descends to it.
+    It solves x + delta_o(x)/total = 1. The left side is convex and increasing, and the start is at or above the root,
+    so that Newton's method descends to it.
     """
 
     def residual(x: Array, args: tuple[Array, ...]) -> Array:
@@ -71,18 +71,17 @@ def _inner_share(total: Array, inner: Array, outer: Array, centrifugal: Array) -
     args = total, inner, outer, centrifugal
     start = 1 - line_contact_approach(outer, centrifugal) / total
     solver = optx.Newton(rtol=1e-13, atol=1e-13)
-    return optx.root_find(residual, solver, start, args, max_steps=64).value
+    return optx.root_find(residual, solver, start, args, max_steps=64, throw=False).value
 
 
 def raceway_loads(approach: Scalar, inner: Scalar, outer: Scalar, centrifugal: Scalar) -> tuple[Array, Array]:
     """Loads of one roller on both raceways under a given approach of the raceways, (3), (4), (10).
 
     The centrifugal force acts on the outer raceway only: Q_o = Q_i + F_cen. The approach splits as
-    delta = (Q_i/K_i)^0.9 + ((Q_i + F_cen)/K_o)^0.9, which is solved for Q_i. A roller that F_cen
-    presses into the outer raceway by more than delta is clear of the inner one, Q_i = 0.
+    delta = (Q_i/K_i)^0.9 + ((Q_i + F_cen)/K_o)^0.9, which is solved for Q_i. A roller that F_cen presses into the outer
+    raceway by more than delta is clear of the inner one, Q_i = 0.
 
-    **Arguments:** total approach of the raceways [m] (negative: apart), stiffnesses [N/m^(10/9)],
-    centrifugal force [N].
+    **Arguments:** total approach [m] (negative: apart), stiffnesses [N/m^(10/9)], centrifugal force [N].
 
     **Returns:** Q_i and Q_o [N].
     """

@@ -1,5 +1,7 @@
 """The rib that guides the cage: rigid, or a mass on its own elastic support."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
@@ -11,7 +13,7 @@ from .._types import Scalar
 def rib_force(
     x: Scalar, y: Scalar, vx: Scalar, vy: Scalar, stiffness: Scalar, damping: Scalar, cubic: Scalar
 ) -> tuple[Array, Array]:
-    """-(K_O + K_O3 |r|^2) r - B_O r' [N]: what holds an elastic rib in place."""
+    """-(K_O + K_O3 |r|^2) r - B_O r' [N]: the force that holds an elastic rib in place."""
     hardening = stiffness + cubic * (x * x + y * y)
     return jnp.asarray(-hardening * x - damping * vx), jnp.asarray(-hardening * y - damping * vy)
 
@@ -19,9 +21,13 @@ def rib_force(
 class RigidRib(eqx.Module):
     """A rib that does not move: the cage has two coordinates."""
 
+    kind: ClassVar[str] = "rigid"
+
 
 class ElasticRib(eqx.Module):
     """A rib of finite mass on a nonlinear spring and a damper: cage and rib have four coordinates together."""
+
+    kind: ClassVar[str] = "elastic"
 
     mass: Scalar = parameter("kg", 1e-3, 100.0, "rib mass M_O", kind="drawing")
     stiffness: Scalar = parameter(

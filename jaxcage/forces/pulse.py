@@ -22,12 +22,12 @@ from .._types import Scalar
 
 NODES = 16
 SWEEPS = 14
-"""Of fixed-point iteration in a step."""
+"""Fixed-point iterations in a step."""
 CONVERGED = 1e-13
 SMOOTH = 1e-9
 """Largest last Legendre coefficient of a step; what follows from a step is as good as its square."""
 PHASE = 8.0
-"""Of the highest harmonic in a step [rad], in which time runs unevenly."""
+"""Largest phase of the highest harmonic in a step [rad], in which time runs unevenly."""
 MOST_STEPS = 20_000
 
 
@@ -46,7 +46,7 @@ INNER, WHOLE, LAST = _collocation()
 
 
 class _Motion(NamedTuple):
-    """Where roller and bar are."""
+    """Motion of roller and bar."""
 
     w: Array
     r: Array

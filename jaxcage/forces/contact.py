@@ -5,15 +5,14 @@ the coefficient of restitution e by the exact law of this model, ln[(1 + chi)/(1
 exponent: integrate m dv/dt = -K p^n (1 + chi v/v_0) over one contact, entered at v_0 and left at -e v_0.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
-from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows
-from ._smooth import power_10_9, root_9, smooth_plus, smooth_plus_slope
+from .elementary import power_10_9, root_9, smooth_plus, smooth_plus_slope
+from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion, Rows
 
 
 def _restitution_defect(s: Array, e: Array) -> Array:
@@ -61,8 +60,10 @@ def contact_slopes(penetration: Scalar, rate: Scalar, stiffness: Scalar, damping
     )
 
 
-class LandContact(eqx.Module):
+class LandContact(AbstractLaw):
     """The contact of the cage's guiding lands with the rib."""
+
+    law_name = "contact"
 
     stiffness: Scalar = parameter(
         "N/m^(10/9)",

@@ -8,7 +8,7 @@ from jaxtyping import Array
 
 from .._parameters import choice, parameter
 from .._types import Scalar
-from ._motion import AbstractForce, Force, GuidedCage, Motion, Rows
+from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion, Rows
 
 
 Cross = Literal["circulatory", "as_printed"]
@@ -55,8 +55,10 @@ def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffnes
     return jnp.asarray(absolute if reading == "absolute" else relative * stiffness / clearance**2)
 
 
-class Support(eqx.Module):
+class Support(AbstractLaw):
     """Stiffness and damping between cage and rib; none of the values is printed in the paper."""
+
+    law_name = "support"
 
     stiffness_x: Scalar = parameter(
         "N/m",

@@ -1,4 +1,6 @@
-"""Unbalance of the cage: the centrifugal force of its mass centre, in the physical and in the printed reading."""
+"""Forces of the cage's own mass: its weight, y pointing up, and the centrifugal force of its mass centre, in the
+physical and in the printed reading.
+"""
 
 from typing import Literal
 
@@ -7,8 +9,8 @@ from jaxtyping import Array
 
 from .._arguments import require_above_zero
 from .._types import Scalar
-from ._motion import AbstractForcing, Force, Motion
-from ._phase import cos_sin
+from .elementary import cos_sin
+from .law import AbstractForcing, Force, Motion
 
 
 UnbalanceReading = Literal["physical", "as_printed"]
@@ -43,3 +45,19 @@ class UnbalanceForce(AbstractForcing):
 
     def force(self, motion: Motion) -> Force:
         return *unbalance_force(motion.phase, self.unbalance, motion.cage_speed), 0.0
+
+
+def weight(mass: Scalar, gravity: Scalar) -> tuple[Array, Array]:
+    """-M g along y [N], with mass [kg] and gravity [m/s^2]."""
+    force = jnp.asarray(mass * gravity)
+    return jnp.zeros_like(force), -force
+
+
+class WeightForce(AbstractForcing):
+    """Weight of the cage."""
+
+    weight: Scalar
+    """M g [N]."""
+
+    def force(self, motion: Motion) -> Force:
+        return 0.0, -self.weight, 0.0

@@ -1,130 +1,26 @@
-"""The forced-system protocol: any y' = f(tau, y; speed) that is 2 pi-periodic in its phase tau = speed * t.
+"""Systems from a user's function, of first or second order, with the checks of what the function returns."""
 
-Everything above this layer (integration, analysis, design) works on `AbstractForcedSystem` and knows nothing of cages.
-`ForcedSystem` and `ForcedOscillator` wrap a user's function; `CageModel` is one of our own.
-"""
-
-import abc
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array
 
 from .._arguments import checked, require_at_least, shown
-from .._errors import ArgumentError
+from .._errors import ArgumentError, InputError
 from .._types import Scalar, State
-from ..quantities import Quantity
-from ._field import AbstractField, FirstOrderField, SecondOrderField
-from ._user_law import components, require_repeats
+from .field import AbstractField, FirstOrderField, SecondOrderField
+from .protocol import AbstractForcedSystem, told
 
 
-ESCAPE = 2.0
-"""Excursion beyond which a lane has left the model for good."""
 MOST_HARMONICS = 4096
-"""Of a law: a sweep takes a few steps in the period of the highest."""
+"""Highest harmonic that a law may declare: a sweep takes a few steps in its period."""
 Numbers = Sequence[Scalar] | np.ndarray | Array
-
-
-class AbstractForcedSystem(eqx.Module):
-    """What integration and analysis ask of a system."""
-
-    @property
-    @abc.abstractmethod
-    def dimension(self) -> int:
-        """Number of state components; a second-order system has its velocities behind its coordinates."""
-
-    @property
-    def beside(self) -> tuple[str, ...]:
-        """Names of the quantities that are integrated beside the state; the state does not follow from them."""
-        return ()
-
-    @property
-    def beside_start(self) -> tuple[float, ...]:
-        """Values of the quantities beside the state at the beginning of a run."""
-        return (0.0,) * len(self.beside)
-
-    @property
-    def watched(self) -> tuple[str, ...]:
-        """Names of the quantities whose largest values are recorded."""
-        return ("excursion",)
-
-    @property
-    def samples(self) -> int:
-        """Number of strobe states of a revolution that a sweep records."""
-        return 1
-
-    def comparable(self, speed: float) -> float:
-        """Phase [rad] over which a run is compared with a more exact one: its error is stated for such a stretch."""
-        return 2 * math.pi
-
-    @property
-    def harmonics(self) -> int:
-        """The highest harmonic of the revolution in the forcing, a static number; 1 by default.
-
-        Fewer than two steps in its period cannot tell it from a slower one, whatever an error estimate says. A system
-        of one's own whose law holds cos(k tau) with k > 1 says so: by an argument of `ForcedSystem` and
-        `ForcedOscillator`, in a class of one's own with a property of this name.
-        """
-        return 1
-
-    def abrupt(self, y: State, rate: State) -> tuple[Scalar, Scalar] | None:
-        """Where the law changes abruptly: how far a state is from there, not below the width of the change, and how
-        fast it comes there [1/rad] where it changes by `rate`. Steps are shortened in proportion to their ratio. None,
-        as here, where the law has no such place.
-        """
-        return None
-
-    run_defaults: ClassVar[Mapping[str, Any]] = {}
-    """Settings of a run (`jaxcage.lanes.Run`) that suit the model better than the general ones."""
-    speed_text: ClassVar[str] = "speed"
-    """Words for the model's speed."""
-    quantities: ClassVar[tuple[Quantity, ...]] = ()
-    """Quantities that the model reports of a run, from averages of `beside` and `watched`."""
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the state components."""
-        return tuple(f"y{i}" for i in range(self.dimension))
-
-    def other_speed(self, speed: Scalar) -> tuple[str, Scalar] | None:
-        """Words for a speed that goes with the model's, and its value [rad/s]: a cage's shaft speed."""
-        return None
-
-    def turning_speed(self, speed: Scalar) -> Scalar:
-        """Speed at which the phase advances, in the mean [rad/s]; the model's own unless its revolutions are others."""
-        return speed
-
-    def centre(self, y: State) -> tuple[Scalar, Scalar]:
-        """Centre of the cage from that of its land, over the clearance, of models that have one."""
-        raise NotImplementedError
-
-    def reference(self, speed: Scalar) -> dict[str, Scalar]:
-        """Numbers by name that the quantities refer to, such as the cage speed in pure rolling."""
-        return {}
-
-    @abc.abstractmethod
-    def at_speed(self, speed: Scalar) -> AbstractField:
-        """The field dy/dtau at `speed` [rad/s], with all that depends on the speed alone worked out once."""
-
-    @abc.abstractmethod
-    def scale(self, speed: Scalar) -> State:
-        """Characteristic magnitude of each state component: tolerances and tangent vectors are measured in it."""
-
-    @abc.abstractmethod
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
-        """Initial states a sweep runs from unless told otherwise, the conventional one first."""
-
-    @abc.abstractmethod
-    def excursion(self, y: State) -> Scalar:
-        """How far the state is towards the edge of what the model holds for, 1 at the edge (a cage: eps).
-
-        A lane must start at 1 or less, is flagged when it goes beyond 1, and fails beyond `ESCAPE`. A system without
-        such an edge returns 0.
-        """
 
 
 def _default_starts(scale: Sequence[float]) -> tuple[tuple[float, ...], ...]:
@@ -142,8 +38,8 @@ def _finite(values: Any) -> tuple[float, ...] | None:
     return row if all(map(math.isfinite, row)) else None
 
 
-def _kept_scale(scale: Any, dimension: int) -> float | tuple[float, ...]:
-    """The scale as it is kept."""
+def _scale_of(scale: Any, dimension: int) -> float | tuple[float, ...]:
+    """The scale as a number, or one for each component."""
     single = isinstance(scale, int | float) or np.shape(scale) == ()
     row = _finite((scale,) if single else scale)
     if row is None or min(row, default=0.0) <= 0 or (not single and len(row) != dimension):
@@ -152,8 +48,8 @@ def _kept_scale(scale: Any, dimension: int) -> float | tuple[float, ...]:
     return row[0] if single else row
 
 
-def _kept_starts(starts: Any, dimension: int) -> tuple[tuple[float, ...], ...]:
-    """The starts as they are kept."""
+def _starts_of(starts: Any, dimension: int) -> tuple[tuple[float, ...], ...]:
+    """The initial states as tuples of numbers."""
     rows = tuple(map(_finite, starts))
     for given, row in zip(starts, rows, strict=True):
         if row is None or len(row) != dimension:
@@ -162,12 +58,91 @@ def _kept_starts(starts: Any, dimension: int) -> tuple[tuple[float, ...], ...]:
     return tuple(row for row in rows if row is not None)
 
 
-def _kept_harmonics(harmonics: int) -> int:
-    """The highest harmonic as it is kept."""
+def _harmonics_of(harmonics: int) -> int:
+    """The highest harmonic as a whole number in its range."""
     if not 1 <= harmonics <= MOST_HARMONICS:
         said = f"must be a whole number from 1 to {MOST_HARMONICS}, but {shown(harmonics)} was given."
         raise ArgumentError("harmonics", said=said)
     return int(harmonics)
+
+
+def components(what: str, law: Callable[..., State], *arguments: Any, number: int) -> State:
+    """The result of `law`, a tuple of `number` scalars.
+
+    **Raises:** `ValueError`, one sentence, for anything else.
+    """
+    with told(what):
+        found = law(*arguments)
+    shape = jnp.shape(arguments[1][0])
+    wanted = f"{what} must return a tuple of {number} scalar{'s' if number > 1 else ''}, one for each component"
+    if not isinstance(found, tuple | list) and not (isinstance(found, jax.Array | np.ndarray) and found.ndim):
+        raise InputError(f"{wanted}, but returned {_named(found)}: a single one is written `(a,)`.")
+    parts = tuple(found)
+    if len(parts) != number:
+        raise InputError(f"{wanted}, but returned {len(parts)}.")
+    if any(jnp.issubdtype(jnp.result_type(part), jnp.complexfloating) for part in parts):
+        raise InputError(f"{wanted}, but one of them is complex: take `jnp.real` or `jnp.abs` of it.")
+    if wrong := [jnp.shape(part) for part in parts if jnp.shape(part) not in ((), shape)]:
+        raise InputError(f"{wanted}, but one of them has shape {wrong[0]}.")
+    whole = lambda part: not jnp.issubdtype(jnp.result_type(part), jnp.inexact)  # has no derivative as it is
+    return tuple(jnp.asarray(part, dtype=float) if whole(part) else part for part in parts)
+
+
+REPEATS = 1e-3
+"""Share of its size by which a law may differ after one revolution: pi in a law may have few digits."""
+PHASES, SPEEDS = (0.4, 1.9, 3.4, 5.3), (1.3717, 41.31)
+"""Phases and speeds of the comparison: no simple fractions of a revolution, so that a law in time does not repeat by
+chance."""
+
+
+def require_repeats(
+    what: str, law: Callable[..., State], states: Sequence[tuple[State, ...]], number: int, harmonics: int
+) -> None:
+    """Compare the law at a few phases with itself one revolution later, in states as its arguments.
+
+    **Raises:** `ValueError` where it differs. A law that cannot be compared passes: one that raises an error, holds
+    traced numbers, returns something else than `number` scalars, or a different result every time.
+    """
+
+    def row(i: int, turn: float = 0.0) -> tuple[float, ...] | None:
+        found = _plain(law, PHASES[i] + turn, *states[i % len(states)], np.float64(SPEEDS[i % 2]))
+        return None if found is None or len(found) != number else found
+
+    pairs = []
+    for i in range(len(PHASES)):
+        pair = row(i), row(i, 2 * np.pi)
+        if None in pair:
+            return
+        pairs.append(pair)
+    found = np.array(pairs, dtype=float)
+    eps = float(jnp.finfo(jnp.result_type(float)).eps)
+    allowed = REPEATS * max(1.0, 1e7 * eps * harmonics)  # single precision rounds the phase
+    size = abs(found).max(axis=1)
+    rounding = 100 * math.sqrt(eps) * np.max(size, axis=0, where=np.isfinite(size), initial=0.0)
+    with np.errstate(invalid="ignore"):
+        off = abs(found[:, 1] - found[:, 0]) > allowed * np.maximum(size, rounding)
+    off = np.any(off & np.isfinite(size), axis=1)
+    if np.any(off) and row(i := int(np.argmax(off))) == pairs[i][0]:
+        raise InputError(
+            f"{what} must repeat after one revolution (tau -> tau + 2 pi), but does not: take the slowest forcing as "
+            "the revolution, so that all others are whole multiples of it, and `jnp.mod(tau, 2 * jnp.pi)` in pulses."
+        )
+
+
+def _plain(law: Callable[..., State], tau: float, *rest: Any) -> tuple[float, ...] | None:
+    """The result of a law as plain numbers, None if it has another form."""
+    try:
+        with np.errstate(all="ignore"):
+            found = law(np.float64(tau), *rest)
+        if any(jnp.shape(part) or isinstance(part, Tracer) or np.iscomplexobj(part) for part in found):
+            return None
+        return tuple(map(float, found))
+    except Exception:  # of any kind: it is reported where the law is used
+        return None
+
+
+def _named(found: Any) -> str:
+    return "nothing (is there a `return`?)" if found is None else f"one {type(found).__name__}"
 
 
 _RATES = "The law `rates(tau, y, speed)`"
@@ -175,7 +150,7 @@ _ACCELERATION = "The law `acceleration(tau, q, v, speed)`"
 
 
 class _UsersSystem(AbstractForcedSystem):
-    """What a user's function does not say: it is the same for first and second order."""
+    """Scale, initial states and harmonics of a system from a user's function, of first or second order."""
 
     _scale: eqx.AbstractVar[float | tuple[float, ...]]
     _starts: eqx.AbstractVar[tuple[tuple[float, ...], ...]]
@@ -197,7 +172,7 @@ class _UsersSystem(AbstractForcedSystem):
         return given or tuple(tuple(map(jnp.asarray, s)) for s in _default_starts(self._magnitudes))
 
     def _probes(self) -> list[State]:
-        """States in which the law is looked at: at rest only the forcing is seen."""
+        """States in which the law is evaluated to see that it repeats; at rest it shows the forcing alone."""
         rows = [(0.0,) * self.dimension, *(self._starts or _default_starts(self._magnitudes))[:2]]
         return [tuple(map(np.float64, row)) for row in rows]
 
@@ -231,8 +206,8 @@ class ForcedSystem(_UsersSystem):
         """
         require_at_least(1, dimension=dimension)
         self.rates, self._dimension = rates, dimension
-        self._scale, self._starts = _kept_scale(scale, dimension), _kept_starts(starts, dimension)
-        self._harmonics = _kept_harmonics(harmonics)
+        self._scale, self._starts = _scale_of(scale, dimension), _starts_of(starts, dimension)
+        self._harmonics = _harmonics_of(harmonics)
         require_repeats(_RATES, rates, [(y,) for y in self._probes()], dimension, harmonics)
 
     @property
@@ -278,8 +253,8 @@ class ForcedOscillator(_UsersSystem):
         """
         require_at_least(1, coordinates=coordinates)
         self.acceleration, self.coordinates = acceleration, coordinates
-        self._scale, self._starts = _kept_scale(scale, 2 * coordinates), _kept_starts(starts, 2 * coordinates)
-        self._harmonics = _kept_harmonics(harmonics)
+        self._scale, self._starts = _scale_of(scale, 2 * coordinates), _starts_of(starts, 2 * coordinates)
+        self._harmonics = _harmonics_of(harmonics)
         states = [(y[:coordinates], y[coordinates:]) for y in self._probes()]
         require_repeats(_ACCELERATION, acceleration, states, coordinates, harmonics)
 
@@ -297,7 +272,7 @@ class _Bound(eqx.Module):
     law: Callable[..., State]
     speed: Scalar
     what: str = eqx.field(static=True)
-    """What a refusal calls it."""
+    """Name of the law in messages."""
 
     def __call__(self, *state: Any) -> State:
         return components(self.what, self.law, *state, self.speed, number=len(state[-1]))

@@ -1,4 +1,4 @@
-"""Constants that the paper does not print, in sets: one set for all its cases.
+"""The six cases of the paper as models, with sets of constants for what the paper does not print.
 
 `preliminary`: a blind search of an independent code, whose film was some twenty times too weak, on the sign of the
 largest exponent in the published zones. `identified`: found with this package, by chaos seen after 300 revolutions
@@ -9,13 +9,16 @@ rigid rib and circulatory cross-coupling.
 
 import dataclasses
 
+from .._checks import require_x64
 from .._errors import ArgumentError
-from ..forces import UnbalanceReading
+from ..bearing import nu2310, published_case, vg
+from ..forces import LandContact, RibFilm, Support, SynchronousImpact, UnbalanceReading
+from .cage import CageModel
 
 
 @dataclasses.dataclass(frozen=True)
 class Constants:
-    """What the paper leaves out, in SI units."""
+    """Constants that the paper does not print, in SI units."""
 
     cage_mass: float
     support_stiffness: float
@@ -23,9 +26,9 @@ class Constants:
     support_damping: float
     support_cross: float
     land_width: float
-    """Of each of two lands."""
+    """Width of each of two lands."""
     impact_amplitude: float
-    """At a cage speed of 1000 rad/s."""
+    """Amplitude at a cage speed of 1000 rad/s."""
     impact_exponent: float
     contact_stiffness: float | None
     """[N/m^(10/9)]; None if it is given by a force at a penetration of one clearance."""
@@ -73,11 +76,39 @@ CONSTANTS: dict[str, Constants] = {
 """The sets by name."""
 
 
-def constants(name: str) -> Constants:
-    """The set `name`.
+def case(name: str, constants: str = "identified") -> CageModel:
+    """The published case `name`, one of 1a, 1b, 2a, 2b, 3a, 3b (Table 2).
 
-    **Raises:** `ValueError` that names the sets there are.
+    **Arguments:** name; the set of constants that the paper does not print (`jaxcage.models.CONSTANTS`).
+
+    **Raises:** `ValueError` for an unknown name, `RuntimeError` without double precision.
     """
-    if name not in CONSTANTS:
-        raise ArgumentError("constants", said=f"must be one of {', '.join(CONSTANTS)}, but '{name}' was given.")
-    return CONSTANTS[name]
+    require_x64()
+    if constants not in CONSTANTS:
+        raise ArgumentError("constants", said=f"must be one of {', '.join(CONSTANTS)}, but '{constants}' was given.")
+    published, found = published_case(name), CONSTANTS[constants]
+    gap = published.guidance_gap_mm * 1e-3
+    return CageModel(
+        bearing=nu2310(),
+        lubricant=vg(published.viscosity_grade),
+        forces=(
+            RibFilm(land_width=found.land_width),
+            LandContact(
+                stiffness=found.contact_stiffness_in(gap), onset=found.contact_onset, restitution=found.restitution
+            ),
+            Support(
+                stiffness_x=found.support_stiffness,
+                stiffness_y=found.support_stiffness,
+                damping=found.support_damping,
+                cubic_stiffness=found.support_cubic,
+                cross_stiffness=found.support_cross,
+            ),
+            SynchronousImpact(amplitude=found.impact_amplitude, exponent=found.impact_exponent),
+        ),
+        cage_mass=found.cage_mass,
+        guidance_gap=gap,
+        eccentricity=published.eccentricity_um * 1e-6,
+        gravity=found.gravity,
+        clearance_reading="as_printed",
+        unbalance=found.unbalance,
+    )

@@ -1,18 +1,65 @@
-"""The bearing: its dimensions (Table 1), what follows from them, and the paper's design rule."""
+"""The bearing: its dimensions (Table 1), its kinematics (7)-(9), (11), (13), and the paper's design rule.
+
+Speeds are positive counter-clockwise.
+"""
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from .._arguments import require_above_zero
+from .._arguments import is_concrete, require_above_zero
 from .._errors import ArgumentError
 from .._parameters import count, parameter
 from .._types import Scalar
-from . import _kinematics as kinematics
-from ._line_contact import PALMGREN_CONSTANT, line_contact_stiffness, series_stiffness
-from ._materials import Material, bearing_steel
-from ._validate import is_concrete
+from .line_contact import PALMGREN_CONSTANT, line_contact_stiffness, series_stiffness
+
+
+class Material(eqx.Module):
+    """A linear elastic solid."""
+
+    density: Scalar = parameter("kg/m^3", 100.0, 30e3, "density of the solid", kind="catalogue")
+    youngs_modulus: Scalar = parameter("Pa", 1e8, 1e12, "Young's modulus", kind="catalogue")
+    poisson_ratio: Scalar = parameter("1", 0.0, 0.5, "Poisson's ratio", kind="catalogue")
+
+
+def brass() -> Material:
+    """CuZn40Pb2, the cage brass of section 4 of the paper.
+
+    Values of the extrusion brasses of this family (CW617N, CW608N): data sheets give 8.40-8.44 g/cm^3 and 99-107 GPa.
+    """
+    return Material(density=8430.0, youngs_modulus=102e9, poisson_ratio=0.34)
+
+
+def bearing_steel() -> Material:
+    """100Cr6 (SAE 52100), the steel of rings and rollers in section 4 of the paper.
+
+    EN ISO 683-17 data sheets give 210 GPa and 0.30. With 7800 kg/m^3 a roller of 16 mm x 27 mm weighs 42.3 g.
+    """
+    return Material(density=7800.0, youngs_modulus=210e9, poisson_ratio=0.30)
+
+
+def raceway_surface_speed(angular_speed: Scalar, raceway_diameter: Scalar) -> Array:
+    """Surface speed of a raceway, v = omega d/2, (7).
+
+    **Arguments:** speed of the ring [rad/s], diameter of its raceway [m].
+
+    **Returns:** surface speed [m/s].
+    """
+    require_above_zero(raceway_diameter=raceway_diameter)
+    return jnp.asarray(angular_speed * raceway_diameter / 2)
+
+
+def cage_speed(inner_speed: Scalar, outer_speed: Scalar, roller_diameter: Scalar, pitch_diameter: Scalar) -> Array:
+    """Speed of the set of rollers, and so of the cage, in pure rolling, (8).
+
+    **Arguments:** speeds of inner and outer ring [rad/s], roller and pitch diameter [m].
+
+    **Returns:** w_c = [w_i (1 - d_w/d_m) + w_o (1 + d_w/d_m)]/2 [rad/s].
+    """
+    require_above_zero(roller_diameter=roller_diameter, pitch_diameter=pitch_diameter)
+    ratio = roller_diameter / pitch_diameter
+    return jnp.asarray((inner_speed * (1 - ratio) + outer_speed * (1 + ratio)) / 2)
 
 
 class Bearing(eqx.Module):
@@ -54,7 +101,7 @@ class Bearing(eqx.Module):
 
     @property
     def outer_raceway_diameter(self) -> Array:
-        """Outer raceway diameter d_i + 2 d_w [m], the clearance left out."""
+        """Outer raceway diameter d_i + 2 d_w [m], without the clearance."""
         return jnp.asarray(self.inner_raceway_diameter + 2 * self.roller_diameter)
 
     @property
@@ -80,28 +127,26 @@ class Bearing(eqx.Module):
 
     @property
     def cage_speed_ratio(self) -> Array:
-        """Cage speed over shaft speed, from (8) [1]."""
-        return kinematics.cage_speed_ratio(self.roller_diameter, self.pitch_diameter)
+        """Cage speed over shaft speed, from (8): (1 - d_w/d_m)/2 [1]."""
+        return jnp.asarray((1 - self.roller_diameter / self.pitch_diameter) / 2)
 
     def cage_speed(self, shaft_speed: Scalar) -> Array:
-        """Cage speed at a shaft speed, both in rad/s, (8): also w_co of (11), as the rib rests."""
-        return kinematics.cage_speed(shaft_speed, 0.0, self.roller_diameter, self.pitch_diameter)
+        """Cage speed at a shaft speed, both in rad/s, (8). It is also w_co of (11), since the rib rests."""
+        return cage_speed(shaft_speed, 0.0, self.roller_diameter, self.pitch_diameter)
 
     def shaft_speed(self, cage_speed: Scalar) -> Array:
         """Shaft speed at a cage speed, both in rad/s: the inverse of (8)."""
         return jnp.asarray(cage_speed / self.cage_speed_ratio)
 
     def roller_centrifugal_force(self, shaft_speed: Scalar) -> Array:
-        """Centrifugal force of one roller at a shaft speed [rad/s], (8) and (9) [N]."""
-        speed = self.cage_speed(shaft_speed)
-        return kinematics.centrifugal_force(self.roller_mass, speed, self.pitch_diameter)
+        """Centrifugal force of one roller at a shaft speed [rad/s], F_cen = m w_c^2 d_m/2 [N], (8) and (9)."""
+        return jnp.asarray(self.roller_mass * self.cage_speed(shaft_speed) ** 2 * self.pitch_diameter / 2)
 
 
 def design_rule_violations(bearing: Bearing, guidance_gap: Scalar) -> list[str]:
     """Sentences that say where T > C_r > G_r, the rule of the paper's introduction, is broken.
 
-    The paper breaks it itself: every published case has T = 0.3 mm below C_r. So it is a warning,
-    not an error.
+    The paper breaks it itself: every published case has T = 0.3 mm, below C_r. It is a warning and not an error.
 
     **Arguments:** the bearing, and the guidance gap C_r [m]; concrete values.
 

@@ -1,25 +1,25 @@
-"""How the rollers share the load, where the cage rests: paper eqs. (1), (2), (5), (6), (10)."""
+"""Distribution of the load over the rollers, and where the cage rests: paper eqs. (1), (2), (5), (6), (10)."""
 
 from typing import Literal, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from .._arguments import require_above_zero, require_at_least
+from .._arguments import is_concrete, require_above_zero, require_at_least
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._types import Scalar
-from ._geometry import Bearing
-from ._line_contact import line_contact_approach, raceway_loads_of_all
-from ._validate import require_at_most, require_not_negative, require_positive
+from .geometry import Bearing
+from .line_contact import line_contact_approach, raceway_loads_of_all
 
 
 Guidance = Literal["outer_rib", "inner_rib", "roller"]
 
 LARGEST = 1e12
-"""Of loads [N]."""
+"""Largest load that is accepted [N]."""
 DEFAULT_SHAFT_LOAD = 4450.0
 """Shaft load F [N]; the paper does not print it."""
 
@@ -55,8 +55,8 @@ def roller_angles(n_rollers: int, first_angle: Scalar = -jnp.pi / 2) -> Float[Ar
 def loaded_half_angle(radial_clearance: Scalar, shaft_shift: Scalar) -> Array:
     """Half angle of the loaded zone, acos(G_r/(2 delta_s)) [rad]: the clean form of (2).
 
-    The paper prints this as the whole angle and with delta_r, the elastic approach, in place of the
-    shift of the shaft delta_s = delta_r + G_r/2; the geometry asks for both corrections.
+    The paper prints this as the whole angle and with delta_r, the elastic approach, in place of the shift of the shaft
+    delta_s = delta_r + G_r/2; the geometry asks for both corrections.
 
     **Arguments:** radial clearance G_r [m], to which twice the approach of the rollers to the outer raceway is added
     that their centrifugal force makes, as it shrinks the zone; shift of the shaft [m].
@@ -72,10 +72,10 @@ def static_cage_displacement(
     radial_clearance: Scalar,
     elastic_approach: Scalar,
 ) -> Array:
-    """How far below the bearing centre the cage rests: (1) outer rib, (5) inner rib, (6) roller.
+    """Distance of the resting cage below the bearing centre: (1) outer rib, (5) inner rib, (6) roller.
 
-    **Arguments:** `Guidance`, then C_r, T, G_r and delta_r [m]. delta_r is the elastic approach at
-    the most loaded roller, delta_r + G_r/2 the shift of the shaft. An outer rib needs C_r alone.
+    **Arguments:** `Guidance`, then C_r, T, G_r and delta_r [m]. delta_r is the elastic approach at the most loaded
+    roller, delta_r + G_r/2 the shift of the shaft. An outer rib needs C_r alone.
 
     **Returns:** C_r/2, delta_r + G_r/2 + C_r/2 or delta_r + G_r/2 + T [m].
 
@@ -130,10 +130,10 @@ class _LoadCase(eqx.Module):
 
 
 def _solve_excess(case: _LoadCase) -> Array:
-    """Excess of the nearest roller at which the rollers carry the load [m].
+    """Excess of the nearest roller at which the rollers carry the load [m]; NaN where there is no such excess.
 
-    By bisection, as the forces rise steadily but have kinks; differentiated implicitly. At zero
-    excess no roller is loaded and at the bound one alone carries the load, so a root is enclosed.
+    The forces rise steadily but have kinks: the root is found by bisection and differentiated implicitly. At zero
+    excess no roller is loaded and at the bound one alone carries the load, so that the root is enclosed.
     """
 
     def imbalance(fraction: Array, case: _LoadCase) -> Array:
@@ -142,8 +142,10 @@ def _solve_excess(case: _LoadCase) -> Array:
 
     solver = optx.Bisection(rtol=1e-12, atol=1e-11, flip=False)
     start, interval = jnp.asarray(0.5), dict(lower=0.0, upper=1.0)
-    root = optx.root_find(imbalance, solver, start, case, options=interval, max_steps=128)
-    return root.value * case.bound
+    # Without `throw`, which would put a callback to Python into every program and keep it from being cached on disk.
+    root = optx.root_find(imbalance, solver, start, case, options=interval, max_steps=128, throw=False)
+    found = (root.result == optx.RESULTS.successful) & (case.load > 0) & (case.centrifugal >= 0)
+    return jnp.where(found, root.value * case.bound, jnp.nan)
 
 
 @eqx.filter_jit
@@ -172,25 +174,27 @@ def load_distribution(
 ) -> LoadDistribution:
     """Loads of all rollers under a shaft load that points down, by (3), (4) and (10).
 
-    The shaft shifts along the load by delta_s until the vertical forces of the discrete rollers
-    carry it. Differentiable with respect to every parameter through the implicit function theorem.
-    With a roller at the bottom, or half a pitch from it, the horizontal forces cancel; at other
-    angles their small rest is left to the shaft.
+    The shaft shifts along the load by delta_s until the vertical forces of the discrete rollers carry it. The result is
+    differentiable with respect to every parameter through the implicit function theorem. With a roller at the bottom,
+    or half a pitch from it, the horizontal forces cancel; at other angles the small remainder is left to the shaft.
 
     **Arguments:** the bearing; the load [N]; the centrifugal force of a roller [N], see
-    `Bearing.roller_centrifugal_force`; the angle of the first roller from +x [rad], by default at
-    the bottom.
+    `Bearing.roller_centrifugal_force`; the angle of the first roller from +x [rad], by default at the bottom.
 
-    **Raises:** `ValueError` for a load that is not positive, or a negative centrifugal force; when
-    traced, an error as the computation runs.
+    **Raises:** `ValueError` for a load that is not positive, or a negative centrifugal force. Where these are traced,
+    the shift of the shaft and the half angle are NaN instead.
     """
     require_x64()
-    force = require_at_most("load", require_positive("load", load), LARGEST, "N")
-    outward = require_not_negative("centrifugal_force", centrifugal_force)
-    outward = require_at_most("centrifugal_force", outward, LARGEST, "N")
-    try:
-        return _distribution(bearing, force, outward, jnp.asarray(roller_angle, dtype=float))
-    except eqx.EquinoxRuntimeError as error:
-        given = f"but {float(force):g} and {float(outward):g} N were given."
-        said = f"must be of sizes that can be added, {given}"
-        raise ArgumentError("load", "centrifugal_force", said=said) from error
+    arrays = (jnp.asarray(x, dtype=float) for x in (load, centrifugal_force, roller_angle))
+    known = is_concrete(load, centrifugal_force)
+    force, outward = (float(load), float(centrifugal_force)) if known else (1.0, 0.0)
+    if not 0 < force <= LARGEST:
+        raise ArgumentError("load", said=f"must be positive and at most {LARGEST:g} N, but {force:g} was given.")
+    if not 0 <= outward <= LARGEST:
+        said = f"must be from 0 to {LARGEST:g} N, but {outward:g} was given."
+        raise ArgumentError("centrifugal_force", said=said)
+    found = _distribution(bearing, *arrays)
+    if known and is_concrete(found.shaft_shift) and np.isnan(found.shaft_shift):
+        said = f"must be of sizes that can be added, but {force:g} and {outward:g} N were given."
+        raise ArgumentError("load", "centrifugal_force", said=said)
+    return found

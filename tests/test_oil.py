@@ -87,11 +87,23 @@ def test_viscosity_falls_with_temperature_as_differences_say():
     assert float(slope) == pytest.approx(float(difference), rel=1e-6)
 
 
-def test_an_oil_thinner_than_its_law_holds_for_is_doubted():
+def test_an_oil_thinner_than_its_law_allows_is_doubted():
     assert jb.vg(32, celsius(100)).doubts() == []
+    assert jb.Lubricant(870.0, 2e-6, 313.15, 1e-6, 373.15).doubts() == []
     (said,) = jb.vg(32, celsius(200)).doubts()
     assert "at 200 °C" in said and "above 2 mm²/s" in said
 
 
-def test_an_oil_at_the_end_of_its_law_is_not():
-    assert jb.Lubricant(870.0, 2e-6, 313.15, 1e-6, 373.15).doubts() == []
+@pytest.mark.parametrize("oil, said", [
+    (lambda: jb.vg(-56), "`grade` must be positive and finite, but -56 was given"),
+    (lambda: jb.Lubricant(870.0, 56e-6, 313.15, 7e-6, 313.15), "both are 313.15 K"),
+    (lambda: jb.Lubricant(870.0, 2e-5, 313.15, 5e-5, 373.15), "must not rise with the temperature, but 2e-05 m.2/s"),
+    (lambda: jb.Lubricant(870.0, 5e-5, 373.15, 2e-5, 313.15), "must not rise .* at 373.15 K and .* were given"),
+])  # fmt: skip
+def test_impossible_oils(oil, said):
+    with pytest.raises(ValueError, match=said):
+        oil()
+
+
+def test_an_oil_of_constant_viscosity():
+    assert float(jb.Lubricant(870.0, 2e-5, 313.15, 2e-5, 373.15).kinematic_viscosity) == pytest.approx(2e-5, rel=1e-12)
