@@ -16,7 +16,7 @@ from .progress import Say, progress
 
 
 if TYPE_CHECKING:
-    from ..integrate import AbstractMethod
+    from ..solve import AbstractMethod
 
 MOST = 10_000_000
 """Largest count: more lanes, speeds or revolutions end in no memory, or in no lifetime."""
@@ -149,6 +149,7 @@ FromZero = Annotated[int, count(0)]
 FromOne = Annotated[int, count(1)]
 FromTwo = Annotated[int, count(2)]
 OptionalCount = Annotated[int | None, count(1)]
+OptionalTwo = Annotated[int | None, count(2), arg(help="Number of speeds that are simulated.")]
 OptionalText = Annotated[str | None, text()]
 Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
@@ -176,7 +177,7 @@ class StepOptions:
         """The integration method that is asked for; None leaves the choice to what is computed."""
         if self.solver is None and self.steps is None and self.tolerance is None:
             return None
-        from ..integrate import method, native
+        from ..solve import method, native
 
         if self.solver is None and self.steps is None:
             return native(tolerance=self.tolerance)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..design import Clue, Ensemble, Narrowed, verdict_of
-from ..files import Range
-from ..io import Measurement
+from ..io import Measurement, Range
 from .tables import Beside, Column, Table, chosen, rows_table, speed_columns
 
 

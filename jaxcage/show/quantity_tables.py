@@ -11,7 +11,7 @@ from jaxtyping import Float
 from .._parameters import walk
 from ..analysis import Around, Measures, OrderSpectrum, failed, named_lines, scatter
 from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
-from ..files import configuration
+from ..io import configuration
 from ..forces import ImpactHistory
 from .tables import SHOWN, Column, Table, rows_table, value_table
 

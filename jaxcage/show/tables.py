@@ -29,9 +29,9 @@ def factor(unit: str, shown: str) -> float:
         return 1.0
     if (unit, shown) == ("1", "%"):
         return 100.0
-    from ..files import unit_registry  # pint takes a while to load
+    from ..io import to_si  # pint takes a while to load
 
-    return float(unit_registry().Quantity(1.0, unit.replace("^", "**")).to(shown.replace("^", "**")).magnitude)
+    return to_si(f"1 {unit}", shown)
 
 
 @dataclasses.dataclass(frozen=True)
