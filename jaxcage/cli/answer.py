@@ -63,7 +63,8 @@ def _write(path: Path, content: Any, show: ShowOptions, subject: "Subject | None
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from ..io import replacing, write_columns
+    from ..files import replacing
+    from ..io import write_columns
     from ..lanes import save
     from ..show import add_shaft_axes, restyle
 

@@ -1,7 +1,6 @@
 """Commands about the case itself: its file, its statics, one impact, the paper's results, a report."""
 
 import shlex
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,7 +27,7 @@ def init(
         model: Describe the cage under prescribed forces, or the bearing with its rollers.
         json: Print one JSON document on standard output.
     """
-    from ..io import write_template
+    from ..files import write_template
 
     written = write_template(path, model)
     said = f"Written: {written}. It describes the NU2310 of case 1a: change the values and go on, e.g. with"
@@ -61,7 +60,9 @@ def statics(
     model, bearing = subject.model, subject.model.bearing
     force = float(model.load) if load is None else load
     if force <= 0:
-        raise InputError(f"The shaft load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load.")
+        raise InputError(
+            f"The shaft load of {subject.name} must be above 0 N, but it is {force:g}: give one with --load."
+        )
     ratio = float(bearing.cage_speed_ratio) if getattr(shaft_speed, "whose", "shaft") == "cage" else 1.0
     shaft = rpm(float(shaft_speed) / ratio)
     with show.computing(f"statics {subject.name}"):
@@ -190,7 +191,9 @@ def report(
     with show.computing(f"report {subject.name}") as say:
         given = {"speeds": speeds, "operating": at, "quick": quick, "method": run.method, "progress": say}
         findings = shown.examine(subject.name, subject.model, subject.published, **given, **settings)
-        chances = draw(subject, speeds[:: -(-count // 40)], draws, seed, run, say) if subject.unknowns and draws else None
+        chances = (
+            draw(subject, speeds[:: -(-count // 40)], draws, seed, run, say) if subject.unknowns and draws else None
+        )
     words = ["jaxcage", "report", Path(case).name, *(["--operating", operating] if operating else [])]
     command = visible(shlex.join([*words, *(["--quick"] if quick else [])]))
     table, left = (None, ()) if subject.file is None else (subject.file.table, subject.file.left)

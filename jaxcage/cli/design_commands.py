@@ -78,8 +78,7 @@ def design(
         discard: Of a bearing: revolutions left out.
         revolutions: Of a bearing: revolutions observed, an even number.
     """
-    from .. import design as d
-    from .. import show as shown
+    from .. import design as d, show as shown
     from .._errors import InputError
     from .subject import RPM, read_case
     from .values import no_worse_balance, read_bounds, read_each, read_scatter
@@ -114,10 +113,18 @@ def design(
             total = d.Robust(total, laws, worst=worst, seed=seed) if laws else total
             return total + price * d.cost() if price else total
 
-    about = repr((subject.name, model, bounds, prices, cost, first, last, speeds, at, starts, scouts, batch, seed, laws))
+    about = repr(
+        (subject.name, model, bounds, prices, cost, first, last, speeds, at, starts, scouts, batch, seed, laws)
+    )
     stored = Path(show.out) / f".design_{subject.name}_{hashlib.sha256(about.encode()).hexdigest()[:12]}.npz"
     batches = steps or subject.usual(10, 12)
-    search = {"starts": starts, "scouts": scouts, "batches": batches, "batch": batch or subject.usual(12, 16), "seed": seed}
+    search = {
+        "starts": starts,
+        "scouts": scouts,
+        "batches": batches,
+        "batch": batch or subject.usual(12, 16),
+        "seed": seed,
+    }
     with show.computing(f"design {subject.name}", ADVICE) as say:
         objective = d.bearing_objective(model, bounds, runs, prices) if objective_of is None else objective_of(chaos)
         report = lambda step, _: say("search", step, batches)
@@ -139,14 +146,23 @@ def design(
         overall = next(row for row in rows if row.name == d.OBJECTIVE)
         better = overall.known and overall.change < 0
     values = ", ".join(f"{name} {value:.4g}" for name, value in best.values.items())
-    said = f"A better design was found: {values} (SI units)." if better else "No better design was found: the given one stays."
+    said = (
+        f"A better design was found: {values} (SI units)."
+        if better
+        else "No better design was found: the given one stays."
+    )
     notes += [
         f"Search: {best.status}, {len(best.history)} steps, objective {best.objective:.4g}",
         f"At a bound: {', '.join(best.at_bound)}." if best.at_bound else "No parameter ended at a bound.",
         f"Fresh runs that failed: {failed}",
     ]
     document = {"vary": bounds, "prices": prices, "better": better, "optimum": best.values, "objective": best.objective}
-    document |= {"at_bound": best.at_bound, "status": best.status, "failed": failed, **({} if at is None else subject.both(at))}
+    document |= {
+        "at_bound": best.at_bound,
+        "status": best.status,
+        "failed": failed,
+        **({} if at is None else subject.both(at)),
+    }
     tables = [
         shown.before_and_after_table("Before and after, from the same initial states", rows),
         shown.parameters_table(f"Design of {subject.name}", model, found, bounds),
@@ -206,7 +222,9 @@ def _compared(
     for kind in ("chaotic", "synchronous_loss"):
         each = document[f"{kind}_zones"].items()
         lines = [{"design": when, "zone": i, **zone} for when, of in each for i, zone in enumerate(of, start=1)]
-        tables += [shown.rows_table(f"{kind.replace('_', '-').capitalize()} zones [rpm]", lines, columns)] if lines else []
+        tables += (
+            [shown.rows_table(f"{kind.replace('_', '-').capitalize()} zones [rpm]", lines, columns)] if lines else []
+        )
     note = "Chaotic speeds by sweeps from other initial states: {before:.0f} rpm before, {after:.0f} rpm after"
     notes = [note.format_map(document["chaotic_rpm"])]
     return Answer("", tables, notes, document, files={"figure": (".png", shown.design_figure(found, *swept))})
@@ -244,8 +262,7 @@ def sensitivity(
         discard: Of a bearing: revolutions left out.
         revolutions: Of a bearing: revolutions observed, an even number.
     """
-    from .. import design as d
-    from .. import show as shown
+    from .. import design as d, show as shown
     from .._errors import InputError
     from ..orbits import loss_zones, sensitivities, synchronous_orbits
     from .subject import RPM, read_case
@@ -264,7 +281,10 @@ def sensitivity(
             if of not in d.BEARING_MEASURES:
                 raise InputError(f"Option --of must be one of {', '.join(d.BEARING_MEASURES)}, but '{of}' was given.")
             at = one_speed(subject, speed)
-            what, document = f"{of.replace('_', ' ').capitalize()} of {subject.name}", document | {"of": of, **subject.both(at)}
+            what, document = (
+                f"{of.replace('_', ' ').capitalize()} of {subject.name}",
+                document | {"of": of, **subject.both(at)},
+            )
             objective = d.measure(d.Runs.of_bearing(at, ensemble, discard, revolutions, seed=seed, **told), of)
         else:
             low, high = subject.range(first, last, 2) * RPM
@@ -281,16 +301,24 @@ def sensitivity(
             edges = [s for s in sensitivities(model, loss.edges).values() if s.trusted]
             budgets = [_budget(d, s, shown.not_fixed(model, s.elasticity), deviation) for s in edges]
             bars = lambda ax: shown.elasticity_bars(shown.to_be_turned(model, edges), ax)
-            files |= {"figure": (".png", drawn(f"{subject.name}: elasticities", bars, 9.0, 2.2 + 1.2 * len(edges)))} if edges else {}
+            files |= (
+                {"figure": (".png", drawn(f"{subject.name}: elasticities", bars, 9.0, 2.2 + 1.2 * len(edges)))}
+                if edges
+                else {}
+            )
     most = max(shares.total, key=lambda n: shares.total[n])
     said = f"{most} matters most: with the other parameters it has {100 * shares.total[most]:.0f} % of the variance."
     tables = [shown.sobol_table(what, shares), *(shown.budget_table(b, tolerance) for b in budgets)]
     notes = [shares.warning] if shares.warning else []
     if shares.scatter:
-        notes.append(f"Scatter of the motion itself is {100 * shares.scatter:.0f} % of the variance, in no parameter's own share.")
+        notes.append(
+            f"Scatter of the motion itself is {100 * shares.scatter:.0f} % of the variance, in no parameter's own share."
+        )
     notes += [f"Within twice the error, no effect: {', '.join(b.unclear)}" for b in budgets if b.unclear]
     document |= {"designs": shares.evaluations, "doubtful": shares.doubtful, "scatter": shares.scatter}
-    return Answer(said, tables, notes, document | {"budgets": [shown.budget_record(b) for b in budgets]}, subject, files)
+    return Answer(
+        said, tables, notes, document | {"budgets": [shown.budget_record(b) for b in budgets]}, subject, files
+    )
 
 
 def _budget(d: Any, slope: Any, names: Any, deviation: float) -> Any:
@@ -369,7 +397,7 @@ def identify(
     from .. import show as shown
     from .._parameters import parameter_info
     from ..design import identify as narrow
-    from ..io import read_bytes, read_measurements, with_ranges
+    from ..files import read_bytes, read_measurements, with_ranges
     from .subject import read_case
 
     subject = read_case(case)
@@ -383,8 +411,12 @@ def identify(
     if not found.met:
         worst = max(tables[0].records, key=lambda row: row["off_by_tolerances"])
         why = f"None of {found.draws} draws does what was measured in all rows: the nearest is {worst['off_by_tolerances']:.2g} "
-        why += f"tolerances off in '{worst['what']}'. Widen ranges or tolerances, or look for what the model leaves out."
-        return Answer("No draw does what was measured.", tables, [], document | {"file": None}, subject.certain, failure=why)
+        why += (
+            f"tolerances off in '{worst['what']}'. Widen ranges or tolerances, or look for what the model leaves out."
+        )
+        return Answer(
+            "No draw does what was measured.", tables, [], document | {"file": None}, subject.certain, failure=why
+        )
     units = {u.label: info[u.names[0]].unit for u in subject.unknowns}
     each = zip(found.unknowns, found.ranges, found.narrowed, strict=True)
     text = with_ranges(read_bytes(case).decode(), {u.label: (r, units[u.label]) for u, r, worth in each if worth})

@@ -51,7 +51,7 @@ def read_quantity(text: str, unit: str) -> float:
     """
     with contextlib.suppress(ValueError):
         return float(text)
-    from ..io import SpeedOf, split_owner, to_si  # loads pint
+    from ..files import SpeedOf, split_owner, to_si  # loads pint
 
     try:
         if unit != "rpm":
@@ -254,7 +254,7 @@ class ShowOptions:
 
         `advice` is what is said to a user who interrupts it.
         """
-        from ..io import check_writable
+        from ..files import check_writable
 
         check_writable(self.out)
         with progress(what, advice) as say:

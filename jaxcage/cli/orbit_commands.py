@@ -4,8 +4,6 @@ import dataclasses
 from functools import partial
 from typing import Annotated, Any
 
-import tyro
-
 from .answer import Answer, drawn
 from .options import (
     Case,
@@ -14,13 +12,13 @@ from .options import (
     First,
     FromOne,
     FromTwo,
-    OptionalTwo,
     FromZero,
     Last,
     Load,
     OptionalCount,
     OptionalSpeed,
     OptionalText,
+    OptionalTwo,
     Points,
     Quick,
     RunOptions,
@@ -114,7 +112,9 @@ def _require_edges(found: Any, loss: Any, what: str) -> None:
 
     if not loss.edges:
         between = f"between {found.lower_rpm:g} and {found.upper_rpm:g} rpm"
-        raise NoResult(f"No zone without a stable synchronous orbit begins or ends {between}: there is no edge to {what}.")
+        raise NoResult(
+            f"No zone without a stable synchronous orbit begins or ends {between}: there is no edge to {what}."
+        )
 
 
 def bifurcations(
@@ -211,7 +211,9 @@ def gradient(
         given = {"designs": designs, "spread": spread, "seed": seed}
         return _of_means(subject, subject.speed(speed), by, length, given, chaos, show)
     if lasting:
-        return _of_lasting(subject, subject.range(first, last, count or 251), zone, by, designs, seed, steps.method, show)
+        return _of_lasting(
+            subject, subject.range(first, last, count or 251), zone, by, designs, seed, steps.method, show
+        )
     if by or zone:
         raise InputError("Options --by and --zone go with --lasting, and --by with --speed.")
     found, loss = _searched(subject, first, last, count, discard, steps.method, show)
@@ -279,7 +281,9 @@ def _of_lasting(
         shown.lasting_table(subject.name, edges, horizon, subject.beside),
         shown.width_table(f"Widths of {subject.name} between mean lives of {horizon} revolutions", edges, names),
     ]
-    said = f"{len(edges)} edges at which the mean life of chaos passes {horizon} revolutions; errors are standard errors."
+    said = (
+        f"{len(edges)} edges at which the mean life of chaos passes {horizon} revolutions; errors are standard errors."
+    )
     return Answer(said, tables, notes, {"horizon": horizon}, subject)
 
 
@@ -299,7 +303,12 @@ def _of_means(
         runs = Runs(speed, **length, blocks=2, exponents=int(chaos), progress=partial(progress, "designs"))
         found = mean_gradient(subject.model, runs, statistics, directions=by or DIRECTIONS, **given)
     title = f"{subject.name}, {subject.at(speed)}"
-    pairs = [(abs(x), n, d, x) for n, each in found.statistics.items() for d, x in zip(each.directions, each.elasticity) if np.isfinite(x)]
+    pairs = [
+        (abs(x), n, d, x)
+        for n, each in found.statistics.items()
+        for d, x in zip(each.directions, each.elasticity)
+        if np.isfinite(x)
+    ]
     _, name, direction, most = max(pairs)
     said = f"1 % more {direction.replace('_', ' ')} changes {name} by {most:+.2f} %, more than any other mean and parameter."
     notes = [
@@ -310,7 +319,9 @@ def _of_means(
         notes.append(f"Not settled, so that more --discard may change it: {', '.join(drifting)}")
     if absent := [n for n, each in found.statistics.items() if not np.any(each.value)]:
         notes.append(f"Zero in every run: {', '.join(absent)}")
-    document = subject.both(speed) | {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate", "spread")} | length
+    document = (
+        subject.both(speed) | {n: getattr(found, n) for n in ("pairs", "failed", "inaccurate", "spread")} | length
+    )
     files = {"figure": (f"_{subject.both(speed)['speed_rpm']:g}rpm.png", shown.statistic_bars(found, title))}
     return Answer(said, shown.mean_gradient_tables(title, found), notes, document, subject, files)
 
@@ -351,7 +362,7 @@ def map_(
     from .. import show as shown
     from .._errors import ArgumentError, InputError, NoResult
     from .._parameters import parameter_info, parameters
-    from ..io import to_si
+    from ..files import to_si
     from ..lanes import label_map
     from .subject import RPM, read_case
 
@@ -364,7 +375,11 @@ def map_(
     if x == y:
         raise InputError(f"Options --x and --y must be two different parameters, but both are {x}.")
     if (speed is None) == (x != shown.SPEED) and not no_points:
-        raise InputError(f"Option --speed must be given for a map over {x}." if x != shown.SPEED else "Option --speed goes with another --x.")
+        raise InputError(
+            f"Option --speed must be given for a map over {x}."
+            if x != shown.SPEED
+            else "Option --speed goes with another --x."
+        )
     ends = {}
     for end, text in (("lower", lower), ("upper", upper)):
         try:
@@ -372,22 +387,38 @@ def map_(
         except ValueError as error:
             raise ArgumentError(end, said=f"{error}.") from error
     up = shown.parameter_axis(model, y, **ends)
-    across = shown.Axis(x, *subject.range(first, last, 2), "rad/s") if x == shown.SPEED else shown.parameter_axis(model, x)
-    curves, refused, found, tables, document = [], {}, None, [], {"x": x, "y": y, "x_range": across.range, "y_range": up.range}
+    across = (
+        shown.Axis(x, *subject.range(first, last, 2), "rad/s") if x == shown.SPEED else shown.parameter_axis(model, x)
+    )
+    curves, refused, found, tables, document = (
+        [],
+        {},
+        None,
+        [],
+        {"x": x, "y": y, "x_range": across.range, "y_range": up.range},
+    )
     if not no_points:
         columns, rows = points or subject.usual((50, 12), (13, 8))
         grid = {x: np.linspace(across.lower, across.upper, columns)}, {y: np.linspace(up.lower, up.upper, rows)}
         settings = {name: value for name, value in run.settings.items() if value is not None}
-        usual = {"discard": 1000, "revolutions": 100, "blocks": 20} if not subject.reports_means else {"discard": 20, "revolutions": 20}
+        usual = (
+            {"discard": 1000, "revolutions": 100, "blocks": 20}
+            if not subject.reports_means
+            else {"discard": 20, "revolutions": 20}
+        )
         at = None if speed is None else subject.speed(speed)
         with show.computing(f"map {subject.name}") as progress:
-            found = label_map(model, *grid, speed=at, starts=starts, persist=persist, stage=progress, **usual | settings)
+            found = label_map(
+                model, *grid, speed=at, starts=starts, persist=persist, stage=progress, **usual | settings
+            )
         require_some(found)
         document |= {"points": [columns, rows], "labels": counted(found), "exponents": shown.top_exponent(found)}
         tables.append(shown.shares_table(f"Points of {subject.name} over {x} and {y}", "label", document["labels"]))
     if not (no_curves or subject.reports_means):
         try:
-            orbits, loss = _searched(subject, first, last, None, 1000 if run.discard is None else run.discard, run.method, show)
+            orbits, loss = _searched(
+                subject, first, last, None, 1000 if run.discard is None else run.discard, run.method, show
+            )
             _require_edges(orbits, loss, "follow")
             with show.computing(f"edges of {subject.name}") as progress:
                 curves, refused = shown.follow_edges(model, loss.edges, across, up, run.method, progress)
@@ -402,7 +433,10 @@ def map_(
         tables.insert(0, shown.curves_table(f"Edges of {subject.name} over {x} and {y}", curves, across, up))
         joined = lambda parts: np.concatenate([np.asarray(part) for part in parts])
         data = {"curve": joined(np.full(c.x_value.size, i) for i, c in enumerate(curves, start=1))}
-        data |= {axis.head: axis.shown(joined(getattr(c, f"{n}_value") for c in curves)) for n, axis in (("x", across), ("y", up))}
+        data |= {
+            axis.head: axis.shown(joined(getattr(c, f"{n}_value") for c in curves))
+            for n, axis in (("x", across), ("y", up))
+        }
         files["curve_data"] = f"_{x}_{y}.csv", data | {"genuine": joined(c.genuine for c in curves)}
     if subject.reports_means:
         files["figure"] = f"_{x}_{y}.png", shown.map_figure(found, title=f"{subject.name} over {x} and {y}")

@@ -76,7 +76,10 @@ def simulate(
     if found.outcome not in ("successful", "inaccurate"):
         how = f"failed ({found.outcome}): try more --steps, or another --solver."
         raise NoResult(f"The simulation at {subject.at(at)} {how}")
-    title, measures = f"{subject.name}, {subject.at(at)}, {length['revolutions']} revolutions", analysis.measures(model, found)
+    title, measures = (
+        f"{subject.name}, {subject.at(at)}, {length['revolutions']} revolutions",
+        analysis.measures(model, found),
+    )
     document = subject.both(at) | length | {"outcome": found.outcome, "error": found.error}
     document["measures"] = {name: value for name, (_, value, _) in measures.items()}
     document["measures_error"] = {name: error for name, (_, _, error) in measures.items()}
@@ -89,9 +92,14 @@ def simulate(
         more = Answer("", files={"figure": (".png", figure), "data": (".csv", trajectory_columns(found, forces))})
     files = {key: (f"_{speed:g}rpm{ending}", content) for key, (ending, content) in more.files.items()}
     told = ("largest_eps", "whirl_ratio", "drag_power", "cage_slip", "pocket_force_max_N", "friction_power_W")
-    each = (f"{q.text} {value:.4g} {q.unit if q.unit != '1' else ''}".rstrip() for q, value, _ in (measures[n] for n in told if n in measures))
+    each = (
+        f"{q.text} {value:.4g} {q.unit if q.unit != '1' else ''}".rstrip()
+        for q, value, _ in (measures[n] for n in told if n in measures)
+    )
     said = f"At {subject.at(at)}: {', '.join(each)}."
-    return Answer(said, [measures_table(title, measures), *more.tables], notes, document | more.document, subject, files)
+    return Answer(
+        said, [measures_table(title, measures), *more.tables], notes, document | more.document, subject, files
+    )
 
 
 def _rollers(model: Any, found: Any, title: str) -> Answer:
@@ -109,8 +117,15 @@ def _rollers(model: Any, found: Any, title: str) -> Answer:
         columns |= {f"{name}_{axis} [N]": getattr(history, name)[:, i] for i, axis in enumerate("xy")}
     for name, unit in {"pocket_force": "N", "inner_load": "N", "roller_slip": "1"}.items():
         columns |= {f"{name}_{j + 1} [{unit}]": x for j, x in enumerate(getattr(history, name).T)}
-    document = {"pocket_force_distribution_N": rollers.pocket_force_distribution(history), "around": around, "orders": orders}
-    files = {"figure": (".png", bearing_figure(model, found, history, around, spectra, orders, title)), "data": (".csv", columns)}
+    document = {
+        "pocket_force_distribution_N": rollers.pocket_force_distribution(history),
+        "around": around,
+        "orders": orders,
+    }
+    files = {
+        "figure": (".png", bearing_figure(model, found, history, around, spectra, orders, title)),
+        "data": (".csv", columns),
+    }
     return Answer("", [circumference_table(around), *line_tables(spectra, orders)], document=document, files=files)
 
 
@@ -145,8 +160,7 @@ def swept(subject: Any, speeds: Any, run: SweepOptions, show: ShowOptions) -> tu
     """The data set of a sweep, and the answer about it."""
     import numpy as np
 
-    from .. import analysis
-    from .. import show as shown
+    from .. import analysis, show as shown
     from ..lanes import sweep as run_sweep
 
     with show.computing(f"sweep of {subject.name}") as progress:
@@ -179,7 +193,10 @@ def swept(subject: Any, speeds: Any, run: SweepOptions, show: ShowOptions) -> tu
     notes = [
         f"Failed lanes: {', '.join(f'{n} {how}' for how, n in failed.items()) or 'none'}",
         f"Error of a revolution: at most {document['error']:.0e} of the scale",
-        *(f"Confirmed by steps at most 1/{2 << i} as long: {n} of {of} labels changed" for i, (of, n, *_) in enumerate(confirmed)),
+        *(
+            f"Confirmed by steps at most 1/{2 << i} as long: {n} of {of} labels changed"
+            for i, (of, n, *_) in enumerate(confirmed)
+        ),
     ]
     return found, Answer(said_of(found, zones), tables, notes, document, subject, files | {"data": (".zarr", found)})
 
@@ -253,7 +270,10 @@ def chances(subject: Any, speeds: Any, draws: int, seed: int, run: RunOptions, s
     )
     columns = {"cage speed [rpm]": found.rpm, "shaft speed [rpm]": found.rpm * subject.shaft}
     columns |= {"chance of chaos": found.chance, "lower bound": found.interval[0], "upper bound": found.interval[1]}
-    tables, files = shown.chances_tables(subject.name, found, subject.beside), {"figure": (".png", figure), "data": (".csv", columns)}
+    tables, files = (
+        shown.chances_tables(subject.name, found, subject.beside),
+        {"figure": (".png", figure), "data": (".csv", columns)},
+    )
     said, notes = shown.chances_answer(found), shown.chances_notes(found)
     return Answer(said, tables, notes, shown.chances_document(found), subject.certain, files)
 
@@ -296,11 +316,20 @@ def poincare(
     starts = []
     for i in range(found.sizes["start"]):
         lane = found.isel(speed=0, start=i)
-        row = {"start": i + 1, "exponent": float(lane["exponents"][0]), "standard_error": float(lane["standard_error"][0])}
+        row = {
+            "start": i + 1,
+            "exponent": float(lane["exponents"][0]),
+            "standard_error": float(lane["standard_error"][0]),
+        }
         row |= {name: str(lane[name].values) for name in ("label", "outcome")}
         starts.append(row | {name: lane["strobe"].sel(component=name).values for name in ("y_C", "vy_C")})
     exponent = Column("largest exponent per revolution", (), key="exponent", errors="standard_error")
-    table = rows_table(f"Strobe section of {where}, {length(found)}", starts, [Column("start", ()), Column("label", ()), exponent], "starts")
+    table = rows_table(
+        f"Strobe section of {where}, {length(found)}",
+        starts,
+        [Column("start", ()), Column("label", ()), exponent],
+        "starts",
+    )
     names = [f"start {row['start']}: {row['label']}" for row in starts]
     figure = drawn(where, lambda ax: strobe_section(found["strobe"].values[0], ax, names=names), 6.5, 5.4)
     files = {"figure": (f"{stem}.png", figure), "data": (f"{stem}.csv", strobe_columns(found))}
@@ -360,13 +389,19 @@ def compare(
     for each, data in zip(pair, found, strict=True):
         require_some(data, f" of {each.name}")
         zones, means = zones_of(data), [shown.mean_over_starts(data, n) for n in quantities]
-        designs[each.name] = {"labels": data["label"].values, "failed": int(failed(data).sum()), **each.both(data["rpm"].values / RPM)}
+        designs[each.name] = {
+            "labels": data["label"].values,
+            "failed": int(failed(data).sum()),
+            **each.both(data["rpm"].values / RPM),
+        }
         for name, row, (mean, error) in zip(quantities, rows, means, strict=True):
             designs[each.name] |= {name: mean, f"{name}_error": error}
             row[each.name] = float(np.nanmean(mean))
         said.append(f"{each.name}: {said_of(data, zones)}")
         tables += [dataclasses.replace(table, key="") for table in zone_tables(each, data, zones)]
-    overall = shown.rows_table("Means over speed, in SI units", rows, [shown.Column(n, ()) for n in ("measure", *names)], "means")
+    overall = shown.rows_table(
+        "Means over speed, in SI units", rows, [shown.Column(n, ()) for n in ("measure", *names)], "means"
+    )
     chosen = [data.isel(speed=places) for data in found]
     tables = [overall, shown.differences_table(names, [each.model for each in pair]), *tables]
     tables += [shown.quantity_beside(n, names, chosen) for n in quantities]
@@ -396,7 +431,10 @@ def _measured(model: Any, found: Any) -> Any:
     from ..design import land_loads, motions
 
     loads, size = land_loads(model, found), motions(model, found).size
-    about = {"orbit_size": (("speed", "start"), size, "m"), "peak_land_force": (("speed",), loads["peak land force"], "N")}
+    about = {
+        "orbit_size": (("speed", "start"), size, "m"),
+        "peak_land_force": (("speed",), loads["peak land force"], "N"),
+    }
     about["wear_load"] = ("speed",), loads["wear load"], "N m/s"
     words = lambda name, unit: {"units": unit, "long_name": name.replace("_", " ")}
     return found.assign({name: (dims, x, words(name, unit)) for name, (dims, x, unit) in about.items()})
@@ -427,7 +465,10 @@ def runup(
 
     subject = read_case(case, load)
     low, high = subject.range(first, last, 2)
-    given = {"windows": windows or subject.usual(100, 24), "settle": subject.usual(100, 10) if discard is None else discard}
+    given = {
+        "windows": windows or subject.usual(100, 24),
+        "settle": subject.usual(100, 10) if discard is None else discard,
+    }
     with show.computing(f"runup {subject.name}"):
         found = ramp_up_down(subject.model, low, high, subject.rate(rate), **given, method=steps.method)
     names, differs, spans = [n for n in RAMPED if n in found], apart(found), stretches_apart(found)
@@ -436,7 +477,10 @@ def runup(
     columns = [Column("speed [rpm]", up["rpm"].values[rows].tolist(), digits=0)]
     for name in names:
         unit = up[name].attrs["units"]
-        columns += [Column(f"{head_of(name, unit)} {way}", found[name].sel(way=way).values[rows].tolist(), unit) for way in ("up", "down")]
+        columns += [
+            Column(f"{head_of(name, unit)} {way}", found[name].sel(way=way).values[rows].tolist(), unit)
+            for way in ("up", "down")
+        ]
     columns.append(Column("hysteresis", ["differs" if x else "" for x in differs[rows]]))
     said = "Up and down are alike within their scatter: no hysteresis is seen at this rate."
     if spans:
@@ -444,12 +488,23 @@ def runup(
         said = f"Up and down differ: {each}. A slower ramp tells whether the cage only lags behind."
     length = f"{found.attrs['revolutions']} revolutions each way in {found.attrs['seconds']:.3g} s"
     title = f"Run-up and run-down of {subject.name}, {rate:g} rpm/s, {length}"
-    document = {"rate_rpm_per_s": rate, "hysteresis_rpm": spans, "ramp_seconds": found.attrs["seconds"], "revolutions": found.attrs["revolutions"]}
-    data = {f"{key.removesuffix('_rpm').replace('_', ' ')} [rpm]": x for key, x in subject.both(up["rpm"].values / RPM).items()}
+    document = {
+        "rate_rpm_per_s": rate,
+        "hysteresis_rpm": spans,
+        "ramp_seconds": found.attrs["seconds"],
+        "revolutions": found.attrs["revolutions"],
+    }
+    data = {
+        f"{key.removesuffix('_rpm').replace('_', ' ')} [rpm]": x
+        for key, x in subject.both(up["rpm"].values / RPM).items()
+    }
     for way, part in (("up", up), ("down", down)):
         document[way] = {"speed_rpm": part["rpm"].values, **{str(n): x.values for n, x in part.data_vars.items()}}
         data |= {f"{n} {way} [{x.attrs['units']}]": x.values for n, x in part.data_vars.items()}
-    files = {"figure": (".png", ramp_figure(up, down, names, spans, title)), "data": (".csv", data | {"differs": differs})}
+    files = {
+        "figure": (".png", ramp_figure(up, down, names, spans, title)),
+        "data": (".csv", data | {"differs": differs}),
+    }
     return Answer(said, [Table(title, columns)], [], document, subject, files)
 
 
@@ -533,9 +588,15 @@ def study(
     known = found.stack(lane=dims)
     require_some(known.isel(lane=np.flatnonzero(known["label"].values != "pending")))
     spread = lambda x: [float(v) for v in np.nanpercentile(x, (0, 50, 100))] if np.isfinite(x).any() else [None] * 3
-    document = {"axes": dict(zip(dims, found["label"].shape, strict=True)), "lanes": found["label"].size, "labels": counts}
+    document = {
+        "axes": dict(zip(dims, found["label"].shape, strict=True)),
+        "lanes": found["label"].size,
+        "labels": counts,
+    }
     document |= {"stored": found["label"].size - left, "stored_before": found["label"].size - left - done[-1] + done[0]}
-    document["least_median_most"] = {q.name: spread(found[q.name].values) for q in subject.model.quantities if q.name in found}
+    document["least_median_most"] = {
+        q.name: spread(found[q.name].values) for q in subject.model.quantities if q.name in found
+    }
     shape = " x ".join(f"{n} {axis}" for axis, n in document["axes"].items())
     said = f"{document['stored']} of {document['lanes']} lanes are stored; {max(counts, key=counts.__getitem__)} is most common."
     table, notes = shares_table(f"Lanes: {shape}", "label", counts), [f"Open it: jaxcage.open_study({str(path)!r})"]

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from .._errors import InputError
 from .._parameters import readings_of, replace
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
-from ..io import BearingFile, Unknown, Whose, read_bearing, read_whole_bearing, subject_of
+from ..files import BearingFile, Unknown, Whose, read_bearing, read_whole_bearing, subject_of
 from ..models import FASTEST, WHOLE_BEARINGS, case, whole_bearing
 from .options import flag
 from .progress import say
@@ -153,7 +153,9 @@ class Subject:
     @property
     def certain(self) -> "Subject":
         """The same without ranges, for answers that have taken them into account."""
-        return self if self.file is None else dataclasses.replace(self, file=dataclasses.replace(self.file, unknowns=()))
+        return (
+            self if self.file is None else dataclasses.replace(self, file=dataclasses.replace(self.file, unknowns=()))
+        )
 
     @property
     def document(self) -> dict[str, Any]:

@@ -42,9 +42,7 @@ def read_vary(given: Sequence[str], subject: Subject) -> Vary:
     return found
 
 
-def read_bounds(
-    given: Sequence[str], subject: Subject, names: Sequence[str] = ()
-) -> dict[str, tuple[float, float]]:
+def read_bounds(given: Sequence[str], subject: Subject, names: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
     """Every `NAME=LOWER:UPPER` of parameters that are to be chosen, in SI units; the usual ones if nothing is given.
 
     **Raises:** `InputError`, also for a parameter that is not one of `names`, if there are any.
@@ -150,7 +148,7 @@ def _number(name: str, subject: Subject) -> Callable[[str], float]:
     own = [SPEED, OIL, *known]
     if name not in own:
         raise InputError(f"Option --vary must name one of {', '.join(own)}, but names '{name}'.")
-    from ..io import to_si
+    from ..files import to_si
 
     return lambda text: to_si(text, "1" if name == OIL else known[name].unit)
 
@@ -174,7 +172,7 @@ def _check_range(name: str, values: Sequence[float] | np.ndarray, subject: Subje
 
 def _check_corners(vary: Vary, subject: Subject) -> None:
     """Check what ranges of single values cannot tell, at the corners of all that is varied."""
-    from ..io import check_together
+    from ..files import check_together
 
     ends = {
         name: sorted(set(how.bounds if isinstance(how, Spread) else (how.min(), how.max())))

@@ -110,4 +110,6 @@ def curves_table(title: str, curves: list[Curve], x: Axis, y: Axis) -> Table:
         for which, axis in (("x", x), ("y", y))
         for end in ("low", "high")
     ]
-    return rows_table(title, rows, [Column("edge", ()), Column("kind", ()), *ends, Column("points", ()), Column("ends", ())], "curves")
+    return rows_table(
+        title, rows, [Column("edge", ()), Column("kind", ()), *ends, Column("points", ()), Column("ends", ())], "curves"
+    )
