@@ -2,22 +2,26 @@
 
 import dataclasses
 import functools
+import json
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pint
 import pytest
 
 import jaxcage as jc
+from jaxcage.cli import main
 from jaxcage.forces import parameter
 
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
 """Lanes as they run, none confirmed or followed further."""
-raw_sweeps = functools.partial(jc.sweep_designs, confirm=False, horizon=0)
+raw_sweeps = functools.partial(jc.sweep, confirm=False, horizon=0)
 
 
 @functools.cache
@@ -134,3 +138,53 @@ def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[t
             yield from declared(value, here)
         elif {"parameter", "choice", "count"} & set(field.metadata):
             yield here, field
+
+
+def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    """The JSON document that a command prints, the only thing on standard output."""
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The sentence with which a command refuses `arguments`."""
+    assert main(list(arguments)) == 2
+    out, err = capsys.readouterr()
+    lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
+    assert out == "" and len(lines) == 1 and lines[0].endswith((".", ".)")), err
+    return lines[0]
+
+
+def is_png(path: str) -> bool:
+    """True for a file that begins as a PNG figure does."""
+    return Path(path).read_bytes().startswith(b"\x89PNG\r\n")
+
+
+def made_sweep(rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, **more: Any) -> Any:
+    """A sweep made by hand: strobe states (speeds, starts, revolutions, components) and growth in blocks."""
+    lanes, speeds = strobe.shape[:2], len(rpm)
+    outcome = np.zeros(lanes, dtype=np.int32) if outcome is None else outcome
+    rest = dict(
+        last=strobe[:, :, -1],
+        peak=np.where(outcome == 0, 0.5, np.nan),
+        error=np.full(lanes, 1e-4),
+        doubt=np.zeros((*lanes, growth.shape[-1])),
+        scale=np.ones((speeds, strobe.shape[-1])),
+        discard=10,
+        revolutions=100,
+    )
+    speed = np.asarray(rpm) * np.pi / 30
+    return jc.Sweep(speed=speed, strobe=strobe, block_growth=growth, outcome=outcome, **rest | more)
+
+
+def cage_sweep() -> Any:
+    """Five speeds, three starts: the second speed chaotic, the others periodic, the last lane of the fourth failed."""
+    rng = np.random.default_rng(0)
+    strobe = np.repeat(rng.normal(size=(5, 3, 1, 4)), 16, axis=2) * 1e-4
+    strobe[1] += rng.normal(size=(3, 16, 4)) * 1e-4
+    growth = rng.normal(-0.2, 0.01, size=(5, 3, 10, 1))
+    growth[1] += 0.5
+    outcome = np.zeros((5, 3), dtype=np.int32)
+    outcome[3, 2], strobe[3, 2], growth[3, 2] = 1, np.nan, np.nan
+    scale = np.tile([4.5e-4, 4.5e-4, 0.4, 0.4], (5, 1))
+    return made_sweep(np.linspace(8000.0, 8400.0, 5), strobe, growth, outcome, scale=scale)

@@ -170,7 +170,7 @@ class AbstractStatistic(AbstractObjective):
     def by_block(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k blocks"]:
         return self.samples(space.models(places)).mean(axis=1)
 
-    def on(self, runs: Runs):
+    def on(self, runs: Runs) -> "AbstractStatistic":
         return dataclasses.replace(self, runs=runs)
 
 
