@@ -32,7 +32,7 @@ STAGES = 4
 KEPT = 0.25
 """Share of the draws of a stage around which the ranges close; with as many accepted the stage is the last."""
 FAR = 5.0
-"""Largest count of a miss [tolerances], also that of a cage that rattles and should not. The larger of two misses counts
+"""Largest count of a miss [tolerances], also of a cage that rattles and should not. The larger of two misses counts
 more, so that a tight tolerance tells near draws from far ones."""
 FEW = 8
 """Accepted draws without which even the last stage closes around the best ones, met or not."""
