@@ -68,6 +68,11 @@ def check_call(f: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
 _signature = functools.lru_cache(maxsize=1024)(inspect.signature)
 
 
+def is_concrete(*values: object) -> bool:
+    """True if none of `values` is traced by JAX, so that Python may compare them."""
+    return not any(isinstance(value, Tracer) for value in values)
+
+
 def require_at_least(least: int, **numbers: Any) -> None:
     """**Raises:** `ArgumentError` for a number below `least`, by its name; what is traced passes."""
     for name, value in numbers.items():

@@ -56,8 +56,8 @@ class ParameterInfo:
 UNKNOWN = "?"
 """Unit of a parameter that is not declared."""
 EXTRA = "extra"
-"""The field in which a model holds modules of its user, a tuple. Their numbers are parameters, declared or not, named
-by the class of the module: `extra.MyDrag.coefficient`."""
+"""Prefix of the numbers of laws that a user wrote: they are parameters, declared or not, and are named after the class
+of the law, `extra.MyDrag.coefficient`."""
 
 
 def _as_leaf(x: Any) -> Any:
@@ -152,12 +152,34 @@ def with_numbers(modules: Any) -> Any:
     return jax.tree.map(lambda x: x if isinstance(x, bool) else _as_leaf(x), modules)
 
 
+def part_path(part: Any) -> tuple[str, ...]:
+    """Path by which a model knows a part that it holds in a tuple: `film` by its name, a user's as `extra.MyDrag`."""
+    name = getattr(type(part), "law_name", "")
+    return (name,) if name else (EXTRA, type(part).__name__)
+
+
+def fields_from(kind: type, parts: Mapping[str, Any], laws: tuple[Any, ...] = ()) -> dict[str, Any]:
+    """Values of fields of `kind` from parts by name.
+
+    A name that is no field belongs to the tuple `forces`: the part takes the place of the one of `laws` of that name,
+    and `extra` the place of all laws that have no name.
+    """
+    fields = {f.name for f in dataclasses.fields(kind)}
+    given = {name: part for name, part in parts.items() if name not in fields}
+    values = {name: part for name, part in parts.items() if name in fields}
+    if given:
+        kept = [law for law in values.get("forces", laws) if part_path(law)[0] not in given]
+        own = given.pop(EXTRA, ())
+        values["forces"] = (*kept, *given.values(), *(own if isinstance(own, tuple) else (own,)))
+    return values
+
+
 Declared = tuple[tuple[str, ...], dataclasses.Field]
 """A declared field with its path of attribute names."""
 
 
 def walk(module: eqx.Module) -> tuple[Declared, ...]:
-    """Every declared field below `module`, depth first, and the plain numbers of modules in `extra`."""
+    """Every declared field below `module`, depth first, and the plain numbers of laws that a user wrote."""
     leaves, structure = jax.tree.flatten(module)
     return _declared(structure, tuple(eqx.is_inexact_array(leaf) for leaf in leaves))
 
@@ -171,9 +193,9 @@ def _declared(structure: Any, is_number: tuple[bool, ...]) -> tuple[Declared, ..
             value, here = getattr(module, field.name), (*path, field.name)
             if isinstance(value, eqx.Module):
                 yield from below(value, here, own)
-            elif field.name == EXTRA and isinstance(value, tuple):
+            elif isinstance(value, tuple) and all(isinstance(each, eqx.Module) for each in value):
                 for each in value:
-                    yield from below(each, (*here, type(each).__name__), True)
+                    yield from below(each, (*path, *part_path(each)), part_path(each)[0] == EXTRA)
             elif {"parameter", "choice", "count"} & set(field.metadata):
                 yield here, field
             elif own and value is True and not field.metadata.get("static"):
@@ -276,7 +298,7 @@ def _with_static(module: Any, path: tuple[str, ...], value: Any) -> Any:
     inner = _with_static(_part(module, name), tuple(rest), value) if rest else value
     if isinstance(module, tuple):
         return tuple(inner if type(each).__name__ == name else each for each in module)
-    return dataclasses.replace(module, **{name: inner})
+    return dataclasses.replace(module, **fields_from(type(module), {name: inner}, getattr(module, "forces", ())))
 
 
 def with_values(module: M, values: Mapping[str, PyTree]) -> M:
@@ -297,9 +319,10 @@ def replace(module: M, **values: PyTree) -> M:
     """
     _require_module(module)
     leaves, choices = parameter_paths(module), choice_paths(module)
-    parts = [
-        f.name for f in dataclasses.fields(module) if f.name == EXTRA or isinstance(getattr(module, f.name), eqx.Module)
-    ]
+    parts = [f.name for f in dataclasses.fields(module) if isinstance(getattr(module, f.name), eqx.Module)]
+    if hasattr(module, "forces"):
+        named = {part_path(law)[0]: None for law in (*module.forces, *values.values())}
+        parts += ["forces", *({EXTRA: None} | named)]
     fields = dict(walk(module))
     for name, value in values.items():
         if not any(name in known for known in (parts, leaves, choices)):
@@ -355,9 +378,11 @@ def _require_range(name: str, value: Any, info: ParameterInfo) -> None:
 def _with_parts(module: M, parts: dict[str, Any]) -> M:
     """A copy of `module` with whole parts exchanged, not asked yet whether they go together."""
     copy = object.__new__(type(module))
+    given = fields_from(type(module), parts, getattr(module, "forces", ()))
     for field in dataclasses.fields(module):
-        value = parts.get(field.name, getattr(module, field.name))
-        object.__setattr__(copy, field.name, with_numbers(value) if field.name == EXTRA else value)
+        value = given.get(field.name, getattr(module, field.name))
+        convert = field.metadata.get("converter", lambda x: x)
+        object.__setattr__(copy, field.name, convert(value) if field.name in given else value)
     return copy
 
 
@@ -403,3 +428,38 @@ def _by_field_name(model: Any) -> dict[str, tuple[str, ...]]:
             paths.append(names)
     last = [path[-1] for path in paths]
     return {(path[-1] if last.count(path[-1]) == 1 else ".".join(path)): path for path in paths}
+
+
+def printed(model: eqx.Module) -> str:
+    """One line for every parameter, choice and count of `model`: name, value, unit, where it comes from."""
+    rows = [_row(".".join(path), get(model, path), field.metadata) for path, field in walk(model)]
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)) for row in rows]
+    said = [f"  {line}  {row[3]}".rstrip() for line, row in zip(lines, rows, strict=True)]
+    return "\n".join([f"{type(model).__name__}, values in SI units", *said])
+
+
+def _row(name: str, value: Any, metadata: Any) -> tuple[str, str, str, str]:
+    info: ParameterInfo | None = metadata.get("parameter")
+    if info is None:
+        said = metadata.get("readings", {}).get(value, metadata.get("text", ""))
+        return name, str(value), "", said
+    unit = "" if info.unit in ("1", "?") else info.unit
+    return name, _number(value), unit, _source(info)
+
+
+def _number(value: Any) -> str:
+    try:
+        known = np.asarray(value, dtype=float)
+    except Exception:  # traced, or a placeholder of tree surgery
+        return "traced"
+    if known.ndim == 0:
+        return f"{float(known):.6g}"
+    return f"{np.min(known):.6g} to {np.max(known):.6g} ({known.size} values)"
+
+
+def _source(info: ParameterInfo) -> str:
+    if info.kind != "unknown" or info.within is None:
+        return f"{info.kind}: {info.source}"
+    low, high = info.within
+    return f"unknown, {low:g} to {high:g} if not measured: {info.source}"

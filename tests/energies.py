@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from jaxcage.forces._phase import cos_sin
+from jaxcage.forces import cos_sin
 from jaxcage.models import BearingAtSpeed, BearingState, Bodies, Rollers
 
 

@@ -21,7 +21,7 @@ from jaxcage.forces import parameter
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
 """Lanes as they run, none confirmed or followed further."""
-raw_sweeps = functools.partial(jc.sweep, confirm=False, horizon=0)
+raw_sweeps = functools.partial(jc.sweep_designs, confirm=False, horizon=0)
 
 
 @functools.cache

@@ -1,6 +1,7 @@
 """Findings made by hand for the tests of the report: nothing is computed."""
 
 import numpy as np
+from helpers import made_sweep
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES, load_distribution
@@ -42,20 +43,8 @@ def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.
     wild = np.random.default_rng(1).uniform(-2e-4, 2e-4, (count, 3, 8, 4))
     calm = np.broadcast_to(1e-4 * np.sin(rpm / 5e3)[:, None, None, None], wild.shape)
     growth = np.where(chaotic, 0.3, -0.4)[:, None, None, None] * np.ones((count, 3, 10, 1))
-    return jc.Sweep(
-        speed=rpm * PER_RPM,
-        strobe=np.where(chaotic[:, None, None, None], wild, calm),
-        last=np.zeros((count, 3, 4)),
-        block_growth=growth,
-        peak=np.full((count, 3), 0.5),
-        outcome=np.zeros((count, 3), dtype=int),
-        error=np.full((count, 3), 1e-4),
-        doubt=np.zeros((count, 3, 1)),
-        scale=np.full((count, 4), 1e-4),
-        discard=300,
-        revolutions=300,
-        settings=VERSIONS,
-    )
+    settled = dict(scale=np.full((count, 4), 1e-4), discard=300, revolutions=300, settings=VERSIONS)
+    return made_sweep(rpm, np.where(chaotic[:, None, None, None], wild, calm), growth, **settled)
 
 
 def orbits(sweep: jc.Sweep) -> SynchronousOrbits:

@@ -9,7 +9,7 @@ from test_whole_motion import SPEED, bearing, moving
 
 import jaxcage as jc
 from jaxcage.design import Runs, gradient_of_pairs, mean_gradient
-from jaxcage.models.whole import rolling_start
+from jaxcage.models import rolling_start
 
 
 CALM = ("guidance_gap", "pocket_clearance", "land_width", "viscosity_1+viscosity_2")

@@ -245,10 +245,12 @@ def cage_alone():
     cage = jc.CageModel(
         bearing=jc.bearing.nu2310(),
         lubricant=same.lubricant,
-        film=same.film,
-        contact=same.contact,
-        support=jc.forces.Support(**none),
-        impact=jc.forces.SynchronousImpact(amplitude=0.0, exponent=1.0),
+        forces=(
+            same.film,
+            same.contact,
+            jc.forces.Support(**none),
+            jc.forces.SynchronousImpact(amplitude=0.0, exponent=1.0),
+        ),
         cage_mass=same.cage_mass,
         guidance_gap=same.guidance_gap,
         eccentricity=same.eccentricity,

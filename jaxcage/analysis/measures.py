@@ -11,10 +11,10 @@ from .._errors import ArgumentError
 from .._form import compiled
 from .._notebook import notebook_html
 from ..forces import Force
-from ..solve import Trajectory
 from ..models import FORCES, AbstractForcedSystem, CageModel
 from ..models.cage_quantities import QUANTITIES, CageHistory
 from ..quantities import Quantity, averaged
+from ..solve import Trajectory
 from .labels import scatter
 
 

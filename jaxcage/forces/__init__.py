@@ -1,35 +1,40 @@
-"""Force laws on the cage: pure functions of arrays, one law per file, and modules that hold their parameters.
+"""Force laws on the cage: pure functions of arrays, and modules that hold their parameters.
 
-| module             | responsibility                                                              |
-|--------------------|-----------------------------------------------------------------------------|
-| `_motion`          | what a law sees of the cage and what it returns                             |
-| `_land`            | where the cage is in its guide                                              |
-| `_land_film`       | the film of all lands as a force on the cage                                |
-| `_film`            | short-bearing oil film of the rib lands, three film models, (25)-(28)       |
-| `_contact`         | line contact of the lands, with restitution                                 |
-| `_support`         | springs, cubic stiffness, damping and cross-coupling, (16), (20)            |
-| `_rib`             | rigid or elastic rib                                                        |
-| `_unbalance`       | centrifugal force of the cage's mass centre                                 |
-| `_gravity`         | weight                                                                      |
-| `_pocket_impact`   | roller-bar impact oscillator (14) and its force history                     |
-| `_pulse`           | Fourier integrals of the force of one impact                                |
-| `_impact_forcing`  | impacts on the cage: synchronous (15) or roller by roller                   |
-| `_smooth`          | regularised elementary functions                                            |
+| module       | responsibility                                                                        |
+|--------------|---------------------------------------------------------------------------------------|
+| `law`        | base classes of laws, the motion that they see, the clearance of the guide            |
+| `film`       | short-bearing oil film of the rib lands, three film models, (25)-(28)                 |
+| `contact`    | line contact of the lands, with restitution                                           |
+| `support`    | springs, cubic stiffness, damping and cross-coupling, (16), (20)                      |
+| `impact`     | roller-bar impact oscillator (14); synchronous impacts (15) or roller by roller       |
+| `pulse`      | Fourier integrals of the force of one impact                                          |
+| `inertia`    | weight, and centrifugal force of the cage's mass centre                               |
+| `rib`        | rigid or elastic rib                                                                  |
+| `elementary` | regularised elementary functions                                                      |
 
 Frame: x to the right, y up, rotation positive counter-clockwise; forces act on the cage.
 """
 
 from .._arguments import check_layer
 from .._parameters import choice as choice, count as count, parameter as parameter
-from ._contact import (
+from .contact import (
     ContactForce as ContactForce,
     LandContact as LandContact,
     contact_force as contact_force,
-    contact_slopes as contact_slopes,
     restitution_damping as restitution_damping,
 )
-from ._film import (
+from .elementary import (
+    cos_sin as cos_sin,
+    inverse_root as inverse_root,
+    power_10_9 as power_10_9,
+    root_9 as root_9,
+    smooth_norm as smooth_norm,
+    smooth_plus as smooth_plus,
+)
+from .film import (
+    FilmForce as FilmForce,
     FilmModel as FilmModel,
+    RibFilm as RibFilm,
     film_drive as film_drive,
     film_pressure as film_pressure,
     film_resistance as film_resistance,
@@ -40,62 +45,55 @@ from ._film import (
     short_film_force as short_film_force,
     supply_force as supply_force,
 )
-from ._gravity import WeightForce as WeightForce, weight as weight
-from ._impact_forcing import (
+from .impact import (
+    ImpactHistory as ImpactHistory,
+    PocketImpact as PocketImpact,
     RollerPassImpact as RollerPassImpact,
     SynchronousForce as SynchronousForce,
     SynchronousImpact as SynchronousImpact,
+    approach_speed as approach_speed,
+    impact_history as impact_history,
+    impact_time_scale as impact_time_scale,
     pulse_spectrum as pulse_spectrum,
     pulse_train as pulse_train,
     pulse_train_force as pulse_train_force,
     synchronous_amplitude as synchronous_amplitude,
     synchronous_force as synchronous_force,
 )
-from ._land import Land as Land
-from ._land_film import FilmForce as FilmForce, RibFilm as RibFilm
-from ._motion import (
+from .inertia import (
+    UnbalanceForce as UnbalanceForce,
+    UnbalanceReading as UnbalanceReading,
+    WeightForce as WeightForce,
+    effective_eccentricity as effective_eccentricity,
+    unbalance_force as unbalance_force,
+    weight as weight,
+)
+from .law import (
     AbstractForce as AbstractForce,
     AbstractForcing as AbstractForcing,
+    AbstractLaw as AbstractLaw,
     Force as Force,
+    Land as Land,
     Motion as Motion,
-    Rows as Rows,
 )
-from ._pocket_impact import (
-    ImpactHistory as ImpactHistory,
-    PocketImpact as PocketImpact,
-    approach_speed as approach_speed,
-    impact_history as impact_history,
-    impact_time_scale as impact_time_scale,
-)
-from ._rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
-from ._smooth import (
-    inverse_root as inverse_root,
-    power_10_9 as power_10_9,
-    root_9 as root_9,
-    smooth_norm as smooth_norm,
-    smooth_plus as smooth_plus,
-    smooth_plus_slope as smooth_plus_slope,
-)
-from ._support import (
+from .rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
+from .support import (
     Support as Support,
     cross_force as cross_force,
     cubic_stiffness as cubic_stiffness,
     spring_force as spring_force,
-    support_slopes as support_slopes,
 )
-from ._unbalance import (
-    UnbalanceForce as UnbalanceForce,
-    UnbalanceReading as UnbalanceReading,
-    effective_eccentricity as effective_eccentricity,
-    unbalance_force as unbalance_force,
-)
+
+
+LAWS: tuple[type[AbstractLaw], ...] = (RibFilm, LandContact, Support, SynchronousImpact, RollerPassImpact)
+"""The laws that a cage and its configuration file know, in the order in which forces are listed and added."""
 
 
 check_layer(
     globals(),
-    "approach_speed contact_force contact_slopes cross_force cubic_stiffness effective_eccentricity "
+    "approach_speed contact_force cross_force cubic_stiffness effective_eccentricity "
     "film_drive film_pressure film_resistance film_scale fixed_half_resistance full_resistance half_circle_resistance "
     "impact_history impact_time_scale inverse_root power_10_9 pulse_spectrum pulse_train pulse_train_force "
-    "restitution_damping rib_force root_9 short_film_force smooth_norm smooth_plus smooth_plus_slope spring_force "
-    "supply_force support_slopes synchronous_amplitude synchronous_force unbalance_force weight",
+    "restitution_damping rib_force root_9 short_film_force smooth_norm smooth_plus spring_force "
+    "supply_force synchronous_amplitude synchronous_force unbalance_force weight",
 )

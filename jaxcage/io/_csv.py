@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float, Shaped
 
+from ..files import read_bytes, replacing
 from ..quantities import component_names, quantity
 from ..solve import Trajectory
-from ._files import read_bytes, replacing
 
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from .dataset import (
 )
 from .grid import OIL as OIL, Grid as Grid, with_values as with_values
 from .observe import Progress as Progress
-from .plan import Plan as Plan, Speeds as Speeds, States as States, rpm as rpm
+from .plan import Plan as Plan, Speeds as Speeds, States as States, initial_states as initial_states, rpm as rpm
 from .run import run_lanes as run_lanes, run_up_down as run_up_down, sweep as sweep
 from .settings import Run as Run
 from .spread import Between as Between, Spread as Spread, Tolerance as Tolerance

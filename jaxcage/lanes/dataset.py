@@ -4,9 +4,9 @@ Variables, over the axes of the plan (`speed` and `start` of a sweep) and what s
 
 | variable | contents |
 |---|---|
-| `label`, `outcome` | what a lane does, and how its integration ended, in words; codes with their meanings on disk |
+| `label`, `outcome` | what a lane does, and how its integration ended; words, on disk codes with their meanings |
 | `exponents`, `standard_error` (exponent) | Lyapunov exponents per revolution |
-| `block_growth` (growth_block, exponent), `doubt` (exponent) | what they are computed from: means of blocks, error of steps |
+| `block_growth` (growth_block, exponent), `doubt` (exponent) | means of blocks, error that comes from the steps |
 | `peak`, `error`, `steps` | largest excursion, largest error of a revolution [scale], steps of a revolution |
 | `last`, `scale` (component) | state at the end, magnitude of each component |
 | `strobe` (revolution, component) | the last strobe states, where revolutions repeat |
@@ -28,9 +28,10 @@ from jaxtyping import Float, Shaped
 
 from .._errors import InputError
 from ..analysis import LABELS, scatter
-from ..solve import OUTCOMES, AbstractMethod
+from ..files import configuration, replacing
 from ..models import AbstractForcedSystem
 from ..quantities import Quantity, averaged, quantity
+from ..solve import OUTCOMES, AbstractMethod
 from .confirm import Confirmation
 from .observe import Observation, over_lanes
 from .plan import SPEED, Plan
@@ -142,8 +143,6 @@ def _attributes(found: Found) -> dict[str, Any]:
 
 def configuration_of(model: AbstractForcedSystem) -> dict[str, Any] | None:
     """The TOML configuration of a model as a nested mapping; None where no file can hold it."""
-    from ..io import configuration  # the tables of configurations are loaded when they are needed
-
     try:
         return configuration(model)
     except InputError:
@@ -186,8 +185,6 @@ def decoded(found: xr.Dataset) -> xr.Dataset:
 
 def save(path: str | Path, found: xr.Dataset) -> Path:
     """Write a data set to the zarr folder `path`, whole or not at all; an earlier result stays until then."""
-    from ..io import replacing
-
     with replacing(path) as temporary:
         coded(found).to_zarr(temporary, mode="w", consolidated=False)
     return Path(path)

@@ -1,7 +1,7 @@
 """Grids and samples of parameters, whose lanes are cut into chunks.
 
-A lane is one sample, one value on each axis of the grid, and one initial state. Its numbers follow from the grid and its
-place alone, so that any process can compute any chunk at any time, and gets the same bits.
+A lane is one sample, one value on each axis of the grid, and one initial state. Its numbers follow from the grid and
+its place alone, so that any process can compute any chunk at any time, and gets the same bits.
 """
 
 import dataclasses
@@ -22,8 +22,8 @@ from .._errors import ArgumentError
 from .._parameters import pick
 from .._sobol import sobol
 from ..bearing import vg
-from ..solve import Lanes
 from ..models import AbstractForcedSystem
+from ..solve import Lanes
 from .observe import over_lanes
 from .plan import SPEED, START, Plan
 from .spread import Spread

@@ -98,8 +98,8 @@ def _aligned(late: Float[np.ndarray, "lanes ran"], count: int) -> Float[np.ndarr
 def _put(
     seen: Observation, lanes: Int[np.ndarray, " some"], new: Observation, open_: Bool[np.ndarray, " some"]
 ) -> None:
-    """Put the later states in place, NaN where a lane fails; the last strobe states of those that are `open_`, which may
-    close."""
+    """Put the later states in place, NaN where a lane fails; and the last strobe states of those that are `open_`,
+    which may close."""
     seen.last[lanes], seen.outcome[lanes] = new.last, new.outcome
     seen.error[lanes] = np.fmax(seen.error[lanes], new.error)
     every = np.concatenate([seen.strobe[lanes[open_]], new.strobe[open_]], axis=1)

@@ -15,8 +15,8 @@ from .._arguments import require_at_least, wrong
 from .._errors import ArgumentError
 from .._form import compiled
 from .._types import State
-from ..solve import Lanes
 from ..models import AbstractForcedSystem, require_speeds
+from ..solve import Lanes
 
 
 Speeds = float | Float[Array, " speeds"] | Float[np.ndarray, " speeds"]

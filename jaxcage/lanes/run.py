@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from .._checks import require_x64
 from ..analysis import label_lanes, motion_label
-from ..solve import OUTCOMES, AbstractMethod
 from ..models import INSTEAD, AbstractForcedSystem, require_known
+from ..solve import OUTCOMES, AbstractMethod
 from .confirm import Confirmation, Labelled, confirm as confirm_lanes, doubtful
 from .dataset import Found, dataset, exponent_error
 from .horizon import follow, run_unsettled

@@ -6,8 +6,8 @@ from typing import Any
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from ..analysis import LONGEST_PERIOD
-from ..solve import AbstractMethod, native
 from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod, native
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,8 +84,6 @@ class Run:
     @property
     def followed(self) -> int:
         """Number of blocks, the last ones, in which exponents are followed."""
-        if not self.exponents:
-            return 0
         if not self.exponent_revolutions:
             return self.blocks
         return min(self.blocks, max(2, -(-self.exponent_revolutions // self.block)))

@@ -57,7 +57,7 @@ class Study:
         if not 0 <= self.strobe <= self.run.revolutions * (not self.model.beside):
             raise ArgumentError(
                 "strobe",
-                said=f"must lie between 0 and the {self.run.revolutions} revolutions of a model whose revolutions repeat, "
+                said=f"must lie between 0 and the {self.run.revolutions} revolutions, and be 0 for a whole bearing, "
                 f"but is {self.strobe}.",
             )
 
@@ -265,7 +265,8 @@ def label_map(
     run = Run.of(model, **{**settings, "confirm": False, "horizon": 0})
     require_at_least(0, persist=persist)
     if persist and (persist <= run.discard or run.exponents < 1 or run.blocks < 2):
-        said = f"must be 0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks, but is {persist}."
+        allowed = f"0 or above the {run.discard} revolutions discarded, with an exponent and 2 blocks"
+        said = f"must be {allowed}, but is {persist}."
         raise ArgumentError("persist", said=said)
     say = lambda what: None if stage is None else lambda done, total: stage(what, done, total)
     every = np.arange(grid.size)

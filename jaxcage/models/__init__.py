@@ -1,35 +1,38 @@
 """Systems that can be integrated and analysed.
 
-| module            | responsibility                                                                  |
-|-------------------|---------------------------------------------------------------------------------|
-| `_system`         | the forced-system protocol; wrappers for a user's function, first or second order |
-| `_field`          | dy/dtau at one speed, its linearisation, elimination of positions                |
-| `_cage`           | the cage in its rib: parameters                                                  |
-| `_cage_at_speed`  | the cage in its rib: forces at one speed                                         |
-| `_door`           | refusal of traced arguments and of speeds that no cage has                       |
-| `_cases`          | the paper's six cases as models                                                  |
-| `_constants`      | what the paper leaves out, in sets                                               |
-| `_printed`        | a model as people read it                                                        |
-| `_user_law`       | what goes wrong in a law of the user's, in a sentence                            |
-| `whole`           | the whole bearing: parameters, starts, magnitudes, ready-made bearings           |
-| `whole_states`    | its state, and the quantities beside it                                          |
-| `whole_field`     | its equations of motion at one shaft speed                                       |
-| `contacts`        | its contacts: raceways, pockets, guiding land, oil                               |
+| module       | responsibility                                                                  |
+|--------------|---------------------------------------------------------------------------------|
+| `protocol`   | the model protocol                                                              |
+| `field`      | dy/dtau at one speed, its linearisation, elimination of positions               |
+| `cage`       | the cage in its rib: parameters, and forces at one speed                        |
+| `cases`      | the paper's six cases as models, constants that it does not print               |
+| `oscillator` | systems from a user's function, of first or second order                        |
+| `whole`      | the whole bearing: parameters, initial states, magnitudes, ready-made bearings  |
+| `whole_states` | its state, and the quantities beside it                                       |
+| `whole_field` | its equations of motion at one shaft speed                                     |
+| `whole_quantities` | quantities that it reports                                                |
+| `contacts`   | its contacts: raceways, pockets, guiding land, oil                              |
+| `cage_quantities` | quantities that a cage reports of a time history                           |
 """
 
 from .._arguments import check_layer
-from ._cage import CageModel as CageModel
-from ._cage_at_speed import FORCES as FORCES, CageAtSpeed as CageAtSpeed
-from ._cases import case as case
-from ._constants import CONSTANTS as CONSTANTS, Constants as Constants
-from ._door import (
+from .cage import (
     FASTEST as FASTEST,
-    INSTEAD as INSTEAD,
+    FORCES as FORCES,
+    NEEDED as NEEDED,
+    CageAtSpeed as CageAtSpeed,
+    CageModel as CageModel,
     fastest_speed as fastest_speed,
-    require_known as require_known,
-    require_speeds as require_speeds,
 )
-from ._field import (
+from .cases import CONSTANTS as CONSTANTS, Constants as Constants, case as case
+from .contacts import (
+    Pockets as Pockets,
+    Raceways as Raceways,
+    RollerDrag as RollerDrag,
+    Traction as Traction,
+    bar_stiffness as bar_stiffness,
+)
+from .field import (
     AbstractField as AbstractField,
     AbstractLinearisation as AbstractLinearisation,
     FirstOrderField as FirstOrderField,
@@ -38,18 +41,13 @@ from ._field import (
     divide as divide,
     multiply as multiply,
 )
-from ._system import (
+from .oscillator import ForcedOscillator as ForcedOscillator, ForcedSystem as ForcedSystem
+from .protocol import (
     ESCAPE as ESCAPE,
+    INSTEAD as INSTEAD,
     AbstractForcedSystem as AbstractForcedSystem,
-    ForcedOscillator as ForcedOscillator,
-    ForcedSystem as ForcedSystem,
-)
-from .contacts import (
-    Pockets as Pockets,
-    Raceways as Raceways,
-    RollerDrag as RollerDrag,
-    Traction as Traction,
-    bar_stiffness as bar_stiffness,
+    require_known as require_known,
+    require_speeds as require_speeds,
 )
 from .whole import (
     CAGE_STARTS as CAGE_STARTS,

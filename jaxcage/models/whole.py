@@ -11,15 +11,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import is_concrete
 from .._checks import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter
 from .._types import Scalar, State
 from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
-from ..bearing._line_contact import raceway_loads_of_all
+from ..bearing.line_contact import raceway_loads_of_all
 from ..forces import Land, LandContact, RibFilm
-from ._system import AbstractForcedSystem
+from .cage import FASTEST
 from .contacts import (
     Guide,
     PocketConstants,
@@ -31,6 +32,7 @@ from .contacts import (
     bar_stiffness,
     hunt_crossley,
 )
+from .protocol import AbstractForcedSystem
 from .whole_field import BearingAtSpeed
 from .whole_quantities import QUANTITIES
 from .whole_states import BESIDE, OF_BODIES, OF_ROLLER, WATCHED, BearingState, Bodies, Rollers
@@ -40,6 +42,9 @@ Guided = Literal["outer", "inner"]
 TURN = 2 * math.pi
 FIRST_ANGLE = -math.pi / 2
 """Angle of the cage at the beginning of a run [rad]: one roller is at the bottom."""
+SLOWEST_CAGE = 0.01
+"""Smallest speed of the cage in pure rolling over that of the faster ring: a revolution of a cage that hardly turns
+takes for ever."""
 SAMPLES = 16
 """Strobe states of a revolution that a sweep records."""
 SPACING = TURN / 16
@@ -202,6 +207,27 @@ class BearingModel(AbstractForcedSystem):
         cage = Bodies(*y[-OF_BODIES:])
         land_x, land_y = (cage.ring_x, cage.ring_y) if self.guidance == "inner" else (0.0, 0.0)
         return (cage.x - land_x) / self.clearance, (cage.y - land_y) / self.clearance
+
+    def check_speeds(self, speeds: np.ndarray, name: str) -> None:
+        if not self.over_angle or not is_concrete(*jax.tree.leaves(self)):
+            return
+        outer = float(self.outer_speed)
+        for speed in np.unique(speeds):
+            rolling, fastest = float(self.rolling_cage_speed(speed)), max(abs(speed), abs(outer))
+            if abs(rolling) < SLOWEST_CAGE * fastest:
+                raise ArgumentError(
+                    name,
+                    said=f"must make the cage turn at {SLOWEST_CAGE:g} of the faster ring's speed at least, "
+                    f"{SLOWEST_CAGE * fastest:.3g} rad/s, but with the outer ring at {outer:.6g} rad/s {speed:.6g} "
+                    f"rad/s of the shaft make it {rolling:.3g} rad/s: `bearing_over_time` follows it over time.",
+                )
+            if abs(rolling) * float(self.land_radius) > FASTEST:
+                land = abs(rolling) * float(self.land_radius)
+                raise ArgumentError(
+                    name,
+                    said=f"must be in rad/s and leave the cage at most {FASTEST:g} m/s at its land, but {speed:.6g} "
+                    f"rad/s ({speed * 30 / math.pi:.0f} rpm) of the shaft make {land:.0f} m/s.",
+                )
 
     def reference(self, speed: Scalar) -> dict[str, Scalar]:
         return {

@@ -18,8 +18,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import Scalar, State
-from ..forces._phase import cos_sin
-from ._field import AbstractField, AbstractLinearisation
+from ..forces import cos_sin
 from .contacts import (
     Guide,
     LandForces,
@@ -34,6 +33,7 @@ from .contacts import (
     pocket_contact,
     quadratic,
 )
+from .field import AbstractField, AbstractLinearisation
 from .whole_states import LOST, BearingState, Bodies, Rates, Rollers, bodies_of, rollers_of
 
 

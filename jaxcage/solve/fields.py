@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._form import Form, split
-from ..forces._phase import cos_sin
+from ..forces import cos_sin
 from ..models import (
     BESIDE,
     MOVING,

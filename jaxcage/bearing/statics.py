@@ -1,0 +1,200 @@
+"""Distribution of the load over the rollers, and where the cage rests: paper eqs. (1), (2), (5), (6), (10)."""
+
+from typing import Literal, get_args
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from .._arguments import is_concrete, require_above_zero, require_at_least
+from .._checks import require_x64
+from .._errors import ArgumentError
+from .._types import Scalar
+from .geometry import Bearing
+from .line_contact import line_contact_approach, raceway_loads_of_all
+
+
+Guidance = Literal["outer_rib", "inner_rib", "roller"]
+
+LARGEST = 1e12
+"""Largest load that is accepted [N]."""
+DEFAULT_SHAFT_LOAD = 4450.0
+"""Shaft load F [N]; the paper does not print it."""
+
+
+class LoadDistribution(eqx.Module):
+    """Loads of the rollers and the shift of the shaft that brings them about."""
+
+    roller_angles: Float[Array, " rollers"]
+    """Angle of each roller from +x, counter-clockwise; the load points to -pi/2 [rad]."""
+    inner_loads: Float[Array, " rollers"]
+    """Load Q_i on the inner raceway [N]."""
+    outer_loads: Float[Array, " rollers"]
+    """Load Q_o = Q_i + F_cen on the outer raceway, (10) [N]."""
+    max_load: Float[Array, ""]
+    """Q_max, the largest load on the inner raceway [N]."""
+    shaft_shift: Float[Array, ""]
+    """delta_s, how far the shaft goes down from the centre [m]."""
+    elastic_approach: Float[Array, ""]
+    """delta_r, approach of the raceways at the most loaded roller [m].
+
+    With that roller at the bottom it is delta_s - G_r/2. It holds the centrifugal part, (10).
+    """
+    half_angle: Float[Array, ""]
+    """Half angle of the loaded zone, (2), at whose ends a roller just touches the inner raceway [rad]."""
+
+
+def roller_angles(n_rollers: int, first_angle: Scalar = -jnp.pi / 2) -> Float[Array, " rollers"]:
+    """Angles of equally spaced rollers from +x, counter-clockwise, the first at `first_angle` [rad]."""
+    require_at_least(1, n_rollers=n_rollers)
+    return jnp.asarray(first_angle) + 2 * jnp.pi / n_rollers * jnp.arange(n_rollers, dtype=float)
+
+
+def loaded_half_angle(radial_clearance: Scalar, shaft_shift: Scalar) -> Array:
+    """Half angle of the loaded zone, acos(G_r/(2 delta_s)) [rad]: the clean form of (2).
+
+    The paper prints this as the whole angle and with delta_r, the elastic approach, in place of the shift of the shaft
+    delta_s = delta_r + G_r/2; the geometry asks for both corrections.
+
+    **Arguments:** radial clearance G_r [m], to which twice the approach of the rollers to the outer raceway is added
+    that their centrifugal force makes, as it shrinks the zone; shift of the shaft [m].
+    """
+    return jnp.arccos(radial_clearance / (2 * shaft_shift))
+
+
+def static_cage_displacement(
+    guidance: str,
+    *,
+    guidance_gap: Scalar,
+    pocket_clearance: Scalar,
+    radial_clearance: Scalar,
+    elastic_approach: Scalar,
+) -> Array:
+    """Distance of the resting cage below the bearing centre: (1) outer rib, (5) inner rib, (6) roller.
+
+    **Arguments:** `Guidance`, then C_r, T, G_r and delta_r [m]. delta_r is the elastic approach at the most loaded
+    roller, delta_r + G_r/2 the shift of the shaft. An outer rib needs C_r alone.
+
+    **Returns:** C_r/2, delta_r + G_r/2 + C_r/2 or delta_r + G_r/2 + T [m].
+
+    **Raises:** `ValueError` for another kind of guidance.
+    """
+    require_x64()
+    require_above_zero(guidance_gap=guidance_gap)
+    shift = elastic_approach + radial_clearance / 2
+    if guidance == "outer_rib":
+        return jnp.asarray(guidance_gap / 2)
+    if guidance == "inner_rib":
+        return jnp.asarray(shift + guidance_gap / 2)
+    if guidance == "roller":
+        return jnp.asarray(shift + pocket_clearance)
+    raise ArgumentError("guidance", said=f"must be one of {', '.join(get_args(Guidance))}, but {guidance!r} was given.")
+
+
+class _LoadCase(eqx.Module):
+    """A bearing under load, with what the root find needs beside the unknown."""
+
+    bearing: Bearing
+    load: Array
+    centrifugal: Array
+    cosines: Float[Array, " rollers"]
+
+    @property
+    def seat(self) -> Array:
+        """Approach of a roller to the outer raceway under its centrifugal force alone, (10) [m]."""
+        return line_contact_approach(self.bearing.raceway_stiffness, self.centrifugal)
+
+    @property
+    def bound(self) -> Array:
+        """Excess at which the roller nearest to the load would carry it alone, plus 1 % [m]."""
+        stiffness = self.bearing.raceway_stiffness
+        force = self.load / jnp.max(self.cosines)
+        inner = line_contact_approach(stiffness, force)
+        outer = line_contact_approach(stiffness, force + self.centrifugal)
+        return 1.01 * (inner + outer - self.seat)
+
+    def shift(self, excess: Array) -> Array:
+        """Shift of the shaft [m] that gives the nearest roller an approach of seat + excess."""
+        play = self.bearing.radial_clearance / 2 + self.seat
+        return (excess + play) / jnp.max(self.cosines)
+
+    def raceway_loads(self, excess: Array) -> tuple[Array, Array]:
+        """Q_i and Q_o of every roller [N], by delta_s cos(psi) - G_r/2 without cancellation at the nearest one."""
+        stiffness = self.bearing.raceway_stiffness
+        ratio = self.cosines / jnp.max(self.cosines)
+        play = self.bearing.radial_clearance / 2 + self.seat
+        approaches = self.seat + excess * ratio - play * (1 - ratio)
+        return raceway_loads_of_all(approaches, stiffness, stiffness, self.centrifugal)
+
+
+def _solve_excess(case: _LoadCase) -> Array:
+    """Excess of the nearest roller at which the rollers carry the load [m]; NaN where there is no such excess.
+
+    The forces rise steadily but have kinks: the root is found by bisection and differentiated implicitly. At zero
+    excess no roller is loaded and at the bound one alone carries the load, so that the root is enclosed.
+    """
+
+    def imbalance(fraction: Array, case: _LoadCase) -> Array:
+        inner, _ = case.raceway_loads(fraction * case.bound)
+        return jnp.sum(inner * case.cosines) / case.load - 1
+
+    solver = optx.Bisection(rtol=1e-12, atol=1e-11, flip=False)
+    start, interval = jnp.asarray(0.5), dict(lower=0.0, upper=1.0)
+    # Without `throw`, which would put a callback to Python into every program and keep it from being cached on disk.
+    root = optx.root_find(imbalance, solver, start, case, options=interval, max_steps=128, throw=False)
+    found = (root.result == optx.RESULTS.successful) & (case.load > 0) & (case.centrifugal >= 0)
+    return jnp.where(found, root.value * case.bound, jnp.nan)
+
+
+@eqx.filter_jit
+def _distribution(bearing: Bearing, load: Array, centrifugal: Array, roller_angle: Array) -> LoadDistribution:
+    angles = roller_angles(bearing.n_rollers, roller_angle)
+    case = _LoadCase(bearing, load, centrifugal, -jnp.sin(angles))
+    excess = _solve_excess(case)
+    inner, outer = case.raceway_loads(excess)
+    shift = case.shift(excess)
+    return LoadDistribution(
+        roller_angles=angles,
+        inner_loads=inner,
+        outer_loads=outer,
+        max_load=jnp.max(inner),
+        shaft_shift=shift,
+        elastic_approach=case.seat + excess,
+        half_angle=loaded_half_angle(bearing.radial_clearance + 2 * case.seat, shift),
+    )
+
+
+def load_distribution(
+    bearing: Bearing,
+    load: Scalar = DEFAULT_SHAFT_LOAD,
+    centrifugal_force: Scalar = 0.0,
+    roller_angle: Scalar = -jnp.pi / 2,
+) -> LoadDistribution:
+    """Loads of all rollers under a shaft load that points down, by (3), (4) and (10).
+
+    The shaft shifts along the load by delta_s until the vertical forces of the discrete rollers carry it. The result is
+    differentiable with respect to every parameter through the implicit function theorem. With a roller at the bottom,
+    or half a pitch from it, the horizontal forces cancel; at other angles the small remainder is left to the shaft.
+
+    **Arguments:** the bearing; the load [N]; the centrifugal force of a roller [N], see
+    `Bearing.roller_centrifugal_force`; the angle of the first roller from +x [rad], by default at the bottom.
+
+    **Raises:** `ValueError` for a load that is not positive, or a negative centrifugal force. Where these are traced,
+    the shift of the shaft and the half angle are NaN instead.
+    """
+    require_x64()
+    arrays = (jnp.asarray(x, dtype=float) for x in (load, centrifugal_force, roller_angle))
+    known = is_concrete(load, centrifugal_force)
+    force, outward = (float(load), float(centrifugal_force)) if known else (1.0, 0.0)
+    if not 0 < force <= LARGEST:
+        raise ArgumentError("load", said=f"must be positive and at most {LARGEST:g} N, but {force:g} was given.")
+    if not 0 <= outward <= LARGEST:
+        said = f"must be from 0 to {LARGEST:g} N, but {outward:g} was given."
+        raise ArgumentError("centrifugal_force", said=said)
+    found = _distribution(bearing, *arrays)
+    if known and is_concrete(found.shaft_shift) and np.isnan(found.shaft_shift):
+        said = f"must be of sizes that can be added, but {force:g} and {outward:g} N were given."
+        raise ArgumentError("load", "centrifugal_force", said=said)
+    return found

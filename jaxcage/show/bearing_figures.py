@@ -1,0 +1,210 @@
+"""The bearing: a drawing of the whole bearing, slips and forces around it, spectra; load of each roller, one impact."""
+
+from collections.abc import Mapping
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Annulus, Circle, Polygon
+
+from ..analysis import OrderSpectrum
+from ..analysis.rollers import Around, RollerHistory
+from ..bearing import LoadDistribution
+from ..forces import ImpactHistory
+from ..models import BearingModel
+from ..quantities import quantity
+from ..solve import Trajectory
+from .history_figures import path_in_circle
+from .style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    GRID,
+    LINE_COLOURS,
+    ORANGE,
+    VERMILION,
+    axes_or_new,
+    entitled,
+    legend_beside,
+    new_figure,
+)
+
+
+MM = 1e3
+LONGEST_ARROW = 0.14
+"""Length of the arrow of the largest pocket force of a run, relative to the outside diameter."""
+SPECTRA = {"cage_place": "Cage, vertical / clearance", "pocket_force": "Pockets, vertical [N]"}
+
+
+def bearing_drawing(
+    model: BearingModel, run: Trajectory, history: RollerHistory, sample: int, ax: Axes | None = None
+) -> Axes:
+    """Rings, rollers and cage at one sample, to scale; arrows are the forces of the rollers on the bars of the cage.
+
+    The displacement of the cage and its clearances, a few tenths of a millimetre, are not enlarged. The longest arrow
+    is the largest pocket force at any sample of the run.
+    """
+    ax = axes_or_new(ax, 6.0, 6.0)
+    ax.grid(False)
+    ax.spines[:].set_visible(False)
+    bearing, ring = model.bearing, {"facecolor": GRID, "edgecolor": GREY, "linewidth": 0.8}
+    outside, bore = MM * float(bearing.outside_diameter) / 2, MM * float(bearing.bore) / 2
+    outer, inner = MM * float(model.outer_radius), MM * float(model.inner_radius)
+    ax.add_patch(Annulus((0, 0), outside, outside - outer, **ring))
+    ax.add_patch(Annulus(tuple(MM * run.bodies[sample, 5:7]), inner, inner - bore, **ring))
+    angle, half = history.roller_angle[sample], MM * float(bearing.roller_diameter) / 2
+    out, along = np.array([np.cos(angle), np.sin(angle)]).T, np.array([-np.sin(angle), np.cos(angle)]).T
+    centres = MM * run.rollers[sample, 2][:, None] * out
+    share = history.inner_load[sample] / max(float(history.inner_load.max()), 1e-9)
+    for centre, load in zip(centres, share, strict=True):
+        face = to_rgba(BLUE, 0.08 + 0.6 * float(load))
+        ax.add_patch(Circle(tuple(centre), half, facecolor=face, edgecolor=BLACK, linewidth=0.7))
+    for bar in _bars(model, run, sample):
+        ax.add_patch(Polygon(bar, facecolor=ORANGE, edgecolor=BLACK, linewidth=0.5, alpha=0.55))
+    force = history.pocket_force[sample]
+    length = LONGEST_ARROW * 2 * outside * force / max(float(np.abs(history.pocket_force).max()), 1e-9)
+    pushed = np.abs(length) > 0.01 * LONGEST_ARROW * 2 * outside
+    begin, arrows = centres + np.sign(force)[:, None] * half * along, length[:, None] * along
+    style: Any = dict(angles="xy", scale_units="xy", scale=1, width=0.005, color=VERMILION, zorder=5)
+    ax.quiver(*begin[pushed].T, *arrows[pushed].T, **style)
+    reach = (-1.06 * outside, 1.06 * outside)
+    ax.set(xticks=[], yticks=[], aspect="equal", xlim=reach, ylim=reach)
+    largest = f"largest pocket force {np.abs(force).max():.0f} N (of {run.largest('pocket_force'):.0f} N at most"
+    ax.set_title(
+        f"{1e3 * (history.time[sample] - history.time[0]):.2f} ms: {largest}, between samples too)", fontsize=9
+    )
+    return ax
+
+
+def _bars(model: BearingModel, run: Trajectory, sample: int) -> list[np.ndarray]:
+    """Corners of the bars between the pockets [mm], in the height that guiding surface and roller centres leave."""
+    n, free = model.bearing.n_rollers, float(model.bearing.roller_diameter + model.bearing.pocket_clearance) / 2
+    pitch, land = float(model.outer_radius - model.bearing.roller_diameter / 2), float(model.land_radius)
+    inner, outer = sorted((land, pitch - 0.6 * (land - pitch)))
+    angles = run.angle[sample] + 2 * np.pi * np.arange(n + 1) / n
+    corner = lambda at, r, side: (
+        np.sqrt(r * r - free * free) * np.array([np.cos(at), np.sin(at)])
+        + (side * free * np.array([-np.sin(at), np.cos(at)]))
+    )
+    ends = lambda left, right: ((left, inner, 1), (left, outer, 1), (right, outer, -1), (right, inner, -1))
+    centre = MM * run.bodies[sample, 0:2]
+    return [
+        np.array([centre + MM * corner(*end) for end in ends(left, right)])
+        for left, right in zip(angles[:-1], angles[1:], strict=True)
+    ]
+
+
+def slip_around(found: Around, ax: Axes | None = None) -> Axes:
+    """Mean slip of the rollers, and their sliding speed on the inner ring, over the circumference."""
+    ax = _around_axis(axes_or_new(ax, 7.0, 3.2), "Slip of the rollers [%]")
+    other = ax.twinx()
+    other.spines[["top", "left"]].set_visible(False)
+    other.set_ylabel("Sliding on the inner ring [m/s]")
+    for axis, values, colour in ((ax, 100 * found.roller_slip, BLUE), (other, found.inner_sliding, VERMILION)):
+        axis.step(np.degrees(found.angle), values, where="mid", color=colour, linewidth=1.1)
+        axis.yaxis.label.set_color(colour)
+        axis.tick_params(axis="y", labelsize=9, colors=colour)
+    return ax
+
+
+def pocket_force_around(found: Around, ax: Axes | None = None) -> Axes:
+    """Mean pocket force over the circumference, of rollers that drive the cage and of rollers that brake it."""
+    ax = _around_axis(axes_or_new(ax, 7.0, 3.2), "Mean pocket force [N]")
+    degrees, width = np.degrees(found.angle), 0.9 * 360 / len(found.angle)
+    ax.bar(degrees, found.driving_force, width, color=GREEN, label="rollers drive the cage")
+    ax.bar(degrees, -found.braking_force, width, color=VERMILION, label="rollers brake the cage")
+    ax.axhline(0, color=GREY, linewidth=0.8)
+    ax.legend(frameon=False, fontsize=8, loc="upper left")
+    return ax
+
+
+def _around_axis(ax: Axes, ylabel: str) -> Axes:
+    ax.axvline(270, color=GREY, linewidth=0.8, linestyle="--")
+    ax.set(
+        xlim=(0, 360), xticks=range(0, 361, 90), xlabel="Place on the circumference [°], load at 270°", ylabel=ylabel
+    )
+    return ax
+
+
+def marked_spectrum(spectrum: OrderSpectrum, orders: Mapping[str, float], ylabel: str, ax: Axes | None = None) -> Axes:
+    """Amplitudes by order of the cage speed, with the frequencies of the bearing marked."""
+    ax = axes_or_new(ax, 7.0, 3.0)
+    keep = (spectrum.order > 0) & (spectrum.order <= 1.15 * max(orders.values()))
+    amplitude = spectrum.amplitude[keep]
+    ax.semilogy(spectrum.order[keep], np.maximum(amplitude, 1e-12), color=BLACK, linewidth=0.8)
+    for colour, (name, order) in zip(cycle(LINE_COLOURS), orders.items(), strict=False):
+        ax.axvline(order, color=colour, linewidth=1.1, linestyle="--", label=f"{name} {order:.3g}")
+    ax.set(ylim=(0.5 * max(amplitude.min(), 1e-6 * amplitude.max()), 2 * amplitude.max()))
+    ax.set(xlabel="Order of the cage speed", ylabel=ylabel)
+    legend_beside(ax, 7)
+    return ax
+
+
+def force_over_time(history: RollerHistory, ax: Axes | None = None) -> Axes:
+    """Largest pocket force, and the land's force on the cage, over the revolutions of the cage."""
+    ax = axes_or_new(ax, 7.0, 3.0)
+    turns = np.abs(history.angle - history.angle[0]) / (2 * np.pi)
+    ax.plot(turns, np.abs(history.pocket_force).max(axis=1), color=VERMILION, linewidth=0.6, label="largest pocket")
+    ax.plot(turns, np.hypot(*history.land_on_cage.T), color=BLUE, linewidth=0.8, label="land")
+    ax.set(xlim=(0, turns[-1]), xlabel="Revolutions of the cage", ylabel="Force [N]")
+    legend_beside(ax, 8)
+    return ax
+
+
+def bearing_figure(
+    model: BearingModel,
+    run: Trajectory,
+    history: RollerHistory,
+    circumference: Around,
+    spectra: Mapping[str, OrderSpectrum],
+    orders: Mapping[str, float],
+    title: str = "",
+) -> Figure:
+    """The bearing at its largest pocket force, the path of the cage, slips and forces around it, spectra if given."""
+    rows = 4 if spectra else 3
+    figure = new_figure(12.0, 11.0 if spectra else 8.0)
+    grid = figure.add_gridspec(rows, 2, height_ratios=(2.4, 1, 1, 1)[:rows])
+    worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
+    bearing_drawing(model, run, history, worst, figure.add_subplot(grid[0, 0]))
+    path = axes_or_new(figure.add_subplot(grid[0, 1]))
+    path_in_circle(path, history.place, 1.0, history.samples)
+    path.set(xlabel="Cage centre, horizontal / clearance", ylabel="Cage centre, vertical / clearance")
+    slip_around(circumference, figure.add_subplot(grid[1, 0]))
+    pocket_force_around(circumference, figure.add_subplot(grid[1, 1]))
+    force_over_time(history, figure.add_subplot(grid[2, :]))
+    for i, (name, spectrum) in enumerate(spectra.items()):
+        ax = marked_spectrum(spectrum, orders, SPECTRA.get(name, name), figure.add_subplot(grid[3, i]))
+        if i == 0 and (legend := ax.get_legend()) is not None:
+            legend.remove()
+    return entitled(figure, title)
+
+
+def load_bars(distribution: LoadDistribution, ax: Axes | None = None) -> Axes:
+    """Load on the inner raceway of every roller over its angle from the load; dashed lines bound the loaded zone."""
+    ax = axes_or_new(ax, 7.0, 3.6)
+    angles = (np.degrees(np.asarray(distribution.roller_angles)) + 270) % 360 - 180
+    half = float(np.degrees(np.asarray(distribution.half_angle)))
+    ax.bar(angles, np.asarray(distribution.inner_loads), width=0.5 * 360 / angles.size, color=BLUE)
+    for edge, label in ((-half, f"half angle {half:.1f}°"), (half, None)):
+        ax.axvline(edge, color=GREY, linewidth=1.0, linestyle="--", label=label)
+    ax.set(xlim=(-190, 190), xticks=range(-180, 181, 45))
+    ax.set(xlabel="Angle from the load [°]", ylabel="Roller load on the inner raceway [N]")
+    ax.legend(frameon=False, fontsize=9)
+    return ax
+
+
+def impact_forces(history: ImpactHistory, ax: Axes | None = None) -> Axes:
+    """Contact force between roller and bar, which is never negative, and force in the swinging bar over time."""
+    ax = axes_or_new(ax, 7.0, 4.0)
+    time = np.asarray(history.time) * quantity("time").factor
+    ax.axhline(0, color=GREY, linewidth=0.8)
+    for name, colour in (("contact_force", BLUE), ("bar_force", VERMILION)):
+        label = f"{quantity(name).text} {quantity(name).symbol}"
+        ax.plot(time, np.asarray(getattr(history, name)), color=colour, linewidth=1.4, label=label)
+    ax.set(xlabel=quantity("time").label, ylabel=quantity("force").label, xlim=(time[0], time[-1]))
+    ax.legend(frameon=False, fontsize=9, loc="upper right")
+    return ax

@@ -1,0 +1,261 @@
+"""Branches of periodic orbits over speed, where they bifurcate, and Floquet multipliers in the complex plane."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Bool, Complex, Float
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+from matplotlib.transforms import offset_copy
+from scipy.optimize import isotonic_regression
+
+from .._errors import ArgumentError
+from ..orbits import Branch, Point
+from ..quantities import component_names, quantity
+from .diagrams import orbit_diagram
+from .speed_axes import Span, label_speed
+from .style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    KIND_COLOURS,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    axes_or_new,
+    enlarge_dots,
+    legend_above,
+    lighter,
+    padded_limits,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Mark:
+    """Marker, colour and abbreviation of a kind of bifurcation."""
+
+    marker: str
+    colour: str
+    short: str
+
+
+MARKS = {
+    "period-doubling": Mark("s", VERMILION, "PD"),
+    "Neimark-Sacker": Mark("D", GREEN, "NS"),
+    "fold": Mark("o", BLACK, "F"),
+    "branch-point": Mark("^", PURPLE, "BP"),
+}
+"""Marks of bifurcations in every figure."""
+PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
+LABEL_SIZE = 7.5
+MOST_LABELS = 40
+REACH = 1.6
+"""Largest real and imaginary part of the multipliers that are shown."""
+
+
+def mark_of(kind: str) -> Mark:
+    """Mark of a kind of bifurcation; an unknown kind is a purple cross and keeps its name."""
+    return MARKS.get(kind, Mark("P", PURPLE, kind))
+
+
+def words(kind: str) -> str:
+    """Name of a kind of bifurcation in a legend."""
+    return f"{kind.replace('branch-p', 'branch p')} ({mark_of(kind).short})" if kind in MARKS else kind
+
+
+def branch_diagram(
+    branches: Sequence[Branch],
+    component: int = 1,
+    ax: Axes | None = None,
+    *,
+    label_points: bool = True,
+    limits_rpm: Span | None = None,
+) -> Axes:
+    """Strobe value of periodic orbits over speed: stable parts thick, unstable parts thin and light, one colour for
+    each number of periods. Bifurcations that bound a stable part are filled markers with their speed above the frame,
+    others are small and hollow.
+
+    **Arguments:** branches over speed; component of the state (1: vertical displacement); axes; True to write the
+    speeds of the edges above the frame; range of speed for a zoomed diagram, whose vertical limits then fit it.
+
+    **Raises:** `ValueError` if a branch is not over speed, or there is none.
+    """
+    if not branches or any(b.parameter != "speed" for b in branches):
+        given = ", ".join(b.parameter for b in branches) or "no branch"
+        raise ArgumentError("branches", said=f"must hold branches over speed, but {given} was given.")
+    ax = axes_or_new(ax, 9.0, 5.0)
+    named = quantity(component_names(branches[0].state.shape[-1])[component])
+    paths = [(b.periods, *polyline(b, component)) for b in branches]
+    everywhere = np.concatenate([x for _, x, _, _ in paths])
+    low, high = (float(everywhere.min()), float(everywhere.max())) if limits_rpm is None else limits_rpm
+    inside = [y[(x >= low) & (x <= high)] for _, x, y, _ in paths]
+    met = [path for path in paths if path[1].min() <= high and path[1].max() >= low]
+    for periods in sorted({path[0] for path in met}):
+        _draw_paths(ax, periods, [path[1:] for path in met if path[0] == periods])
+    ax.set(xlim=(low, high), ylim=padded_limits(np.concatenate(inside)), ylabel=named.label)
+    special = [p for b in branches for p in b.special if low <= p.speed_rpm <= high]
+    place = lambda p: [(float(p.speed_rpm), float(p.state[component]) * named.factor)]
+    _mark_points(ax, special, place)
+    if any(not p.edge for p in special):
+        style: dict[str, Any] = {"color": GREY, "markersize": 4.5, "markerfacecolor": "white"}
+        ax.plot([], [], "o", **style, label="hollow: unstable on both sides")
+    if label_points:
+        _write_above(ax, [p for p in special if p.edge])
+    below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
+    enlarge_dots(ax.legend(**below, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
+    return label_speed(ax)
+
+
+def orbit_diagram_with_branches(
+    sweep: xr.Dataset,
+    branches: Sequence[Branch],
+    component: int = 1,
+    ax: Axes | None = None,
+    *,
+    label_points: bool = True,
+    limits_rpm: Span | None = None,
+) -> Axes:
+    """Branches of periodic orbits over the orbit diagram, whose points are grey.
+
+    **Arguments:** as for `orbit_diagram` and `branch_diagram`.
+    """
+    ax = orbit_diagram(sweep, component, axes_or_new(ax, 9.0, 5.0), limits_rpm=limits_rpm)
+    clouds = [line for line in ax.get_lines() if line.get_label() in KIND_COLOURS]
+    for i, line in enumerate(clouds):
+        label = "simulated" if i == 0 else "_simulated"
+        line.set(color=GREY, alpha=0.5, markersize=1.4 * line.get_markersize(), zorder=1, label=label)
+    limits, (low, high) = ax.get_xlim(), ax.get_ylim()
+    branch_diagram(branches, component, ax, label_points=label_points, limits_rpm=limits)
+    bottom, top = ax.get_ylim()
+    ax.set_ylim(min(low, bottom), max(high, top))
+    return ax
+
+
+def polyline(
+    branch: Branch, component: int
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Bool[np.ndarray, " n-1"]]:
+    """Speeds [rpm] and shown values of a component, special points included, and True for each stable piece between
+    two points."""
+    times = quantity(component_names(branch.state.shape[-1])[component]).factor
+    x, y, stable = branch.speed_rpm, branch.state[:, component] * times, branch.stable
+    pieces = stable[:-1] & stable[1:]
+    done = branch.value.size
+    for p in sorted(branch.special, key=lambda p: (p.index, _share(branch, p)), reverse=True):
+        k = p.index
+        beyond = stable[k] and stable[k + 1] if k == done else stable[k + 1]
+        x, y = np.insert(x, k + 1, p.speed_rpm), np.insert(y, k + 1, p.state[component] * times)
+        pieces = np.concatenate([pieces[:k], [stable[k], beyond], pieces[k + 1 :]])
+        done = k
+    return x, y, pieces
+
+
+def _share(branch: Branch, point: Point) -> float:
+    """Place of a special point between the branch's point before it (0) and the one after it (1)."""
+    scale = np.ptp(branch.state, axis=0) + 1e-300
+    before, after = branch.state[point.index] / scale, branch.state[point.index + 1] / scale
+    step = after - before
+    return float(np.dot(point.state / scale - before, step) / (np.dot(step, step) + 1e-300))
+
+
+def _draw_paths(ax: Axes, periods: int, paths: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+    colour = PERIOD_COLOURS.get(periods, GREEN)  # long periods share one
+    thin = {"color": lighter(colour), "linewidth": 0.8, "linestyle": (0, (4, 1.5)), "zorder": 2.0}
+    thick = {"color": colour, "linewidth": 2.4, "solid_capstyle": "butt", "zorder": 3.0}
+    for word, style in (("stable", thick), ("unstable", thin)):
+        parts = [chosen_pieces(x, y, pieces if word == "stable" else ~pieces) for x, y, pieces in paths]
+        x, y = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+        if x.size:
+            ax.plot(x, y, **style, label=f"period-{periods}, {word}")
+
+
+def chosen_pieces(x: np.ndarray, y: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The chosen pieces of a polyline, with NaN between pieces that are not neighbours."""
+    change = np.diff(np.concatenate([[0], chosen.astype(int), [0]]))
+    ends = zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True)
+    kept = [np.append(np.arange(a, b + 1), -1) for a, b in ends]
+    index = np.concatenate(kept) if kept else np.zeros(0, dtype=int)
+    return np.where(index < 0, np.nan, x[index]), np.where(index < 0, np.nan, y[index])
+
+
+def _mark_points(ax: Axes, points: Sequence[Point], places: Any) -> None:
+    """Mark bifurcations at their `places`: filled where a stable orbit is on one side, else small and hollow."""
+    for kind in [*MARKS, *sorted({p.kind for p in points} - set(MARKS))]:
+        mark = mark_of(kind)
+        for edge in (True, False):
+            found = [place for p in points if p.kind == kind and p.edge == edge for place in places(p)]
+            if not found:
+                continue
+            style: dict[str, Any] = {"marker": mark.marker, "linestyle": "none", "color": mark.colour}
+            if edge:
+                style |= {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "zorder": 5.0}
+            else:
+                style |= {"markersize": 3.5, "markerfacecolor": "white", "markeredgewidth": 0.8, "zorder": 4.0}
+            ax.plot(*np.transpose(found), **style, label=words(kind) if edge else f"_{words(kind)}, hollow")
+
+
+def _write_above(ax: Axes, points: Iterable[Point]) -> None:
+    """Write kind and speed of points in a row above the frame, moved apart, with lines to their places.
+
+    Equal texts, as on branches that share a part, are written once; of too many points only the first are named.
+    """
+    texts = {f"{mark_of(p.kind).short} {p.speed_rpm:.0f}": p for p in points}
+    row = sorted(texts.items(), key=lambda item: item[1].speed_rpm)[:MOST_LABELS]
+    low, high = ax.get_xlim()
+    gap = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi)
+    at = np.array([(p.speed_rpm - low) / (high - low) for _, p in row])
+    upright = at.size > 1 and float(np.min(np.diff(at))) < 4 * gap
+    above = offset_copy(ax.transAxes, ax.figure, y=16, units="points")  # pyright: ignore[reportArgumentType]
+    line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.5, 0.0)}
+    style = {"ha": "center", "va": "bottom", "fontsize": LABEL_SIZE, "annotation_clip": False, "arrowprops": line}
+    for (text, p), where in zip(row, move_apart(at, gap, 0.0, 1.0) if upright else at, strict=True):
+        places = {"xycoords": ax.get_xaxis_transform(), "textcoords": above, "rotation": 90 if upright else 0}
+        ax.annotate(text, (p.speed_rpm, 1.0), (where, 1.0), **places, **style, color=mark_of(p.kind).colour)
+
+
+def move_apart(at: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
+    """Ascending places at least `gap` apart and within limits, as near (least squares) to `at` as possible."""
+    steps = gap * np.arange(at.size)
+    if at.size == 0:
+        return at
+    return np.clip(isotonic_regression(at - steps).x, low, max(low, high - steps[-1])) + steps
+
+
+def multiplier_circle(branch: Branch | Complex[np.ndarray, "*points dim"], ax: Axes | None = None) -> Axes:
+    """Multipliers along a branch, coloured by speed, with the unit circle; critical multipliers of its bifurcations are
+    marked, filled where a stable orbit is on one side.
+
+    **Arguments:** branch, or multipliers alone; axes. Multipliers beyond 1.6 are not shown.
+    """
+    ax = axes_or_new(ax, 7.0, 5.6)
+    ax.add_patch(Circle((0, 0), 1.0, fill=False, color=BLACK, linewidth=1.0, zorder=2))
+    for line in (ax.axhline, ax.axvline):
+        line(0, color=GREY, linewidth=0.6, zorder=1)
+    mu = branch.multipliers if isinstance(branch, Branch) else branch
+    shown = (np.abs(np.real(mu)) <= REACH) & (np.abs(np.imag(mu)) <= REACH)
+    if isinstance(branch, Branch):
+        speed = np.repeat(branch.speed_rpm, mu.shape[1]).reshape(mu.shape)
+        style = {"c": speed[shown], "s": 7, "cmap": "viridis", "linewidths": 0}
+        cloud = ax.scatter(np.real(mu)[shown], np.imag(mu)[shown], **style)
+        cloud.set(clim=(float(speed.min()), float(speed.max())), zorder=3)
+        beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+        ax.figure.colorbar(cloud, cax=beside, label=quantity("speed_rpm").label, format="{x:.0f}")
+        _mark_points(ax, branch.special, _critical)
+        if branch.special:
+            legend_above(ax, size=8)
+    else:
+        ax.plot(np.real(mu)[shown], np.imag(mu)[shown], "o", color=BLUE, markersize=4, zorder=3, label="multipliers")
+    limits = (-REACH, REACH)
+    ax.set(xlim=limits, ylim=limits, aspect="equal")
+    ax.set(xlabel=r"Real part of the multiplier $\mu$", ylabel=r"Imaginary part of the multiplier $\mu$")
+    return ax
+
+
+def _critical(point: Point) -> list[tuple[float, float]]:
+    """Places of the critical multipliers in the complex plane, of a Neimark-Sacker bifurcation the pair."""
+    mu = point.critical
+    return [(mu.real, mu.imag), (mu.real, -mu.imag)] if point.kind == "Neimark-Sacker" else [(mu.real, 0.0)]

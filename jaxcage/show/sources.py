@@ -1,0 +1,118 @@
+"""Parameters of a model with their units and sources, and the readings of what the paper leaves open."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .._parameters import EXTRA, get, readings_of, walk
+from ..io import is_range
+from ..models import AbstractForcedSystem
+from .tables import Column, Table, rows_table
+
+
+SHOWN = {"m^2/s": ("mm²/s", 1e6, 0.0), "K": ("°C", 1.0, -273.15), "Pa": ("GPa", 1e-9, 0.0), "1": ("", 1.0, 0.0)}
+"""Unit in which a parameter is shown, the factor from SI, and the offset."""
+READY_MADE = {("bearing", "designation"): "catalogue, {}", ("lubricant", "grade"): "grade {}"}
+PUBLISHED = {
+    ("bearing", "inner_raceway_diameter"): "catalogue",
+    ("bearing", "palmgren_constant"): "default",
+    ("bearing", "roller_material"): "default",
+    ("bearing",): "paper, Table 1",
+    ("guidance_gap",): "paper, Table 2",
+    ("eccentricity",): "paper, Table 2",
+    ("lubricant", "temperature"): "default",
+    ("lubricant",): "paper, Table 2, read as a grade",
+}
+"""Sources of a published case by path, of which the longest that fits counts; the paper does not print the rest."""
+READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One parameter, choice or count."""
+
+    path: tuple[str, ...]
+    text: str
+    value: str
+    unit: str
+    source: str
+
+    @property
+    def group(self) -> str:
+        """The part of the model that it belongs to."""
+        return self.path[0].replace("_", " ") if len(self.path) > 1 else "model"
+
+
+def parameter_rows(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> list[Row]:
+    """All parameters of `model` in the units in which they are read.
+
+    **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still
+    those of the template, by dotted name.
+    """
+    rows = []
+    for path, field in walk(model):
+        value, text, unit = get(model, path), field.metadata.get("text", ""), ""
+        info = field.metadata.get("parameter")
+        if info is not None:
+            unit, number = shown(float(value), info.unit)
+            text, value = info.text, f"{number:.6g}"
+        name = ".".join(path)
+        if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
+            source = "the template's, not yours"
+        elif path[0] == EXTRA:
+            source = "a force of your own"
+        elif table is None:
+            source = _published(model, path, field)
+        else:
+            source = _in_file(path, table)
+        rows.append(Row(path, text, str(value), unit, source))
+    return rows
+
+
+def parameters_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
+    """The parameters of `parameter_rows` as a table, each part of the model named once."""
+    rows = parameter_rows(model, table, left)
+    before = [None, *(row.group for row in rows)]
+    records = [vars(row) | {"part": row.group if row.group != b else ""} for row, b in zip(rows, before, strict=False)]
+    heads = {"part": "part", "text": "parameter", "value": "value", "unit": "unit", "source": "from"}
+    return rows_table("All parameters", records, [Column(head, (), key=key) for key, head in heads.items()])
+
+
+def shown(value: float, unit: str) -> tuple[str, float]:
+    """The unit in which a value [SI] is read, and the value in it."""
+    if unit == "m":
+        name, times = ("µm", 1e6) if abs(value) < 1e-4 else ("mm", 1e3)
+        return name, value * times
+    name, times, offset = SHOWN.get(unit, (unit, 1.0, 0.0))
+    if name == "GPa" and abs(value) < 1e7:
+        return unit, value
+    return name, value * times + offset
+
+
+def _published(model: AbstractForcedSystem, path: tuple[str, ...], field: dataclasses.Field) -> str:
+    for n in range(len(path), 0, -1):
+        if path[:n] in PUBLISHED:
+            return PUBLISHED[path[:n]]
+    own = field.default is not dataclasses.MISSING and bool(get(model, path) == field.default)
+    return "default" if own else "identified, not printed"
+
+
+def _in_file(path: tuple[str, ...], table: Mapping[str, Any]) -> str:
+    here: Any = table
+    for name in path:
+        here = here.get(name) if isinstance(here, Mapping) else None
+    part = table.get(path[0])
+    if here is None and path[-1] in ("stiffness_x", "stiffness_y") and isinstance(part, Mapping):
+        here = part.get("stiffness")
+    if here is not None:
+        return "best guess in a range of this file" if isinstance(here, str) and is_range(here) else "this file"
+    for (made, key), words in READY_MADE.items():
+        if path[0] == made and isinstance(part, Mapping) and key in part:
+            return "default" if path[1:] == ("temperature",) else words.format(part[key])
+    replaced = isinstance(part, Mapping) and "kind" in part  # by another law than that of the base
+    return f"case {table['base']}" if "base" in table and not replaced else "default"
+
+
+def readings_words(model: Any) -> str:
+    """The readings in one line: `radial clearance c = C_r/2 ("radial"), unbalance M e omega^2 ("physical")`."""
+    return ", ".join(f'{READINGS[name]} {words} ("{chosen}")' for name, (chosen, words) in readings_of(model).items())
