@@ -10,6 +10,7 @@
 | `zones`       | zones and both kinds of edge; stretches of speed with the same labels                |
 | `spectra`     | amplitude spectra by order of speed                                                  |
 | `equilibrium` | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
+| `rollers`     | rollers of a whole bearing along a time history, over time and around the bearing    |
 | `measures`    | whirl ratio, displacement, film, forces, impulse, drag of a motion                   |
 """
 
@@ -58,6 +59,17 @@ from .measures import (
     measures as measures,
     relative_state as relative_state,
 )
+from .rollers import (
+    Around as Around,
+    NamedLine as NamedLine,
+    RollerHistory as RollerHistory,
+    around as around,
+    bearing_orders as bearing_orders,
+    bearing_spectra as bearing_spectra,
+    named_lines as named_lines,
+    pocket_force_distribution as pocket_force_distribution,
+    roller_history as roller_history,
+)
 from .spectra import (
     OrderSpectrum as OrderSpectrum,
     Peak as Peak,
@@ -99,6 +111,6 @@ from .zones import (
 
 check_layer(
     globals(),
-    "cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
+    "around cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
     "measures order_spectrum stability_chart survival zones",
 )

@@ -17,7 +17,7 @@ from .._errors import ArgumentError
 from .._parameters import parameter_info, replace
 from .._sobol import sobol
 from ..analysis import chaotic_share, failed, restless, zones
-from ..io import Unknown, check_together
+from ..files import Unknown, check_together
 from ..lanes import Progress, sweep
 from ..models import CageModel
 from ..solve import AbstractMethod, native

@@ -19,7 +19,7 @@ from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._sobol import sobol
 from ..analysis import failed, restless
-from ..io import Measurement, Range, Unknown
+from ..files import Measurement, Range, Unknown
 from ..lanes import Progress
 from ..models import CageModel
 from ..solve import AbstractMethod, native

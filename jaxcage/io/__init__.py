@@ -39,6 +39,7 @@ from ..files import (
     with_ranges as with_ranges,
     write_template as write_template,
 )
+from ..files.measurements import Measurement as Measurement, read_measurements as read_measurements
 from ._csv import (
     branch_columns as branch_columns,
     read_columns as read_columns,
@@ -46,4 +47,3 @@ from ._csv import (
     trajectory_columns as trajectory_columns,
     write_columns as write_columns,
 )
-from ..files.measurements import Measurement as Measurement, read_measurements as read_measurements

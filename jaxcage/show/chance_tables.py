@@ -8,7 +8,7 @@ import numpy as np
 
 from ..design import Clue, Ensemble, Narrowed, verdict_of
 from ..files import Range
-from ..io import Measurement
+from ..files import Measurement
 from .tables import Beside, Column, Table, chosen, rows_table, speed_columns
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters, within
-from ..integrate import AbstractMethod
+from ..solve import AbstractMethod
 from ..orbits import Curve, Point, bifurcation, curve
 from .tables import SHOWN, Column, Table, factor, rows_table
 

@@ -31,7 +31,7 @@ from .zone_tables import stretches_table, transient_tables, zone_span, zones_tab
 
 
 if TYPE_CHECKING:
-    from ..studies import Ensemble
+    from ..design import Ensemble
 
 
 COUNTED = ("No", "One", "Two", "Three", "Four", "Five", "Six")

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import EXTRA, get, readings_of, walk
-from ..io import is_range
+from ..files import is_range
 from ..models import AbstractForcedSystem
 from .tables import Column, Table, rows_table
 
