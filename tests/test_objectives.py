@@ -101,10 +101,8 @@ def test_a_failed_lane_counts_as_chaotic():
     """Starts beyond what the model holds for fail; a design of which nothing is known is not called calm."""
     model = jc.case("1a")
     space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3)})
-    bad = jc.design.ChaosMeasure(
-        jc.rpm(9000, 10000, 2), np.ones(2), discard=2, revolutions=2, method=jc.method("rk4", steps=2)
-    )
-    assert np.all(bad.chaos(space, np.array([[0.5]])) == 1.0)
+    bad = jc.design.chaotic_width(9000.0, 10000.0, 2, discard=2, revolutions=2, method=jc.method("rk4", steps=2))
+    assert np.all(bad.levels(space.models(np.array([[0.5]]))) == 1.0)
 
 
 def test_robust_mean_and_worst_of_a_parabola():
@@ -149,26 +147,27 @@ def test_loads_of_the_land_are_those_of_a_time_history():
     fine = jc.method("rk4", steps=2048)
     places = np.array([[1.0, 0.33], [0.0, 0.98]])
     # Where motion is chaotic two integrations part: they are compared over two revolutions.
-    wear, peak, film = (jc.design.LandMeasure(width, what, revolutions=2) for what in jc.design.MEASURES)
-    least = jc.design.LandMeasure(width, "least film", revolutions=2)
-    got = [measure.at_speeds(space, places) for measure in (wear, peak, film, least)]
-    last = width.run(space, places).last
+    models = space.models(places)
+    wear, peak, film = (jc.design.LandLoad(width.runs, name, over=2) for name in jc.design.LAND_LOADS)
+    least = jc.design.LandLoad(width.runs, "least film", over=2)
+    got = [load.at_speeds(models) for load in (wear, peak, film, least)]
+    last = width.runs.run(models)["last"].values
     touched = 0
-    for k, place in enumerate(places):
-        model = space.model(place)
-        for i, speed in enumerate(width.speeds):
+    for k, model in enumerate(models):
+        for i, speed in enumerate(width.runs.speed):
             length = dict(revolutions=2, samples=1024, method=fine)
             runs = [jc.simulate(model, speed, start=tuple(y), **length) for y in last[k, i]]
-            seen = [jc.orbit_measures(model, run) for run in runs]
-            load = np.mean([o.mean_contact_force for o in seen]) * speed * float(model.land_radius)
+            seen = [jc.analysis.measures(model, run) for run in runs]
+            every = lambda name: [found[name].value for found in seen]
+            load = np.mean(every("mean_contact_force")) * speed * float(model.land_radius)
             assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
-            assert got[1][k, i] == pytest.approx(np.mean([o.peak_contact_force for o in seen]), rel=0.06, abs=1e-6)
-            assert got[2][k, i] == pytest.approx(np.mean([o.drag_power for o in seen]), rel=0.02)
-            thinnest = np.min([o.minimum_film_thickness for o in seen])
+            assert got[1][k, i] == pytest.approx(np.mean(every("peak_contact_force")), rel=0.06, abs=1e-6)
+            assert got[2][k, i] == pytest.approx(np.mean(every("drag_power")), rel=0.02)
+            thinnest = np.min(every("minimum_film_thickness"))
             assert got[3][k, i] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
             touched += load > 1.0
     assert touched >= 2
-    own = wear.values(space, space.place[None])
-    assert own[0] > 100.0 and wear.relative(space, 1000.0).values(space, space.place[None]) == pytest.approx([1000.0])
-    with pytest.raises(ValueError, match="`what` must be one of wear load, .* but 'least film' was given"):
-        least.relative(space, 1000.0)
+    own, now = wear.estimate([space.system]), jc.design.relative(wear, space.system, 1000.0)
+    assert own[0] > 100.0 and own[1] > 0.0 and now.values(space, space.place[None]) == pytest.approx([1000.0])
+    with pytest.raises(ValueError, match="`name` must be one of wear load, .* but 'least film' was given"):
+        jc.design.relative(least, space.system, 1000.0)

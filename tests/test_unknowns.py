@@ -8,7 +8,9 @@ import pytest
 from helpers import document, is_png
 
 import jaxcage as jc
-from jaxcage.io import (
+from jaxcage._sobol import sobol
+from jaxcage.design import Band, Ensemble, binomial_interval, misses, narrow, verdict_of
+from jaxcage.files import (
     ConfigError,
     Measurement,
     Range,
@@ -20,8 +22,7 @@ from jaxcage.io import (
     with_ranges,
     write_template,
 )
-from jaxcage.report import chances_notes
-from jaxcage.studies import Band, Ensemble, binomial_interval, misses, narrow, sobol, verdict_of
+from jaxcage.show import chances_notes
 
 
 STIFF = Unknown("support.stiffness", ("stiffness_x", "stiffness_y"), Range(1e4, 1e6))

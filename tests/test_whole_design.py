@@ -5,21 +5,22 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.design import (
-    BearingRuns,
     DesignSpace,
-    bearing_budget,
-    bearing_gradient,
+    Runs,
     bearing_objective,
-    bearing_sensitivity,
     before_and_after,
+    global_sensitivity,
+    mean_gradient,
+    measure,
+    tolerance_budget,
 )
-from jaxcage.models.whole import drawn_places
+from jaxcage.models import drawn_places, rolling_start
 
 
 jc.enable_x64()
 SPEED = float(jc.rpm(10000))
 MODEL = jc.whole_bearing("nu2310")
-RUNS = BearingRuns(SPEED, starts=2, discard=2, revolutions=2)
+RUNS = Runs.of_bearing(SPEED, starts=2, discard=2, revolutions=2)
 PRICES = {"power": 3.0, "slip": 1.0, "balance": 2.0}
 VARY = {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 23e-6)}
 
@@ -27,7 +28,8 @@ VARY = {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 23e-6)}
 def swept(model: jc.BearingModel):
     """The runs that `RUNS` stands for."""
     length = dict(discard=RUNS.discard, revolutions=RUNS.revolutions, blocks=2, exponents=0)
-    return jc.sweep_bearing(model, SPEED, starts=drawn_places(RUNS.starts), tolerance=RUNS.tolerance, **length)
+    starts = [tuple(rolling_start(model, SPEED, place=place).row) for place in drawn_places(RUNS.starts)]
+    return jc.sweep(model, SPEED, starts=starts, tolerance=RUNS.tolerance, **length)
 
 
 @pytest.mark.wide
@@ -36,7 +38,7 @@ def test_the_objective_is_what_the_terms_are_beside_now():
     objective, space = bearing_objective(MODEL, VARY, RUNS, PRICES), DesignSpace.of(MODEL, VARY)
     place = np.array([0.8, 0.4])
     here, there = swept(MODEL), swept(space.model(place))
-    ratio = lambda name: getattr(there, name).mean() / getattr(here, name).mean()
+    ratio = lambda name: float(there[name].mean() / here[name].mean())
     eccentricity = space.values(place)["eccentricity"]
     expected = 3 * ratio("friction_power_W") + ratio("cage_slip") + 2 * eccentricity / 23e-6
     found = objective.values(space, np.array([space.place, place]))
@@ -50,8 +52,9 @@ def test_before_and_after_are_of_the_same_starts():
     rows, failed = before_and_after(MODEL, better, RUNS)
     found, here, there = {row.name: row for row in rows}, swept(MODEL), swept(better)
     power = found["friction_power_W"]
-    change = (there.friction_power_W - here.friction_power_W)[0]
-    assert failed == 0 and power.unit == "W" and power.before == pytest.approx(here.friction_power_W.mean(), rel=1e-3)
+    before, after = (each["friction_power_W"].values[0] for each in (here, there))
+    change = after - before
+    assert failed == 0 and power.unit == "W" and power.before == pytest.approx(before.mean(), rel=1e-3)
     assert power.change == pytest.approx(change.mean(), rel=1e-2) and power.change < 0
     assert power.change_error == pytest.approx(change.std(ddof=1) / np.sqrt(change.size), rel=0.05)
     grade = found["balance_grade_mm_per_s"]
@@ -63,12 +66,13 @@ def test_before_and_after_are_of_the_same_starts():
 def test_shares_and_budgets():
     """The power over a wide range of gap and a narrow one of the pockets; a budget is slopes times tolerances."""
     vary = {"guidance_gap": (0.4e-3, 0.6e-3), "pocket_clearance": (0.29e-3, 0.31e-3)}
-    shares, scatter = bearing_sensitivity(MODEL, vary, RUNS, "power", samples=8)
+    shares = global_sensitivity(MODEL, vary, measure(RUNS, "power"), samples=8)
     # 0.86 and 0.10, with bars of some 0.5 and 0.07
-    assert shares.total["guidance_gap"] > 3 * shares.total["pocket_clearance"] > 0 and 0 <= scatter < 1
+    assert shares.total["guidance_gap"] > 3 * shares.total["pocket_clearance"] > 0 and 0 < shares.scatter < 1
     names = ("guidance_gap", "pocket_clearance")
-    found = bearing_gradient(MODEL, SPEED, directions=names, designs=12, starts=1, discard=1, revolutions=2)
-    budget, power = bearing_budget(found, "power", 0.02), found.statistics["friction_power_W"]
+    runs = Runs(SPEED, discard=1, revolutions=2, blocks=2, exponents=0)
+    power = mean_gradient(MODEL, runs, ["friction_power_W"], directions=names, designs=12).statistics["friction_power_W"]
+    budget = tolerance_budget(power, dict.fromkeys(names, 0.02))
     expected = 0.02 * power.value * np.abs(power.elasticity)
     assert [budget.deviation[name] for name in names] == pytest.approx(expected)
     assert budget.total == pytest.approx(np.hypot(*expected)) and budget.value == pytest.approx(power.value)
@@ -84,11 +88,9 @@ def test_shares_and_budgets():
 )
 def test_refusals(given, said):
     with pytest.raises(ValueError, match=said):
-        bearing_objective(MODEL, runs=BearingRuns(SPEED), **{"vary": VARY, "prices": {"wear": 1.0}} | given)
+        bearing_objective(MODEL, runs=RUNS, **{"vary": VARY, "prices": {"wear": 1.0}} | given)
 
 
-def test_runs_and_places_that_cannot_be():
-    with pytest.raises(ValueError, match="`revolutions`"):
-        BearingRuns(SPEED, revolutions=3)
-    with pytest.raises(ValueError, match="`starts` must hold places of the cage within its clearance"):
-        jc.sweep_bearing(MODEL, SPEED, starts=[(0.0, 1.2, 0.0, 0.0)])
+def test_runs_that_cannot_be():
+    with pytest.raises(ValueError, match="`revolutions` must be a multiple of 2 above 0, but 3 was given"):
+        Runs.of_bearing(SPEED, revolutions=3)

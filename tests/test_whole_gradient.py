@@ -8,7 +8,7 @@ import pytest
 from test_whole_motion import SPEED, bearing, moving
 
 import jaxcage as jc
-from jaxcage.design import bearing_gradient, gradient_of_pairs
+from jaxcage.design import Runs, gradient_of_pairs, mean_gradient
 from jaxcage.models import rolling_start
 
 
@@ -22,7 +22,7 @@ def calm():
     model = bearing(gravity=0.0, load=0.0, radial_clearance=-10e-6, eccentricity=0.0)
     omega = float(model.rolling_cage_speed(SPEED))
     pressed = float(model.outer_radius - model.bearing.roller_diameter / 2) + 3e-6
-    return model, moving(model, orbit=omega, cage_speed=omega, radius=pressed)
+    return model, tuple(moving(model, orbit=omega, cage_speed=omega, radius=pressed).row)
 
 
 @pytest.mark.wide
@@ -30,7 +30,8 @@ def test_a_calm_bearing_by_closed_form_and_by_differences():
     """Petroff's drag goes with viscosity, land width, and R^3 over the gap; its cage neither slips much nor rattles."""
     model, start = calm()
     length = dict(starts=[start], discard=4, revolutions=2)
-    found = bearing_gradient(model, SPEED, directions=CALM, designs=16, spread=0.01, **length)
+    runs = Runs(SPEED, blocks=2, exponents=0, **length)
+    found = mean_gradient(model, runs, directions=CALM, designs=16, spread=0.01)
     gap, wide = float(model.guidance_gap), float(model.bearing.rib_diameter)
     expected = [-1 - 3 * gap / (wide - gap), 0.0, 1.0, 1.0]
     for name in ("friction_power_W", "pocket_impulse_N_s"):
@@ -41,7 +42,7 @@ def test_a_calm_bearing_by_closed_form_and_by_differences():
     assert 1e-4 < slip.value < 1e-3
     for i, name in enumerate(CALM[:1]):
         designs = [jc.replace(model, **{name: gap * (1 + side)}) for side in (1e-3, -1e-3)]
-        ends = [jc.sweep_bearing(x, SPEED, **length, blocks=1, exponents=0).cage_slip[0, 0] for x in designs]
+        ends = jc.sweep(designs, SPEED, **length, blocks=1, exponents=0)["cage_slip"].values.ravel()
         assert slip.elasticity[i] == pytest.approx(np.log(ends[0] / ends[1]) / 2e-3, rel=1e-3)
     value, error = found.slope("friction_power_W", "guidance_gap")
     assert value == pytest.approx(expected[0] * found.statistics["friction_power_W"].value / gap, rel=1e-3)
@@ -56,16 +57,15 @@ def test_a_rattling_bearing_by_differences():
     starts = [rolling_start(model, SPEED, k) for k in range(3)]
     rng = np.random.default_rng(5)
     shaken = lambda s: s._replace(bodies=s.bodies.at[2:4].add(jnp.asarray(rng.normal(size=2) * 5e-3)))
-    several = [shaken(start) for start in starts * 5]
+    several = [tuple(shaken(start).row) for start in starts * 5]
     designs = [jc.replace(model, guidance_gap=float(model.guidance_gap) * (1 + side)) for side in (0.1, -0.1)]
-    more, less = jc.sweep_bearings(designs, SPEED, starts=several, blocks=1, exponents=0, **length)
+    ends = jc.sweep(designs, SPEED, starts=several, blocks=1, exponents=0, **length)
+    runs = Runs(SPEED, starts=2, blocks=2, exponents=0, **length)
     for seed in (1, 2):
-        found = bearing_gradient(
-            model, SPEED, directions=("guidance_gap",), designs=16, spread=0.1, starts=2, seed=seed, **length
-        )
+        found = mean_gradient(model, runs, directions=("guidance_gap",), designs=16, spread=0.1, seed=seed)
         for name in ("friction_power_W", "land_impulse_N_s", "pocket_impulse_N_s"):
             each = found.statistics[name]
-            change = (more.block_means[name] - less.block_means[name])[0, :, 0] / 0.2
+            change = ends[name].values[:, 0].T @ [1, -1] / 0.2
             error = np.hypot(change.std(ddof=1) / np.sqrt(change.size), each.by_relative_change_error[0])
             assert abs(each.by_relative_change[0] - change.mean()) < 4 * error
         power = found.statistics["friction_power_W"]
@@ -101,10 +101,9 @@ def test_errors_are_those_of_noise():
         ({"directions": ("load", "load")}, "must name each parameter once, but has 'load' twice"),
         ({"designs": 16}, "`designs` must be an even number from 18 on, for so many directions, but 16 was given"),
         ({"spread": 0.5}, "`spread` must be above 0 and at most 0.3, but 0.5 was given"),
-        ({"revolutions": 5}, "`revolutions` must be an even number above 0, but 5 was given"),
         ({"statistics": ("slip",)}, "`statistics` must hold some of cage_slip, pocket_force_mean_sum_N"),
     ],
 )
 def test_refusals(options, said):
     with pytest.raises(ValueError, match=said.replace("+", r"\+")):
-        bearing_gradient(jc.whole_bearing("nu2310"), SPEED, **options)
+        mean_gradient(jc.whole_bearing("nu2310"), Runs(SPEED), **options)

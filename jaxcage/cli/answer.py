@@ -64,7 +64,7 @@ def _write(path: Path, content: Any, show: ShowOptions, subject: "Subject | None
     from matplotlib.figure import Figure
 
     from ..files import replacing
-    from ..io import write_columns
+    from ..show import write_columns
     from ..lanes import save
     from ..show import add_shaft_axes, restyle
 

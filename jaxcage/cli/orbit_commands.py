@@ -129,7 +129,7 @@ def bifurcations(
 ) -> Answer:
     """Synchronous orbits over speed: where they are stable, how they lose it, and the zones without one."""
     from .. import show as shown
-    from ..io import branch_columns
+    from ..show import branch_columns
     from .subject import read_case
 
     subject = read_case(case)

@@ -61,7 +61,7 @@ def simulate(
     """Time history, orbit and forces at one speed, of 20 revolutions; slips and losses of a bearing with its rollers."""
     from .. import analysis
     from .._errors import NoResult
-    from ..io import trajectory_columns
+    from ..show import trajectory_columns
     from ..show import measures_table, simulation_figure
     from ..solve import simulate
     from .subject import read_case
@@ -300,7 +300,7 @@ def poincare(
     import numpy as np
 
     from ..analysis import length
-    from ..io import strobe_columns
+    from ..show import strobe_columns
     from ..lanes import sweep as run_sweep
     from ..show import Column, rows_table, strobe_section
     from .subject import read_case

@@ -1,4 +1,4 @@
-"""Chaos of a cage of which some values are known within ranges only: chances instead of zones.
+"""Chances of chaos of a cage of which some values are known within ranges only.
 
 Each draw is a design with values from the ranges; it runs once at every speed, from the conventional start. At a speed
 the draws are independent, so that their chaotic share has the error bar of a binomial count; speeds are not.
@@ -25,18 +25,18 @@ from ..solve import AbstractMethod, native
 
 DRAWS, ENSEMBLE_SPEEDS = 64, 40
 REVOLUTIONS = 100
-"""Left out, and observed: what one lane shows is an example of a chance, and need not be known to three digits."""
+"""Revolutions left out, and observed: one lane is an example of a chance, and need not be known to three digits."""
 SETTLED = 64
-"""A draw that is periodic by then is left where it is: as it is at the end of what is left out: three in five are."""
+"""Revolutions after which a draw that is periodic is not run any further, which are three in five."""
 ERROR = 1e-2
-"""Of a revolution [clearances]: with fewer levels than the default method has, a quarter of the draws fail."""
+"""Error of a revolution [clearances] up to which a lane counts; with the default, a quarter of the draws fail."""
 RARE = 0.05
 """Chance below which a speed is called calm, and above one less which it is called chaotic."""
 FEWEST = 29
-"""Draws without which nothing is called calm: of so many none would be chaotic, once in 20 times, if 10 % were."""
+"""Draws without which nothing is called calm: if 10 % were chaotic, none of so many would be once in 20 times."""
 CONFIDENCE = 0.95
 BINS = 4
-"""Parts of a range whose chances are compared, to tell what an unknown has to say."""
+"""Parts of a range whose chances are compared, to tell how much an unknown explains."""
 
 
 Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
@@ -44,45 +44,45 @@ Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", 
 
 @dataclasses.dataclass(frozen=True)
 class Band:
-    """Where an edge may be."""
+    """Speeds between which an edge lies."""
 
     name: str
     share: float
-    """Of the draws that have this edge."""
+    """Share of the draws that have this edge."""
     rpm: tuple[float, float, float]
-    """5 %, 50 % and 95 % of the draws that have it lie below."""
+    """Speeds below which 5 %, 50 % and 95 % of the draws that have it lie."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Clue:
-    """What one unknown says about the verdict."""
+    """Influence of an unknown on the verdict."""
 
     label: str
     share: float
-    """Of the variance of the chaotic share, due to it alone, as far as the draws can tell."""
+    """Share of the variance of the chaotic share that is due to it alone, as far as the draws can tell."""
     source: str
-    """What to measure."""
+    """How to measure it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Ensemble:
-    """What the draws do."""
+    """Chaos of designs that are drawn from ranges."""
 
     unknowns: tuple[Unknown, ...]
     sources: tuple[str, ...]
-    """What to measure of each."""
+    """How to measure each unknown."""
     place: Float[np.ndarray, "draws unknowns"]
     """Place of each draw in each range, 0 to 1."""
     speed: Float[np.ndarray, " speeds"]
     """[rad/s]."""
     chaotic: Bool[np.ndarray, "draws speeds"]
-    """While observed."""
+    """True where a draw is chaotic while observed."""
     failed: Bool[np.ndarray, "draws speeds"]
     bands: tuple[Band, ...]
     discard: int
     revolutions: int
     units: tuple[str, ...] = ()
-    """Of the unknowns, by name of the SI unit."""
+    """SI units of the unknowns."""
 
     @property
     def rpm(self) -> Float[np.ndarray, " speeds"]:
@@ -102,24 +102,24 @@ class Ensemble:
 
     @property
     def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
-        """Between which bounds the chance lies with 95 % confidence, by Clopper and Pearson: the lower one as if all
-        that failed were calm, the upper one as if all were chaotic."""
+        """Bounds of the chance with 95 % confidence, by Clopper and Pearson: the lower one as if all that failed were
+        calm, the upper one as if all were chaotic."""
         (chaotic, of), draws = self.counts, len(self.place)
         return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
 
     @property
     def verdict(self) -> list[Verdict]:
-        """What the chance means at each speed, see `verdict_of`."""
+        """Meaning of the chance at each speed, see `verdict_of`."""
         return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
 
     @property
     def undecided(self) -> Bool[np.ndarray, " speeds"]:
-        """Speeds at which what is known does not decide."""
+        """Speeds at which the ranges are too wide to decide."""
         return np.array([v == "not decided" for v in self.verdict], dtype=bool)
 
     def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
-        """What each unknown has to say about the chaotic share of the speeds `which` (all undecided ones if left out),
-        the most telling first; empty where there is nothing to decide."""
+        """Influence of each unknown on the chaotic share of the speeds `which`, by default all undecided ones, the
+        largest first; empty where there is nothing to decide."""
         chosen = self.undecided if which is None else which
         y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
         if np.ptp(y) == 0:
@@ -135,10 +135,10 @@ class Ensemble:
 
 
 def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
-    """What it means that `chaotic` of `finished` of `draws` draws are.
+    """Meaning of `chaotic` draws among `finished` of `draws`.
 
-    `calm` and `chaotic` hold whatever those that failed would do: at most 5 %, or at least 95 %, of all draws are
-    chaotic then. `calm as computed` and `chaotic as computed` say that of those that finished; those that failed are
+    `calm` and `chaotic` hold whatever the draws that failed would do: at most 5 %, or at least 95 %, of all draws are
+    chaotic then. `calm as computed` and `chaotic as computed` are about the draws that finished; those that failed are
     often the ones that hit the land hardest, and others drawn in their place would not be like them. `not decided` is
     in between.
     """
@@ -156,7 +156,7 @@ def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
 def binomial_interval(
     hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Clopper and Pearson's bounds of a share of which `hits` of `of` were seen."""
+    """Clopper and Pearson's bounds of a share, from `hits` among `of`."""
     from scipy.stats import beta  # takes half a second to load
 
     k, n, tail = np.asarray(hits, dtype=float), np.asarray(of, dtype=float), (1 - CONFIDENCE) / 2

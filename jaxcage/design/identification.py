@@ -1,9 +1,9 @@
-"""Ranges narrowed by what was measured: draws that do not do it are given up, and the ranges close around the others.
+"""Ranges of parameters narrowed by measurements on a machine.
 
 Approximate Bayesian computation by rejection (S. A. Sisson, Y. Fan and M. A. Beaumont, Handbook of Approximate Bayesian
 Computation (2018)): even draws from the ranges run at the measured speeds, and a draw is accepted if every measurement
 is met within its tolerance. Where few are, the ranges close around the best of them, with a margin, and are drawn from
-again. A box keeps less than what was learned: values that only matter together stay wide. What it gives up may have
+again. A box holds less than what was learned: values that only matter together stay wide. What is left out may have
 held the truth.
 """
 
@@ -30,31 +30,31 @@ from .loads import motions
 DRAWS = 128
 STAGES = 4
 KEPT = 0.25
-"""Of the draws of a stage, around which the ranges close; with as many accepted it is the last."""
+"""Share of the draws of a stage around which the ranges close; with as many accepted the stage is the last."""
 FAR = 5.0
-"""In tolerances: no miss counts more, and what rattles and should not is as far off; of two misses the larger counts
-more, however large, or a tight tolerance could not tell near draws from far ones."""
+"""Largest count of a miss [tolerances], also of a cage that rattles and should not. The larger of two misses counts
+more, so that a tight tolerance tells near draws from far ones."""
 FEW = 8
 """Accepted draws without which even the last stage closes around the best ones, met or not."""
 WHOLE = 0.9
-"""Of a range, what a stage must keep at most to change it."""
+"""Share of a range above which a stage leaves it whole."""
 WORTH = 0.9
 """A range that keeps more of its length is left as it is."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Narrowed:
-    """What measurements leave of some ranges."""
+    """Ranges that are narrowed by measurements."""
 
     unknowns: tuple[Unknown, ...]
-    """As they were."""
+    """The ranges before."""
     lower: Float[np.ndarray, " unknowns"]
     """Place of each new range in the old one, 0 to 1."""
     upper: Float[np.ndarray, " unknowns"]
     middle: Float[np.ndarray, " unknowns"]
     """Median of the accepted draws."""
     accepted: int
-    """Draws of the last stage that do what was measured."""
+    """Draws of the last stage that meet all measurements."""
     draws: int
     """Draws of each stage."""
     stages: int
@@ -63,22 +63,22 @@ class Narrowed:
 
     @property
     def met(self) -> bool:
-        """Whether any draw does what was measured."""
+        """True if any draw meets all measurements."""
         return self.accepted > 0
 
     @property
     def share(self) -> Float[np.ndarray, " unknowns"]:
-        """Of each range, what is left."""
+        """Share of each range that is left."""
         return self.upper - self.lower
 
     @property
     def narrowed(self) -> Bool[np.ndarray, " unknowns"]:
-        """Ranges that are worth a change."""
+        """True for ranges that become shorter by more than a tenth."""
         return self.share < WORTH
 
     @property
     def ranges(self) -> tuple[Range, ...]:
-        """New ranges, those that are not worth a change as they were."""
+        """New ranges; those that are not narrowed as they were."""
         return tuple(
             Range(float(u.range.at(a)), float(u.range.at(b)), float(u.range.at(m))) if worth else u.range
             for u, a, b, m, worth in zip(self.unknowns, self.lower, self.upper, self.middle, self.narrowed, strict=True)
@@ -92,9 +92,9 @@ Misses = Callable[[Float[np.ndarray, "draws unknowns"]], Float[np.ndarray, "draw
 def narrow(
     unknowns: Sequence[Unknown], misses: Misses, *, draws: int = DRAWS, stages: int = STAGES, seed: int = 0
 ) -> Narrowed:
-    """Close ranges around what does as was measured.
+    """Close ranges around the draws that meet the measurements.
 
-    **Arguments:** ranges; how far draws are from the measurements; draws of each stage; stages at most; seed.
+    **Arguments:** ranges; how far draws are from the measurements; draws of each stage; largest number of stages; seed.
 
     **Raises:** `ValueError` if nothing is unknown, or for fewer than 16 draws.
     """
@@ -121,12 +121,12 @@ def narrow(
 
 
 def _counted(missed: np.ndarray) -> np.ndarray:
-    """How much a miss counts: itself where it is small, and never more than `FAR`."""
+    """Count of a miss: the miss itself where it is small, and at most `FAR`."""
     return FAR * (1 - 1 / (1 + missed / FAR))
 
 
 def _closed(place: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ends around these places, some distances of even draws beyond the outermost; a range of which they keep most
+    """Ends around these places, some distances of even draws beyond the outermost; a range of which they leave most
     stays whole, since nothing was learned of it."""
     low, high = place.min(axis=0), place.max(axis=0)
     margin = 2.0 * (high - low) / (len(place) - 1) + 0.02 * (upper - lower)
@@ -146,9 +146,9 @@ def identify(
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> Narrowed:
-    """Narrow the ranges of a file by what was measured on the machine.
+    """Narrow the ranges of a file by measurements on the machine.
 
-    **Arguments:** design; what is unknown of it; measurements; draws of each stage; stages at most; seed of the draws;
+    **Arguments:** design; its unknowns; measurements; draws of each stage; largest number of stages; seed of the draws;
     method and progress as in `sweep`.
     """
     missed_by = lambda place: misses(model, unknowns, measured, place, method=method, progress=progress)
@@ -164,8 +164,8 @@ def misses(
     method: AbstractMethod | None = None,
     progress: Progress | None = None,
 ) -> Float[np.ndarray, "draws measurements"]:
-    """How far each draw is from each measurement, in tolerances; NaN where it failed. What is chaotic rattles: it is
-    right (0) or wrong (as far as anything counts)."""
+    """Distance of each draw from each measurement, in tolerances; NaN where it failed. A cage that is chaotic rattles:
+    its distance is 0 if that is right, else `FAR`."""
     models = draw(model, unknowns, place)
     rpm = np.unique([m.cage_rpm for m in measured])
     found = run_draws(models, rpm * np.pi / 30, method, progress)

@@ -25,7 +25,7 @@ from ..lanes import Plan, Progress, Run, Speeds, rpm, run_lanes
 from ..models import AbstractForcedSystem, BearingModel, drawn_places, rolling_start
 from ..solve import AbstractMethod
 from .loads import FILM, LAND_LOADS, loads_of_lanes, mean_of_known, negligible_load
-from .objective import AbstractObjective, DesignSpace, Models
+from .objective import AbstractObjective, DesignSpace, Models, Smooth
 
 
 CAGE_PARAMETERS = (
@@ -170,7 +170,7 @@ class AbstractStatistic(AbstractObjective):
     def by_block(self, space: DesignSpace, places: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k blocks"]:
         return self.samples(space.models(places)).mean(axis=1)
 
-    def on(self, runs: Runs):
+    def on(self, runs: Runs) -> "AbstractStatistic":
         return dataclasses.replace(self, runs=runs)
 
 
@@ -399,7 +399,7 @@ class BeforeAfter:
     change: float
     """After less before, [unit]."""
     change_error: float
-    """Standard error of the mean difference between runs from the same initial state."""
+    """Standard error of the mean difference between runs from the same initial state; NaN of a single one."""
 
     @property
     def known(self) -> bool:
@@ -421,16 +421,16 @@ def before_and_after(
     **Returns:** a row for each statistic; the number of lanes that failed, which are left out together with those of
     the other design from the same initial state.
     """
-    pair = [before, after]
-    found = {name: each.samples(pair).mean(axis=2) for name, each in statistics_of(runs, statistics).items()}
+    pair, chosen = [before, after], statistics_of(runs, statistics)
+    found = {name: each.samples(pair).mean(axis=2) for name, each in chosen.items()}
     starts = max(values.shape[1] for values in found.values())
     whole = np.all([np.isfinite(values).all(axis=0) & np.ones(starts, dtype=bool) for values in found.values()], axis=0)
     mean = lambda x: float(x.mean()) if x.size else math.nan
-    error = lambda x: float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else math.nan
 
     def row(name: str, each: AbstractObjective) -> BeforeAfter:
-        a, b = np.broadcast_to(found[name], (2, starts))[:, whole]
+        a, b = found[name][:, whole] if found[name].shape[1] == starts else found[name]
+        alone = 0.0 if isinstance(each, Balance | Smooth) else math.nan
+        error = lambda x: float(x.std(ddof=1) / math.sqrt(x.size)) if x.size > 1 else alone
         return BeforeAfter(name, each.unit(before), mean(a), error(a), mean(b), error(b), mean(b - a), error(b - a))
 
-    lost = int(failed(runs.run(pair)).sum())
-    return [row(name, each) for name, each in statistics_of(runs, statistics).items()], lost
+    return [row(name, each) for name, each in chosen.items()], int(failed(runs.run(pair)).sum())

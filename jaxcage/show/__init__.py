@@ -3,6 +3,7 @@
 | module            | responsibility                                                        |
 |-------------------|-----------------------------------------------------------------------|
 | `tables`          | columns of numbers with units                                         |
+| `columns`         | time histories, strobe points and branches as CSV                     |
 | `style`           | colours, frames, legends; light, dark and print style                 |
 | `speed_axes`      | axes of speed: shaft speed, zones, published edges, operating speeds  |
 | `diagrams`        | sweeps over speed: orbit diagram, exponents, quantities; comparisons  |
@@ -43,6 +44,13 @@ from .chance_tables import (
     narrowed_table as narrowed_table,
     operating_chances as operating_chances,
     range_words as range_words,
+)
+from .columns import (
+    branch_columns as branch_columns,
+    read_columns as read_columns,
+    strobe_columns as strobe_columns,
+    trajectory_columns as trajectory_columns,
+    write_columns as write_columns,
 )
 from .design_figures import (
     EDGE_COLOURS as EDGE_COLOURS,
