@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import equinox as eqx
 import jax
@@ -15,7 +15,7 @@ from .._checks import require_x64
 from .._errors import ArgumentError
 from .._form import compiled
 from .._parameters import choice, parameter
-from .._types import Scalar, State
+from .._types import Scalar
 from ..bearing import Bearing, Lubricant, brass, line_contact_approach, load_distribution, nu2310, vg
 from ..bearing._line_contact import raceway_loads_of_all
 from ..forces import Land, LandContact, RibFilm
@@ -175,13 +175,13 @@ class BearingModel(AbstractForcedSystem):
     def samples(self) -> int:
         return SAMPLES
 
-    def scale(self, speed: Scalar) -> State:
-        return tuple(state_scale(self, speed).row)
+    def scale(self, speed: Scalar) -> Float[Array, " dim"]:
+        return state_scale(self, speed).row
 
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
-        return tuple(tuple(row) for row in _starts(self, jnp.asarray(speed)))
+    def starts(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
+        return tuple(_starts(self, jnp.asarray(speed)))
 
-    def excursion(self, y: State) -> Scalar:
+    def excursion(self, y: Any) -> Scalar:
         """Eccentricity ratio of the cage in its land."""
         cage = Bodies(*y[-OF_BODIES:])
         land_x, land_y = (cage.ring_x, cage.ring_y) if self.guidance == "inner" else (0.0, 0.0)
@@ -262,7 +262,7 @@ def _slowness(model: BearingModel, speed: Scalar) -> Array:
 
 @compiled
 def _starts(model: BearingModel, speed: Scalar) -> Array:
-    return jnp.stack([rolling_start(model, speed, k).row for k in range(len(CAGE_STARTS))])
+    return jax.vmap(lambda place: rolling_start(model, speed, place=place).row)(jnp.array(CAGE_STARTS))
 
 
 class BearingOverTime(BearingModel):

@@ -346,7 +346,9 @@ def _scales(form: Any, several: bool) -> Any:
 
     def of(speed: Any, row: Any, y: Any) -> tuple[Any, Any]:
         system = form.filled(row)
-        return jnp.stack([jnp.asarray(s, float) for s in system.scale(speed)]), jnp.asarray(system.excursion(tuple(y)))
+        scale, state = system.scale(speed), y if system.beside else tuple(y)
+        row = scale if system.beside else jnp.stack([jnp.asarray(s, float) for s in scale])
+        return row, jnp.asarray(system.excursion(state))
 
     return jax.jit(jax.vmap(of, in_axes=(0, 0 if several else None, 0)))
 

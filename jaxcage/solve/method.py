@@ -125,7 +125,7 @@ class AbstractMethod(eqx.Module):
         scale: State,
         y: State,
         phase: Scalar,
-        parts: Int[Array, ""] | int,
+        parts: Int[Array, ""] | Scalar,
     ) -> Stretch:
         """Go one `parts`-th of a revolution from state `y` at `phase`; `scale` is the magnitude of the components."""
 
@@ -147,7 +147,7 @@ def run_steps(
     pieces: Pieces,
     y: State,
     phase: Scalar,
-    parts: Int[Array, ""] | int,
+    parts: Int[Array, ""] | Scalar,
 ) -> Stretch:
     """One `parts`-th of a revolution of so many equal steps, in a single lane."""
     if isinstance(steps, int) and isinstance(parts, int):
@@ -215,13 +215,13 @@ class Beside(AbstractForcedSystem):
         return BesideField(self.system.at_speed(speed))
 
     def scale(self, speed: Scalar) -> Any:
-        return jnp.stack(self.system.scale(speed)), jnp.ones(len(self.system.beside))
+        return self.system.scale(speed), jnp.ones(len(self.system.beside))
 
     def starts(self, speed: Scalar) -> Any:
-        return tuple((jnp.stack(y), jnp.array(self.system.beside_start)) for y in self.system.starts(speed))
+        return tuple((y, jnp.array(self.system.beside_start)) for y in self.system.starts(speed))
 
     def excursion(self, y: Any) -> Scalar:
-        return self.system.excursion(tuple(y[0]))
+        return self.system.excursion(y[0])
 
     def parts(self, row: Array) -> tuple[Array, Array]:
         """A row of numbers as state and quantities beside it."""
@@ -254,7 +254,7 @@ class FixedSteps(AbstractMethod):
         scale: State,
         y: State,
         phase: Scalar,
-        parts: Int[Array, ""] | int,
+        parts: Int[Array, ""] | Scalar,
     ) -> Stretch:
         return run_steps(self.solver, self.steps, (field, system, scale), y, phase, parts)
 
@@ -292,7 +292,7 @@ class AdaptiveSteps(AbstractMethod):
         scale: State,
         y: State,
         phase: Scalar,
-        parts: Int[Array, ""] | int,
+        parts: Int[Array, ""] | Scalar,
     ) -> Stretch:
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
         watches = isinstance(field, BesideField)
@@ -362,7 +362,7 @@ class NativeSteps(AbstractMethod):
         scale: State,
         y: State,
         phase: Scalar,
-        parts: Int[Array, ""] | int,
+        parts: Int[Array, ""] | Scalar,
     ) -> Stretch:
         return self.in_jax.advance(field, system, scale, y, phase, parts)
 

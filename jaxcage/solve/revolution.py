@@ -43,7 +43,7 @@ class StrobeMap(eqx.Module):
         """One revolution from `y`: state after it, largest excursion on the way, outcome."""
         return self.part(y, 0, 1)
 
-    def part(self, y: State, i: Int[Array, ""] | int, parts: Int[Array, ""] | int) -> Stretch:
+    def part(self, y: State, i: Int[Array, ""] | int, parts: Int[Array, ""] | Scalar) -> Stretch:
         """The `i`-th of `parts` equal parts of a revolution."""
         phase = jnp.asarray(i, dtype=float) * (REVOLUTION / jnp.asarray(parts, dtype=float))
         return self.method.advance(self.field, self.system, self.scale, y, phase, parts)
