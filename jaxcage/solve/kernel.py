@@ -6,7 +6,7 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any, TypeGuard
+from typing import Any, NamedTuple, TypeGuard
 
 import diffrax as dfx
 import equinox as eqx
@@ -23,8 +23,14 @@ from .steps import march_with_tangents
 
 
 KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
-Pieces = tuple[AbstractField, AbstractForcedSystem, State]
-"""What is integrated: field, system and its scale."""
+
+
+class Pieces(NamedTuple):
+    """The field, the model and its scale, as passed to the solver."""
+
+    field: AbstractField
+    system: AbstractForcedSystem
+    scale: State
 
 
 def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:

@@ -17,7 +17,6 @@ from .._types import Scalar, State
 from ..models import (
     ESCAPE,
     AbstractField,
-    AbstractForcedSystem,
     AbstractLinearisation,
     ScaledField,
     divide,
@@ -118,16 +117,8 @@ class AbstractMethod(eqx.Module):
         """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
 
     @abc.abstractmethod
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | Scalar,
-    ) -> Stretch:
-        """Go one `parts`-th of a revolution from state `y` at `phase`; `scale` is the magnitude of the components."""
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        """Go one `parts`-th of a revolution from state `y` at `phase`."""
 
 
 def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
@@ -202,32 +193,6 @@ class BesideField(AbstractField):
         return self.field.rates_beside(*y)[2]
 
 
-class Beside(AbstractForcedSystem):
-    """A model with the quantities that are integrated beside its state."""
-
-    system: AbstractForcedSystem
-
-    @property
-    def dimension(self) -> int:
-        return self.system.dimension
-
-    def at_speed(self, speed: Scalar) -> BesideField:
-        return BesideField(self.system.at_speed(speed))
-
-    def scale(self, speed: Scalar) -> Any:
-        return self.system.scale(speed), jnp.ones(len(self.system.beside))
-
-    def starts(self, speed: Scalar) -> Any:
-        return tuple((y, jnp.array(self.system.beside_start)) for y in self.system.starts(speed))
-
-    def excursion(self, y: Any) -> Scalar:
-        return self.system.excursion(y[0])
-
-    def parts(self, row: Array) -> tuple[Array, Array]:
-        """A row of numbers as state and quantities beside it."""
-        return row[: self.dimension], row[self.dimension :]
-
-
 class FixedSteps(AbstractMethod):
     """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
 
@@ -247,16 +212,8 @@ class FixedSteps(AbstractMethod):
         """With twice the steps, `times` over."""
         return FixedSteps(self.solver, self.steps << times)
 
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | Scalar,
-    ) -> Stretch:
-        return run_steps(self.solver, self.steps, (field, system, scale), y, phase, parts)
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        return run_steps(self.solver, self.steps, pieces, y, phase, parts)
 
 
 class AdaptiveSteps(AbstractMethod):
@@ -285,15 +242,8 @@ class AdaptiveSteps(AbstractMethod):
     def _with(self, factor: float) -> "AdaptiveSteps":
         return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | Scalar,
-    ) -> Stretch:
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        field, system, scale = pieces
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
         watches = isinstance(field, BesideField)
         saved, norm = dfx.SubSaveAt(t1=True), optx.rms_norm
@@ -355,16 +305,8 @@ class NativeSteps(AbstractMethod):
         """The same by the implicit method, for stiff laws."""
         return NativeSteps(self.tolerance, self.error, IMPLICIT)
 
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | Scalar,
-    ) -> Stretch:
-        return self.in_jax.advance(field, system, scale, y, phase, parts)
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        return self.in_jax.advance(pieces, y, phase, parts)
 
     def finer(self, times: int = 1) -> "NativeSteps":
         """The same with tolerances 16 times smaller, `times` over."""
