@@ -111,7 +111,7 @@ class BearingRecord:
     """What was gathered of lanes, block by block."""
 
     integrals: dict[str, Float[np.ndarray, "lanes blocks"]]
-    """`time`, and the names of `jaxcage.integrate.INTEGRATED`."""
+    """`time`, and the names of `jaxcage.models.INTEGRATED`."""
     peaks: dict[str, Float[np.ndarray, "lanes blocks"]]
     growth: Float[np.ndarray, "lanes followed"]
     place: Float[np.ndarray, "lanes samples 2"]

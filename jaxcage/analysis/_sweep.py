@@ -52,7 +52,7 @@ class Sweep:
     peak: Float[np.ndarray, "speeds starts"]
     """Largest excursion while observed: for a cage the largest eps, flagged above 1 (overlap of the surfaces)."""
     outcome: Int[np.ndarray, "speeds starts"]
-    """Code of how each lane ended: its place in `jaxcage.integrate.OUTCOMES`."""
+    """Code of how each lane ended: its place in `jaxcage.solve.OUTCOMES`."""
     error: Float[np.ndarray, "speeds starts"]
     """Largest error of a revolution, by halving its steps, in units of `scale` (for a cage: clearances)."""
     doubt: Float[np.ndarray, "speeds starts exponents"]

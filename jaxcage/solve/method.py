@@ -122,7 +122,7 @@ class AbstractMethod(eqx.Module):
 
 
 def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
-    """What to say of a state that a solver returned with one of diffrax's results."""
+    """The result of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
@@ -228,7 +228,7 @@ class AdaptiveSteps(AbstractMethod):
 
     @property
     def tolerance(self) -> float:
-        """What no error is measured below."""
+        """Lower bound of a measured error."""
         return self.atol
 
     @property
