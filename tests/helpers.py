@@ -2,22 +2,30 @@
 
 import dataclasses
 import functools
+import json
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pint
 import pytest
+import xarray as xr
 
 import jaxcage as jc
+from jaxcage.analysis import label_lanes, scatter
+from jaxcage.cli import main
 from jaxcage.forces import parameter
+from jaxcage.quantities import component_names
+from jaxcage.solve import OUTCOMES
 
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
 """Lanes as they run, none confirmed or followed further."""
-raw_sweeps = functools.partial(jc.sweep_designs, confirm=False, horizon=0)
+raw_sweeps = raw_sweep
 
 
 @functools.cache
@@ -134,3 +142,61 @@ def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[t
             yield from declared(value, here)
         elif {"parameter", "choice", "count"} & set(field.metadata):
             yield here, field
+
+
+def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    """The JSON document that a command prints, the only thing on standard output."""
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The sentence with which a command refuses `arguments`."""
+    assert main(list(arguments)) == 2
+    out, err = capsys.readouterr()
+    lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
+    assert out == "" and len(lines) == 1 and lines[0].endswith((".", ".)", "?")), err
+    return lines[0]
+
+
+def is_png(path: str) -> bool:
+    """True for a file that begins as a PNG figure does."""
+    return Path(path).read_bytes().startswith(b"\x89PNG\r\n")
+
+
+def made_sweep(rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, **more: Any) -> xr.Dataset:
+    """A sweep made by hand: strobe states (speeds, starts, revolutions, components) and growth in blocks."""
+    lanes = strobe.shape[:2]
+    outcome = np.zeros(lanes, dtype=np.int32) if outcome is None else outcome
+    scale = np.broadcast_to(more.pop("scale", np.ones(strobe.shape[-1])), (*lanes, strobe.shape[-1]))
+    exponents, errors = growth.mean(axis=2), scatter(growth, axis=2)
+    label, escape = label_lanes(outcome, strobe, scale, exponents[..., 0], errors[..., 0]), more.pop("escape", None)
+    if escape is not None:
+        label[(label == "chaotic") & np.isfinite(escape)] = "transient"
+    values = {"label": label, "outcome": np.array(OUTCOMES)[outcome], "exponents": exponents, "standard_error": errors}
+    values |= {"block_growth": growth, "peak": np.where(outcome == 0, 0.5, np.nan), "error": np.full(lanes, 1e-4)}
+    values |= {"last": strobe[:, :, -1], "strobe": strobe, "scale": scale}
+    values |= {} if escape is None else {"escape": escape}
+    within = {"exponents": ("exponent",), "standard_error": ("exponent",), "block_growth": ("growth_block", "exponent")}
+    within |= {"last": ("component",), "scale": ("component",), "strobe": ("revolution", "component")}
+    words = {"units": "rpm", "long_name": "cage speed"}
+    coordinates = {"speed": np.asarray(rpm) * np.pi / 30, "component": list(component_names(strobe.shape[-1]))}
+    shaft = np.asarray(rpm) / more.pop("cage_speed_ratio", 0.4)
+    coordinates |= {"rpm": ("speed", np.asarray(rpm, dtype=float), words), "shaft_rpm": ("speed", shaft)}
+    settings = json.dumps(more.pop("settings", {}))
+    attributes = {"discard": 10, "revolutions": 100, "horizon": 0, "confirmed": "[]", "settings": settings} | more
+    shaped = {name: (("speed", "start", *within.get(name, ())), value) for name, value in values.items()}
+    return xr.Dataset(shaped, coordinates, attributes)
+
+
+def cage_sweep() -> xr.Dataset:
+    """Five speeds, three starts: the second speed chaotic, the others periodic, the last lane of the fourth failed."""
+    rng = np.random.default_rng(0)
+    strobe = np.repeat(rng.normal(size=(5, 3, 1, 4)), 16, axis=2) * 1e-4
+    strobe[1] += rng.normal(size=(3, 16, 4)) * 1e-4
+    growth = rng.normal(-0.2, 0.01, size=(5, 3, 10, 1))
+    growth[1] += 0.5
+    outcome = np.zeros((5, 3), dtype=np.int32)
+    outcome[3, 2], strobe[3, 2], growth[3, 2] = 1, np.nan, np.nan
+    scale = np.array([4.5e-4, 4.5e-4, 0.4, 0.4])
+    return made_sweep(np.linspace(8000.0, 8400.0, 5), strobe, growth, outcome, scale=scale)

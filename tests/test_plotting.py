@@ -1,28 +1,46 @@
-"""Figures show what they should: points, limits, units, zones at the right speeds."""
+"""Figures show what they should: points, limits, units, zones at the right speeds, colours that are told apart."""
+
+import itertools
 
 import numpy as np
 import pytest
+import xarray as xr
+from helpers import cage_sweep
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
-from test_io_dataset import sweep_of
 
 import jaxcage as jc
-from jaxcage.analysis import Edge, Zone, Zones, zones
-from jaxcage.bearing import load_distribution
-from jaxcage.plotting import (
+from jaxcage.analysis import Edge, Zone, Zones
+from jaxcage.orbits import Branch, Curve, Point
+from jaxcage.show import (
+    EDGE_COLOURS,
+    FORCE_COLOURS,
+    KIND_COLOURS,
+    MARKS,
+    OWN_COLOURS,
+    PERIOD_COLOURS,
+    START_COLOURS,
+    STYLES,
+    branch_diagram,
     exponent_strip,
-    load_bars,
+    multiplier_circle,
     orbit,
     orbit_diagram,
     shade_zones,
-    sweep_figure,
+    stability_map,
     time_history,
 )
+from jaxcage.show.style import BLACK, PAPER, ZONE
+
+
+PER_RPM = np.pi / 30
 
 
 def points(ax: Axes, label: str) -> np.ndarray:
     """Finite points of the line with `label`, as rows (x, y)."""
-    line = next(line for line in ax.get_lines() if line.get_label() == label)
+    (line,) = [line for line in ax.get_lines() if line.get_label() == label]
     data = np.asarray(line.get_xydata())
     return data[np.all(np.isfinite(data), axis=1)]
 
@@ -33,53 +51,35 @@ def spans(ax: Axes) -> list[tuple[float, float]]:
     return [(float(p.get_x()), float(p.get_x() + p.get_width())) for p in shaded]
 
 
-def trajectory(revolutions: int = 2, samples: int = 32) -> jc.Trajectory:
-    """A circle of 0.1 mm at 100 rad/s."""
-    tau = np.arange(revolutions * samples) * 2 * np.pi / samples
-    x, y = 1e-4 * np.cos(tau), 1e-4 * np.sin(tau)
-    state, speed = np.stack([x, y, -100 * y, 100 * x], axis=1), np.full(tau.size, 100.0)
-    return jc.Trajectory(tau / 100, tau, state, speed, samples, 0.2, "successful")
+# Sweeps and time histories.
 
 
 def test_orbit_diagram_shows_every_strobe_point_of_every_start():
-    sweep = sweep_of()
+    sweep = cage_sweep()
     ax = orbit_diagram(sweep)
-    assert len(points(ax, "chaotic")) == 3 * 16
-    assert len(points(ax, "periodic")) == (4 * 3 - 1) * 16
     chaotic = points(ax, "chaotic")
+    assert len(chaotic) == 3 * 16 and len(points(ax, "periodic")) == (4 * 3 - 1) * 16
     np.testing.assert_allclose(np.unique(chaotic[:, 0]), [8100])
-    expected = np.sort(sweep.strobe[1, :, :, 1].ravel()) * 1e3
-    np.testing.assert_allclose(np.sort(chaotic[:, 1]), expected)
+    np.testing.assert_allclose(np.sort(chaotic[:, 1]), np.sort(sweep["strobe"].values[1, :, :, 1].ravel()) * 1e3)
     np.testing.assert_allclose(points(ax, "failed")[:, 0], [8300])
-    assert ax.get_xlabel() == "Cage speed $n$ [rpm]"
-    assert ax.get_ylabel() == "Vertical displacement $Y_C$ [mm]"
-    assert ax.get_xlim() == pytest.approx((8000, 8400))
+    assert ax.get_xlabel() == "Cage speed $n$ [rpm]" and ax.get_ylabel() == "Vertical displacement $Y_C$ [mm]"
 
 
 def test_exponent_strip():
-    sweep = sweep_of()
-    ax = exponent_strip(sweep)
-    every = sweep.exponents[..., 0]
-    assert len(points(ax, "each start")) == np.sum(np.isfinite(every))
+    """The largest exponent with a band of two standard errors; a speed at which all starts failed is a gap."""
+    sweep = cage_sweep()
+    sweep["label"].values[4], sweep["exponents"].values[4], sweep["standard_error"].values[4] = "failed", np.nan, np.nan
+    ax, every = exponent_strip(sweep), sweep["exponents"].values[..., 0]
     largest = points(ax, "largest of the starts")
-    np.testing.assert_allclose(largest[:, 1], np.nanmax(every, axis=1))
+    assert largest[:, 0] == pytest.approx([8000, 8100, 8200, 8300])
+    np.testing.assert_allclose(largest[:, 1], np.nanmax(every[:4], axis=1))
     (band,) = ax.collections
-    height = np.asarray(band.get_paths()[0].get_extents())
-    error = 2 * sweep.standard_error[1, np.argmax(every[1]), 0]
-    assert height[1, 1] == pytest.approx(np.max(every[1]) + error)
-    assert points(ax, "chaotic above 0.02")[:, 1].tolist() == [0.02, 0.02]
-    low, high = ax.get_ylim()
-    assert low < 0 < 0.02 < high
-
-
-def test_exponent_of_a_speed_at_which_all_starts_failed_is_a_gap():
-    sweep = sweep_of(starts=3)
-    sweep.outcome[4], sweep.block_growth[4], sweep.strobe[4] = 1, np.nan, np.nan
-    assert points(exponent_strip(sweep), "largest of the starts")[:, 0] == pytest.approx([8000, 8100, 8200, 8300])
+    error = 2 * float(sweep["standard_error"][1, np.argmax(every[1]), 0])
+    assert np.asarray(band.get_paths()[0].get_extents())[1, 1] == pytest.approx(np.max(every[1]) + error)
 
 
 def test_zones_are_shaded_where_they_are():
-    ax = orbit_diagram(sweep_of())
+    ax = orbit_diagram(cage_sweep())
     inner, open_end = (
         Zone("chaotic", Edge(8050.0, 100.0, "chaotic"), Edge(8150.0, 100.0, "chaotic"), 1.0),
         Zone("chaotic", Edge(8350.0, 100.0, "chaotic"), None, 1.0),
@@ -87,60 +87,183 @@ def test_zones_are_shaded_where_they_are():
     shade_zones(ax, Zones((inner, open_end), (), 100.0, 500.0))
     np.testing.assert_allclose(spans(ax), [(8050, 8150), (8350, 8400)])
     assert ax.get_xlim() == pytest.approx((8000, 8400))
-    labels = ax.get_legend_handles_labels()[1]
-    assert labels.count("chaotic zone") == 1
 
 
-def test_sweep_figure_has_both_panels_on_one_axis_and_no_clash():
-    sweep = sweep_of()
-    figure = sweep_figure(sweep, zones(sweep), jc.bearing.published_case("1a"), "Case 1a")
-    above, below = figure.axes
-    assert above.get_xlim() == below.get_xlim()
-    np.testing.assert_allclose(spans(above), [(8050, 8150)])
-    assert spans(above) == spans(below)
-    assert above.get_title(loc="left") == "Case 1a"
-    assert below.get_xlabel() == "Cage speed $n$ [rpm]" and above.get_xlabel() == ""
-    figure.draw_without_rendering()
-    legend = figure.legends[0].get_window_extent()
-    panel = below.get_tightbbox()
-    assert panel is not None and legend.y1 <= panel.y0
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert len(names) == len(set(names))
-    assert {"periodic", "chaotic", "failed", "chaotic zone", "each start"} <= set(names)
-
-
-def test_time_history_and_orbit():
-    run = trajectory()
-    ax = time_history(run)
-    np.testing.assert_allclose(points(ax, "$Y_C$")[:, 1], 0.1 * np.sin(run.tau), atol=1e-15)
-    np.testing.assert_allclose(points(ax, "$Y_C$")[:, 0], run.time * 1e3)
-    assert ax.get_xlabel() == "Time $t$ [ms]" and ax.get_ylabel() == "Displacement [mm]"
+@pytest.mark.parametrize("elastic", [False, True])
+def test_time_history_and_orbit(elastic: bool):
+    """A circle of 0.1 mm at 100 rad/s; that of a cage in an elastic rib is relative to the rib."""
+    tau = np.arange(64) * 2 * np.pi / 32
+    x, y = 1e-4 * np.cos(tau), 1e-4 * np.sin(tau)
+    state, rib = np.stack([x, y, -100 * y, 100 * x], axis=1), np.full((64, 2), 5e-5)
+    if elastic:
+        state = np.concatenate([state[:, :2] + rib, rib, state[:, 2:], 0 * rib], axis=1)
+    run = jc.Trajectory(tau / 100, tau, state, np.full(64, 100.0), 32, 0.2, "successful")
+    if not elastic:
+        ax = time_history(run)
+        np.testing.assert_allclose(points(ax, "$Y_C$"), np.stack([run.time * 1e3, 1e3 * y], axis=1), atol=1e-15)
     ax = orbit(run, 0.45e-3)
     (circle,) = [p for p in ax.patches if isinstance(p, Circle)]
-    assert circle.get_radius() == pytest.approx(0.45)
     path, strobe = ax.get_lines()
+    assert circle.get_radius() == pytest.approx(0.45) and ax.get_aspect() == 1.0
     np.testing.assert_allclose(np.hypot(*np.asarray(path.get_xydata()).T), 0.1)
     assert np.asarray(strobe.get_xydata()) == pytest.approx(np.array([[0.1, 0.0]] * 2))
-    assert ax.get_aspect() == 1.0
 
 
-def test_orbit_of_a_cage_in_an_elastic_rib_is_relative_to_the_rib():
-    run = trajectory()
-    rib = np.full((run.tau.size, 2), 5e-5)
-    state = np.concatenate([run.state[:, :2] + rib, rib, run.state[:, 2:], 0 * rib], axis=1)
-    moved = jc.Trajectory(run.time, run.tau, state, run.speed, run.samples, 0.2, "successful")
-    path, _ = orbit(moved, 0.45e-3).get_lines()
-    np.testing.assert_allclose(np.hypot(*np.asarray(path.get_xydata()).T), 0.1)
+# Branches, multipliers, elasticities, curves.
+
+CRITICAL = {"period-doubling": -1.0, "Neimark-Sacker": np.exp(2.5j), "fold": 1.0}
+T = np.linspace(-2.0, 2.0, 40)
 
 
-def test_load_bars():
-    shared = load_distribution(jc.bearing.nu2310())
-    ax = load_bars(shared)
-    bars = [p for p in ax.patches if isinstance(p, Rectangle)]
-    assert len(bars) == 13
-    tallest = max(bars, key=lambda bar: bar.get_height())
-    assert tallest.get_height() == pytest.approx(float(shared.max_load))
-    assert tallest.get_x() + tallest.get_width() / 2 == pytest.approx(0, abs=1e-9)
-    loaded = [bar.get_x() + bar.get_width() / 2 for bar in bars if bar.get_height() > 0]
-    assert max(loaded) == pytest.approx(-min(loaded))
-    assert max(loaded) < np.degrees(float(shared.half_angle))
+def special(kind: str, rpm: float, y: float, index: int, edge: bool) -> Point:
+    second = np.conj(CRITICAL[kind]) if kind == "Neimark-Sacker" else 0.5
+    mu, state = np.array([CRITICAL[kind], second, 0.2, 0.1], dtype=complex), np.array([0.0, y, 0.0, 0.0])
+    known = dict(multipliers=mu, index=index, edge=edge, steps=1024, error=1e-4 * PER_RPM, outcome=0)
+    return Point(kind, rpm * PER_RPM, state, **known)
+
+
+def branch_of(rpm: np.ndarray, y: np.ndarray, stable: np.ndarray, points: list[Point], mu=None) -> Branch:
+    """A branch on which only the vertical displacement [m] is not zero."""
+    state, speed = np.stack([0 * y, y, 0 * y, 0 * y], axis=1), rpm * PER_RPM
+    mu = np.full(state.shape, 0.5 + 0j) if mu is None else mu
+    ended, steps = ("range", "range"), np.full(rpm.size, 512)
+    return Branch("speed", speed, speed, state, mu, stable, tuple(points), 1, ended, steps, 0.0 * rpm)
+
+
+def s_rpm(t):
+    return 9000 + 50 * (t**3 - 3 * t)
+
+
+def s_curve() -> Branch:
+    """Stable, turning at t = -1 and 9100 rpm, unstable, turning at t = 1 and 8900 rpm, stable; the vertical
+    displacement is t [0.1 mm]."""
+    before = lambda t: int(np.flatnonzero(t > T)[-1])
+    kinds = (("fold", -1.0, True), ("period-doubling", 0.2, False), ("fold", 1.0, True))
+    found = [special(kind, s_rpm(t), t * 1e-4, before(t), edge) for kind, t, edge in kinds]
+    return branch_of(s_rpm(T), T * 1e-4, np.abs(T) > 1, found)
+
+
+def test_branch_is_thick_where_it_is_stable_up_to_the_bifurcations():
+    ax = branch_diagram([s_curve()])
+    stable, unstable = points(ax, "period-1, stable"), points(ax, "period-1, unstable")
+    inner, outer = T[np.abs(T) < 1], T[np.abs(T) > 1]
+    np.testing.assert_allclose(stable[:, 1], 0.1 * np.sort([*outer, -1.0, 1.0]))
+    np.testing.assert_allclose(unstable[:, 1], 0.1 * np.sort([*inner, -1.0, 0.2, 1.0]))
+    for part in (stable, unstable):
+        np.testing.assert_allclose(part[:, 0], s_rpm(10 * part[:, 1]))
+    width = {line.get_label(): line.get_linewidth() for line in ax.get_lines()}
+    assert width["period-1, stable"] > 2 * width["period-1, unstable"]
+    np.testing.assert_allclose(points(ax, "fold (F)"), [[9100, -0.1], [8900, 0.1]])
+    assert [text.get_text() for text in ax.texts] == ["F 8900", "F 9100"]
+    with pytest.raises(ValueError, match="no branch was given"):
+        branch_diagram([])
+
+
+def test_multipliers_along_a_branch():
+    """All within the frame, coloured by speed, with those of the bifurcations on the unit circle."""
+    rpm, angle = np.linspace(8000, 9000, 11), np.linspace(0.5, 3.0, 11)
+    mu = np.stack([0.9 * np.exp(1j * angle), 0.9 * np.exp(-1j * angle), 0.1 + 0j * angle, -0.5 * np.arange(11)], axis=1)
+    found = [special("Neimark-Sacker", 8300.0, 0.0, 2, True), special("period-doubling", 8700.0, 0.0, 6, True)]
+    ax = multiplier_circle(branch_of(rpm, 1e-7 * rpm, rpm < 8300, found, mu=mu))
+    (circle,) = [p for p in ax.patches if isinstance(p, Circle)]
+    (cloud,) = [c for c in ax.collections if isinstance(c, PathCollection)]
+    assert circle.get_radius() == 1 and ax.get_aspect() == 1.0
+    far = np.abs(mu.real) > 1.6
+    np.testing.assert_allclose(np.asarray(cloud.get_offsets()), np.stack([mu[~far].real, mu[~far].imag], axis=1))
+    np.testing.assert_allclose(np.asarray(cloud.get_array()), np.repeat(rpm, 4)[~far.ravel()])
+    pair = [[np.cos(2.5), np.sin(2.5)], [np.cos(2.5), -np.sin(2.5)]]
+    np.testing.assert_allclose(points(ax, "Neimark-Sacker (NS)"), pair)
+    np.testing.assert_allclose(points(ax, "period-doubling (PD)"), [[-1, 0]])
+
+
+def curve_of(kind: str, rpm: np.ndarray, gap: np.ndarray, y: str = "guidance_gap") -> Curve:
+    mu, genuine = np.full((rpm.size, 4), 0.5 + 0j), np.ones(rpm.size, bool)
+    return Curve(kind, "speed", y, rpm * PER_RPM, gap, 0 * mu.real, mu, genuine, ("range", "range"), kind)
+
+
+def two_curves() -> list[Curve]:
+    """A period-doubling and a torus curve that meet at 10000 rpm and 0.5 mm."""
+    gap = np.linspace(4e-4, 6e-4, 21)
+    doubling = curve_of("period-doubling", 10000 + (gap - 5e-4) * 5e6, gap)
+    torus = curve_of("Neimark-Sacker", 10000 + np.linspace(0, 900, 10), 5e-4 - np.linspace(0, 0.8e-4, 10))
+    return [doubling, torus]
+
+
+def test_curves_and_exponents_share_their_axes():
+    """Curves in the parameter's unit; exponents beneath them are white at zero, red above, blue below."""
+    rpm, gap = np.linspace(9000, 11000, 5), np.array([4e-4, 5e-4, 6e-4])
+    largest, axes = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3]), ("speed", "guidance_gap", "start")
+    label = np.full((5, 3, 1), "undecided")
+    label[0, 0], largest[0, 0] = "failed", np.nan
+    values = {"label": (axes, label), "exponents": ((*axes, "exponent"), largest[..., None, None])}
+    found = xr.Dataset(values, {"speed": rpm * PER_RPM, "guidance_gap": gap})
+    ax = stability_map(two_curves(), found=found, unit="m")
+    np.testing.assert_allclose(points(ax, "Neimark-Sacker")[[0, -1]], [[10000, 0.5], [10900, 0.42]])
+    assert ax.get_ylabel() == "Guidance gap [mm]"
+    (mesh,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
+    shown = np.ma.asarray(mesh.get_array()).reshape(3, 5)
+    np.testing.assert_allclose(shown.filled(0), np.nan_to_num(largest.T))
+    assert np.ma.getmaskarray(shown)[0, 0] and np.sum(np.ma.getmaskarray(shown)) == 1
+    red, blue = mesh.cmap(mesh.norm(0.3)), mesh.cmap(mesh.norm(-0.3))
+    assert min(mesh.cmap(mesh.norm(0.0))[:3]) > 0.95 and red[0] > red[2] and blue[2] > blue[0]
+    assert ax.get_xlim() == pytest.approx((8750, 11250)) and ax.get_ylim() == pytest.approx((0.35, 0.65))
+    with pytest.raises(ValueError, match="one parameter over speed, but .*load"):
+        stability_map([*two_curves(), curve_of("fold", np.ones(2), np.ones(2), "load")])
+
+
+# Colours: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291.
+
+SEEN_BY = {
+    "everybody": np.eye(3),
+    "protanopes": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "deuteranopes": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+}
+MARKED = tuple(mark.colour for mark in MARKS.values())
+CYCLES = [
+    *(tuple(colours.values()) for colours in (KIND_COLOURS, FORCE_COLOURS, PERIOD_COLOURS)),
+    *(tuple(colours) for colours in (OWN_COLOURS, MARKED, EDGE_COLOURS, START_COLOURS)),
+]
+CLEARLY_APART = 12.0
+"""Five times the just noticeable CIE 1976 difference of 2.3."""
+
+
+def linear(colour: str) -> np.ndarray:
+    c = np.array(to_rgb(colour))
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def cielab(rgb: np.ndarray) -> np.ndarray:
+    """CIE L*a*b* (D65) of linear sRGB."""
+    to_xyz = np.array(
+        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    )
+    x = to_xyz @ np.clip(rgb, 0, 1) / np.array([0.95047, 1.0, 1.08883])
+    f = np.where(x > (6 / 29) ** 3, np.cbrt(x), x / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def contrast(a: str, b: str) -> float:
+    """Contrast ratio of WCAG 2."""
+    light = sorted(float(np.array([0.2126, 0.7152, 0.0722]) @ linear(c)) for c in (a, b))
+    return (light[1] + 0.05) / (light[0] + 0.05)
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("reader", SEEN_BY)
+def test_colours_of_a_cycle_are_told_apart(reader: str, style: str):
+    for cycle in CYCLES:
+        seen = [cielab(SEEN_BY[reader] @ linear(STYLES[style].get(c, c))) for c in cycle]
+        nearest = min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2))
+        assert nearest > CLEARLY_APART, cycle
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_text_and_data_stand_out_from_the_paper(style: str):
+    shown = lambda colour: STYLES[style].get(colour, colour)
+    assert contrast(shown(BLACK), shown(PAPER)) > 7.0 and contrast(shown(BLACK), shown(ZONE)) > 7.0
+    for colour in {c for cycle in CYCLES for c in cycle}:
+        assert contrast(shown(colour), shown(PAPER)) > 2.2, colour

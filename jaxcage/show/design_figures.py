@@ -81,7 +81,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     return ax
 
 
-def _named_rows(ax: Axes, names: Sequence[str], size: float = 9) -> None:
+def _named_rows(ax: Axes, names: Sequence[str], size: float | int = 9) -> None:
     """Names of horizontal bars, the first on top, and a line at zero."""
     ax.axvline(0, color=BLACK, linewidth=0.8)
     ax.set_yticks(np.arange(len(names)), names, fontsize=size)
