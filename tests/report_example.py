@@ -3,14 +3,14 @@
 import numpy as np
 import xarray as xr
 from helpers import made_sweep
+from jaxcage.show.parameter_axes import Axis
 
 import jaxcage as jc
 from jaxcage.analysis import zones
 from jaxcage.bearing import PUBLISHED_CASES, load_distribution
-from jaxcage.orbits import Branch, Curve, Explained, Point, Sensitivity, Stretch, SynchronousOrbits, loss_zones
+from jaxcage.orbits import Branch, Curve, Point, Sensitivity, Stretch, SynchronousOrbits, loss_zones
 from jaxcage.show import Findings, Operating
 from jaxcage.show.findings import Map, Orbits
-from jaxcage.show.parameter_axes import Axis
 
 
 PER_RPM = np.pi / 30

@@ -5,11 +5,11 @@ import re
 import numpy as np
 import pytest
 from helpers import made_sweep
+from jaxcage.show.quantity_tables import differences
 
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.show.quantity_tables import differences
 from jaxcage.show.reproduction import CONCLUSIONS, Runs, compare_edges, reproduction, run_all
 
 
