@@ -24,7 +24,7 @@ import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.cli._job import save_figure
 from jaxcage.io import load_sweep, open_sweep, save_model, save_sweep, write_columns, write_template
-from jaxcage.plotting import new_figure
+from jaxcage.show import new_figure
 from jaxcage.studies import Plan, Store, Study, open_study, run_study
 
 

@@ -16,7 +16,7 @@
 | `reproduction`    | the paper's edges, conclusions and diagrams beside the model's        |
 | `findings`        | everything that a report shows, computed                              |
 | `sections`        | sections of the report                                                |
-| `checks`          | tables of the report that no command prints                           |
+| `checks`          | tables of checks and settings for the report                          |
 | `page`            | the report as HTML                                                    |
 """
 
@@ -62,7 +62,7 @@ from .orbit_figures import (
 )
 from .page import page as page
 from .sections import Section as Section, assess as assess, verdict_table as verdict_table
-from .sources import parameter_rows as parameter_rows
+from .sources import parameters_table as parameters_table
 from .speed_axes import (
     add_shaft_axes as add_shaft_axes,
     mark_operating as mark_operating,
