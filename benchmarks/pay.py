@@ -27,14 +27,15 @@ import jaxcage as jc
 from benchmarks.common import columns
 from jaxcage.design import (
     AbstractObjective,
-    ChaosMeasure,
+    Chaos,
     DesignSpace,
-    LandMeasure,
+    LandLoad,
     SurrogateSearch,
     chaotic_width,
     cost,
+    relative,
 )
-from jaxcage.io import read_bearing
+from jaxcage.files import read_bearing
 from jaxcage.solve import DEFAULT_ERROR
 
 
@@ -82,9 +83,10 @@ def bearing(name: str) -> tuple[jc.CageModel, dict[str, tuple[float, float]], tu
     return model, vary | {n: (low * now[n], high * now[n]) for n, (low, high) in RELATIVE.items()}, range_
 
 
-def whole(space: DesignSpace, chaos: ChaosMeasure) -> AbstractObjective:
+def whole(space: DesignSpace, chaos: Chaos) -> AbstractObjective:
     """Chaotic speeds, wear load and peak land force beside what the bearing itself has, and cost."""
-    loads = [LandMeasure(chaos, what, LOADED).relative(space, PRICE) for what in ("wear load", "peak land force")]
+    each = (LandLoad(chaos.runs, name, LOADED) for name in ("wear load", "peak land force"))
+    loads = [relative(load, space.system, PRICE) for load in each]
     return sum(loads, start=chaos) + PRICE * cost()
 
 

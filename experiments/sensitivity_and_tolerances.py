@@ -53,7 +53,7 @@ for _ in range(small(12, 2)):
 solved = np.array(solved)
 print(
     f"{np.isfinite(solved).sum()} of {solved.size} edges found, deviation {np.nanstd(solved):.1f} rpm, "
-    f"to first order {budget.total_rpm:.1f} rpm"
+    f"to first order {budget.total:.1f} rpm"
 )
 
 # %%
@@ -62,7 +62,7 @@ left, right = figure.subplots(1, 2)
 order = sorted(varied, key=lambda n: shares.total[n])
 left.barh(order, [shares.total[n] for n in order], color="#0072B2")
 left.set_xlabel("Share of the chaotic width's variance, with interactions")
-order = sorted(varied, key=lambda n: budget.deviation_rpm[n])
-right.barh(order, [budget.deviation_rpm[n] for n in order], color="#D55E00")
+order = sorted(varied, key=lambda n: budget.deviation[n])
+right.barh(order, [budget.deviation[n] for n in order], color="#D55E00")
 right.set_xlabel(f"Scatter of the edge at {exact.value_rpm:.0f} rpm [rpm]")
 save(figure, "sensitivity_and_tolerances")

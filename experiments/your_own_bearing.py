@@ -18,7 +18,7 @@ from pathlib import Path
 from _size import FOLDER, save, small
 
 import jaxcage as jc
-from jaxcage.io import load_model
+from jaxcage.files import load_model
 from jaxcage.show import new_figure, orbit_diagram
 
 

@@ -10,7 +10,8 @@
 | `sweeps`     | lanes in chunks on all cores; sweeps over speed; run-up and run-down                |
 | `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
 | `design`    | constants identified from edges; objectives, optimisation, tolerances               |
-| `io`, `plotting` | TOML in, xarray and zarr out, units at the door; figures                        |
+| `files`      | TOML in and out, units                                                              |
+
 | `studies`    | sweeps over any parameters, stored as they go; maps of labels                       |
 | `report`     | tables of what was found; one HTML page about a design                              |
 | `cli`        | the `jaxcage` command                                                               |

@@ -4,27 +4,33 @@ from . import (
     analysis as analysis,
     bearing as bearing,
     design as design,
+    files as files,
     forces as forces,
+    lanes as lanes,
     models as models,
     orbits as orbits,
+    show as show,
     solve as solve,
-    studies as studies,
-    sweeps as sweeps,
 )
 from ._checks import enable_x64 as enable_x64
 from ._parameters import parameter_info as parameter_info, parameters as parameters, replace as replace
 from .analysis import (
-    BearingSweep as BearingSweep,
-    Sweep as Sweep,
-    Zones as Zones,
-    bearing_measures as bearing_measures,
     equilibrium as equilibrium,
-    orbit_measures as orbit_measures,
-    survival as survival,
+    measures as measures,
+    stretches as stretches,
+    summary as summary,
     zones as zones,
 )
 from .bearing import Bearing as Bearing, Lubricant as Lubricant
 from .design import DesignSpace as DesignSpace, optimise as optimise
+from .lanes import (
+    label_map as label_map,
+    open_study as open_study,
+    rpm as rpm,
+    run_up_down as run_up_down,
+    study as study,
+    sweep as sweep,
+)
 from .models import (
     BearingModel as BearingModel,
     CageModel as CageModel,
@@ -53,13 +59,4 @@ from .solve import (
     ramp as ramp,
     simulate as simulate,
     strobe_map as strobe_map,
-)
-from .studies import label_map as label_map, open_study as open_study, study as study
-from .sweeps import (
-    rpm as rpm,
-    run_up_down as run_up_down,
-    sweep as sweep,
-    sweep_bearing as sweep_bearing,
-    sweep_bearings as sweep_bearings,
-    sweep_designs as sweep_designs,
 )

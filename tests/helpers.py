@@ -25,7 +25,6 @@ from jaxcage.solve import OUTCOMES
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
 """Lanes as they run, none confirmed or followed further."""
-raw_sweeps = raw_sweep
 
 
 @functools.cache
@@ -155,7 +154,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert main(list(arguments)) == 2
     out, err = capsys.readouterr()
     lines = [line for line in err.splitlines() if not line.startswith("Warning:")]
-    assert out == "" and len(lines) == 1 and lines[0].endswith((".", ".)", "?")), err
+    assert out == "" and len(lines) == 1 and lines[0].endswith((".", ".)")), err
     return lines[0]
 
 
@@ -164,29 +163,49 @@ def is_png(path: str) -> bool:
     return Path(path).read_bytes().startswith(b"\x89PNG\r\n")
 
 
-def made_sweep(rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, **more: Any) -> xr.Dataset:
+def made_sweep(
+    rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, scale: Any = None, **attrs: Any
+) -> xr.Dataset:
     """A sweep made by hand: strobe states (speeds, starts, revolutions, components) and growth in blocks."""
-    lanes = strobe.shape[:2]
+    lanes, dim = strobe.shape[:2], strobe.shape[-1]
     outcome = np.zeros(lanes, dtype=np.int32) if outcome is None else outcome
-    scale = np.broadcast_to(more.pop("scale", np.ones(strobe.shape[-1])), (*lanes, strobe.shape[-1]))
-    exponents, errors = growth.mean(axis=2), scatter(growth, axis=2)
-    label, escape = label_lanes(outcome, strobe, scale, exponents[..., 0], errors[..., 0]), more.pop("escape", None)
-    if escape is not None:
-        label[(label == "chaotic") & np.isfinite(escape)] = "transient"
-    values = {"label": label, "outcome": np.array(OUTCOMES)[outcome], "exponents": exponents, "standard_error": errors}
-    values |= {"block_growth": growth, "peak": np.where(outcome == 0, 0.5, np.nan), "error": np.full(lanes, 1e-4)}
-    values |= {"last": strobe[:, :, -1], "strobe": strobe, "scale": scale}
-    values |= {} if escape is None else {"escape": escape}
-    within = {"exponents": ("exponent",), "standard_error": ("exponent",), "block_growth": ("growth_block", "exponent")}
-    within |= {"last": ("component",), "scale": ("component",), "strobe": ("revolution", "component")}
-    words = {"units": "rpm", "long_name": "cage speed"}
-    coordinates = {"speed": np.asarray(rpm) * np.pi / 30, "component": list(component_names(strobe.shape[-1]))}
-    shaft = np.asarray(rpm) / more.pop("cage_speed_ratio", 0.4)
-    coordinates |= {"rpm": ("speed", np.asarray(rpm, dtype=float), words), "shaft_rpm": ("speed", shaft)}
-    settings = json.dumps(more.pop("settings", {}))
-    attributes = {"discard": 10, "revolutions": 100, "horizon": 0, "confirmed": "[]", "settings": settings} | more
-    shaped = {name: (("speed", "start", *within.get(name, ())), value) for name, value in values.items()}
-    return xr.Dataset(shaped, coordinates, attributes)
+    scale = np.broadcast_to(np.ones(dim) if scale is None else np.asarray(scale)[:, None, :], (*lanes, dim))
+    exponents, error = growth.mean(axis=2), scatter(growth, axis=2)
+    label = label_lanes(outcome, strobe, scale, exponents[..., 0], error[..., 0])
+    at, lost = ("speed", "start"), outcome != 0
+    speed, keep = np.asarray(rpm) * np.pi / 30, strobe.shape[2]
+    return xr.Dataset(
+        {
+            "label": (at, label),
+            "outcome": (at, np.array(OUTCOMES)[outcome]),
+            "exponents": ((*at, "exponent"), exponents),
+            "standard_error": ((*at, "exponent"), error),
+            "block_growth": ((*at, "growth_block", "exponent"), growth),
+            "doubt": ((*at, "exponent"), np.zeros(exponents.shape)),
+            "peak": (at, np.where(lost, np.nan, 0.5)),
+            "error": (at, np.full(lanes, 1e-4)),
+            "steps": (at, np.full(lanes, 100.0)),
+            "last": ((*at, "component"), strobe[:, :, -1]),
+            "scale": ((*at, "component"), scale),
+            "strobe": ((*at, "revolution", "component"), strobe),
+        },
+        coords={
+            "speed": ("speed", speed, {"units": "rad/s", "long_name": "cage speed"}),
+            "rpm": ("speed", speed * 30 / np.pi, {"units": "rpm", "long_name": "cage speed"}),
+            "shaft_rpm": ("speed", speed * 30 / np.pi / attrs.pop("cage_speed_ratio", 0.4)),
+            "component": np.array(component_names(dim), dtype=object),
+            "revolution": np.arange(110 - keep + 1, 111),
+        },
+        attrs={"discard": 10, "revolutions": 100, "horizon": 0, "confirmed": "[]", "settings": "{}"} | attrs,
+    )
+
+
+def followed(sweep: xr.Dataset, escape: np.ndarray, horizon: int) -> xr.Dataset:
+    """The sweep with times after which its lanes are calm, as if they had been followed to a horizon."""
+    label = sweep["label"].values.copy()
+    label[(label == "chaotic") & np.isfinite(escape)] = "transient"
+    later = {"escape": (("speed", "start"), escape), "label": (("speed", "start"), label)}
+    return sweep.assign(later).assign_attrs(horizon=horizon)
 
 
 def cage_sweep() -> xr.Dataset:
@@ -198,5 +217,5 @@ def cage_sweep() -> xr.Dataset:
     growth[1] += 0.5
     outcome = np.zeros((5, 3), dtype=np.int32)
     outcome[3, 2], strobe[3, 2], growth[3, 2] = 1, np.nan, np.nan
-    scale = np.array([4.5e-4, 4.5e-4, 0.4, 0.4])
+    scale = np.tile([4.5e-4, 4.5e-4, 0.4, 0.4], (5, 1))
     return made_sweep(np.linspace(8000.0, 8400.0, 5), strobe, growth, outcome, scale=scale)

@@ -1,9 +1,10 @@
 """Findings made by hand for the tests of the report: nothing is computed."""
 
+import json
+
 import numpy as np
 import xarray as xr
 from helpers import made_sweep
-from jaxcage.show.parameter_axes import Axis
 
 import jaxcage as jc
 from jaxcage.analysis import zones
@@ -11,6 +12,7 @@ from jaxcage.bearing import PUBLISHED_CASES, load_distribution
 from jaxcage.orbits import Branch, Curve, Point, Sensitivity, Stretch, SynchronousOrbits, loss_zones
 from jaxcage.show import Findings, Operating
 from jaxcage.show.findings import Map, Orbits
+from jaxcage.show.parameter_axes import Axis
 
 
 PER_RPM = np.pi / 30
@@ -39,7 +41,8 @@ def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> xr.
     wild = np.random.default_rng(1).uniform(-2e-4, 2e-4, (count, 3, 8, 4))
     calm = np.broadcast_to(1e-4 * np.sin(rpm / 5e3)[:, None, None, None], wild.shape)
     growth = np.where(chaotic, 0.3, -0.4)[:, None, None, None] * np.ones((count, 3, 10, 1))
-    settled = dict(scale=np.full(4, 1e-4), discard=300, revolutions=300, settings=VERSIONS, cage_speed_ratio=RATIO)
+    settled = dict(scale=np.full((count, 4), 1e-4), discard=300, revolutions=300, cage_speed_ratio=RATIO)
+    settled["settings"] = json.dumps(VERSIONS)
     return made_sweep(rpm, np.where(chaotic[:, None, None, None], wild, calm), growth, **settled)
 
 

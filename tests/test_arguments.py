@@ -1,9 +1,11 @@
-"""Public functions compare their arguments with their annotations, and numbers with their bounds."""
+"""What is refused before anything is computed: wrong arguments, speeds in rpm, tracing, wrong laws, precision."""
 
 import inspect
+import math
 from collections.abc import Callable
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -13,49 +15,7 @@ import jaxcage as jc
 
 DUFFING = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.2 * v[0] - q[0] + 0.3 * jnp.cos(tau),), coordinates=1)
 SPEEDS = np.array([1.0, 1.1])
-
-
-@pytest.mark.parametrize(
-    "call, said",
-    [
-        (lambda: jc.sweep(DUFFING, SPEEDS, blocks=-20), "`blocks` must be at least 1, but -20"),
-        (
-            lambda: jc.sweep(DUFFING, SPEEDS, discard=-1),
-            "`discard` must be at least 0, but -1",
-        ),
-        (lambda: jc.sweep(DUFFING, SPEEDS, horizon=-1), "`horizon` must be at least 0, but -1"),
-        (lambda: jc.sweep(DUFFING, SPEEDS, keep=0), "`keep` must be at least 1, but 0"),
-        (
-            lambda: jc.sweep(DUFFING, SPEEDS, discard=2.5),
-            "`discard` must be a whole number, but 2.5",
-        ),
-        (lambda: jc.sweep(DUFFING, SPEEDS + 1j), "`speeds` must be of real numbers, without a mask, but an array"),
-        (lambda: jc.sweep(DUFFING, np.ma.array(SPEEDS, mask=[0, 1])), "without a mask, but a masked array of shape"),
-        (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
-        (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
-        (lambda: jc.sweep(DUFFING, ["a", 10**5000]), "`speeds` must be .*, but a very large list was given"),
-        (lambda: jc.sweep("1a", SPEEDS), "`system` must be of kind AbstractForcedSystem, but '1a' was given"),
-        (lambda: jc.sweep_designs(DUFFING, SPEEDS), "`systems` must be a row of things, but something of kind Forced"),
-        (
-            lambda: jc.simulate(DUFFING, 1e300, revolutions=2),
-            "`speed` must be positive and finite, at most 1e.09",
-        ),
-        (lambda: jc.simulate(DUFFING, 1.0, revolutions=10**9), "`revolutions` must be a whole number"),
-        (lambda: jc.periodic_orbit(DUFFING, 1.0, method="rk4"), "`method` must be of kind AbstractMethod, but 'rk4'"),
-        (lambda: jc.periodic_orbit(DUFFING, 1.0, periods=0), "`periods` must be at least 1, but 0 was given"),
-        (lambda: jc.periodic_orbit(DUFFING, 1.0, revolutions=-1), "`revolutions` must be at least 0, but -1 was given"),
-        (lambda: jc.bifurcation(DUFFING, "fold", 1.0, reach=np.inf), "`reach` must be at least 0 and finite, but inf"),
-        (lambda: jc.study(DUFFING, {"speed": SPEEDS + 0j}, store="s"), "`vary` must be a mapping to what is"),
-        (lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="s", executor="slurm"), "one of local, dask, but 'slurm'"),
-        (lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="s", shard=(1, 2, 3)), "`shard` must be a row of 2"),
-    ],
-)
-def test_what_was_taken_in_silence(call: Callable[[], Any], said: str):
-    with pytest.raises(ValueError, match=said):
-        call()
-
-
-DUFFING_LAW = DUFFING.acceleration
+CASE, WHOLE = jc.case("1a"), jc.whole_bearing("nu2310")
 unwrap = inspect.unwrap
 """Without the types that tests check."""
 
@@ -63,41 +23,117 @@ unwrap = inspect.unwrap
 @pytest.mark.parametrize(
     "call, said",
     [
-        (lambda: unwrap(jc.rpm)("a"), "`first` must be a finite number, but 'a'"),
-        (lambda: jc.rpm(np.nan), "`first` must be a finite number, but nan"),
-        (lambda: jc.rpm(1, 2, -3), "`count` must be at least 1, but -3"),
-        (lambda: unwrap(jc.rpm)(1, 2, 2.5), "`count` must be a whole number"),
-        (lambda: unwrap(jc.parameters)(3), "`module` must be a model or a part of one, but 3"),
-        (lambda: unwrap(jc.parameter_info)("1a"), "`module` must be a model or a part of one, but '1a'"),
-        (lambda: unwrap(jc.replace)("1a", load=1.0), "`module` must be a model"),
-        (lambda: jc.replace(jc.case("1a"), load="x"), "`load` must be a number from 0 to 1e.07 N, but 'x'"),
-        (lambda: jc.replace(jc.case("1a"), load=True), "`load` must be a number from 0 to 1e.07 N, but True"),
-        (lambda: jc.bearing.Material("brass", 1e11, 0.3), "must be a number from .* but 'brass' was given"),
-        (lambda: unwrap(jc.keep_compiled_programs)(3), "`folder` must be a path, but 3"),
-        (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
-        (lambda: jc.ForcedOscillator(DUFFING_LAW, coordinates=-1), "`coordinates` must be at least 1, but -1"),
-        (lambda: jc.ForcedSystem(DUFFING_LAW, 2.5), "`dimension` must be a whole number"),
-        (lambda: jc.ForcedOscillator(DUFFING_LAW, 1, scale="x"), "`scale` must be a number or a row of them, but 'x'"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, blocks=-20), "`blocks` must be at least 1, but -20"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, blocks=7, revolutions=10), "divide"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, discard=2.5), "`discard` must be a whole number, but 2.5"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, exponents=3), "at most 2"),
+        (lambda: jc.sweep(DUFFING, np.array([])), "at least one speed"),
+        (lambda: jc.sweep(DUFFING, np.array([1.0, np.nan])), "positive and finite"),
+        (lambda: jc.sweep(DUFFING, SPEEDS[::-1]), "ascending"),
+        (lambda: jc.sweep(DUFFING, ["a", "b"]), "`speeds` must be a number or an array of numbers"),
+        (lambda: jc.sweep(DUFFING, np.array(["2020"], dtype="datetime64[Y]")), "of real numbers"),
+        (lambda: jc.sweep(DUFFING, SPEEDS, starts=[(1.0,)]), "states of 2 numbers"),
+        (lambda: jc.sweep("1a", SPEEDS), "`system` must be of kind AbstractForcedSystem, but '1a' was given"),
+        (lambda: jc.sweep_designs(DUFFING, SPEEDS), "`systems` must be a row of things"),
+        (lambda: jc.simulate(DUFFING, 1e300, revolutions=2), "`speed` must be positive and finite, at most"),
         (lambda: jc.simulate(DUFFING, 1.0, revolutions=1, start=(np.nan, 0.0)), r"finite numbers, but \(nan, 0.0\)"),
-        (lambda: jc.orbits.coexisting_orbits(DUFFING, 1.0, seed=-1), "`seed` must be at least 0, but -1"),
-        (lambda: jc.equilibrium(jc.case("1a"), -900.0), "`speed` must be positive and finite, at most .*, but -900"),
-        (lambda: jc.bearing.vg(100.0, -3.0), "`temperature` must be positive and finite, but -3.0"),
-        (lambda: jc.forces.film_scale(0.1, 1.0, 0.0, 1.0), "`width` must be positive and finite, but 0.0"),
-        (lambda: jc.periodic_orbit(DUFFING, 1.0, guess="x"), "`guess` must be a state of 2 numbers, but 'x'"),
+        (lambda: jc.periodic_orbit(DUFFING, 1.0, method="rk4"), "`method` must be of kind AbstractMethod, but 'rk4'"),
         (lambda: jc.periodic_orbit(DUFFING, 1.0, guess=3), "`guess` must be a state of 2 numbers, but 3"),
-        (lambda: jc.bifurcation(DUFFING, "fold", SPEEDS), "`guess` must be a number, a state and a number, an `Orbit`"),
+        (lambda: jc.bifurcation(DUFFING, "fold", 1.0, reach=np.inf), "`reach` must be at least 0 and finite"),
         (lambda: jc.bifurcation(DUFFING, "fold", (1, 2, 3)), r"`guess` must be .*, but \(1, 2, 3\) was given"),
+        (lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="s", executor="slurm"), "one of local, dask, but 'slurm'"),
+        (lambda: jc.method(solver="euler"), "must be one of"),
+        (lambda: jc.method(steps=10, tolerance=1e-3), "must not both"),
+        (lambda: jc.method(tolerance=2.0), "between 0 and 1"),
+        (lambda: jc.rpm(np.nan), "`first` must be a finite number, but nan"),
+        (lambda: unwrap(jc.parameters)(3), "`module` must be a model or a part of one, but 3"),
+        (lambda: jc.replace(CASE, load="x"), "`load` must be a number from 0 to 1e.07 N, but 'x'"),
+        (lambda: jc.replace(CASE, guidance_gap=0.5), "`guidance_gap` must be a number from 1e-05 to 0.005 m"),
+        (lambda: jc.replace(CASE, cage_mass=math.nan), "`cage_mass` must be a number from 0.001 to 100 kg"),
+        (lambda: jc.bearing.Material("brass", 1e11, 0.3), "must be a number from .* but 'brass' was given"),
+        (lambda: jc.ForcedOscillator(3, coordinates=1), "`acceleration` must be something that can be called, but 3"),
+        (lambda: jc.ForcedSystem(DUFFING.acceleration, 2.5), "`dimension` must be a whole number"),
+        (lambda: jc.equilibrium(CASE, -900.0), "`speed` must be positive and finite, at most .*, but -900"),
+        (lambda: jc.forces.film_scale(0.1, 1.0, 0.0, 1.0), "`width` must be positive and finite, but 0.0"),
+        (lambda: jc.forces.synchronous_force(tau=2**63, amplitude=1.0), "`tau` must be a number, of 64 bits"),
+        (lambda: jc.bearing.raceway_surface_speed(1.0, 0.0), "`raceway_diameter` must be positive and finite"),
     ],
 )
-def test_what_was_said_by_others(call: Callable[[], Any], said: str):
-    """By Python, NumPy or JAX, in words of theirs, or by nobody."""
+def test_wrong_arguments_get_a_sentence(call: Callable[[], Any], said: str):
     with pytest.raises(ValueError, match=said):
         call()
 
 
-def test_numbers_that_no_formula_takes_are_refused():
-    """Found by random calls: a whole number beyond 64 bits, and a gap that divides by nothing."""
-    with pytest.raises(ValueError, match="`tau` must be a number, of 64 bits if it is whole"):
-        jc.forces.synchronous_force(tau=2**63, amplitude=1.0)
-    with pytest.raises(ValueError, match="`raceway_diameter` must be positive and finite"):
-        jc.bearing.raceway_surface_speed(1.0, 0.0)
+@pytest.mark.parametrize(
+    "run",
+    [
+        lambda: jc.sweep(CASE, np.array([8500.0, 9000.0])),
+        lambda: jc.simulate(CASE, 9000.0, revolutions=1),
+        lambda: jc.ramp(CASE, 900.0, 9000.0, revolutions=1),
+        lambda: jc.periodic_orbit(CASE, 9000.0),
+    ],
+    ids=["sweep", "simulate", "ramp", "periodic_orbit"],
+)
+def test_revolutions_per_minute_for_radians_are_refused(run):
+    with pytest.raises(ValueError, match=r"must be in rad/s, .* but 9000 was given, .* `jaxcage.rpm\(9000\)`"):
+        run()
+
+
+def exponent(gap):
+    return jc.sweep(jc.replace(CASE, guidance_gap=gap), np.array([900.0])).exponents[0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        lambda: jax.grad(exponent)(4.5e-4),
+        lambda: jax.vmap(lambda w: jc.simulate(CASE, w, revolutions=1).state)(jnp.array([900.0, 950.0])),
+    ],
+    ids=["grad of a sweep", "vmap of a simulation"],
+)
+def test_what_steers_by_its_findings_says_what_to_call_instead(run):
+    with pytest.raises(ValueError, match="must be known numbers, but are traced by .*`jaxcage.sweep_designs"):
+        run()
+
+
+@pytest.mark.parametrize(
+    "law, said",
+    [
+        (lambda tau, q, v, speed: (math.cos(tau) - q[0],), "must be made of functions of `jax.numpy`"),
+        (lambda tau, q, v, speed: (-q[0] if q[0] > 0 else q[0],), r"`jnp.where\(x > 0, a, b\)`"),
+        (lambda tau, q, v, speed: (-q[0], -v[0]), "must return a tuple of 1 scalar, .* but returned 2"),
+        (lambda tau, q, v, speed: (jax.lax.complex(jnp.cos(tau), q[0]),), "one of them is complex"),
+        (lambda tau, q, v, speed: None, "but returned nothing"),
+    ],
+)
+def test_a_law_of_ones_own_that_is_wrong_is_explained(law, said: str):
+    system = jc.ForcedOscillator(law, coordinates=1)
+    with pytest.raises(ValueError, match="The law `acceleration.*" + said):
+        jc.simulate(system, 1.0, revolutions=1, method=jc.method("rk4", steps=64))
+
+
+ENTRIES: dict[str, Callable[[], Any]] = {
+    "branch": lambda: jc.branch(DUFFING, np.zeros(2), lower=1.0, upper=2.0),
+    "case": lambda: jc.case("1a"),
+    "equilibrium": lambda: jc.equilibrium(CASE, 900.0),
+    "optimise": lambda: jc.optimise(CASE, {"guidance_gap": (3e-4, 6e-4)}, jc.design.cost()),
+    "periodic_orbit": lambda: jc.periodic_orbit(DUFFING, 1.0),
+    "simulate": lambda: jc.simulate(DUFFING, 1.0, revolutions=1),
+    "study": lambda: jc.study(DUFFING, {"speed": SPEEDS}, store="nowhere", name="duffing", version="1"),
+    "sweep": lambda: jc.sweep(DUFFING, SPEEDS),
+    "sweep_bearing": lambda: jc.sweep_bearing(WHOLE, 1000.0),
+}
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_single_precision_is_refused(name: str):
+    with jax.enable_x64(False), pytest.raises(RuntimeError, match=r"double precision: call `jaxcage.enable_x64\(\)`"):
+        ENTRIES[name]()
+
+
+@pytest.mark.parametrize("bad", ["0.10.2", "0.11.0"])
+@pytest.mark.parametrize("name", ["case", "sweep", "simulate"])
+def test_versions_of_jax_that_give_wrong_numbers_are_refused(monkeypatch: pytest.MonkeyPatch, name: str, bad: str):
+    monkeypatch.setattr(jax, "__version__", bad)
+    with pytest.raises(RuntimeError, match=f"JAX {bad} gives wrong results"):
+        ENTRIES[name]()

@@ -332,7 +332,7 @@ def test_two_crossings_of_one_kind_within_a_step(kind, block):
     places = (0.0199, 0.0203) if kind == "Neimark-Sacker" else (0.0198, 0.0202)
     a = (-places[0], -places[1]) if kind == "Neimark-Sacker" else (-0.3, -0.02)
     block |= dict(a=a, c=(1.0, 1.0) if kind == "Neimark-Sacker" else (0.2, 1.0))
-    branch = planted_branch(how=dict(steps=jc.orbits.Steps(first=0.1, longest=0.4), method=METHOD), **block)
+    branch = planted_branch(how=dict(steps=jc.orbits.StepControl(first=0.1, longest=0.4), method=METHOD), **block)
     assert kinds(branch) == [kind, kind]
     np.testing.assert_allclose([p.value for p in branch.special], places, rtol=0, atol=1e-8)
     assert np.diff(branch.value)[branch.special[0].index] < 0.003 < 0.007 < np.max(np.diff(branch.value))  # halved
@@ -368,7 +368,7 @@ def test_bad_arguments(settings, sentence):
 def test_an_orbit_at_the_end_of_the_range_is_followed():
     """Also where rounding puts it just beyond."""
     beyond = np.nextafter(0.8, 0.0)
-    steps = jc.orbits.Steps(most=2)
+    steps = jc.orbits.StepControl(most=2)
     branch = jc.branch(hardening(), ((0.5, 0.0), beyond), lower=0.8, upper=1.5, steps=steps, method=METHOD)
     assert branch.value.max() > 0.8 and branch.ended == ("range", "steps")
 
@@ -393,4 +393,4 @@ def test_no_doubled_branch_begins_at_a_fold(over_speed):
 @pytest.mark.parametrize("steps", [dict(first=0.6), dict(shortest=0.05), dict(shortest=0.0), dict(longest=0.01)])
 def test_lengths_of_steps_must_be_in_order(steps):
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
-        jc.orbits.Steps(**steps)
+        jc.orbits.StepControl(**steps)

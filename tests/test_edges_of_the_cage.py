@@ -194,7 +194,7 @@ def test_sensitivity_of_the_limit_of_a_cascade(monkeypatch):
         one = dict(derivative={"gap": slope}, elasticity={"gap": slope / value}, homogeneity={"mass": 0.0})
         return jc.orbits.Sensitivity(name, point.kind, value, **one, transversality=1.0, status="converged")
 
-    monkeypatch.setattr("jaxcage.orbits._sensitivity.sensitivity", planted)
+    monkeypatch.setattr("jaxcage.orbits.gradient.sensitivity", planted)
     cascade = jc.orbits.Cascade(points, limit[0] / per_rpm, 0.0)
     found = jc.orbits.limit_sensitivity(CASE, cascade)
     np.testing.assert_allclose([found.value_rpm, found.derivative["gap"]], limit, rtol=1e-12)

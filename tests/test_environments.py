@@ -1,14 +1,18 @@
-"""The command in other surroundings: home folder, locale, time zone, terminal, paths; the same numbers."""
+"""The command in other surroundings: home folder, locale, terminal, paths, a cache out of reach; the same numbers."""
 
 import json
 import os
+import stat
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
+import jax
 import pytest
 
 import jaxcage
+from jaxcage import keep_compiled_programs
 
 
 PACKAGE = Path(jaxcage.__file__).parent
@@ -81,3 +85,35 @@ def test_nothing_to_write_to_is_no_failure(tmp_path: Path, closed: str):
     line = f"'{sys.executable}' -m jaxcage init new.toml {closed}"
     assert subprocess.run(line, shell=True, cwd=tmp_path, env=OURS, capture_output=True).returncode == 0
     assert (tmp_path / "new.toml").is_file()
+
+
+@pytest.fixture(autouse=True)
+def own_settings(monkeypatch: pytest.MonkeyPatch):
+    """Settings of the process are put back."""
+    monkeypatch.delenv("JAXCAGE_CACHE", raising=False)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    names = ("jax_compilation_cache_dir", "jax_persistent_cache_min_compile_time_secs")
+    before = {name: getattr(jax.config, name) for name in names}
+    yield
+    for name, value in before.items():
+        jax.config.update(name, value)
+
+
+def test_the_folder_is_its_users_alone(tmp_path: Path):
+    place = keep_compiled_programs(tmp_path / "programs")
+    assert place is not None and stat.S_IMODE(place.stat().st_mode) == 0o700
+
+
+@pytest.mark.parametrize(
+    "spoil, why",
+    [
+        (lambda place: place.chmod(0o777), "others may write to it: delete it, or take that away by chmod go-w"),
+        (lambda place: (place.rmdir(), place.write_text("a file")), "File exists"),
+    ],
+)
+def test_a_folder_that_is_not_fit_is_left_alone(tmp_path: Path, spoil, why: str):
+    place = keep_compiled_programs(tmp_path)
+    assert place is not None
+    spoil(place)
+    with pytest.warns(RuntimeWarning, match=rf"Compiled programs are not kept in '.*' \({why}\): everything is"):
+        assert keep_compiled_programs(tmp_path) is None

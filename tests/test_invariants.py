@@ -3,14 +3,12 @@
 Parameters, speeds and states are drawn from physical ranges. One program serves all draws of a test.
 """
 
-from unittest import mock
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers import beyond_range, elastic, even, in_other_units, raw_sweep, wide_but
+from helpers import beyond_range, elastic, in_other_units, wide_but
 from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import simpson
 
@@ -128,20 +126,6 @@ def test_mirrored_states_have_mirrored_forces(film, cross, design, speed, tau, s
         )
 
 
-@pytest.mark.wide
-@random(50)
-@given(designs, speeds, states(0.0, 1.2))
-def test_mirror_image_of_the_fixed_half_is_the_other_half(design, speed, state):
-    """The arc is fixed for rotation counter-clockwise: in a mirror it is what is missing to the whole circle."""
-    full, half = (
-        jc.replace(CASE, **{**design, "supply_pressure": 0.0, "film.model": film}) for film in ("full", "fixed_half")
-    )
-    y = in_si(full, speed, state)
-    here = forces(half, speed, 0.0, y)["film"]
-    whole, part = (forces(mirrored(m), -speed, 0.0, y * np.tile(FLIP, 2))["film"] for m in (full, half))
-    np.testing.assert_allclose(whole - part, FLIP * here, rtol=0, equal_nan=False, atol=1e-11 * np.linalg.norm(whole))
-
-
 UNITS = "mass", "length", "time"
 READINGS = {
     "support.cubic": "dimensionless",
@@ -198,35 +182,6 @@ def test_film_takes_energy_out_in_a_frame_that_turns_at_half_speed(film, design,
     assert arc / (1 + eps) ** 3 * (1 - 1e-9) <= found <= arc / (1 - eps) ** 3 * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("film", wide_but(FILMS, "positive_pressure"))
-@random(50)
-@given(designs, speeds, between(0.01, 0.96), angles, between(-1.5, 1.5))
-def test_film_feeds_whirl_below_half_speed_only(film, design, speed, eps, phi, whirl):
-    """Work on a circular whirl: 2 pi r F_t, F_t = S (w - 2 whirl w) pi eps/(2 (1 - eps^2)^(3/2)) for the whole film."""
-    model = jc.replace(CASE, **{**design, "supply_pressure": 0.0, "film.smoothing": 1e-12, "film.model": film})
-    scale, c = float(model.cage_at(speed).law("film").scale), float(model.clearance)
-    radial, along = turn(phi).T
-    y = np.concatenate([eps * c * radial, eps * c * whirl * speed * along])
-    found = forces(model, speed, 0.0, y)["film"] @ y[2:]
-    share = 1.0 if film == "full" else 0.5
-    tangential = share * scale * speed * np.pi * eps / (2 * (1 - eps**2) ** 1.5)
-    work = tangential * eps * c * speed
-    np.testing.assert_allclose(found, work * (1 - 2 * whirl) * whirl, rtol=0, equal_nan=False, atol=1e-10 * work)
-
-
-@random(50)
-@given(designs, speeds, states(0.0, 1.2))
-def test_land_contact_pushes_along_the_radius_and_takes_energy_out(design, speed, state):
-    """It is stronger on the way in than at rest, weaker on the way out, and never pulls."""
-    model = jc.replace(CASE, **design)
-    y = in_si(model, speed, state)
-    moving, still = (forces(model, speed, 0.0, at)["contact"] for at in (y, y * [1, 1, 0, 0]))
-    r, v = y[:2], y[2:]
-    assert moving @ r <= 0.0 and (moving - still) @ v <= 1e-9 * np.linalg.norm(still) * np.linalg.norm(v)
-    np.testing.assert_allclose(moving[0] * r[1], moving[1] * r[0], rtol=1e-9)
-    assert (np.linalg.norm(still) > 0) == (np.hypot(*state[:2]) > 0.97)
-
-
 # --- motion ----------------------------------------------------------------------------------
 
 DEFAULT, EXPLICIT = jc.method(), jc.method("rk4", steps=512)
@@ -272,66 +227,6 @@ def test_turned_starts_have_turned_ends(kind, design, speed, cage, rib, angle):
     turned = np.kron(np.eye(start.size // 2), turn(angle))
     end, found = after(model, speed, start), after(model, speed, turned @ start, angle)
     np.testing.assert_allclose(found, turned @ end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
-class Mirrored(eqx.Module):
-    """Acceleration of a cage in a mirror: it turns the other way."""
-
-    model: jc.CageModel
-
-    def __call__(self, tau, q, v, speed):
-        return mirrored(self.model).at_speed(-speed).acceleration(-tau, q, v)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("film", ["positive_pressure", "full"])
-@random(20)
-@given(designs, speeds, states(0.01, 0.9))
-def test_mirrored_starts_have_mirrored_ends(film, design, speed, start):
-    model = even(system(film, design))
-    image = jc.ForcedOscillator(Mirrored(model), coordinates=2)
-    end = after(model, speed, start)
-    found = after(model, speed, start * np.tile(FLIP, 2), seen=image)
-    np.testing.assert_allclose(found, end * np.tile(FLIP, 2), rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("kind", SYSTEMS)
-@random(20)
-@given(designs, speeds, states(0.01, 0.9), states(0.0, 0.05, 0.05), units)
-def test_revolutions_in_other_units(kind, design, speed, cage, rib, scales):
-    model, start = system(kind, design), start_of(kind, cage, rib)
-    end = after(model, speed, start)
-    found = after(rescaled(model, jnp.asarray(scales)), speed / scales[2], start)
-    np.testing.assert_allclose(found, end, rtol=0, equal_nan=False, atol=1e-9 * np.linalg.norm(end))
-
-
-@pytest.mark.wide
-@random(15)
-@given(speeds, between(0.95, 1.05), units)
-def test_exponents_in_other_units(speed, gap, scales):
-    """Of ten revolutions, from three starts."""
-    model = jc.replace(CASE, guidance_gap=float(CASE.guidance_gap) * gap)
-    options = dict(discard=2, revolutions=10, blocks=2, keep=1, exponents=1, method=EXPLICIT)
-    here = raw_sweep(model, speed, **options)
-    with mock.patch("jaxcage.models.cage.FASTEST", np.inf):
-        there = raw_sweep(rescaled(model, jnp.asarray(scales)), speed / scales[2], **options)
-    np.testing.assert_allclose(there.block_growth, here.block_growth, rtol=0, equal_nan=False, atol=1e-7)
-    np.testing.assert_allclose(there.last / there.scale, here.last / here.scale, rtol=0, equal_nan=False, atol=1e-7)
-
-
-@pytest.mark.wide
-@random(12)
-@given(between(jc.rpm(14000.0), jc.rpm(19000.0)), units)
-def test_orbits_in_other_units(speed, scales):
-    here = jc.periodic_orbit(CASE, speed, revolutions=60, method=EXPLICIT)
-    other = rescaled(CASE, jnp.asarray(scales))
-    with mock.patch("jaxcage.models.cage.FASTEST", np.inf):
-        there = jc.periodic_orbit(other, speed / scales[2], revolutions=60, method=EXPLICIT)
-    assert here.status == there.status == "converged"
-    np.testing.assert_allclose(there.multipliers, here.multipliers, rtol=0, equal_nan=False, atol=1e-9)
-    place = np.repeat([scales[1], scales[1] / scales[2]], 2)
-    np.testing.assert_allclose(there.state / place, here.state, rtol=1e-9)
 
 
 # --- energy and phase volume -----------------------------------------------------------------
@@ -415,7 +310,7 @@ def liouville_defect(model, speed, start, steps):
     """log|det| of the derivative of a revolution less the integral of the divergence along it; that integral."""
     tau, _, _, divergence = first_revolution(model, speed, start, steps)
     method, at = jc.method("rodas4", steps=steps), in_si(model, speed, start)
-    _, matrix = jc.sweeps.monodromy(model, np.array([speed]), at[None], method=method)
+    _, matrix = jc.lanes.monodromy(model, np.array([speed]), at[None], method=method)
     size = np.array([1.0, 1.0, speed, speed])
     expected = simpson(divergence, x=tau)
     return abs(np.linalg.slogdet(matrix[0] * size / size[:, None])[1] - expected), abs(expected)

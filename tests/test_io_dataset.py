@@ -1,127 +1,38 @@
 """Stored results: labelled, complete, read back equal, written whole or not at all."""
 
-import dataclasses
-import json
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
+from helpers import cage_sweep
 
 import jaxcage as jc
-from jaxcage.io import (
-    check_writable,
-    configuration,
-    load_sweep,
-    model_from,
-    open_sweep,
-    read_columns,
-    replacing,
-    save_sweep,
-    stored_configuration,
-    to_dataset,
-    trajectory_columns,
-    write_columns,
-)
-
-
-def sweep_of(speeds: int = 5, starts: int = 3) -> jc.Sweep:
-    """A made-up sweep: the second speed is chaotic, the others periodic, one lane failed."""
-    rng = np.random.default_rng(0)
-    rpm = np.linspace(8000.0, 8400.0, speeds)
-    strobe = np.repeat(rng.normal(size=(speeds, starts, 1, 4)), 16, axis=2) * 1e-4
-    strobe[1] += rng.normal(size=(starts, 16, 4)) * 1e-4
-    growth = rng.normal(-0.2, 0.01, size=(speeds, starts, 10, 1))
-    growth[1] += 0.5
-    outcome = np.zeros((speeds, starts), dtype=np.int32)
-    outcome[3, 2] = 1
-    strobe[3, 2], growth[3, 2] = np.nan, np.nan
-    return jc.Sweep(
-        speed=rpm * np.pi / 30,
-        strobe=strobe,
-        last=strobe[:, :, -1],
-        block_growth=growth,
-        peak=np.where(outcome == 0, 0.7, np.nan),
-        outcome=outcome,
-        error=np.full((speeds, starts), 1e-4),
-        doubt=np.full((speeds, starts, 1), 1e-3),
-        scale=np.broadcast_to(np.array([4.5e-4, 4.5e-4, 0.4, 0.4]), (speeds, 4)).copy(),
-        discard=30,
-        revolutions=100,
-        settings={"method": "made up", "version_jaxcage": "0"},
-    )
+from jaxcage.files import check_writable, configuration, model_from
+from jaxcage.lanes import load, save, stored_configuration
+from jaxcage.show import read_columns, trajectory_columns, write_columns
 
 
 def test_round_trip(tmp_path: Path):
-    sweep = sweep_of()
-    again = load_sweep(save_sweep(tmp_path / "sweep.zarr", sweep, jc.case("1a", "preliminary")))
-    for field in dataclasses.fields(sweep):
-        stored, expected = getattr(again, field.name), getattr(sweep, field.name)
-        if isinstance(expected, np.ndarray):
-            assert stored.dtype == expected.dtype
-            np.testing.assert_array_equal(stored, expected)
-        else:
-            assert stored == expected
-    np.testing.assert_array_equal(again.label, sweep.label)
+    sweep = cage_sweep()
+    again = load(save(tmp_path / "sweep.zarr", sweep))
+    xr.testing.assert_identical(again, sweep)
 
 
 def test_labels_units_and_configuration_are_stored(tmp_path: Path):
     model = jc.replace(jc.case("2b", "preliminary"), guidance_gap=0.5e-3)
-    sweep = sweep_of()
-    dataset = open_sweep(save_sweep(tmp_path / "sweep.zarr", sweep, model))
-    assert dataset["strobe"].dims == ("speed", "start", "revolution", "component")
-    assert dataset["block_growth"].dims == ("speed", "start", "block", "exponent")
-    assert dataset["component"].values.tolist() == ["x_C", "y_C", "vx_C", "vy_C"]
-    assert dataset["revolution"].values.tolist() == list(range(115, 131))
-    assert dataset["speed"].attrs["units"] == "rad/s"
-    assert dataset["speed_rpm"].values == pytest.approx(np.linspace(8000, 8400, 5))
-    one = dataset.isel(start=0).sel(component="y_C", speed=sweep.speed[2])
-    np.testing.assert_array_equal(one["strobe"].values, sweep.strobe[2, 0, :, 1])
-    meanings = dataset["label"].attrs["flag_meanings"].split()
-    assert [meanings[i] for i in dataset["label"].values[1]] == ["chaotic"] * 3
-    assert meanings[int(dataset["label"].values[3, 2])] == "failed"
-    assert dataset["outcome"].attrs["flag_meanings"].split()[1] == "not_finite"
-    kept = stored_configuration(dataset)
+    sweep = jc.sweep(model, jc.rpm(8000, 8400, 2), discard=4, revolutions=16, blocks=4, confirm=False, horizon=0)
+    stored = xr.open_zarr(save(tmp_path / "sweep.zarr", sweep), consolidated=False, chunks=None)
+    assert stored["strobe"].dims == ("speed", "start", "revolution", "component")
+    assert stored["component"].values.tolist() == ["x_C", "y_C", "vx_C", "vy_C"]
+    assert stored["speed"].attrs["units"] == "rad/s" and stored["rpm"].values == pytest.approx([8000, 8400])
+    assert stored["shaft_rpm"].values == pytest.approx(stored["rpm"] / float(model.bearing.cage_speed_ratio))
+    for name in ("label", "outcome"):
+        meanings = dict(zip(stored[name].attrs["flag_values"], stored[name].attrs["flag_meanings"].split()))
+        assert [meanings[i] for i in stored[name].values.ravel()] == sweep[name].values.ravel().tolist()
+    kept = stored_configuration(stored)
     assert kept is not None
     assert configuration(model_from(kept)) == configuration(model)
-    assert json.loads(dataset.attrs["settings"])["method"] == "made up"
-
-
-def test_other_systems_than_cages_have_numbered_components():
-    dataset = to_dataset(sweep_of())
-    assert dataset["component"].values.tolist() == ["y0", "y1", "y2", "y3"]
-    assert stored_configuration(dataset) is None
-
-
-def test_replacing_an_earlier_result(tmp_path: Path):
-    path = tmp_path / "sweep.zarr"
-    save_sweep(path, sweep_of(5))
-    save_sweep(path, sweep_of(7))
-    assert load_sweep(path).speed.size == 7
-    assert [p.name for p in tmp_path.iterdir()] == ["sweep.zarr"]
-
-
-def test_a_folder_that_cannot_move_in_leaves_the_earlier_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    path = tmp_path / "result"
-    path.mkdir()
-    (path / "old").write_text("kept")
-    rename = os.rename
-
-    def fails_to_move_in(source: Path, target: Path) -> None:
-        if target == path and source.name != "earlier":
-            raise OSError("the disk is gone")
-        rename(source, target)
-
-    monkeypatch.setattr(os, "rename", fails_to_move_in)
-    with pytest.raises(OSError, match="the disk is gone"), replacing(path) as temporary:
-        temporary.mkdir()
-    assert (path / "old").read_text() == "kept"
-    assert [p.name for p in tmp_path.iterdir()] == ["result"]
-
-
-def test_missing_store(tmp_path: Path):
-    with pytest.raises(FileNotFoundError, match="no stored sweep"):
-        load_sweep(tmp_path / "nothing.zarr")
 
 
 def test_trajectory_as_csv(tmp_path: Path):

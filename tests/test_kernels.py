@@ -12,7 +12,6 @@ from helpers import even, raw_sweep, raw_sweeps, wide_but
 
 import jaxcage as jc
 from jaxcage._form import compiled
-from jaxcage.models._field import _columns
 from jaxcage.solve import OUTCOMES, march, method, native, strobe_map
 from jaxcage.solve.method import TERM, moved_by
 
@@ -134,40 +133,19 @@ def test_kernels_give_the_strobe_map_and_its_derivative(name):
     assert np.all(peak >= 0)
 
 
-@pytest.mark.parametrize("film", wide_but(["fixed_half", "full"], "fixed_half"))
-@pytest.mark.parametrize("cross", wide_but(["circulatory", "as_printed"], "as_printed"))
-@pytest.mark.parametrize("smoothing", wide_but([1e-9, 5e-6], 5e-6))
-def test_analytic_slopes_of_the_cage_against_autodiff(film, cross, smoothing):
-    """Everywhere in the land, the middle too, where the film's smoothing rounds the line of centres off."""
-    model = jc.replace(MODEL, supply_pressure=2e4, restitution=0.6, cross_cubic=1e9, **{"film.smoothing": smoothing})
-    changed = dataclasses.replace(model.film, model=film), dataclasses.replace(model.support, cross=cross)
-    model = eqx.tree_at(lambda m: (m.film, m.support), model, changed)
-    law = model.at_speed(1200.0).acceleration
-    rng = np.random.default_rng(3)
-    for eps in (0.0, 0.01, 0.2, 0.9, 0.9699, 0.97, 0.9703, 0.99):
-        angle = rng.uniform(0, 2 * np.pi)
-        q = tuple(jnp.asarray(eps * CLEARANCE * c) for c in (np.cos(angle), np.sin(angle)))
-        v = tuple(jnp.asarray(c) for c in rng.normal(size=2) * CLEARANCE * 600)
-        of_q = np.array(_columns(lambda z: law(0.3, z, v), q))
-        of_v = np.array(_columns(lambda z: law(0.3, q, z), v))
-        found_q, found_v = map(np.array, law.slopes(q, v))
-        np.testing.assert_allclose(found_q, of_q, rtol=0, atol=1e-11 * np.abs(of_q).max())
-        np.testing.assert_allclose(found_v, of_v, rtol=0, atol=1e-11 * np.abs(of_v).max())
-
-
 # --- monodromy matrices -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.wide
 def test_monodromy_of_bad_shapes_and_failed_lanes():
     with pytest.raises(ValueError, match="4 numbers for each of the 6 speeds"):
-        jc.sweeps.monodromy(MODEL, SPEEDS, STATES[:, :3])
+        jc.lanes.monodromy(MODEL, SPEEDS, STATES[:, :3])
     states = STATES.copy()
     states[1] = np.nan
-    image, matrix = jc.sweeps.monodromy(MODEL, SPEEDS, states)
+    image, matrix = jc.lanes.monodromy(MODEL, SPEEDS, states)
     assert np.all(np.isnan(image[1])) and np.all(np.isnan(matrix[1]))
     others = [0, 2, 3, 4, 5]
-    good = jc.sweeps.monodromy(MODEL, SPEEDS, STATES)
+    good = jc.lanes.monodromy(MODEL, SPEEDS, STATES)
     np.testing.assert_array_equal(image[others], good[0][others])
     np.testing.assert_array_equal(matrix[others], good[1][others])
 

@@ -1,20 +1,33 @@
-"""Labels, zones and edges from made-up lanes."""
-
-import dataclasses
+"""Labels, zones and edges from made-up lanes; labels of short runs; maps of labels beside sweeps."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import xarray as xr
+from helpers import followed, made_sweep
 
 import jaxcage as jc
-from jaxcage.analysis import closing_period, closing_width, decay, label_lanes, lives_in_words, on_torus
+from jaxcage.analysis import (
+    chaotic_share,
+    closing_period,
+    decay,
+    label_lanes,
+    lasting,
+    on_torus,
+    restless,
+    small,
+    summary,
+    to_decide,
+    too_short,
+)
 
 
-def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
+def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> xr.Dataset:
     """A sweep whose lanes carry the labels of the string: 1-8, # chaotic, q quasi-periodic, ? undecided, X failed."""
     n, keep, blocks = len(label_row), 32, 10
-    speed = (5000.0 + step_rpm * np.arange(n)) * np.pi / 30
+    rpm = 5000.0 + step_rpm * np.arange(n)
     strobe = np.zeros((n, starts, keep, 2))
     growth = np.zeros((n, starts, blocks, 1))
     outcome = np.zeros((n, starts), dtype=int)
@@ -29,25 +42,7 @@ def made(label_row: str, step_rpm: float = 100.0, starts: int = 1) -> jc.Sweep:
         else:
             strobe[i, 0, :, 0] = wiggle
             growth[i, 0, :, 0] = {"#": 0.4, "q": 0.0, "?": -0.1}[sign] + (0.0 if sign == "q" else noise)
-    return jc.Sweep(
-        speed=speed,
-        strobe=strobe,
-        last=strobe[:, :, -1],
-        block_growth=growth,
-        peak=np.full((n, starts), 0.5),
-        outcome=outcome,
-        error=np.zeros((n, starts)),
-        doubt=np.zeros((n, starts, 1)),
-        scale=np.ones((n, 2)),
-        discard=10,
-        revolutions=100,
-    )
-
-
-@pytest.mark.parametrize("k", range(1, 9))
-def test_smallest_closing_period_is_found(k: int):
-    strobe = np.tile(np.arange(k, dtype=float), 64)[:64, None] * np.array([1.0, -2.0])
-    assert closing_period(strobe, np.ones(2)) == k
+    return made_sweep(rpm, strobe, growth, outcome)
 
 
 def test_closing_is_measured_by_the_size_of_the_motion_and_at_most_the_scale():
@@ -66,32 +61,12 @@ def spiral(turn: float, size: float, shrinks: float = 0.985, orbit: tuple[float,
     return np.stack([np.resize(orbit, 64) + z.real, 0.7 * z.imag], axis=1)
 
 
-@pytest.mark.parametrize("turn", [0.5, 0.497, 1 / 3, 0.2, 0.401, 2 / 7, 1 / 8, 0.1251])
+@pytest.mark.parametrize("turn", [0.5, 0.497, 0.401, 1 / 8])
 @pytest.mark.parametrize("orbit", [(0.0,), (0.0, 0.5), (0.0, 0.2, 0.3)], ids=["1", "2", "3"])
 def test_a_spiral_has_the_period_of_the_orbit_that_it_leads_to(turn: float, orbit: tuple[float, ...]):
     """Sizes at which the states return after more revolutions than the orbit has, and smaller ones."""
     found = {int(closing_period(spiral(turn, size, orbit=orbit), np.ones(2))) for size in (2e-3, 5e-4, 1e-4, 1e-5, 0.0)}
     assert found - {0} == {len(orbit)}
-
-
-@pytest.mark.parametrize("size", [4e-4, 2e-4, 1e-5, 0.0])
-def test_a_small_orbit_keeps_its_period_while_what_is_left_dies_out(size: float):
-    """Of period 2 and three tolerances wide, as next to a doubling: what is left may be as large as the orbit."""
-    assert closing_period(spiral(0.5, size, 0.95, (1.0, 1.0 + 3e-4)), np.ones(2)) == 2
-    assert closing_period(spiral(0.0, size / 10, 0.99, (1.0, 1.0 + 3e-4)), np.ones(2)) == 2
-
-
-def test_a_linear_oscillator_has_no_subharmonics():
-    """Lightly damped, still on its way: seen to return after 2, 3 or 5 revolutions, it was called by these."""
-    linear = jc.ForcedOscillator(lambda tau, q, v, speed: (-0.0054 * v[0] - q[0] + jnp.cos(tau),), coordinates=1)
-    speeds = np.array([1.5, 2.0, 2.5, 4.5])
-    label = jc.sweep(linear, speeds, horizon=0, confirm=False, method=jc.method("rk4", steps=64)).label
-    assert set(label.ravel()) <= {"periodic-1", "undecided"} and "periodic-1" in label
-
-
-def test_period_nine_and_nan_do_not_close():
-    assert closing_period(np.tile(np.arange(9.0), 8)[:, None], np.ones(1)) == 0
-    assert closing_period(np.full((64, 1), np.nan), np.ones(1)) == 0
 
 
 CIRCLE = spiral(0.618, 1.0, shrinks=1.0)
@@ -106,7 +81,6 @@ CIRCLE = spiral(0.618, 1.0, shrinks=1.0)
         (-0.004, 0.002, "quasi-periodic"),
         (0.0, 0.003, "undecided"),
         (0.03, 0.02, "undecided"),
-        (0.5, np.inf, "undecided"),
         (-0.1, 0.01, "undecided"),
         (np.nan, np.nan, "undecided"),
     ],
@@ -130,8 +104,8 @@ def test_failure_comes_first_and_closing_before_the_exponent():
     assert list(label) == ["failed", "undecided", "periodic-2", "periodic-2"]
 
 
-@pytest.mark.parametrize("shrinks", [0.95, 0.98, 0.99, 0.995, 0.998, 0.999, 1.001])
-@pytest.mark.parametrize("turn", [0.03, 0.2, 0.497, 0.618])
+@pytest.mark.parametrize("shrinks", [0.95, 0.995, 0.999, 1.001])
+@pytest.mark.parametrize("turn", [0.03, 0.497, 0.618])
 def test_a_spiral_is_no_torus_however_slow(shrinks: float, turn: float):
     states = spiral(turn, 0.1, shrinks)
     factor, error = decay(states)
@@ -149,36 +123,24 @@ class SlowSpirals(eqx.Module):
         return (-damping * v[0] - 0.3 * q[0] - 0.2 * q[0] ** 3 + 0.1 * jnp.cos(tau),)
 
 
-@pytest.mark.parametrize("revolutions", [20, 60, 120, 300, 600])
+@pytest.mark.parametrize("revolutions", [20, 120, 600])
 def test_slow_spirals_are_not_called_quasi_periodic(revolutions: int):
     """50 lanes, multipliers from 0.95 to 0.999: periodic-1 once they have closed, undecided with a cure before that."""
     system = jc.ForcedOscillator(SlowSpirals(), coordinates=1)
     settings = dict(discard=revolutions, revolutions=revolutions, confirm=False, horizon=0, starts=1)
     found = jc.sweep(system, np.linspace(1, 2, 50), **settings, method=jc.method("rk4", steps=64))
-    assert set(found.label.ravel()) <= {"periodic-1", "undecided"}
-    open_ = found.label == "undecided"
-    assert np.array_equal(found.too_short, open_) and np.all(found.revolutions_to_decide[open_] > revolutions)
+    open_ = found["label"].values == "undecided"
+    assert np.all(open_ | (found["label"].values == "periodic-1"))
+    assert np.array_equal(too_short(found), open_) and np.all(to_decide(found)[open_] > revolutions)
     if np.any(open_):
-        assert "lanes have no certain label: about" in str(found)
-
-
-def test_the_estimate_of_revolutions_is_what_a_spiral_needs():
-    system = jc.ForcedOscillator(SlowSpirals(), coordinates=1)
-    settings = dict(confirm=False, horizon=0, starts=1, method=jc.method("rk4", steps=64))
-    speed = np.array([1.5, 1.8])  # multipliers 0.9745 and 0.9892
-    few = jc.sweep(system, speed, discard=60, revolutions=60, **settings)
-    assert np.all(few.label == "undecided")
-    for i, needed in enumerate(few.revolutions_to_decide[:, 0]):
-        enough, half = 20 * int(np.ceil(needed / 20) + 4), 20 * int(np.ceil(needed / 40))
-        assert jc.sweep(system, speed[i], discard=60, revolutions=enough, **settings).label[0, 0] == "periodic-1"
-        assert jc.sweep(system, speed[i], discard=60, revolutions=half, **settings).label[0, 0] == "undecided"
+        assert "lanes have no certain label: about" in summary(found)
 
 
 def test_labels_of_short_runs_of_a_cage_are_undecided_and_the_default_decides():
     """Case 1a from 13 000 to 18 000 rpm: slow spirals onto periodic orbits, the slowest with a multiplier of 0.997."""
     model, speeds = jc.case("1a"), jc.rpm(13000, 18000, 11)
     short = jc.sweep(model, speeds, discard=200, revolutions=60, confirm=False, horizon=0)
-    assert not np.any(short.label == "quasi-periodic") and np.mean(short.label == "undecided") > 0.8
+    assert not np.any(short["label"] == "quasi-periodic") and np.mean(short["label"] == "undecided") > 0.8
     assert np.all(jc.sweep(model, speeds).label == "periodic-1")
 
 
@@ -192,13 +154,7 @@ def test_small_motion_is_labelled_by_its_own_size(scale: float):
     system = jc.ForcedOscillator(law, coordinates=1, scale=scale, starts=((1e-5, 0.0),))
     found = jc.sweep(system, np.array([1.9, 2.3]), confirm=False)
     assert np.all(found.label == "quasi-periodic")
-    assert np.all(found.small) == (scale == 1.0) == ("choose a smaller `scale`" in str(found))
-
-
-def test_windows_of_slow_bearings_are_closed_below_a_part_of_their_speed():
-    """Two zones at 125 to 374 rpm stay two: what is closed is narrower than 5 % of the highest speed, here 18.7 rpm."""
-    assert closing_width(np.array([125.0, 374.0])) == pytest.approx(18.7)
-    assert closing_width(np.array([4000.0, 27500.0])) == 500
+    assert np.all(small(found)) == (scale == 1.0) == ("choose a smaller `scale`" in summary(found))
 
 
 def test_narrow_windows_are_closed_and_wide_ones_are_not():
@@ -225,7 +181,7 @@ def test_failed_speeds_are_neither_chaotic_nor_calm():
     (zone,) = jc.zones(made("XX##11")).zones
     assert zone.onset is None
     sweep = made("XX##11")
-    assert np.isnan(sweep.chaotic_share[0]) and sweep.chaotic_share[2] == 1.0
+    assert np.isnan(chaotic_share(sweep)[0]) and chaotic_share(sweep)[2] == 1.0
 
 
 def test_synchronous_stretches_end_where_period_one_is_lost():
@@ -235,38 +191,22 @@ def test_synchronous_stretches_end_where_period_one_is_lost():
     assert all(e.kind == "synchronous-loss" for z in stretch for e in (z.onset, z.exit) if e)
 
 
-def test_no_zone_and_table():
-    found = jc.zones(made("1111"))
-    assert found.zones == () and "none" in str(found)
-    assert "500" not in str(found) and "resolution of 100 rpm" in str(found)
-    assert "zone 1: 5150 +- 100 rpm to 5350 +- 100 rpm, 200 rpm wide, 100% of starts chaotic" in str(
-        jc.zones(made("11##1"))
-    )
-
-
-def test_sweep_prints_counts():
-    text = str(made("11#qX?"))
-    assert "2 periodic-1" in text and "1 lanes failed: not_finite" in text
-
-
 def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     """Escapes of made-up lanes: the mean life at a speed is that of the lanes there and next to it."""
     sweep = made("11###11###11")
-    escape = np.full(sweep.outcome.shape, 20.0)
+    escape = np.full(sweep["label"].shape, 20.0)
     escape[2:5], escape[7:10] = np.inf, 320.0
-    followed = dataclasses.replace(sweep, escape=escape, horizon=3020)
-    assert followed.label[3, 0] == "chaotic" and followed.label[8, 0] == "transient"
-    assert followed.observed_label[8, 0] == "chaotic"
-    assert np.array_equal(np.flatnonzero(followed.lasting), [2, 3, 4])
-    assert np.array_equal(np.flatnonzero(followed.restless), [2, 3, 4, 7, 8, 9])
-    found = jc.zones(followed, close_below_rpm=0.0)
-    (lasting,), (dying,) = found.zones, found.transient
-    assert lasting.onset.speed_rpm == pytest.approx((followed.rpm[1] + followed.rpm[2]) / 2)
-    assert dying.exit.speed_rpm == pytest.approx((followed.rpm[9] + followed.rpm[10]) / 2)
-    assert lasting.life is not None and dying.life is not None
-    shortest, longest = lasting.life  # bounds: two lanes at the rim, three within
-    assert shortest == (pytest.approx(2 * 3000 / 3), pytest.approx(followed.rpm[2]), True)
-    assert longest == (pytest.approx(3 * 3000 / 3), pytest.approx(followed.rpm[3]), True)
+    later, rpm = followed(sweep, escape, 3020), sweep["rpm"].values
+    assert np.array_equal(np.flatnonzero(lasting(later)), [2, 3, 4])
+    assert np.array_equal(np.flatnonzero(restless(later)), [2, 3, 4, 7, 8, 9])
+    found = jc.zones(later, close_below_rpm=0.0)
+    (staying,), (dying,) = found.zones, found.transient
+    assert staying.onset.speed_rpm == pytest.approx((rpm[1] + rpm[2]) / 2)
+    assert dying.exit.speed_rpm == pytest.approx((rpm[9] + rpm[10]) / 2)
+    assert staying.life is not None and dying.life is not None
+    shortest, longest = staying.life  # bounds: two lanes at the rim, three within
+    assert shortest == (pytest.approx(2 * 3000 / 3), pytest.approx(rpm[2]), True)
+    assert longest == (pytest.approx(3 * 3000 / 3), pytest.approx(rpm[3]), True)
     n, survived, block = 3, 3 * 270, 30  # three escapes in the block that ends 300 revolutions after the first begins
     assert dying.life[1].revolutions == pytest.approx(block / np.log1p(n * block / survived))
     assert dying.life[1].seconds == pytest.approx(dying.life[1].revolutions * 60 / dying.life[1].speed_rpm)
@@ -275,30 +215,47 @@ def test_chaos_that_lasts_and_chaos_that_dies_out_make_zones_of_their_own():
     assert jc.zones(sweep, close_below_rpm=0.0).transient == ()
 
 
-def test_a_bound_is_not_the_shortest_of_mean_lives_of_which_some_are_known():
-    """One lane of three leaves chaos, in the middle of a zone: at its ends it is only known to last longer."""
-    sweep = made("11#####11")
-    escape = np.full(sweep.outcome.shape, 20.0)
-    escape[2:7], escape[4] = np.inf, 2720.0
-    (zone,) = jc.zones(dataclasses.replace(sweep, escape=escape, horizon=3020), close_below_rpm=0.0).zones
-    assert zone.life is not None
-    shortest, longest = zone.life
-    assert not shortest.bound and shortest.speed_rpm == pytest.approx(sweep.rpm[3])
-    assert longest.bound and longest.revolutions == max(shortest.revolutions, 3000)
-    words = lives_in_words(zone.life, lambda life: f"{life.revolutions:.0f}")
-    assert words == f"{shortest.revolutions:.0f} to > {longest.revolutions:.0f}"
-
-
 def test_an_edge_is_no_more_certain_than_the_mean_lives_next_to_it():
     """Lanes that leave chaos at the first two speeds of a zone: none; 12 of 20, late; all of them, soon."""
     sweep = made("111####11", starts=20)
-    alike = lambda x: np.broadcast_to(x[:, :1], x.shape)
-    sweep = dataclasses.replace(sweep, block_growth=alike(sweep.block_growth), strobe=alike(sweep.strobe))
+    sweep = sweep.isel(start=np.zeros(20, dtype=int))
     for leaving, at, onset, apart in ((0, 2000.0, 5250, 100), (12, 2000.0, 5250, 150), (20, 320.0, 5450, 100)):
-        escape = np.full(sweep.outcome.shape, 20.0)
+        escape = np.full(sweep["label"].shape, 20.0)
         escape[3:7] = np.inf
         escape[3:5, :leaving] = at
-        found = jc.zones(dataclasses.replace(sweep, escape=escape, horizon=3020), close_below_rpm=0.0)
+        found = jc.zones(followed(sweep, escape, 3020), close_below_rpm=0.0)
         assert found.zones[0].onset.speed_rpm == pytest.approx(onset)
         assert found.zones[0].onset.uncertainty_rpm == pytest.approx(apart)
         assert found.zones[0].exit.uncertainty_rpm == pytest.approx(100)
+
+
+class Ueda(eqx.Module):
+    """x'' + 0.05 x' + x^3 = force cos t."""
+
+    force: jax.Array
+
+    def __call__(self, tau, q, v, speed):
+        del speed
+        (x,), (u,) = q, v
+        return (-0.05 * u - x**3 + self.force * jnp.cos(tau),)
+
+
+@pytest.mark.wide
+def test_map_of_a_system_agrees_with_a_sweep():
+    """Labels are those of sweeps; what a point counts as follows from all of its starts."""
+    make = lambda force: jc.ForcedOscillator(Ueda(jnp.array(force)), coordinates=1)
+    speeds, forces = np.linspace(0.9, 1.4, 9), np.linspace(4.0, 8.0, 8)
+    length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rodas4", steps=32))
+    found = jc.label_map(make(7.5), {"speed": speeds}, {"force": forces}, starts=2, **length)
+    starts = [tuple(float(c) for c in s) for s in make(7.5).starts(1.0)[:2]]
+    same, near = 0, 0
+    for j in (0, 7):
+        swept = jc.sweep(make(forces[j]), speeds, starts=starts, keep=16, confirm=False, horizon=0, **length)
+        mine, theirs = found["label"].values[:, j], swept["label"].values
+        periodic = np.char.startswith(theirs, "periodic")
+        assert np.array_equal(mine[periodic], theirs[periodic])
+        agree = mine == theirs
+        assert np.mean(too_short(found)[:, j][agree] == too_short(swept)[agree]) > 0.9
+        same, near = same + np.sum(agree), near + mine.size
+    assert same >= 0.9 * near  # long chaotic lanes differ by rounding, and a few of their labels with them
+    assert found["label"].dims == ("speed", "force", "start") and np.any(found["label"] == "chaotic")

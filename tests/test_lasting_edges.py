@@ -100,7 +100,7 @@ class Planted:
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch):
     def plant(seed: int, **law: float) -> None:
-        monkeypatch.setattr("jaxcage.design._lasting._escapes", Planted(seed, **law))
+        monkeypatch.setattr("jaxcage.design.lasting._escapes", Planted(seed, **law))
 
     return plant
 

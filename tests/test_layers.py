@@ -1,4 +1,4 @@
-"""The house rule on imports: a file imports only from layers below its own."""
+"""The rule on imports: a file imports only from layers below its own, and from their public names."""
 
 import ast
 import pathlib
@@ -9,46 +9,24 @@ import jaxcage
 
 
 ROOT = pathlib.Path(jaxcage.__file__).parent
-LAYERS = [
-    "bearing",
-    "forces",
-    "models",
-    "solve",
-    "analysis",
-    "sweeps",
-    "orbits",
-    "design",
-    "io",
-    "studies",
-    "plotting",
-    "report",
-    "cli",
-]
-SAME_LEVEL = {"io": {"plotting"}, "plotting": {"io"}}
-FILES = sorted(p for layer in LAYERS for p in (ROOT / layer).glob("*.py"))
+LAYERS = ("bearing forces models solve integrate analysis sweeps orbits design io studies plotting report cli").split()
+FILES = sorted(p for layer in LAYERS for p in (ROOT / layer).rglob("*.py"))
 
 
-def _imports(path: pathlib.Path) -> list[tuple[int, str]]:
-    """(level, module) of every import statement of a file, those inside functions too."""
-    found = []
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_go_down_and_to_public_names_only(path: pathlib.Path):
+    """Imports inside functions too; a folder within a layer is public, a file is not."""
+    layer, *inner = path.relative_to(ROOT).parts[:-1]
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom):
-            found.append((node.level, node.module or ""))
-        elif isinstance(node, ast.Import):
-            found += [(0, alias.name) for alias in node.names]
-    return found
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda p: f"{p.parent.name}/{p.name}")
-def test_imports_go_down_only(path: pathlib.Path):
-    layer = path.parent.name
-    below = set(LAYERS[: LAYERS.index(layer)]) - SAME_LEVEL.get(layer, set())
-    for level, module in _imports(path):
-        top = module.split(".")[0]
-        if level == 2 and top in LAYERS:
-            assert top in below, f"{layer} imports {module}"
-        if level == 0 and top == "jaxcage":
-            assert layer == "cli", f"{layer} imports {module} by its full name"
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        assert node.level or layer == "cli" or not (node.module or "").startswith("jaxcage"), "imports by full name"
+        if node.level != len(inner) + 2:
+            continue
+        top, *rest = (node.module or "").split(".")
+        if top in LAYERS:
+            assert LAYERS.index(top) < LAYERS.index(layer), f"{layer} imports {node.module}"
+            assert (ROOT / top).joinpath(*rest).is_dir(), f"{node.module} is a file of another layer"
 
 
 def test_every_layer_is_on_the_list():

@@ -2,13 +2,19 @@
 
 import pathlib
 
+import jax.numpy as jnp
 import literature
+import literature_motion as motion
+import numpy as np
 import pytest
 from helpers import wide_but
-from literature import DUFFING_DOUBLINGS, EXPONENTS, LAWS, TOPICS
+from literature import DUFFING_DOUBLINGS, EXPONENTS
+
+import jaxcage as jc
 
 
 ROOT = pathlib.Path(__file__).parents[1]
+TOPICS = literature.topics()
 GROUPS = [rows for of in TOPICS.values() for rows in of]
 QUICK = "short_bearing film_limits lund_thomsen nicholas load_factors nu2310 contact".split()
 
@@ -42,7 +48,7 @@ BRACKETS = {1: (0.262, 0.27), 2: (0.285, 0.288), 4: (0.2908, 0.2912), 8: (0.2919
 @pytest.mark.parametrize("periods", BRACKETS)
 def test_shooting_finds_the_doublings_of_the_table(periods: int):
     number = DUFFING_DOUBLINGS[periods][1]
-    found = literature.doubling(lambda g: literature.duffing(0.3, g, 1.2), periods, BRACKETS[periods], (1.0, 0.0))
+    found = motion.doubling(lambda g: motion.duffing(0.3, g, 1.2), periods, BRACKETS[periods], (1.0, 0.0))
     assert found == pytest.approx(number.value, abs=number.tolerance)
 
 
@@ -51,5 +57,51 @@ def test_shooting_finds_the_doublings_of_the_table(periods: int):
 def test_ensembles_find_the_exponents_of_the_table(index: int):
     """A smaller one than the table's."""
     number = list(EXPONENTS.values())[index]
-    found, error = literature.largest_exponent(LAWS[index][1], starts=1024, discard=50, periods=150, steps=64)
+    found, error = motion.largest_exponent(motion.LAWS[index][1], starts=1024, discard=50, periods=150, steps=64)
     assert error < 6e-4 and abs(found - number.value) < number.tolerance + 3 * error
+
+
+# A linear oscillator, whose multipliers are exp((-z +- sqrt(z^2 - 1)) w_0 T).
+
+
+def spectrum(law, omega, steps=256, **options):
+    settings = dict(discard=20, revolutions=100, exponents=2, blocks=20)
+    oscillator = jc.ForcedOscillator(law, coordinates=1)
+    chosen = jc.method("rodas4", steps=steps)
+    return jc.sweep(oscillator, np.array([omega]), method=chosen, **(settings | options))
+
+
+def linear(zeta, natural):
+    def acceleration(tau, q, v, speed):
+        (x,), (u,) = q, v
+        return (-2 * zeta * natural * u - natural**2 * x + jnp.cos(tau),)
+
+    return acceleration
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("omega", [0.4, 1.7])
+def test_multipliers_of_the_linear_oscillator_underdamped(omega):
+    """exp((-z +- i sqrt(1 - z^2)) w_0 T): both exponents are -z w_0 T in the mean."""
+    zeta, natural = 0.05, 1.3
+    result = spectrum(linear(zeta, natural), omega, discard=50, revolutions=400, blocks=4)
+    decay = -zeta * natural * 2 * np.pi / omega
+    np.testing.assert_allclose(np.sum(result.exponents, axis=-1), 2 * decay, atol=1e-7)
+    # The tangent vectors turn: over n revolutions what is left of it is of the order of 1/n.
+    np.testing.assert_allclose(result.exponents, decay, atol=2 / 400)
+    assert np.all(result.label == "periodic-1")
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("omega", [0.9, 3.0])
+def test_multipliers_of_the_linear_oscillator_overdamped(omega):
+    """Real multipliers exp((-z +- sqrt(z^2 - 1)) w_0 T), one exponent each."""
+    zeta, natural = 1.5, 1.3
+    result = spectrum(linear(zeta, natural), omega)
+    period = 2 * np.pi / omega
+    roots = np.array([-zeta + np.sqrt(zeta**2 - 1), -zeta - np.sqrt(zeta**2 - 1)])
+    exact = np.broadcast_to(roots * natural * period, result.exponents.shape)
+    np.testing.assert_allclose(result.exponents, exact, rtol=1e-7)
+    # Nothing scatters: what is stated is the error of the steps, which it covers.
+    assert np.all(result.standard_error < 1e-6 * np.abs(exact))
+    assert np.all(result.standard_error > np.abs(result.exponents - exact))

@@ -227,7 +227,7 @@ def test_an_exit_is_taken_from_the_limit_of_a_cascade_that_ends_within_its_uncer
         asked.append((point.speed_rpm, lower / PER_RPM, upper / PER_RPM))
         return jc.orbits.Cascade((point,), limit * PER_RPM, 2.0 * PER_RPM)
 
-    monkeypatch.setattr("jaxcage.orbits._loss.cascade", planted)
+    monkeypatch.setattr("jaxcage.orbits.unstable_ranges.cascade", planted)
     above = stretch(6700, 9000, kinds=("period-doubling", "fold"))
     result = explained(chaotic(None, 6300), above)
     np.testing.assert_allclose(asked, [(6700, 5700, 7700)])

@@ -9,7 +9,6 @@ import pytest
 from helpers import double_well
 
 import jaxcage as jc
-from jaxcage.design import COSTS
 
 
 METHOD = jc.method("rk4", steps=64)
@@ -55,18 +54,6 @@ def test_width_of_a_zone(edges):
     assert here.value == pytest.approx(exact[0] - exact[1], rel=1e-9)
 
 
-def test_an_open_zone_counts_to_the_end_of_the_range_and_has_the_slope_of_its_other_edge(edges):
-    onset = jc.design.FollowedEdges({"zone 1 onset": edges.points["zone 1 onset"]}, METHOD)
-    with pytest.raises(ValueError, match="`range_rpm` must be given for zone 1, which is open: its onset alone"):
-        jc.design.zone_width(onset)
-    with pytest.raises(ValueError, match="`zone` must be one with an edge among zone 1 onset, but is 2"):
-        jc.design.zone_width(onset, 2)
-    got = agrees(jc.design.zone_width(onset, range_rpm=(5.0, 20.0)), SPACE, SPACE.place + 0.01)
-    speeds, slopes = onset.at(SPACE, SPACE.place + 0.01)
-    assert got.value == pytest.approx(20.0 - speeds[0], rel=1e-12)
-    np.testing.assert_allclose(got.slope, -slopes[0], rtol=1e-12)
-
-
 @pytest.mark.parametrize("operating", [(10.0,), (9.9, 11.0)])
 def test_distance_from_the_nearest_edge(edges, operating):
     far = jc.design.EdgeClearance(edges, operating, softness=0.05)
@@ -105,36 +92,8 @@ def test_derivatives_of_a_multiplier_against_autodiff():
         assert value == pytest.approx(float(jc.parameters(slope)[name]), rel=1e-7, abs=1e-9), name
 
 
-def test_cost_is_its_formula():
-    model = jc.case("1a")
-    space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 60e-6)})
-    got = agrees(jc.design.cost(), space, np.array([0.3, 0.7]))
-    gap, e = 0.3e-3 + 0.3 * 0.3e-3, 5e-6 + 0.7 * 55e-6
-    assert got.value == pytest.approx(0.45e-3 / gap + 23e-6 / e, rel=1e-12)
-    assert set(COSTS) == {"guidance_gap", "eccentricity"}
-
-
-def test_objectives_add_up(edges):
-    width, price = jc.design.zone_width(edges), jc.design.Smooth(lambda s: 1 / jc.parameters(s)["damping"])
-    both = agrees(2.0 * width + price * 0.5 - width, SPACE, SPACE.place)
-    (a,), (b,) = width.measure(SPACE, SPACE.place[None]), price.measure(SPACE, SPACE.place[None])
-    assert both.value == pytest.approx(a.value + 0.5 * b.value, rel=1e-12)
-    np.testing.assert_allclose(both.slope, a.slope + 0.5 * b.slope, rtol=1e-12)
-
-
 CHAOS = dict(starts=1, discard=60, revolutions=40)
 CHAOS_SPACE = jc.DesignSpace.of(double_well(), {"damping": (0.2, 0.45), "cubic": (0.7, 1.4)})
-
-
-@pytest.mark.wide
-def test_a_share_is_a_mean_over_the_hours():
-    spectrum = [(9.0, 10.0, 3.0), (11.0, 12.0, 1.0)]
-    share = jc.design.chaotic_share(spectrum, count=6, **CHAOS)
-    chaos = share.chaos(CHAOS_SPACE, np.array([[0.4, 0.5]]))[0]
-    assert share.weights.sum() == pytest.approx(1.0)
-    assert share.values(CHAOS_SPACE, np.array([[0.4, 0.5]]))[0] == pytest.approx(
-        0.75 * chaos[:6].mean() + 0.25 * chaos[6:].mean(), rel=1e-12
-    )
 
 
 @pytest.mark.wide
@@ -142,10 +101,8 @@ def test_a_failed_lane_counts_as_chaotic():
     """Starts beyond what the model holds for fail; a design of which nothing is known is not called calm."""
     model = jc.case("1a")
     space = jc.DesignSpace.of(model, {"guidance_gap": (0.3e-3, 0.6e-3)})
-    bad = jc.design.ChaosMeasure(
-        jc.rpm(9000, 10000, 2), np.ones(2), discard=2, revolutions=2, method=jc.method("rk4", steps=2)
-    )
-    assert np.all(bad.chaos(space, np.array([[0.5]])) == 1.0)
+    bad = jc.design.chaotic_width(9000.0, 10000.0, 2, discard=2, revolutions=2, method=jc.method("rk4", steps=2))
+    assert np.all(bad.levels(space.models(np.array([[0.5]]))) == 1.0)
 
 
 def test_robust_mean_and_worst_of_a_parabola():
@@ -163,27 +120,14 @@ def test_robust_mean_and_worst_of_a_parabola():
     assert worst.value == pytest.approx((0.5 + 0.15) ** 2, rel=5e-3)
 
 
-def test_scatter_laws():
-    q = (np.arange(4096) + 0.5) / 4096
-    assert jc.design.uniform(0.1)(q).std() == pytest.approx(0.1 / np.sqrt(3), rel=1e-3)
-    ray = jc.design.rayleigh()(q)
-    assert ray.mean() == pytest.approx(1.0, rel=2e-3)
-    assert ray.std() == pytest.approx(np.sqrt(4 / np.pi - 1), rel=5e-3)  # of a Rayleigh distribution with mean 1
-
-
 @pytest.mark.parametrize(
     "make, words",
     [
         (lambda: jc.DesignSpace.of(double_well(), {"heat": (0.0, 1.0)}), "must be a parameter"),
         (lambda: jc.DesignSpace.of(double_well(), {"damping": (1.0, 0.5)}), "must ascend"),
-        (lambda: jc.design.FollowedEdges({}), "at least one edge"),
-        (lambda: jc.DesignSpace.of(double_well(), {}), "at least one parameter"),
-        (lambda: jc.design.chaotic_width(9.0, 14.0, softness=0.0), "must be positive"),
         (lambda: jc.design.chaotic_share([(9.0, 12.0, 1.0), (11.0, 14.0, 1.0)]), "do not overlap"),
         (lambda: jc.design.Robust(jc.design.cost(), {}, draws=1), "at least 2"),
         (lambda: jc.design.uniform(3.0), "Argument `half_width` must be at least 0 and below 1, but 3 was given."),
-        (lambda: jc.design.regular_motion("noise", 1.0, (0.0,)), "must be one of displacement"),
-        (lambda: jc.design.StabilityMargin(np.ones(2), np.ones((1, 2))), "a state for each speed"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, words):
@@ -198,57 +142,32 @@ def cage_at_speeds(**options):
 
 
 @pytest.mark.wide
-def test_a_design_is_judged_alike_whatever_it_is_swept_with():
-    """Each design starts from its own states: those of a wide gap lie outside a narrow one."""
-    space, width = cage_at_speeds(discard=3, revolutions=2, method=jc.method("rk4", steps=128))
-    narrow, wide = np.array([[0.0, 0.3]]), np.array([[1.0, 0.3]])
-    pair = lambda *places: width.run(space, np.concatenate(places)).last  # two at a time, by one program
-    alike, beside = pair(narrow, narrow), pair(wide, narrow)
-    assert np.all(np.isfinite(alike)) and not np.allclose(beside[0], alike[0])
-    np.testing.assert_allclose(beside[1], alike[0], rtol=1e-9)
-
-
-@pytest.mark.wide
 def test_loads_of_the_land_are_those_of_a_time_history():
     space, width = cage_at_speeds(discard=60, revolutions=20, method=jc.method("rk4", steps=1024))
     fine = jc.method("rk4", steps=2048)
     places = np.array([[1.0, 0.33], [0.0, 0.98]])
     # Where motion is chaotic two integrations part: they are compared over two revolutions.
-    wear, peak, film = (jc.design.LandMeasure(width, what, revolutions=2) for what in jc.design.MEASURES)
-    least = jc.design.LandMeasure(width, "least film", revolutions=2)
-    got = [measure.at_speeds(space, places) for measure in (wear, peak, film, least)]
-    last = width.run(space, places).last
+    models = space.models(places)
+    wear, peak, film = (jc.design.LandLoad(width.runs, name, over=2) for name in jc.design.LAND_LOADS)
+    least = jc.design.LandLoad(width.runs, "least film", over=2)
+    got = [load.at_speeds(models) for load in (wear, peak, film, least)]
+    last = width.runs.run(models)["last"].values
     touched = 0
-    for k, place in enumerate(places):
-        model = space.model(place)
-        for i, speed in enumerate(width.speeds):
+    for k, model in enumerate(models):
+        for i, speed in enumerate(width.runs.speed):
             length = dict(revolutions=2, samples=1024, method=fine)
             runs = [jc.simulate(model, speed, start=tuple(y), **length) for y in last[k, i]]
-            seen = [jc.orbit_measures(model, run) for run in runs]
-            load = np.mean([o.mean_contact_force for o in seen]) * speed * float(model.land_radius)
+            seen = [jc.analysis.measures(model, run) for run in runs]
+            every = lambda name: [found[name].value for found in seen]
+            load = np.mean(every("mean_contact_force")) * speed * float(model.land_radius)
             assert got[0][k, i] == pytest.approx(load, rel=0.02, abs=1e-6)
-            assert got[1][k, i] == pytest.approx(np.mean([o.peak_contact_force for o in seen]), rel=0.06, abs=1e-6)
-            assert got[2][k, i] == pytest.approx(np.mean([o.drag_power for o in seen]), rel=0.02)
-            thinnest = np.min([o.minimum_film_thickness for o in seen])
+            assert got[1][k, i] == pytest.approx(np.mean(every("peak_contact_force")), rel=0.06, abs=1e-6)
+            assert got[2][k, i] == pytest.approx(np.mean(every("drag_power")), rel=0.02)
+            thinnest = np.min(every("minimum_film_thickness"))
             assert got[3][k, i] == pytest.approx(thinnest, abs=0.01 * float(model.clearance))
             touched += load > 1.0
     assert touched >= 2
-    own = wear.values(space, space.place[None])
-    assert own[0] > 100.0 and wear.relative(space, 1000.0).values(space, space.place[None]) == pytest.approx([1000.0])
-    with pytest.raises(ValueError, match="`what` must be one of wear load, .* but 'least film' was given"):
-        least.relative(space, 1000.0)
-
-
-def test_sobol_indices_say_when_they_are_not_to_be_believed():
-    row = lambda first, total: dict(first=dict(gap=first), total=dict(gap=total))
-    known = dict(first_interval=dict(gap=(0.4, 0.6)), total_interval=dict(gap=(0.5, 0.7)))
-    sure = jc.design.SobolIndices(**row(0.5, 0.6), **known, evaluations=192, samples=64)
-    assert sure.doubtful == () and sure.warning is None and sure.samples_wanted == 64
-    above = dataclasses.replace(sure, **row(0.5, 1.19), total_interval=dict(gap=(1.08, 1.31)))
-    assert above.doubtful == ("gap",) and "between 0 and 1" in str(above.warning) and above.samples_wanted == 128
-    below = dataclasses.replace(sure, **row(-0.002, 0.24), first_interval=dict(gap=(-0.06, 0.05)))
-    assert below.doubtful == ()
-    wide = dataclasses.replace(sure, first_interval=dict(gap=(-0.1, 1.1)))  # 1.2 wide: 16 times the samples for .3
-    assert wide.doubtful == ("gap",) and wide.samples_wanted == 1024 and "1024 base samples" in str(wide)
-    none = dataclasses.replace(sure, total_interval=dict(gap=(float("nan"), float("nan"))))
-    assert none.doubtful == ("gap",) and none.samples_wanted == 1024
+    own, now = wear.estimate([space.system]), jc.design.relative(wear, space.system, 1000.0)
+    assert own[0] > 100.0 and own[1] > 0.0 and now.values(space, space.place[None]) == pytest.approx([1000.0])
+    with pytest.raises(ValueError, match="`name` must be one of wear load, .* but 'least film' was given"):
+        jc.design.relative(least, space.system, 1000.0)

@@ -42,50 +42,6 @@ def test_a_surrogate_finds_a_known_optimum(vary: dict[str, tuple[float, float]])
     assert found.values == pytest.approx({n: {"damping": WELL["damping"], "cubic": 1.5}[n] for n in vary}, rel=0.03)
 
 
-def test_a_surrogate_search_goes_on_where_it_stopped(tmp_path):
-    class Stopped(Exception):
-        pass
-
-    def stop(batch, values):
-        assert values.shape == (2, 8)
-        if batch == 2:
-            raise Stopped
-
-    asked = []
-
-    class Counted(jc.design.Smooth):
-        def values(self, space, places):
-            asked.append(len(places))
-            return super().values(space, places)
-
-    search = lambda **options: jc.design.surrogate_search(
-        double_well(), VARY, Counted(bowl().function), starts=2, batches=5, batch=8, **options
-    )
-    whole = search()
-    with pytest.raises(Stopped):
-        search(keep=tmp_path / "search", report=stop)
-    asked.clear()
-    assert search(keep=tmp_path / "search").optima[0].history == whole.optima[0].history
-    assert asked == [16] * 2
-    with pytest.raises(ValueError, match="but is of another one"):
-        search(keep=tmp_path / "search", seed=1)
-    with pytest.raises(ValueError, match="but is of another one"):
-        jc.design.surrogate_search(double_well(), VARY, bowl(), starts=2, batches=5, batch=8, keep=tmp_path / "search")
-    with pytest.raises(ValueError, match="`batch` and `batches` must be at least 2 and 1, but 1 and 10"):
-        jc.design.surrogate_search(double_well(), VARY, bowl(), batch=1)
-
-
-def test_designs_without_a_value_are_the_worst():
-    """Beyond damping 0.5 there is none, just past its smallest value; where there is none anywhere, that is said."""
-    vary = {"damping": (0.1, 1.0)}
-    height = lambda s: jnp.where(s.acceleration.damping < 0.5, 1.0 - s.acceleration.damping, jnp.nan)
-    found = jc.design.surrogate_search(double_well(), vary, jc.design.Smooth(height)).best
-    assert found.values["damping"] == pytest.approx(0.5, abs=0.01) and found.values["damping"] < 0.5
-    nowhere = jc.design.Smooth(lambda s: s.acceleration.damping * jnp.nan)
-    found = jc.design.surrogate_search(double_well(), vary, nowhere, batches=3).best
-    assert found.status == "no design has a value"
-
-
 def test_the_best_of_many_with_noise_is_chosen_anew():
     """Noise of 2 hides a bowl; by the bowl itself the design chosen is better than what the search took for best, and
     one that is the best from the beginning stays."""
@@ -98,12 +54,12 @@ def test_the_best_of_many_with_noise_is_chosen_anew():
     exact = bowl(damping=0.7)
     found = jc.design.surrogate_search(double_well(), VARY, Noisy(exact.function), starts=2, batches=8)
     worth = lambda o: float(exact.function(o.model))
-    chosen, itself = jc.design.judged(found, exact)
+    chosen, itself = jc.design.confirmed(found, exact)
     assert itself == pytest.approx(float(exact.function(double_well())))
     assert chosen.best.objective == pytest.approx(worth(chosen.best)) and found.best.objective < 1.0
     assert chosen.best.objective < min(worth(found.best), itself)
     at_best = bowl(damping=WELL["damping"], cubic=WELL["cubic"])
-    stays, itself = jc.design.judged(found, at_best)
+    stays, itself = jc.design.confirmed(found, at_best)
     assert stays.best.status == "nothing better found" and stays.best.objective == itself == pytest.approx(1.0)
     assert stays.best.values == pytest.approx({n: WELL[n] for n in VARY})
 
@@ -121,9 +77,6 @@ def test_scouts_find_the_deeper_valley():
     looked = search(starts=4, scouts=32, steps=200)
     assert looked.best.values["damping"] == pytest.approx(0.2, abs=0.02)
     assert looked.distinct[0][1] >= 2
-    assert len(search(starts=1, scouts=8, steps=1).optima) == 1
-    with pytest.raises(ValueError, match="`scouts` must be 0 or at least 3, but 2 was given"):
-        search(starts=4, scouts=2)
 
 
 def test_a_bound_that_stops_the_search_is_named():
@@ -152,10 +105,7 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(tmp_path):
     )
     assert seen[0] == 11
     assert [o.history for o in again.optima] == [o.history for o in unbroken.optima]
-    with pytest.raises(ValueError, match="file of this search"):
-        jc.optimise(double_well(), VARY, bowl(), starts=3, steps=30, keep=path)
-    compiled = jc.design.Smooth(jax.jit(bowl(cubic=1.0).function))
-    for other in (bowl(damping=0.5), 2.0 * bowl(), bowl() + jc.design.Smooth(jnp.sum), compiled):
+    for other in (bowl(damping=0.5), 2.0 * bowl(), jc.design.Smooth(jax.jit(bowl(cubic=1.0).function))):
         with pytest.raises(ValueError, match="but is of another one"):
             jc.optimise(double_well(), VARY, other, starts=2, steps=30, keep=path)
     path.write_bytes(path.read_bytes()[:100])
@@ -181,43 +131,21 @@ def test_sobol_indices_of_ishigami():
         assert got.first_interval[name][0] <= got.first[name] <= got.first_interval[name][1]
 
 
-def test_sobol_indices_of_a_parameter_without_influence_are_known_to_be_zero():
-    """x_1 + x_2^2 / 2: of the variances 1/12 and 1/45, none due to a third."""
-    found = jc.design.sobol_of(lambda x: (x[0] + x[1] ** 2 / 2)[None], ("a", "b", "idle"), samples=256)
-    assert found.first["idle"] == found.total["idle"] == 0.0
-    assert found.first_interval["idle"] == found.total_interval["idle"] == (0.0, 0.0)
-    assert found.doubtful == () and found.warning is None
-    shares = np.array([1 / 12, 1 / 45]) / (1 / 12 + 1 / 45)
-    np.testing.assert_allclose([found.total["a"], found.total["b"]], shares, atol=0.02)
-
-
 def test_tolerance_budget_is_the_root_of_squares():
     elasticity = {"gap": 0.5, "mass": -2.0}
     edge = jc.orbits.Sensitivity("zone 1 exit", "fold", 10000.0, {}, elasticity, {}, 1.0, "converged")
     got = jc.design.tolerance_budget(edge, {"gap": 0.02, "mass": 0.01})
-    assert got.deviation_rpm == pytest.approx({"gap": 100.0, "mass": 200.0})
-    assert got.total_rpm == pytest.approx(np.hypot(100, 200))
-    assert "80 % of the variance" in str(got)
-    with pytest.raises(ValueError, match="must be of one of"):
-        jc.design.tolerance_budget(edge, {"heat": 0.1})
-    assert "0 % of the variance" in str(jc.design.tolerance_budget(edge, {"gap": 0.0}))
+    assert got.deviation == pytest.approx({"gap": 100.0, "mass": 200.0}) and got.unclear == ()
+    assert got.total == pytest.approx(np.hypot(100, 200))
 
 
 @pytest.mark.parametrize(
     "options, words",
     [
         (dict(starts=0), "at least 1"),
-        (dict(starts=np.array([[0.5]])), "one column for each"),
         (dict(starts=np.array([[0.5, 1.5]])), "between 0 and 1"),
     ],
 )
 def test_bad_input_gets_a_sentence(options, words):
     with pytest.raises(ValueError, match=words):
         jc.optimise(double_well(), VARY, bowl(), **options)
-
-
-def test_what_cannot_be_is_refused():
-    with pytest.raises(ValueError, match="power of 2"):
-        jc.design.global_sensitivity(double_well(), VARY, bowl(), samples=3)
-    with pytest.raises(ValueError, match="`objective` must have a slope, but ChaosMeasure has none: `jaxcage.design"):
-        jc.optimise(double_well(), VARY, bowl() + jc.design.chaotic_width(9.0, 14.0))

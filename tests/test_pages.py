@@ -1,11 +1,90 @@
-"""Blocks of pages that a command makes: each has its entry, and each entry its block."""
+"""The code of README and pages runs, its numbers hold; blocks that a command makes have their entries."""
 
+import contextlib
+import io
+import pathlib
 import re
 from collections import Counter
 
+import jax
+import numpy as np
 import pytest
+from literature import DUFFING_DOUBLINGS, EXPONENTS
 
 from benchmarks import pages
+
+
+ROOT = pathlib.Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+PAGES = {p.stem: p.read_text() for p in sorted((ROOT / "docs").glob("*.md"))}
+
+
+def run_blocks(page: str) -> tuple[dict, str]:
+    """What the Python blocks of a page leave behind, run in order, and what they print."""
+    space: dict = {}
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        for block in re.findall(r"```python\n(.*?)```", page, flags=re.S):
+            exec(compile(block, "<page>", "exec"), space)
+    return space, out.getvalue()
+
+
+@pytest.mark.wide
+def test_python_blocks_of_the_readme():
+    space, text = run_blocks(README)
+    assert "Sweep of 9 speeds x 3 starts" in text and "at a resolution of 500 rpm" in text
+    assert float(space["force"]) == pytest.approx(DUFFING_DOUBLINGS[1][1].value, abs=1e-7)
+    assert float(space["slope"].acceleration.cubic / space["force"]) == pytest.approx(-0.5, abs=1e-9)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if "```python" in page])
+def test_python_blocks_of_the_pages(name: str):
+    """Each page runs by itself."""
+    space, _ = run_blocks(PAGES[name])
+    PROMISED.get(name, lambda space: None)(space)
+
+
+def ueda(space: dict) -> None:
+    per_time = space["got"].exponents[0, :, 0].mean() / (2 * np.pi)
+    error = np.max(space["got"].standard_error) / (2 * np.pi)
+    printed = EXPONENTS["Ueda x'' + .05 x' + x^3 = 7.5 sin t"]
+    assert per_time == pytest.approx(printed.value, abs=printed.tolerance + 2 * error)
+
+
+def drag(space: dict) -> None:
+    assert space["orbit"].converged and float(jax.grad(space["growth"])(2.0)) < 0
+
+
+PROMISED = {"python": ueda, "own-force": drag}
+"""What the text of a page promises of its code."""
+
+
+def test_set_up_commands_are_those_of_the_check():
+    check = (ROOT / ".ci" / "run").read_text()
+    for command in ("python -m pip install . && jaxcage sweep 1a", 'python -m pip install -e ".[test]" && pytest'):
+        assert command in README
+        assert command.split(" sweep")[0] in check
+
+
+def test_toml_of_the_pages_is_accepted(tmp_path: pathlib.Path):
+    from jaxcage.files import load_model, load_whole_bearing
+
+    blocks = re.findall(r"```toml\n(.*?)```", "\n".join(PAGES.values()), flags=re.S)
+    cage, whole = sorted(blocks, key=lambda block: "nu2310" in block)
+    path = tmp_path / "bearing.toml"
+    path.write_text(whole)
+    assert float(load_whole_bearing(path).load) == 1000.0
+    path.write_text(cage)
+    model = load_model(path)
+    assert float(model.guidance_gap) == pytest.approx(0.5e-3)
+    assert float(model.lubricant.temperature) == pytest.approx(343.15)
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in PAGES)])
+def test_files_that_pages_point_to_exist(page: str):
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", (ROOT / page).read_text()):
+        assert ((ROOT / page).parent / target).exists(), target
 
 
 FOUND = {

@@ -1,182 +1,149 @@
-"""Zones, maps and ramps of the whole bearing: from made-up sweeps, against sweeps of their parts, as commands."""
+"""The commands for a whole bearing print, draw and store what the same calls of the library find."""
 
-import dataclasses
 import json
 import pathlib
 import re
 
 import numpy as np
 import pytest
-from test_whole_motion import SPEED, bearing
+from helpers import document, is_png, refused
 
 import jaxcage as jc
-from jaxcage.analysis import bearing_zones
-from jaxcage.cli import _whole, _whole_page, main
-from jaxcage.plotting import bearing_ramp_figure
-from jaxcage.report import read_operating
-from jaxcage.sweeps import BearingRamp, BearingUpDown, bearing_up_down
+from jaxcage.cli import main
+from jaxcage.design import bearing_gradient
+from jaxcage.files import subject_of, whole_bearing_from
+from jaxcage.lanes import load, stored_configuration
+from jaxcage.show import read_columns, read_operating
 
 
 jc.enable_x64()
+SPEED = float(jc.rpm(10000))
+RANGE = ["nu2310", "--first", "8000", "--last", "10000", "--discard", "0"]
 
 
-@pytest.fixture(scope="module")
-def swept():
-    """Two speeds, two starts, as short as can be."""
-    return jc.sweep_bearing(
-        bearing(), jc.rpm(6000, 10000, 2), starts=2, discard=0, revolutions=2, blocks=2, tolerance=1e-3
-    )
+@pytest.fixture
+def mine(tmp_path: pathlib.Path) -> str:
+    (path := tmp_path / "mine.toml").write_text('base = "nu2310"\nload = "1 kN"')
+    return str(path)
 
 
-def made_up(found, states, exponents):
-    """A sweep over other speeds with these states, and exponents that scatter by 0.1."""
-    n, starts = np.shape(states)
-
-    def spread(x):
-        if isinstance(x, dict):
-            return {name: spread(each) for name, each in x.items()}
-        of_lanes = isinstance(x, np.ndarray) and x.ndim >= 2
-        return np.repeat(np.repeat(x[:1, :1], n, axis=0), starts, axis=1) if of_lanes else x
-
-    same = {f.name: spread(getattr(found, f.name)) for f in dataclasses.fields(found)}
-    speed = np.asarray(jc.rpm(1000.0, 1000.0 * n, n))
-    blocks = np.array(exponents, dtype=float)[:, None, None] + 0.1 * np.array([-1.0, 1.0]) * np.ones((n, starts, 2))
-    means = {name: np.zeros((n, starts, 2)) for name in found.block_means} | {"exponent": blocks}
-    return dataclasses.replace(found, **same | {"speed": speed, "state": np.array(states), "block_means": means})
+def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mine: str):
+    """A file's bearing at a load of the command line."""
+    asked = ["simulate", mine, "--speed", "10000 rpm", "--load", "4.45 kN", "--revolutions", "1"]
+    found = document(capsys, *asked, "--out", str(tmp_path))
+    assert found["outcome"] == "successful" and found["shaft_speed_rpm"] == 10000 and found["load_N"] == 4450
+    assert found["friction_power_W"] == pytest.approx(sum(found["power_parts_W"].values()))
+    assert is_png(found["figure"]) and "pocket_force_13 [N]" in read_columns(found["data"])
+    run = jc.simulate_bearing(jc.whole_bearing("nu2310"), SPEED, revolutions=1)
+    expected = jc.bearing_measures(jc.whole_bearing("nu2310"), run, SPEED)
+    for name in ("cage_slip", "pocket_force_mean_sum_N", "eccentricity_mean"):
+        assert found[name] == pytest.approx(getattr(expected, name), rel=0.05)
 
 
 @pytest.mark.wide
-def test_zones_are_stretches_of_the_same(swept):
-    assert {name for zone in bearing_zones(swept) for name in zone.states} == set(swept.state.ravel().tolist())
-    a, b, c = "disordered", "circular", "failed"
-    states = [[a, a], [a, a], [a, b], [b, b], [b, c], [c, c], [b, b]]
-    found = bearing_zones(made_up(swept, states, [3.0, 4.0, 4.0, 2.0, 0.0, np.nan, 0.0]))
-    assert [zone.states for zone in found] == [(a,), (b, a), (b,), (b,), (c,), (b,)]
-    assert [zone.chaotic for zone in found] == [True, True, True, False, False, False]
-    edges = [found[0].low_rpm, *(zone.high_rpm for zone in found)]
-    assert edges == pytest.approx([1000, 2500, 3500, 4500, 5500, 6500, 7000])
-    assert [zone.speeds for zone in found] == [2, 1, 1, 1, 1, 1] and found[0].exponent == pytest.approx(3.5)
-    expected = np.std([2.9, 3.1, 3.9, 4.1] * 2, ddof=1) / np.sqrt(8)
-    assert found[0].exponent_error == pytest.approx(expected, rel=1e-9)
+def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mine: str):
+    asked = ["sweep", mine, "--first", "8000", "--last", "12000 rpm shaft", "--count", "2", "--discard", "1"]
+    found = document(capsys, *asked, "--revolutions", "10", "--out", str(tmp_path))
+    model = jc.replace(jc.whole_bearing("nu2310"), load=1000.0)
+    expected = jc.sweep_bearing(model, jc.rpm(8000, 12000, 2), discard=1, revolutions=10, blocks=10)
+    assert found["outcomes"] == {"successful": 6} and found["load_N"] == 1000 and is_png(found["figure"])
+    for name in ("cage_slip", "exponent", "pocket_force_mean_sum_N", "synchronous_force_x_N"):
+        np.testing.assert_allclose(found[name], getattr(expected, name), rtol=1e-9)
+    stored = load(found["data"])
+    np.testing.assert_allclose(stored["speed_rpm"].values, [8000, 12000])
+    names = stored["state"].attrs["flag_meanings"].split()
+    assert [names[code] for code in stored["state"].values.ravel()] == expected.state.ravel().tolist()
+    configured = stored_configuration(stored)
+    assert configured is not None and float(whole_bearing_from(configured).load) == 1000
 
 
 @pytest.mark.wide
-def test_a_ramp_is_runs_one_after_the_other():
-    """Up by two steps: what a sweep of the first speed leaves is where the second begins; and down again from there."""
-    model, low, high = bearing(), float(jc.rpm(8000)), SPEED
-    turn = 2 * np.pi / float(model.rolling_cage_speed(low))
-    found = bearing_up_down(model, low, high, (high - low) / (2.0 * turn), steps=2, starts=1, settle=1)
-    assert found.up.revolutions.tolist() == [2, 2] and found.rpm == pytest.approx([8000, 10000])
-    one = jc.sweep_bearing(model, low, starts=1, discard=1, revolutions=2, blocks=2, exponents=0)
-    assert found.up.cage_slip[0] == pytest.approx(one.cage_slip[0, 0], rel=1e-9)
-    assert found.up.eccentricity[0] == pytest.approx(one.eccentricity_max[0, 0], rel=1e-9)
-    assert np.all(np.isfinite(found.up.friction_power_W)) and not found.up.failed.any()
-
-
-def ramp(slip, error=1e-4):
-    """One way with these slips."""
-    slip = np.array(slip)
-    rest = {f.name: np.ones_like(slip) for f in dataclasses.fields(BearingRamp)}
-    own = {"cage_slip": slip, "cage_slip_error": np.full_like(slip, error), "failed": np.zeros(slip.size, dtype=bool)}
-    return BearingRamp(**rest | own)
-
-
-def test_hysteresis_is_beyond_the_errors():
-    up, down = ramp([0.01, 0.02, 0.05, 0.05, 0.02]), ramp([0.01, 0.0205, 0.02, 0.02, 0.025])
-    found = BearingUpDown(np.asarray(jc.rpm(1000.0, 5000.0, 5)), 100.0, up, down)
-    assert found.apart.tolist() == [False, False, True, True, True]
-    assert found.stretches == [(pytest.approx(3000), pytest.approx(5000))]
-    loud = BearingUpDown(found.speed, 100.0, dataclasses.replace(up, cage_slip_error=np.full(5, 0.02)), down)
-    assert not loud.apart.any() and loud.stretches == []
-    slip, *_ = bearing_ramp_figure(found).axes  # shaded half a step beyond the speeds
-    assert [(p.get_x(), p.get_width()) for p in slip.patches] == [(pytest.approx(2500), pytest.approx(3000))]
-    np.testing.assert_allclose(slip.containers[1].lines[0].get_ydata(), 100 * down.cage_slip)
-
-
-@pytest.mark.parametrize(
-    "given, said",
-    [
-        ((SPEED, SPEED, 1.0), "positive and ascending"),
-        ((100.0, SPEED, 0.0), "`rate` must be positive, but 0 was given"),
-    ],
-)
-def test_refusals_of_ramps(given, said):
-    with pytest.raises(ValueError, match=said):
-        bearing_up_down(jc.whole_bearing("nu2310"), *given)
-
-
-@pytest.mark.wide
-def test_commands(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    """Zones and map print what sweeps of the same say; the ramp is drawn."""
-    common = ["nu2310", "--first", "8000", "--last", "10000", "--discard", "0", "--json", "--out", str(tmp_path)]
-    assert main(["zones", *common, "--count", "2", "--revolutions", "10", "--load", "1 kN"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["load_N"] == 1000 and found["zones"][-1]["high_rpm"] == pytest.approx(1e4)
-    assert {state for zone in found["zones"] for state in zone["states"]} <= {s for row in found["state"] for s in row}
+def test_zones_map_and_runup(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    out = ["--out", str(tmp_path)]
+    zones = document(capsys, "zones", *RANGE, "--count", "2", "--revolutions", "10", "--load", "1 kN", *out)
+    assert zones["load_N"] == 1000 and zones["zones"][-1]["high_rpm"] == pytest.approx(1e4)
+    first, second = (set(row) for row in zones["state"])
+    assert [zone["high_rpm"] for zone in zones["zones"]] == pytest.approx([9000, 10000][first == second :])
     asked = ["--lower", "1 kN", "--rows", "2", "--columns", "2", "--revolutions", "2"]
-    assert main(["map", *common, *asked]) == 0
-    mapped = json.loads(capsys.readouterr().out)
+    mapped = document(capsys, "map", *RANGE, *asked, *out)
     assert mapped["y"] == "load" and mapped["y_values"] == pytest.approx([1000, 1.25 * 4450])
     models = [jc.replace(jc.whole_bearing("nu2310"), load=x) for x in mapped["y_values"]]
     each = jc.sweep_bearings(models, jc.rpm(8000, 10000, 2), starts=1, discard=0, revolutions=2, blocks=2)
     np.testing.assert_allclose(mapped["friction_power_W"][1], each[1].friction_power_W[:, 0], rtol=0.05)
-    assert pathlib.Path(mapped["figure"]).stat().st_size > 30_000 and len(mapped["state"]) == 2
-    assert main(["runup", *common, "--windows", "2", "--rate", "40000"]) == 0
-    ramped = json.loads(capsys.readouterr().out)
-    assert len(ramped["up"]["cage_slip"]) == 2 and pathlib.Path(ramped["figure"]).stat().st_size > 20_000
+    ramped = document(capsys, "runup", *RANGE, "--windows", "2", "--rate", "40000", *out)
+    assert len(ramped["up"]["cage_slip"]) == 2 and is_png(mapped["figure"]) and is_png(ramped["figure"])
 
 
-@pytest.mark.parametrize(
-    "arguments, said",
-    [
-        (["zones", "nu2310", "--quick"], "Option --quick does not go with a whole bearing."),
-        (["zones", "1a", "--load", "1 kN"], "Option --load goes with a whole bearing, such as nu2310."),
-        (["map", "nu2310", "--x", "load"], "Option --x does not go with a whole bearing."),
-        (["map", "nu2310", "--points", "10x10"], "Option --points does not go with a whole bearing."),
-        (["map", "nu2310", "--y", "speed"], "Option --y must be one of bore"),
-        (["map", "nu2310", "--rows", "0"], "Option --rows must be at least 2 for a whole bearing, but 0 was given."),
-        (["map", "nu2310", "--lower", "3 kg"], "Option --lower"),
-        (["compare", "nu2310", "1a"], "Case '1a' must be a whole bearing, as the first one is"),
-        (["compare", "nu2310", "nu2310", "--at", "9000"], "Option --at does not go with a whole bearing."),
-        (["report", "nu2310", "--operating", "fast"], "Option --operating must be speeds and ranges"),
-        (["report", "nu2310", "--draws", "3"], "Option --draws does not go with a whole bearing."),
-        (["runup", "nu2310", "--solver", "rk4"], "Option --solver does not go with a whole bearing."),
-        (["runup", "nu2310", "--last", "200000"], "must leave the cage at most 300 m/s"),
-        (["compare", "nu2310", "nu2310", "--last", "200000"], "must leave the cage at most 300 m/s"),
-    ],
-)
-def test_refusals(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
-    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
-    assert said in capsys.readouterr().err and not (tmp_path / "out").exists()
+@pytest.mark.wide
+def test_gradient(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    names = ("guidance_gap", "cage_mass+cage_inertia")
+    asked = ["gradient", "nu2310", "--speed", "10000 rpm shaft", "--load", "1 kN", "--designs", "10", "--starts", "1"]
+    asked += ["--by", *names, "--discard", "1", "--revolutions", "2"]
+    found = document(capsys, *asked, "--out", str(tmp_path))
+    model = jc.replace(jc.whole_bearing("nu2310"), load=1000.0)
+    expected = bearing_gradient(model, SPEED, directions=names, designs=10, starts=1, discard=1, revolutions=2)
+    power, each = found["statistics"]["friction_power_W"], expected.statistics["friction_power_W"]
+    assert power["value"] == pytest.approx(each.value, rel=1e-9) and is_png(found["figure"])
+    for i, name in enumerate(names):
+        assert power["by"][name]["elasticity"] == pytest.approx(each.elasticity[i], rel=1e-6)
+        assert power["by"][name]["elasticity_error"] == pytest.approx(each.elasticity_error[i], rel=1e-6)
+
+
+@pytest.mark.wide
+def test_design(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    """Power alone by the gap: a wider gap drags less (Petroff), which the search finds and the check confirms."""
+    asked = ["design", "nu2310", "--speed", "10000 rpm shaft", "--vary", "guidance_gap=0.4mm:0.6mm", "--batch", "4"]
+    asked += ["--ensemble", "2", "--discard", "2", "--revolutions", "2", "--steps", "2"]
+    asked += [x for name in ("wear", "force", "impulse", "slip", "balance") for x in (f"--{name}", "0")]
+    found = document(capsys, *asked, "--out", str(tmp_path))
+    power = found["before_and_after"]["friction_power_W"]
+    assert found["optimum"]["guidance_gap"] > 0.48e-3 and power["known"] and power["change"] < 0
+    rows = found["before_and_after"].values()
+    assert all(np.isfinite([row["before"], row["after"], row["change_error"]]).all() for row in rows)
+
+
+@pytest.mark.wide
+def test_study(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    asked = ["study", "nu2310", "--vary", "speed=9000rpm,5000 rpm cage", "--vary", "load=1kN:2kN:2", "--starts", "1"]
+    asked += ["--discard", "1", "--revolutions", "10", "--out", str(tmp_path)]
+    found = document(capsys, *asked)
+    assert found["axes"] == {"speed": 2, "load": 2, "start": 1} and sum(found["states"].values()) == 4
+    stored = jc.open_study(found["store"])
+    ratio = float(jc.whole_bearing("nu2310").rolling_cage_speed(1.0))
+    np.testing.assert_allclose(stored["speed_rpm"], [9000, 5000 / ratio])
+    again = document(capsys, *asked)
+    assert again["stored_before"] == again["stored"] == 4
+    assert main(["study", "nu2310", "--check", "--out", str(tmp_path)]) == 0
+
+
+@pytest.mark.wide
+def test_report(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    """A page that needs nothing from outside, with what the document says."""
+    asked = ["report", *RANGE, "--count", "2", "--quick", "--revolutions", "10", "--operating", "9000 rpm shaft"]
+    found = document(capsys, *asked, "--out", str(tmp_path))
+    text = pathlib.Path(found["report"]).read_text()
+    assert found["operating_shaft_rpm"] == pytest.approx([9000]) and found["gradient"] is None
+    assert f"{100 * found['measures']['cage_slip']:.2f} %" in text
+    assert text.count("data:image/svg+xml;base64,") == 4 and "http" not in text.replace("http-equiv", "")
+    ids = re.findall('id="([^"]+)"', text)
+    assert len(ids) == len(set(ids)) and set(re.findall('href="#([^"]+)"', text)) <= set(ids)
+
+
+def test_init(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
+    path = tmp_path / "mine.toml"
+    assert json.dumps(document(capsys, "init", str(path), "--model", "bearing")) == json.dumps({"file": str(path)})
+    assert subject_of(path) == "bearing"
+    assert "takes a cage" in refused(capsys, "statics", str(path))
 
 
 def test_speeds_of_the_cage_with_a_turning_outer_ring(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     """The outer ring turns the cage by itself; what it does is neither forgotten nor asked back of the shaft."""
     (path := tmp_path / "planet.toml").write_text('base = "nu2310"\nouter_speed = "1500 rpm"')
-    assert main(["sweep", str(path), "--first", "500 rpm cage", "--out", str(tmp_path / "out")]) == 2
-    assert "--first must be above 898.075 rpm of the cage, which the outer ring makes" in capsys.readouterr().err
+    said = refused(capsys, "sweep", str(path), "--first", "500 rpm cage", "--out", str(tmp_path / "out"))
+    assert "--first must be above 898.075 rpm of the cage" in said
     planet = jc.replace(jc.whole_bearing("nu2310"), outer_speed=float(jc.rpm(1500)))
     ratio = float(planet.rolling_cage_speed(1.0) - planet.rolling_cage_speed(0.0))
     at_rest = float(planet.rolling_cage_speed(0.0)) * 30 / np.pi
     for text in ("1200 rpm cage", f"{(1200 - at_rest) / ratio:.6f} rpm shaft"):
         (at,) = read_operating(text, ratio, "cage", at_rest)
         assert at.low_rpm == pytest.approx(1200, abs=1e-3)
-
-
-@pytest.mark.wide
-def test_the_report(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch):
-    """A page that needs nothing from outside, with what sweep and simulate say."""
-    monkeypatch.setattr(_whole_page, "REVOLUTIONS", 2)
-    monkeypatch.setattr(_whole_page, "DISCARD", 0)
-    monkeypatch.setattr(_whole, "SAMPLES", 32)
-    asked = ["report", "nu2310", "--first", "8000", "--last", "10000", "--count", "2", "--quick", "--discard", "0"]
-    asked += ["--revolutions", "10", "--operating", "9000 rpm shaft", "--json", "--out", str(tmp_path)]
-    assert main(asked) == 0
-    found = json.loads(capsys.readouterr().out)
-    text = pathlib.Path(found["report"]).read_text()
-    assert found["operating_shaft_rpm"] == pytest.approx([9000]) and found["gradient"] is None
-    assert f"{100 * found['measures']['cage_slip']:.2f} %" in text and "At 9000 rpm of the shaft" in text
-    assert text.count("data:image/svg+xml;base64,") == 4 and "http" not in text.replace("http-equiv", "")
-    assert "Spectrum, Cage" in text and "guidance gap C_r between cage and land" in text
-    ids = re.findall('id="([^"]+)"', text)
-    assert len(ids) == len(set(ids)) and set(re.findall('href="#([^"]+)"', text)) <= set(ids)

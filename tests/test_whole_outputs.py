@@ -11,13 +11,11 @@ from test_whole_motion import SPEED, bearing
 import jaxcage as jc
 from jaxcage.analysis import (
     OrderSpectrum,
-    around,
     bearing_history,
     bearing_orders,
     bearing_spectra,
     equivalent_synchronous_force,
     named_lines,
-    pocket_force_distribution,
 )
 from jaxcage.models import rolling_start
 
@@ -48,34 +46,6 @@ def test_pocket_forces_are_those_of_the_second_implementation(run):
         found = complex(*(history.pocket_on_cage[i] + history.land_on_cage[i]))
         assert found == pytest.approx(expected, rel=1e-8)
     assert np.abs(history.pocket_force).max() > 10
-
-
-def test_loads_carry_the_shaft(run):
-    """In the mean the inner raceway bears load and weight of the ring, and rollers in the upper half bear nothing."""
-    model, ran, history = run
-    upward = -(history.inner_load * np.sin(history.roller_angle)).sum(axis=1)
-    heavy = float(model.load + model.ring.ring_mass * model.gravity)
-    assert upward[SAMPLES:].mean() == pytest.approx(heavy, rel=0.02)
-    found = around(history, 12)
-    assert np.all(found.inner_load[1:5] == 0) and found.inner_load[8:10].min() > 1000
-    assert found.inner_sliding[8] < 0.1 * found.inner_sliding[2]
-    with pytest.raises(ValueError, match="bins"):
-        around(history, 1)
-
-
-def test_around_and_distribution_are_of_all_rollers(run):
-    """Weighted with their times, bins make up the whole; quantiles ascend to the largest."""
-    _, _, history = run
-    found = around(history, 9)
-    weight = np.broadcast_to(np.gradient(history.time)[:, None], history.pocket_force.shape)
-    where = np.floor(np.mod(history.roller_angle, 2 * np.pi) * 9 / (2 * np.pi)).astype(int)
-    time = np.array([weight[where == k].sum() for k in range(9)])
-    total = ((found.driving_force + found.braking_force) * time).sum()
-    assert total == pytest.approx((weight * np.abs(history.pocket_force)).sum(), rel=1e-12)
-    shares = pocket_force_distribution(history)
-    quantiles = [v for k, v in shares.items() if k.startswith("q")]
-    assert 0.01 < shares["contact_share"] < 0.9
-    assert quantiles == sorted(quantiles) and quantiles[-1] <= np.abs(history.pocket_force).max()
 
 
 def test_impulse_wear_and_torque_are_integrals(run):
@@ -121,15 +91,6 @@ def test_the_synchronous_force_of_a_known_one(run):
     x, y, error = equivalent_synchronous_force(dataclasses.replace(ran, time=time, integrals=integrals))
     assert (x, y) == (pytest.approx(7.0, rel=1e-9), pytest.approx(0.0, abs=1e-9))
     assert error == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_synchronous_force_of_a_run(run):
-    """The quadrature against the samples, which are coarse."""
-    _, ran, history = run
-    x, y, error = equivalent_synchronous_force(ran)
-    rough = 2 * np.abs((history.pocket_on_cage[1:] * np.exp(-1j * history.angle[1:, None])).mean(axis=0))
-    assert error > 0 and np.all(np.abs(rough - [x, y]) < 15)
-    assert np.isnan(equivalent_synchronous_force(beginning(ran, SAMPLES + 1))[2])
 
 
 def beginning(found, n):

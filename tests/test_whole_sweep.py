@@ -1,51 +1,47 @@
 """Sweeps of the whole bearing: lanes against single runs, exponents against two runs, failures, symmetry."""
 
-from typing import Any
-
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from matplotlib.patches import Circle, FancyArrowPatch
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
-from jaxcage.analysis import around, bearing_history
-from jaxcage.models import INTEGRATED, bodies_of, rollers_of, rolling_start, state_scale
-from jaxcage.plotting import (
-    bearing_figure,
-    bearing_map_figure,
-    bearing_sweep_figure,
-    bearings_beside,
-    over_shaft_speed,
-)
-from jaxcage.solve import FINISHED, NOT_FINITE, OUTSIDE, Lanes
+from jaxcage.models.whole import BearingState, rolling_start, state_scale
+from jaxcage.solve import FINISHED, SAMPLES, SPACING, STALLED, Bearings, limits_of
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
 
 
-def run_samples(model, states, samples, tolerance, direction=None, **more):
-    """Lanes of one bearing at one speed from sample to sample; their first states in units of the scale too."""
-    lanes, every = Lanes.of([model], np.full(len(states), SPEED)), np.arange(len(states))
-    y = np.array([[*state.row, *state.clock, *np.zeros(len(INTEGRATED))] for state in states])
-    y = y / lanes.begin(every, y)[0]
-    method, tangents = jc.native(tolerance), None
-    if direction is not None:
-        tangents = np.tile(direction, (len(y), 1, 1))
-    engine = lanes.engine(0 if direction is None else 1, method, 16)
-    numbers = lanes.numbers(engine, every)
-    return engine(numbers, y, samples, samples, method, tangents=tangents, **{"step": 1e-4} | more), y
+def lanes_of(model, states):
+    """Lanes of one bearing at one speed, and its states in units of the scale."""
+    scale = state_scale(model, jnp.asarray(SPEED))
+    scale = scale._replace(rollers=scale.rollers[:, 0])
+    scale = jax.tree.map(lambda x: np.stack([x] * len(states), axis=-1), scale)
+    at = model.at_speed(jnp.asarray(SPEED))
+    slowest = np.full(len(states), STALLED * abs(float(at.rolling_cage_speed)))
+    bearings = Bearings(at, scale, slowest, over_angle=True)
+    return bearings, bearings.packed(np.arange(len(states)), jax.tree.map(lambda *x: np.stack(x), *states))
+
+
+def run_samples(bearings, y, samples, tolerance, direction=None):
+    """The lanes from sample to sample."""
+    tangents = None if direction is None else np.tile(direction, (len(y), 1))
+    options = dict(tangents=tangents, step=1e-4)
+    return bearings.run(np.arange(len(y)), y, SPACING, samples, samples, tolerance, limits_of(1.0), **options)
 
 
 def in_units(model, state):
     """A state over its magnitudes, in one row as the engine has it."""
-    return np.asarray(state.row) / np.asarray(state_scale(model, jnp.asarray(SPEED)).row)
+    unit = state_scale(model, jnp.asarray(SPEED))
+    return np.concatenate([np.ravel((state.rollers / unit.rollers).T), state.bodies / unit.bodies])
 
 
 @pytest.fixture(scope="module")
 def start():
     """A state with contacts of all kinds: a revolution on from the cage near its lowest place."""
-    return jc.simulate(bearing(), SPEED, revolutions=1, samples=32).last
+    return jc.simulate_bearing(bearing(), SPEED, revolutions=1, samples=32).last
 
 
 def along():
@@ -57,59 +53,32 @@ def along():
 def test_a_lane_is_a_simulation(start):
     """From one state over an eighth of a revolution, both by tight steps."""
     model = bearing()
-    ran, _ = run_samples(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)], 2, 1e-9, along())
-    run = jc.simulate(model, SPEED, revolutions=1, samples=32, start=start, method=jc.native(1e-9, 1e-2))
+    bearings, y = lanes_of(model, [start, rolling_start(model, SPEED, 1), rolling_start(model, SPEED)])
+    ran = run_samples(bearings, y, 2, 1e-9, along())
+    run = jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=start, tolerance=1e-9)
+    k = 2 * 32 // SAMPLES
+    expected = BearingState(jnp.asarray(run.rollers[k]), jnp.asarray(run.bodies[k]), jnp.zeros(2))
     assert np.all(ran.mark == FINISHED) and run.outcome == "successful"
-    unit = np.asarray(state_scale(model, SPEED).row)
-    moved = np.abs(run.state[4] / unit - in_units(model, start)).max()
-    assert np.abs(ran.strobe[0, :, :74] - run.state[2:5:2] / unit).max() < 1e-5 < 1e-2 < moved
-    angle, seconds, *integrals = ran.state[0, 74:]
-    assert angle == pytest.approx(float(run.angle[4]), abs=1e-12) and seconds == pytest.approx(run.time[4], rel=1e-8)
-    np.testing.assert_allclose(integrals, run.integrals[4, 2:] - run.integrals[0, 2:], rtol=1e-6, atol=1e-9)
-    largest = ran.peaks[0].max(axis=0)
-    np.testing.assert_allclose(largest[1:4], run.peaks[:4].max(axis=0)[1:4], rtol=1e-3)
-
-
-@pytest.mark.wide
-def test_rates_in_machine_code_are_those_of_the_model(start):
-    """A step so short that it is the rate: beside the field that JAX evaluates."""
-    model, h = bearing(), 1e-7
-    states = [start, rolling_start(model, SPEED, 1)]
-    ran, y = run_samples(model, states, 1, 1e-3, step=h, turn=h)
-    found = ran.state[:, :74]
-    rates = [model.at_speed(jnp.asarray(SPEED)).rates(s) for s in states]
-    for row, before, rate in zip(found, y, rates, strict=True):
-        expected = in_units(model, rate.state) / abs(float(rate.state.clock[0]))
-        np.testing.assert_allclose((row - before[:74]) / h, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
+    moved = np.abs(in_units(model, expected) - in_units(model, start)).max()
+    apart = np.abs(ran.state[0, :74] - in_units(model, expected)).max()
+    assert apart < 1e-5 < 1e-2 < moved
+    _, _, clock, integrals = bearings.unpacked([0], ran.state[:1])
+    assert clock[0, 1] == pytest.approx(run.time[k], rel=1e-8)
+    np.testing.assert_allclose(integrals[0, :-1], run.integrals[k] - run.integrals[0], rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.wide
 def test_growth_is_that_of_the_distance_of_two_runs(start):
     """Over an eighth of a revolution, the logarithm of the tangent's length against runs a little apart."""
     model, direction, little = bearing(), along(), 1e-7
-    unit = np.asarray(state_scale(model, SPEED).row) * little * direction
-    moved = lambda sign: start._replace(
-        rollers=start.rollers + sign * rollers_of(unit), bodies=start.bodies + sign * bodies_of(unit)
-    )
-    ran, _ = run_samples(model, [start, moved(1), moved(-1)], 2, 1e-9, direction)
+    bearings, y = lanes_of(model, [start] * 3)
+    y[1, :74] += little * direction
+    y[2, :74] -= little * direction
+    ran = run_samples(bearings, y, 2, 1e-9, direction)
     apart = np.linalg.norm(ran.state[1, :74] - ran.state[2, :74])
     expected = np.log(apart / (2 * little * np.linalg.norm(direction)))
     assert abs(expected) > 0.1
     assert ran.growth[0].sum() - np.log(np.linalg.norm(direction)) == pytest.approx(expected, abs=2e-3)
-
-
-@pytest.mark.wide
-def test_a_lane_that_fails_leaves_its_neighbours_as_they_are(start):
-    """Beside a cage that hardly turns, and one that starts with no number, a lane is bit for bit what it is alone."""
-    model = bearing()
-    stalled = rolling_start(model, SPEED, turning=0.01)
-    broken = start._replace(rollers=start.rollers.at[1, 4].set(jnp.nan))
-    ran, alone = (
-        run_samples(model, [start, *others], 1, 1e-5, along())[0] for others in ((stalled, broken), (start, start))
-    )
-    assert list(ran.mark) == [FINISHED, OUTSIDE, NOT_FINITE]
-    np.testing.assert_array_equal(ran.state[0], alone.state[0])
-    assert ran.growth[0] == alone.growth[0] and np.isfinite(ran.growth[0])
 
 
 @pytest.mark.wide
@@ -118,38 +87,6 @@ def test_slow_shafts_run_through():
     how = dict(starts=1, discard=1, revolutions=1, blocks=1)
     found = jc.sweep_bearing(bearing(), jc.rpm(1000.0), **how)
     assert found.outcome[0, 0] == "successful" and found.error[0, 0] < 0.05 and found.exponent[0, 0] > 50
-
-
-@pytest.mark.wide
-def test_rollers_have_no_names():
-    """With a balanced cage, a start with its rollers and its angle moved on by one pocket is the same motion."""
-    model = bearing(eccentricity=0.0)
-    start, turn = rolling_start(model, SPEED, 1), 2 * np.pi / 13
-    renamed = lambda state: state._replace(rollers=jnp.roll(state.rollers, -1, axis=1))
-    rolled = renamed(start)._replace(clock=start.clock + jnp.asarray([turn, 0.0]))
-    ran, _ = run_samples(model, [start, rolled, start], 1, 1e-6, along())
-    one, other = (row[:74].copy() for row in ran.state[:2])
-    moved = np.concatenate([np.roll(one[:65].reshape(13, 5), -1, axis=0).ravel(), one[65:]])
-    assert np.abs(moved - other).max() < 1e-8
-    assert np.abs(one - other).max() > 1e-3
-    np.testing.assert_allclose(ran.peaks[0, 0], ran.peaks[1, 0], rtol=1e-6)
-
-
-@pytest.mark.wide
-def test_exponents_of_the_last_revolutions():
-    """Followed over four of 16, all else over all; means are those of a run that follows them from the beginning."""
-    options: Any = dict(starts=1, discard=0, revolutions=16, blocks=16, tolerance=1e-4)
-    few = jc.sweep_bearing(bearing(), SPEED, exponent_revolutions=4, **options)
-    every = jc.sweep_bearing(bearing(), SPEED, exponent_revolutions=16, **options)
-    shapes = [{name: x.shape[-1] for name, x in found.block_means.items()} for found in (few, every)]
-    assert shapes[0].pop("exponent") == 4 and shapes[1].pop("exponent") == 16
-    assert shapes[0] == shapes[1] and set(shapes[0].values()) == {16}
-    late = every.block_means["exponent"][..., 4:]
-    assert few.exponent[0, 0] == pytest.approx(late.mean(), abs=4 * late.std() / np.sqrt(4))
-    assert few.friction_power_W[0, 0] == pytest.approx(every.friction_power_W[0, 0], rel=0.05)
-    assert jc.io.bearing_dataset(few)["exponent_blocks"].sizes["exponent_block"] == 4
-    with pytest.raises(ValueError, match="exponent_revolutions"):
-        jc.sweep_bearing(bearing(), SPEED, exponent_revolutions=0, **options)
 
 
 @pytest.fixture(scope="module")
@@ -165,15 +102,7 @@ def test_a_lane_that_fails_spoils_no_other(swept):
     model, starts, both = swept
     assert list(both.outcome[0]) == ["successful", "outside"] and both.state[0, 1] == "failed"
     alone = jc.sweep_bearing(model, SPEED, starts=starts[:1], **SHORT)
-    for name in (
-        "cage_slip",
-        "pocket_force_max_N",
-        "friction_power_W",
-        "whirl_ratio",
-        "exponent",
-        "error",
-        "last_bodies",
-    ):
+    for name in ("cage_slip", "pocket_force_max_N", "friction_power_W", "whirl_ratio", "exponent", "error"):
         good, bad = getattr(both, name)[0]
         np.testing.assert_array_equal(good, getattr(alone, name)[0, 0])
         assert np.all(np.isnan(bad)) and np.all(np.isfinite(good))
@@ -183,7 +112,7 @@ def test_a_lane_that_fails_spoils_no_other(swept):
 def run(swept):
     """The lane that does not fail by itself."""
     model, starts, _ = swept
-    return jc.simulate(model, SPEED, revolutions=1, samples=32, start=starts[0])
+    return jc.simulate_bearing(model, SPEED, revolutions=1, samples=32, start=starts[0])
 
 
 def test_measures_of_a_sweep_are_those_of_a_run(swept, run):
@@ -197,42 +126,6 @@ def test_measures_of_a_sweep_are_those_of_a_run(swept, run):
     assert both.eccentricity_std[0, 0] == pytest.approx(expected.eccentricity_std, rel=0.1)
     for name in ("pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h"):
         assert getattr(both, name)[0, 0] == pytest.approx(getattr(expected, name), rel=0.05)
-
-
-def test_a_sweep_is_drawn_with_the_lane_that_failed(swept):
-    """A line for each start, the numbers of the sweep on it; beside another bearing the mean of those that ended."""
-    _, _, both = swept
-    figure = bearing_sweep_figure(both, "two starts")
-    slip, power = figure.axes[0], figure.axes[3]
-    assert [len(ax.lines) for ax in figure.axes] == [2] * 6
-    np.testing.assert_allclose([line.get_ydata() for line in slip.lines], 100 * both.cage_slip.T)
-    assert list(power.lines[0].get_ydata()) == list(both.friction_power_W[:, 0])
-    beside = bearings_beside(["a", "b"], [both, both])
-    first, second = beside.axes[0].lines
-    for line in (first, second):
-        assert np.asarray(line.get_ydata())[0] == pytest.approx(100 * both.cage_slip[0, 0])
-    assert len(bearings_beside([*"abcdefg"], [both] * 7).axes[0].lines) == 7  # more than there are colours
-    many = over_shaft_speed(both, np.tile(both.cage_slip, 4), "Cage slip")
-    assert len(many.lines) == 8
-    over = bearing_map_figure([both, both], np.array([1.0, 10.0]), "a parameter", logarithmic=True)
-    cells = np.ravel(np.asarray(over.axes[0].collections[0].get_array(), float))
-    np.testing.assert_allclose(cells, 100 * np.tile(both.cage_slip[:, 0], 2))
-
-
-def test_the_bearing_is_drawn_to_scale(swept, run):
-    """Circles of the rollers' size at their places, an arrow for each force of note, at the sample of the largest."""
-    model, *_ = swept
-    history = bearing_history(model, run, SPEED)
-    figure = bearing_figure(model, run, history, around(history), {}, {})
-    drawing, (over_time,) = figure.axes[0], [ax for ax in figure.axes if ax.get_ylabel() == "Force [N]"]
-    rollers = [p for p in drawing.patches if isinstance(p, Circle)]
-    assert len(rollers) == 13 and {p.radius for p in rollers} == {500 * float(model.bearing.roller_diameter)}
-    worst = int(np.abs(history.pocket_force).max(axis=1).argmax())
-    np.testing.assert_allclose([np.hypot(*p.center) for p in rollers], 1e3 * run.rollers[worst, 2])
-    forces = np.abs(history.pocket_force[worst])
-    arrows = [p for p in drawing.patches if isinstance(p, FancyArrowPatch)]
-    assert len(arrows) == np.sum(forces >= 0.01 * forces.max())
-    assert over_time.lines[0].get_ydata().max() == forces.max()
 
 
 def test_what_cannot_be_swept():

@@ -10,6 +10,7 @@
 | `zones`       | zones and both kinds of edge; stretches of speed with the same labels                |
 | `spectra`     | amplitude spectra by order of speed                                                  |
 | `equilibrium` | equilibrium of the cage in its film, dynamic coefficients, whirl threshold           |
+| `rollers`     | rollers of a whole bearing along a time history, over time and around the bearing    |
 | `measures`    | whirl ratio, displacement, film, forces, impulse, drag of a motion                   |
 """
 
@@ -18,13 +19,11 @@ from .equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,
     attitude_angle as attitude_angle,
-    dimensional as dimensional,
     eccentricity_ratio as eccentricity_ratio,
     equilibrium as equilibrium,
     film_coefficients as film_coefficients,
     film_whirl_speed as film_whirl_speed,
     load_number as load_number,
-    stability_chart as stability_chart,
     whirl_threshold as whirl_threshold,
 )
 from .escapes import (
@@ -57,6 +56,17 @@ from .measures import (
     film_drag_power as film_drag_power,
     measures as measures,
     relative_state as relative_state,
+)
+from .rollers import (
+    Around as Around,
+    NamedLine as NamedLine,
+    RollerHistory as RollerHistory,
+    around as around,
+    bearing_orders as bearing_orders,
+    bearing_spectra as bearing_spectra,
+    named_lines as named_lines,
+    pocket_force_distribution as pocket_force_distribution,
+    roller_history as roller_history,
 )
 from .spectra import (
     OrderSpectrum as OrderSpectrum,
@@ -99,6 +109,6 @@ from .zones import (
 
 check_layer(
     globals(),
-    "cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
-    "measures order_spectrum stability_chart survival zones",
+    "around cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
+    "measures order_spectrum survival zones",
 )

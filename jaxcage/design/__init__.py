@@ -1,96 +1,105 @@
-"""Designs chosen by what they do to the zones.
+"""Designs: objectives, statistics, slopes and searches, chances and identification of unknown parameters.
 
-| module      | responsibility                                                               |
-|-------------|------------------------------------------------------------------------------|
-| `_objective`| design space, objectives that add up, manufacturing scatter                   |
-| `_smooth`   | manufacturing cost, measures of regular motion                                |
-| `_edges`    | exact objectives: widths of zones, distances from edges, margins of stability |
-| `_width`    | widths between edges of any kind, and how they answer to the design           |
-| `_lasting`  | edges of lasting chaos with their gradients, by survival regression          |
-| `_chaos`    | chaotic widths and shares                                                     |
-| `_bearing_gradient` | slip, impulses, wear and power of the whole bearing by its parameters |
-| `_bearing_sensitivity` | Sobol indices and tolerance budgets of its measures               |
-| `_bearing_design` | the whole bearing's wear, forces, power and slip as an objective, before and after |
-| `_land`     | wear load and peak force of the guiding land                                  |
-| `_optimise` | designs made better by gradient                                               |
-| `_surrogate` | designs made better without slopes, by a Gaussian process; the best judged anew |
-| `_kept`     | the state of a search in a file                                              |
-| `_scatter`  | Sobol indices, tolerance budgets                                              |
+| module           | responsibility                                                                          |
+|------------------|-----------------------------------------------------------------------------------------|
+| `objective`      | design space, objectives that add up, manufacturing scatter                             |
+| `statistics`     | chaotic speeds, quantities, loads of designs, read off one sweep; two designs compared  |
+| `loads`          | loads of the guiding land, size and whirl of the motion                                 |
+| `edges`          | exact objectives: edges that are followed, margins of stability                         |
+| `lasting`        | edges of lasting chaos with their gradients, by survival regression                     |
+| `widths`         | widths of zones between edges of any kind                                               |
+| `slopes`         | slopes of statistics by paired designs                                                  |
+| `shares`         | Sobol indices, tolerance budgets                                                        |
+| `optimisation`   | searches by gradient and by a Gaussian process                                          |
+| `checkpoint`     | the state of a search in a file                                                         |
+| `chances`        | chances of chaos of a cage that is known within ranges only                             |
+| `identification` | ranges narrowed by measurements                                                         |
 """
 
 from .._arguments import check_layer
-from ._bearing_design import (
-    CAGE_PARAMETERS as CAGE_PARAMETERS,
-    COMPARED as COMPARED,
-    OBJECTIVE as OBJECTIVE,
-    TERMS as TERMS,
-    BearingObjective as BearingObjective,
-    BearingRuns as BearingRuns,
-    BeforeAfter as BeforeAfter,
-    bearing_objective as bearing_objective,
-    before_and_after as before_and_after,
-    usual_bounds as usual_bounds,
+from .chances import (
+    ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
+    REVOLUTIONS as REVOLUTIONS,
+    Band as Band,
+    Clue as Clue,
+    Ensemble as Ensemble,
+    binomial_interval as binomial_interval,
+    chaotic_shares as chaotic_shares,
+    draw as draw,
+    ensemble as ensemble,
+    verdict_of as verdict_of,
 )
-from ._bearing_gradient import (
-    DIRECTIONS as DIRECTIONS,
-    STATISTICS as STATISTICS,
-    BearingGradient as BearingGradient,
-    StatisticGradient as StatisticGradient,
-    bearing_gradient as bearing_gradient,
-    gradient_of_pairs as gradient_of_pairs,
-)
-from ._bearing_sensitivity import (
-    BEARING_MEASURES as BEARING_MEASURES,
-    BearingBudget as BearingBudget,
-    bearing_budget as bearing_budget,
-    bearing_measure as bearing_measure,
-    bearing_sensitivity as bearing_sensitivity,
-)
-from ._chaos import ChaosMeasure as ChaosMeasure, chaotic_share as chaotic_share, chaotic_width as chaotic_width
-from ._edges import (
-    EdgeClearance as EdgeClearance,
-    FollowedEdges as FollowedEdges,
-    StabilityMargin as StabilityMargin,
-    zone_width as zone_width,
-)
-from ._land import (
-    MEASURES as MEASURES,
-    LandMeasure as LandMeasure,
+from .edges import EdgeClearance as EdgeClearance, FollowedEdges as FollowedEdges, StabilityMargin as StabilityMargin
+from .identification import Narrowed as Narrowed, identify as identify, misses as misses, narrow as narrow
+from .lasting import LastingEdge as LastingEdge, lasting_edge as lasting_edge, lasting_edges as lasting_edges
+from .loads import (
+    LAND_LOADS as LAND_LOADS,
+    Motion as Motion,
+    averages as averages,
     land_loads as land_loads,
+    motions as motions,
     negligible_load as negligible_load,
 )
-from ._lasting import (
-    LastingEdge as LastingEdge,
-    lasting_edge as lasting_edge,
-    lasting_edges as lasting_edges,
-)
-from ._objective import (
+from .objective import (
+    COSTS as COSTS,
     AbstractObjective as AbstractObjective,
     DesignSpace as DesignSpace,
     Measured as Measured,
+    Price as Price,
     Robust as Robust,
     Scatter as Scatter,
     Smooth as Smooth,
+    cost as cost,
     rayleigh as rayleigh,
     uniform as uniform,
 )
-from ._optimise import Optimised as Optimised, optimise as optimise
-from ._scatter import (
+from .optimisation import (
+    UNCONFIRMED as UNCONFIRMED,
+    Optimised as Optimised,
+    Optimum as Optimum,
+    SurrogateSearch as SurrogateSearch,
+    confirmed as confirmed,
+    optimise as optimise,
+    surrogate_search as surrogate_search,
+    unchanged as unchanged,
+)
+from .shares import (
     SobolIndices as SobolIndices,
     ToleranceBudget as ToleranceBudget,
     global_sensitivity as global_sensitivity,
     sobol_of as sobol_of,
     tolerance_budget as tolerance_budget,
 )
-from ._smooth import COSTS as COSTS, Price as Price, cost as cost, regular_motion as regular_motion
-from ._surrogate import (
-    UNCONFIRMED as UNCONFIRMED,
-    SurrogateSearch as SurrogateSearch,
-    judged as judged,
-    surrogate_search as surrogate_search,
-    unchanged as unchanged,
+from .slopes import (
+    DIRECTIONS as DIRECTIONS,
+    MeanGradient as MeanGradient,
+    StatisticGradient as StatisticGradient,
+    gradient_of_pairs as gradient_of_pairs,
+    mean_gradient as mean_gradient,
 )
-from ._width import SolvedEdge as SolvedEdge, ZoneWidth as ZoneWidth
+from .statistics import (
+    BALANCE as BALANCE,
+    BEARING_MEASURES as BEARING_MEASURES,
+    CAGE_PARAMETERS as CAGE_PARAMETERS,
+    COMPARED as COMPARED,
+    OBJECTIVE as OBJECTIVE,
+    STATISTICS as STATISTICS,
+    TERMS as TERMS,
+    BeforeAfter as BeforeAfter,
+    Chaos as Chaos,
+    LandLoad as LandLoad,
+    Mean as Mean,
+    Runs as Runs,
+    bearing_objective as bearing_objective,
+    before_and_after as before_and_after,
+    chaotic_share as chaotic_share,
+    chaotic_width as chaotic_width,
+    measure as measure,
+    relative as relative,
+    statistic as statistic,
+    usual_bounds as usual_bounds,
+)
+from .widths import SolvedEdge as SolvedEdge, ZoneWidth as ZoneWidth, zone_width as zone_width
 
 
-check_layer(globals(), "bearing_gradient global_sensitivity optimise tolerance_budget")
+check_layer(globals(), "global_sensitivity mean_gradient optimise tolerance_budget")

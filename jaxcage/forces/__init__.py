@@ -21,7 +21,6 @@ from .contact import (
     ContactForce as ContactForce,
     LandContact as LandContact,
     contact_force as contact_force,
-    contact_slopes as contact_slopes,
     restitution_damping as restitution_damping,
 )
 from .elementary import (
@@ -31,7 +30,6 @@ from .elementary import (
     root_9 as root_9,
     smooth_norm as smooth_norm,
     smooth_plus as smooth_plus,
-    smooth_plus_slope as smooth_plus_slope,
 )
 from .film import (
     FilmForce as FilmForce,
@@ -77,7 +75,6 @@ from .law import (
     Force as Force,
     Land as Land,
     Motion as Motion,
-    Rows as Rows,
 )
 from .rib import ElasticRib as ElasticRib, RigidRib as RigidRib, rib_force as rib_force
 from .support import (
@@ -85,7 +82,6 @@ from .support import (
     cross_force as cross_force,
     cubic_stiffness as cubic_stiffness,
     spring_force as spring_force,
-    support_slopes as support_slopes,
 )
 
 
@@ -95,9 +91,9 @@ LAWS: tuple[type[AbstractLaw], ...] = (RibFilm, LandContact, Support, Synchronou
 
 check_layer(
     globals(),
-    "approach_speed contact_force contact_slopes cross_force cubic_stiffness effective_eccentricity "
+    "approach_speed contact_force cross_force cubic_stiffness effective_eccentricity "
     "film_drive film_pressure film_resistance film_scale fixed_half_resistance full_resistance half_circle_resistance "
     "impact_history impact_time_scale inverse_root power_10_9 pulse_spectrum pulse_train pulse_train_force "
-    "restitution_damping rib_force root_9 short_film_force smooth_norm smooth_plus smooth_plus_slope spring_force "
-    "supply_force support_slopes synchronous_amplitude synchronous_force unbalance_force weight",
+    "restitution_damping rib_force root_9 short_film_force smooth_norm smooth_plus spring_force "
+    "supply_force synchronous_amplitude synchronous_force unbalance_force weight",
 )

@@ -11,8 +11,8 @@ from jaxtyping import Array
 
 from .._parameters import parameter
 from .._types import Scalar
-from .elementary import power_10_9, root_9, smooth_plus, smooth_plus_slope
-from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion, Rows
+from .elementary import power_10_9, smooth_plus
+from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 
 def _restitution_defect(s: Array, e: Array) -> Array:
@@ -49,15 +49,6 @@ def contact_force(penetration: Scalar, rate: Scalar, stiffness: Scalar, damping:
     """
     loading = 1 + damping * rate
     return stiffness * power_10_9(penetration) * smooth_plus(loading, 1e-4)
-
-
-def contact_slopes(penetration: Scalar, rate: Scalar, stiffness: Scalar, damping: Scalar) -> tuple[Array, Array]:
-    """Derivatives of `contact_force` with respect to penetration [N/m] and its rate [N s/m]."""
-    loading = 1 + damping * rate
-    return (
-        stiffness * (10 / 9) * root_9(penetration) * smooth_plus(loading, 1e-4),
-        stiffness * power_10_9(penetration) * smooth_plus_slope(loading, 1e-4) * damping,
-    )
 
 
 class LandContact(AbstractLaw):
@@ -118,19 +109,3 @@ class ContactForce(AbstractForce):
         rate = at.nx * at.vx + at.ny * at.vy
         normal = contact_force(c * at.excess, c * rate, self.stiffness, self.damping)
         return -normal * at.nx, -normal * at.ny, 0.0
-
-    def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
-        """Closed form: a displacement u turns the line of centres n by (u - n n.u)/eps."""
-        at, c = motion.place, motion.land.clearance
-        nx, ny, rate = at.nx, at.ny, at.nx * at.vx + at.ny * at.vy
-        normal = contact_force(c * at.excess, c * rate, self.stiffness, self.damping)
-        stiff, damp = contact_slopes(c * at.excess, c * rate, self.stiffness, self.damping)
-        swing, turn = damp * at.per_eps, normal * motion.land.per_clearance * at.per_eps
-        push = stiff * at.touch - swing * rate
-        of_x, of_y = push * nx + swing * at.vx, push * ny + swing * at.vy
-        xx, xy, yy = nx * nx, nx * ny, ny * ny
-        of_q = (
-            (-nx * of_x - turn * (1 - xx), turn * xy - nx * of_y),
-            (turn * xy - ny * of_x, -ny * of_y - turn * (1 - yy)),
-        )
-        return of_q, ((-damp * xx, -damp * xy), (-damp * xy, -damp * yy))

@@ -47,13 +47,6 @@ def smooth_plus(u: Scalar, width: Scalar) -> Array:
     return jnp.where(u >= width, u, 2 * width * t**4 * (t * (t - 3) + 2.5))
 
 
-def smooth_plus_slope(u: Scalar, width: Scalar) -> Array:
-    """Derivative of `smooth_plus`: the quintic smoothstep from 0 to 1."""
-    require_above_zero(width=width)
-    t = jnp.clip((u + width) * (0.5 / width), 0.0, 1.0)
-    return t**3 * (t * (6 * t - 15) + 10)
-
-
 def smooth_norm(x: Scalar, y: Scalar, length: Scalar) -> Array:
     """sqrt(x^2 + y^2 + length^2): the distance from the origin, differentiable at the origin."""
     return jnp.sqrt(x * x + y * y + length * length)

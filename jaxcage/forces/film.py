@@ -25,7 +25,7 @@ from .._arguments import require_above_zero, require_at_least
 from .._parameters import choice, count, parameter
 from .._types import Scalar
 from .elementary import inverse_root, smooth_norm
-from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion, Rows
+from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 
 Vector = tuple[Scalar, Scalar]
@@ -52,32 +52,23 @@ def film_scale(viscosity: Scalar, radius: Scalar, width: Scalar, clearance: Scal
     return jnp.asarray(viscosity * radius * width * (width / clearance) ** 2)
 
 
-class FixedArc(NamedTuple):
-    """Parts of M of a fixed arc: M = isotropic I + radial r r^T - skew (n r'^T + r' n^T) with r' = (-y, x)."""
-
-    inverse: Scalar
-    """1 / (1 - eps^2)."""
-    isotropic: Scalar
-    radial: Scalar
-    skew: Scalar
-
-
-def fixed_arc(model: FilmModel, square: Scalar) -> FixedArc:
-    """The parts of M for the fixed half circle or the whole one, at the square of the eccentricity ratio."""
+def _arc_parts(half: bool, square: Scalar) -> tuple[Scalar, Scalar]:
+    """1/(1 - eps^2), and the isotropic part of M over half the circle or the whole one, at the square of eps."""
     inverse = 1 / (1 - square)
-    half = model == "fixed_half"
-    isotropic = (jnp.pi / 2 if half else jnp.pi) * inverse * jnp.sqrt(inverse)
-    return FixedArc(inverse, isotropic, 3 * isotropic * inverse, 2 * inverse * inverse if half else 0 * inverse)
+    return inverse, (jnp.pi / 2 if half else jnp.pi) * inverse * jnp.sqrt(inverse)
 
 
 def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance:
     """M over the half circle that trails the line of centres (alpha from 0 to pi), as in (27).
 
+    With r' = (-y, x) it is isotropic I + radial r r^T - skew (n r'^T + r' n^T).
+
     **Arguments:** position over clearance, and its direction as a unit vector, regularised where the arc loses it (at
     the centre).
     """
     nx, ny = direction
-    _, isotropic, radial, skew = fixed_arc("fixed_half", x * x + y * y)
+    inverse, isotropic = _arc_parts(True, x * x + y * y)
+    radial, skew = 3 * isotropic * inverse, 2 * inverse * inverse
     return Resistance(
         isotropic + radial * x * x + 2 * skew * nx * y,
         radial * x * y - skew * (nx * x - ny * y),
@@ -87,7 +78,8 @@ def fixed_half_resistance(x: Scalar, y: Scalar, direction: Vector) -> Resistance
 
 def full_resistance(x: Scalar, y: Scalar) -> Resistance:
     """M over the whole circle: pressure of both signs (full Sommerfeld condition)."""
-    _, isotropic, radial, _ = fixed_arc("full", x * x + y * y)
+    inverse, isotropic = _arc_parts(False, x * x + y * y)
+    radial = 3 * isotropic * inverse
     return Resistance(isotropic + radial * x * x, radial * x * y, isotropic + radial * y * y)
 
 
@@ -244,51 +236,3 @@ class FilmForce(AbstractForce):
         eps = place.eps - place.excess
         torque = self.drag * inverse_root(1 - eps * eps) * (motion.cage_speed - motion.land_speed)
         return fx + self.supply_scale * thrust[0], fy + self.supply_scale * thrust[1], -torque
-
-    def slopes(self, motion: Motion) -> tuple[Rows, Rows] | None:
-        """Closed form for a fixed arc.
-
-        A displacement u turns the line of centres n by dn = (u - n n.u)/eps and t = (-n_y, n_x), across it, by as much.
-        """
-        if self.model == "positive_pressure":
-            return None
-        place, per_c, omega = motion.place, motion.land.per_clearance, motion.cage_speed + motion.land_speed
-        nx, ny, per_eps = place.nx, place.ny, place.per_eps
-        px, py = film_drive(place.x, place.y, place.vx, place.vy, omega)
-        p_n, p_t = nx * px + ny * py, nx * py - ny * px
-        # The film is at w n, shorter than the cage's place by the excess, and than w by the length that rounds n off.
-        w, open_, length = place.eps - place.excess, 1 - place.touch, nx * nx + ny * ny
-        inverse, isotropic, radial, skew = fixed_arc(self.model, w * w * length)
-        steep = w * (w * (1 - length) * per_eps + length * open_)  # half of the square's derivative along n
-        # M P = isotropic P + b n p_n - g (n p_t + t p_n)
-        b, g = radial * w * w, skew * w
-        d_b, d_g = radial * w * (5 * inverse * steep * w + 2 * open_), skew * (4 * inverse * steep * w + open_)
-        of_pn = ((px - p_n * nx) * per_eps - omega * ny, (py - p_n * ny) * per_eps + omega * nx)
-        of_pt = ((py - p_t * nx) * per_eps - omega * nx, (-px - p_t * ny) * per_eps - omega * ny)
-        along_n, along_t = d_b * p_n - d_g * p_t, d_g * p_n
-        of_n = [along_n * n + b * x - g * y for n, x, y in zip((nx, ny), of_pn, of_pt, strict=True)]
-        of_t = [along_t * n + g * x for n, x in zip((nx, ny), of_pn, strict=True)]
-        half = -self.scale / 2 * per_c
-        thrust = 2 * self.supply_scale * per_c if self.model == "fixed_half" else 0.0
-        swelling, turning = radial * steep, (b * p_n - g * p_t) * per_eps
-        across = (thrust - half * g * p_n) * per_eps
-        shear = isotropic * omega
-        of_q = (
-            (
-                half * (swelling * px * nx + turning * (1 - nx * nx) + nx * of_n[0] + ny * of_t[0]) + across * nx * ny,
-                half * (swelling * px * ny + shear - turning * nx * ny + nx * of_n[1] + ny * of_t[1])
-                - across * (1 - ny * ny),
-            ),
-            (
-                half * (swelling * py * nx - shear - turning * nx * ny + ny * of_n[0] - nx * of_t[0])
-                + across * (1 - nx * nx),
-                half * (swelling * py * ny + turning * (1 - ny * ny) + ny * of_n[1] - nx * of_t[1]) - across * nx * ny,
-            ),
-        )
-        drag, skewed = 2 * half, 2 * g * nx * ny
-        xy = drag * (b * nx * ny - g * (nx * nx - ny * ny))
-        of_v = (
-            (drag * (isotropic + b * nx * nx + skewed), xy),
-            (xy, drag * (isotropic + b * ny * ny - skewed)),
-        )
-        return of_q, of_v

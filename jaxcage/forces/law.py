@@ -9,10 +9,9 @@ import abc
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
-import jax
 
 from .._types import Scalar
-from .elementary import smooth_norm, smooth_plus, smooth_plus_slope
+from .elementary import smooth_norm, smooth_plus
 
 
 Force = tuple[Scalar, Scalar, Scalar]
@@ -21,8 +20,6 @@ Force = tuple[Scalar, Scalar, Scalar]
 The speed of the cage is prescribed: moments do not change its motion. They are reported
 (`jaxcage.analysis.cage_moments`), and times the speed they are the power that drives the cage.
 """
-Rows = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
-"""A 2 x 2 matrix, e.g. of the derivatives of (F_x, F_y)."""
 
 
 class Place(NamedTuple):
@@ -43,8 +40,6 @@ class Place(NamedTuple):
     """Distance of eps from the onset of contact, negative before it."""
     excess: Scalar
     """The same distance, smoothly cut off at 0."""
-    touch: Scalar
-    """Derivative of the excess with respect to eps."""
 
 
 class Land(eqx.Module):
@@ -66,8 +61,8 @@ class Land(eqx.Module):
         x, y, vx, vy = x * per_c, y * per_c, vx * per_c, vy * per_c
         eps = smooth_norm(x, y, self.centre_width)
         per_eps, gap = 1 / eps, eps - self.onset
-        excess, touch = smooth_plus(gap, self.onset_width), smooth_plus_slope(gap, self.onset_width)
-        return Place(x, y, vx, vy, eps, per_eps, x * per_eps, y * per_eps, gap, excess, touch)
+        excess = smooth_plus(gap, self.onset_width)
+        return Place(x, y, vx, vy, eps, per_eps, x * per_eps, y * per_eps, gap, excess)
 
 
 class Motion(NamedTuple):
@@ -163,28 +158,6 @@ class AbstractForce(AbstractLaw):
     def force(self, motion: Motion) -> Force:
         """(F_x, F_y, moment) on the cage, scalars made with `jax.numpy` or plain arithmetic."""
 
-    def slopes(self, motion: Motion) -> tuple[Rows, Rows] | None:
-        """Derivatives of (F_x, F_y) with respect to position and velocity, as rows; None if they cost too much.
-
-        By forward differentiation unless a law knows better.
-        """
-        q, v = (motion.x, motion.y), (motion.vx, motion.vy)
-
-        def held(q: Any, v: Any) -> tuple[Scalar, Scalar]:
-            return self.force(motion._replace(x=q[0], y=q[1], vx=v[0], vy=v[1]))[:2]
-
-        one, zero = jax.numpy.ones_like(motion.x), jax.numpy.zeros_like(motion.x)
-        along = [(one, zero), (zero, one)]
-        still = (zero, zero)
-        of_q = [jax.jvp(held, (q, v), (e, still))[1] for e in along]
-        of_v = [jax.jvp(held, (q, v), (still, e))[1] for e in along]
-        rows = lambda columns: ((columns[0][0], columns[1][0]), (columns[0][1], columns[1][1]))
-        return rows(of_q), rows(of_v)
-
 
 class AbstractForcing(AbstractForce):
     """A force that depends on the phase alone; it does not react on the rib."""
-
-    def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
-        none = ((0.0, 0.0), (0.0, 0.0))
-        return none, none

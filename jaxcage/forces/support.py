@@ -8,7 +8,7 @@ from jaxtyping import Array
 
 from .._parameters import choice, parameter
 from .._types import Scalar
-from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion, Rows
+from .law import AbstractForce, AbstractLaw, Force, GuidedCage, Motion
 
 
 Cross = Literal["circulatory", "as_printed"]
@@ -30,24 +30,6 @@ def cross_force(cross: Cross, x: Scalar, y: Scalar, linear: Scalar, cubic: Scala
     if cross == "circulatory":
         return jnp.asarray(-linear * y), jnp.asarray(linear * x)
     return jnp.asarray(-(linear * y + cubic * y**3)), jnp.asarray(-(linear * x + cubic * x**3))
-
-
-def support_slopes(
-    cross: Cross,
-    x: Scalar,
-    y: Scalar,
-    stiffness_x: Scalar,
-    stiffness_y: Scalar,
-    cubic: Scalar,
-    linear: Scalar,
-    odd: Scalar,
-) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]:
-    """Derivatives of spring and cross-coupling force with respect to (x, y) [N/m], as rows; `odd` is K'_xy."""
-    r2, mixed = x * x + y * y, 2 * cubic * x * y
-    xx, yy = stiffness_x + cubic * (r2 + 2 * x * x), stiffness_y + cubic * (r2 + 2 * y * y)
-    if cross == "circulatory":
-        return (-xx, -mixed - linear), (linear - mixed, -yy)
-    return (-xx, -mixed - (linear + 3 * odd * y * y)), (-mixed - (linear + 3 * odd * x * x), -yy)
 
 
 def cubic_stiffness(reading: Cubic, absolute: Scalar, relative: Scalar, stiffness: Scalar, clearance: Scalar) -> Array:
@@ -148,8 +130,3 @@ class SupportForce(AbstractForce):
         spring = spring_force(x, y, self.stiffness_x, self.stiffness_y, self.cubic)
         cross = cross_force(self.cross, x, y, self.cross_stiffness, self.cross_cubic)
         return spring[0] + cross[0] - b * motion.vx, spring[1] + cross[1] - b * motion.vy, 0.0
-
-    def slopes(self, motion: Motion) -> tuple[Rows, Rows]:
-        springs = (self.stiffness_x, self.stiffness_y, self.cubic, self.cross_stiffness, self.cross_cubic)
-        b = self.damping
-        return support_slopes(self.cross, motion.x, motion.y, *springs), ((-b, 0.0), (0.0, -b))

@@ -9,6 +9,7 @@
 | `horizon`  | lanes followed until they settle                                                |
 | `run`      | plan and settings to data set; sweeps over speed                                |
 | `dataset`  | the data set with units, words and provenance; zarr                             |
+| `ramps`    | run-up and run-down                                                             |
 | `spread`   | how a parameter is sampled                                                      |
 | `grid`     | grids and samples of parameters, cut into chunks                                |
 | `study`    | lanes over any parameters, stored as they go; maps of labels                    |
@@ -27,7 +28,13 @@ from .dataset import (
 )
 from .grid import OIL as OIL, Grid as Grid, with_values as with_values
 from .observe import Progress as Progress
-from .plan import Plan as Plan, Speeds as Speeds, States as States, rpm as rpm
+from .plan import Plan as Plan, Speeds as Speeds, States as States, initial_states as initial_states, rpm as rpm
+from .ramps import (
+    apart as apart,
+    ramp_revolutions as ramp_revolutions,
+    ramp_up_down as ramp_up_down,
+    stretches_apart as stretches_apart,
+)
 from .run import run_lanes as run_lanes, run_up_down as run_up_down, sweep as sweep
 from .settings import Run as Run
 from .spread import Between as Between, Spread as Spread, Tolerance as Tolerance

@@ -28,6 +28,7 @@ from jaxtyping import Float, Shaped
 
 from .._errors import InputError
 from ..analysis import LABELS, scatter
+from ..files import configuration, replacing
 from ..models import AbstractForcedSystem
 from ..quantities import Quantity, averaged, quantity
 from ..solve import OUTCOMES, AbstractMethod
@@ -142,8 +143,6 @@ def _attributes(found: Found) -> dict[str, Any]:
 
 def configuration_of(model: AbstractForcedSystem) -> dict[str, Any] | None:
     """The TOML configuration of a model as a nested mapping; None where no file can hold it."""
-    from ..io import configuration  # the tables of configurations are loaded when they are needed
-
     try:
         return configuration(model)
     except InputError:
@@ -186,8 +185,6 @@ def decoded(found: xr.Dataset) -> xr.Dataset:
 
 def save(path: str | Path, found: xr.Dataset) -> Path:
     """Write a data set to the zarr folder `path`, whole or not at all; an earlier result stays until then."""
-    from ..io import replacing
-
     with replacing(path) as temporary:
         coded(found).to_zarr(temporary, mode="w", consolidated=False)
     return Path(path)

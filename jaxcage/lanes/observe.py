@@ -106,7 +106,7 @@ def observe(
     """
     count, each, done = lanes.speed.size, run.discard + run.revolutions, 0.0
 
-    def report(revolutions: float) -> None:
+    def report(revolutions: float | int) -> None:
         nonlocal done
         done += revolutions / max(each, 1)
         if progress is not None:

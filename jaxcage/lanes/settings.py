@@ -84,8 +84,6 @@ class Run:
     @property
     def followed(self) -> int:
         """Number of blocks, the last ones, in which exponents are followed."""
-        if not self.exponents:
-            return 0
         if not self.exponent_revolutions:
             return self.blocks
         return min(self.blocks, max(2, -(-self.exponent_revolutions // self.block)))

@@ -22,6 +22,7 @@ import xarray as xr
 
 from .._errors import ArgumentError, InputError
 from .._parameters import parameter_info
+from ..files import sync
 from ..quantities import quantity
 from .dataset import configuration_of, decoded
 from .grid import OIL, SAMPLE
@@ -272,8 +273,6 @@ def _differences(theirs: Any, ours: Any, name: str = "") -> list[str]:
 
 def _create(path: Path, study: "Study") -> None:
     """Make an empty store beside its place and move it there in one step; whoever comes second leaves it alone."""
-    from ..io import sync
-
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
     try:

@@ -57,8 +57,8 @@ class Study:
         if not 0 <= self.strobe <= self.run.revolutions * (not self.model.beside):
             raise ArgumentError(
                 "strobe",
-                said=f"must lie between 0 and the {self.run.revolutions} revolutions, and be 0 for a whole bearing, but "
-                f"is {self.strobe}.",
+                said=f"must lie between 0 and the {self.run.revolutions} revolutions, and be 0 for a whole bearing, "
+                f"but is {self.strobe}.",
             )
 
     @property

@@ -26,7 +26,6 @@ from ..forces import (
     Land,
     Motion,
     RigidRib,
-    Rows,
     UnbalanceForce,
     UnbalanceReading,
     WeightForce,
@@ -66,9 +65,7 @@ def _in_order(laws: Any) -> Any:
 def _check_laws(laws: Any) -> None:
     """**Raises:** `ValueError` for anything but a tuple of laws, each of its own name, that has all of `NEEDED`."""
     if wrong := [law for law in (laws if isinstance(laws, tuple) else [laws]) if not isinstance(law, AbstractLaw)]:
-        said = (
-            f"must be a tuple of laws, each a `jaxcage.forces.AbstractLaw`, but holds: {type(wrong[0]).__name__}."
-        )
+        said = f"must be a tuple of laws, each a `jaxcage.forces.AbstractLaw`, but holds: {type(wrong[0]).__name__}."
         raise ArgumentError("forces", said=said)
     for law in laws:
         if law.law_name and type(law) not in LAWS:
@@ -118,19 +115,6 @@ class CageAtSpeed(eqx.Module):
         pairs = zip(self.names, self.laws, strict=True)
         return tuple(name for name, law in pairs if not isinstance(law, AbstractForcing))
 
-    def slopes(self, x: Scalar, y: Scalar, vx: Scalar, vy: Scalar) -> tuple[Rows, Rows] | None:
-        """Derivatives of the whole force with respect to position [N/m] and velocity [N s/m], as rows.
-
-        None where a law leaves it to whoever differentiates. Forces that the phase alone decides have none.
-        """
-        motion = self.motion(0.0, x, y, vx, vy)
-        found = [law.slopes(motion) for law in self.laws]
-        known = [each for each in found if each is not None]
-        if len(known) < len(found):
-            return None
-        of_q, of_v = zip(*known, strict=True)
-        return _sum(of_q), _sum(of_v)
-
 
 def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
     """**Raises:** `ValueError` for a user's law that returns anything but three numbers."""
@@ -139,16 +123,6 @@ def _force(name: str, law: AbstractForce, motion: Motion) -> Force:
     if not isinstance(force, tuple) or [jnp.shape(part) for part in force] != [(), (), ()]:
         raise ValueError(f"Force `{name}` must return (F_x, F_y, moment), three numbers, but returned {force}.")
     return force
-
-
-def _sum(matrices: tuple[Rows, ...]) -> Rows:
-    at = lambda i, j: sum((k[i][j] for k in matrices[1:]), start=matrices[0][i][j])
-    return (at(0, 0), at(0, 1)), (at(1, 0), at(1, 1))
-
-
-def _times(factor: Scalar, k: Rows) -> Rows:
-    (xx, xy), (yx, yy) = k
-    return (factor * xx, factor * xy), (factor * yx, factor * yy)
 
 
 class RigidRibLaw(eqx.Module):
@@ -160,12 +134,6 @@ class RigidRibLaw(eqx.Module):
         f = self.cage.forces(tau, *q, *v).values()
         per_mass = 1 / self.cage.mass
         return per_mass * sum(p[0] for p in f), per_mass * sum(p[1] for p in f)
-
-    def slopes(self, q: State, v: State) -> tuple[Rows, Rows] | None:
-        """Derivatives with respect to q and v, as rows, where every law gives its own."""
-        found = self.cage.slopes(*q, *v)
-        per_mass = 1 / self.cage.mass
-        return None if found is None else (_times(per_mass, found[0]), _times(per_mass, found[1]))
 
 
 class ElasticRibLaw(eqx.Module):

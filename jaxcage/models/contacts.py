@@ -19,10 +19,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._arguments import is_concrete
 from .._errors import ArgumentError
 from .._parameters import choice, parameter
 from .._types import Scalar
-from .._arguments import is_concrete
 from ..forces import (
     ContactForce,
     FilmForce,

@@ -8,7 +8,6 @@ form, so that only a system of the size of the velocities is solved: with J = [[
 
 import abc
 from collections.abc import Callable
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -55,10 +54,6 @@ def lu_solve(lu: Matrix, r: State) -> State:
 def _shifted(shift: Scalar, a: Matrix) -> Matrix:
     """shift I - a."""
     return tuple(tuple(shift - c if i == j else -c for j, c in enumerate(row)) for i, row in enumerate(a))
-
-
-def _times(a: Matrix, u: State) -> State:
-    return tuple(sum((c * x for c, x in zip(row, u, strict=True)), start=jnp.zeros(())) for row in a)
 
 
 def _trace(a: Matrix) -> Scalar:
@@ -143,10 +138,15 @@ class AbstractField(eqx.Module):
 
 
 def _columns(f: Callable[[State], State], x: State) -> Matrix:
-    """Jacobian of f at x as rows of scalars, by forward differentiation along each coordinate."""
-    basis = [tuple(jnp.ones_like(c) if i == j else jnp.zeros_like(c) for j, c in enumerate(x)) for i in range(len(x))]
-    columns = [jax.jvp(f, (x,), (e,))[1] for e in basis]
-    return tuple(zip(*columns, strict=True))
+    """Jacobian of f at x as rows of scalars, by forward differentiation along each coordinate.
+
+    The other coordinates are constants, so that no products with zero tangents are computed.
+    """
+
+    def along(i: int) -> State:
+        return jax.jvp(lambda c: f((*x[:i], c, *x[i + 1 :])), (x[i],), (jnp.ones_like(x[i]),))[1]
+
+    return tuple(zip(*map(along, range(len(x))), strict=True))
 
 
 def _phase_derivative(f: Callable[[Scalar], State], tau: Scalar) -> tuple[State, State]:
@@ -169,62 +169,24 @@ class FirstOrderField(AbstractField):
 
 
 class SecondOrderField(AbstractField):
-    """dq/dtau = v / speed, dv/dtau = acceleration(tau, q, v) / speed.
-
-    If `acceleration` has a method `slopes(q, v)` that returns its derivatives with respect to q and v as rows (or None
-    where it cannot), these are used wherever the field is differentiated by its state; else it is differentiated.
-    """
+    """dq/dtau = v / speed, dv/dtau = acceleration(tau, q, v) / speed."""
 
     acceleration: Callable[[Scalar, State, State], State]
     speed: Scalar
 
     def __call__(self, tau: Scalar, y: State) -> State:
-        return _second_order_rates(self, tau, y)
+        n = len(y) // 2
+        q, v = y[:n], y[n:]
+        rate = 1 / self.speed
+        return (*(c * rate for c in v), *(c * rate for c in self.acceleration(tau, q, v)))
 
     def linearise(self, tau: Scalar, y: State) -> AbstractLinearisation:
         n = len(y) // 2
         q, v = y[:n], y[n:]
         value, slope = _phase_derivative(lambda t: self(t, y), tau)
-        a_q, a_v = self.slopes(q, v) or (
-            _columns(lambda z: self.acceleration(tau, z, v), q),
-            _columns(lambda z: self.acceleration(tau, q, z), v),
-        )
+        a_q = _columns(lambda z: self.acceleration(tau, z, v), q)
+        a_v = _columns(lambda z: self.acceleration(tau, q, z), v)
         return SecondOrderLinearisation(value, slope, a_q, a_v, self.speed)
-
-    def slopes(self, q: State, v: State) -> tuple[Matrix, Matrix] | None:
-        """Derivatives of the acceleration as its law gives them, None where it gives none."""
-        return getattr(self.acceleration, "slopes", lambda q, v: None)(q, v)
-
-
-def _rates(field: SecondOrderField, tau: Scalar, y: State) -> State:
-    n = len(y) // 2
-    q, v = y[:n], y[n:]
-    rate = 1 / field.speed
-    return (*(c * rate for c in v), *(c * rate for c in field.acceleration(tau, q, v)))
-
-
-@eqx.filter_custom_jvp
-def _second_order_rates(field: SecondOrderField, tau: Scalar, y: State) -> State:
-    """The field's value; a law's own slopes are half the work of differentiating it, shared by all directions."""
-    return _rates(field, tau, y)
-
-
-@_second_order_rates.def_jvp
-def _second_order_rates_jvp(primals: Any, tangents: Any) -> Any:
-    (field, tau, y), (field_dot, tau_dot, y_dot) = primals, tangents
-    n = len(y) // 2
-    given = field.slopes(y[:n], y[n:])
-    if given is None or all(c is None for c in y_dot):
-        return eqx.filter_jvp(_rates, primals, tangents)
-    moved = tuple(jnp.zeros(()) if c is None else c for c in y_dot)
-    rate = 1 / field.speed
-    pushed = zip(_times(given[0], moved[:n]), _times(given[1], moved[n:]), strict=True)
-    slope = (*(rate * c for c in moved[n:]), *(rate * (a + b) for a, b in pushed))
-    along = (field_dot, tau_dot)
-    if all(x is None for x in jax.tree.leaves(along, is_leaf=lambda x: x is None)):
-        return _rates(field, tau, y), slope
-    value, drift = eqx.filter_jvp(lambda f, t: _rates(f, t, y), (field, tau), along)
-    return value, tuple(a if b is None else a + b for a, b in zip(slope, drift, strict=True))
 
 
 class ScaledLinearisation(AbstractLinearisation):

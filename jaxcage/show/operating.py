@@ -10,7 +10,7 @@ import xarray as xr
 
 from .._errors import ArgumentError
 from ..analysis import Edge, Stretch, Zone, Zones, failed
-from ..io import Whose, split_owner, to_si
+from ..files import Whose, split_owner, to_si
 from ..models import AbstractForcedSystem
 from .zone_tables import zone_span
 

@@ -22,7 +22,7 @@ from .tables import Table
 
 
 if TYPE_CHECKING:
-    from ..studies import Ensemble
+    from ..design import Ensemble
 
 
 RASTER_DPI = 150

@@ -23,7 +23,7 @@ from .operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict,
 from .orbit_figures import multiplier_circle, orbit_diagram_with_branches
 from .orbit_tables import coexisting_notes, edge_table, loss_table
 from .quantity_tables import quantities_table, statics_table
-from .sources import parameters_table, readings_words, shown
+from .sources import readings_words, shown, sources_table
 from .speed_axes import mark_operating, zone_strip
 from .style import new_figure
 from .tables import Beside, Column, Table, rows_table
@@ -31,7 +31,7 @@ from .zone_tables import stretches_table, transient_tables, zone_span, zones_tab
 
 
 if TYPE_CHECKING:
-    from ..studies import Ensemble
+    from ..design import Ensemble
 
 
 COUNTED = ("No", "One", "Two", "Three", "Four", "Five", "Six")
@@ -308,7 +308,7 @@ def _design(findings: Findings, table: Mapping[str, Any] | None, left: Sequence[
     model = findings.model
     warnings = [*design_rule_violations(model.bearing, model.guidance_gap), *model.lubricant.doubts()]
     said = [f"Warning: {warning}" for warning in warnings]
-    return Section("design", "The design", said, tables=[parameters_table(model, table, left)])
+    return Section("design", "The design", said, tables=[sources_table(model, table, left)])
 
 
 def _alone(width: float, height: float, draw: Callable[[Axes], Any]) -> Figure:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .._parameters import EXTRA, get, readings_of, walk
-from ..io import is_range
+from ..files import is_range
 from ..models import AbstractForcedSystem
 from .tables import Column, Table, rows_table
 
@@ -27,7 +27,7 @@ PUBLISHED = {
 READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
-def parameters_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
+def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
     """All parameters of `model` in the units in which they are read, with their sources.
 
     **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still

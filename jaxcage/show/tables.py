@@ -16,6 +16,8 @@ import xarray as xr
 
 SHOWN = {"m": "mm", "rad/s": "rpm", "rad": "deg", "1": ""}
 """Units in which quantities of an SI unit are shown, unless a column says otherwise."""
+Beside = tuple[str, float] | None
+"""Speed that is shown beside the model's: `shaft` or `cage`, and its ratio to the model's."""
 NOTHING = "-"
 """Cell of a value that is not known."""
 
@@ -27,9 +29,9 @@ def factor(unit: str, shown: str) -> float:
         return 1.0
     if (unit, shown) == ("1", "%"):
         return 100.0
-    from ..files import unit_registry  # pint takes a while to load
+    from ..files import to_si  # pint takes a while to load
 
-    return float(unit_registry().Quantity(1.0, unit.replace("^", "**")).to(shown.replace("^", "**")).magnitude)
+    return to_si(f"1 {unit}", shown)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,12 +44,14 @@ class Column:
     unit: str = "1"
     shown: str | None = None
     """Unit in which numbers are shown; None takes that of `SHOWN`."""
-    errors: Sequence[float] | None = None
-    """Standard errors, or uncertainties, in `unit`."""
+    errors: Sequence[float | None] | str | None = None
+    """Standard errors, or uncertainties, in `unit`; of a column for `rows_table` the key that holds them."""
     digits: int | None = None
     """Digits after the point; None takes those of the error, or four significant ones."""
     key: str = ""
     """Name in a document; the head if it is left out."""
+    nothing: str = NOTHING
+    """Cell of a value that is not known."""
 
     @property
     def unit_shown(self) -> str:
@@ -62,14 +66,14 @@ class Column:
     @property
     def cells(self) -> list[str]:
         """Values as texts."""
-        errors = [None] * len(self.values) if self.errors is None else self.errors
+        errors = [None] * len(self.values) if self.errors is None or isinstance(self.errors, str) else self.errors
         return [self._cell(value, error) for value, error in zip(self.values, errors, strict=True)]
 
     def _cell(self, value: Any, error: float | None) -> str:
         if value is None or isinstance(value, str):
-            return value or NOTHING
+            return value or self.nothing
         if not math.isfinite(float(value)):
-            return NOTHING
+            return self.nothing
         if isinstance(value, bool | np.bool_):
             return "yes" if value else "no"
         if isinstance(value, int | np.integer) and self.unit_shown == SHOWN.get(self.unit, self.unit):
@@ -102,6 +106,10 @@ class Table:
 
     title: str
     columns: Sequence[Column]
+    key: str = ""
+    """Name under which the records stand in a document; without one they do not."""
+    data: Sequence[Mapping[str, Any]] | None = None
+    """The records, where they hold more than the columns show."""
 
     @property
     def heads(self) -> list[str]:
@@ -115,10 +123,12 @@ class Table:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Numbers in SI units, row by row, for a document."""
+        """Numbers in SI units, or in the unit of the head, row by row, for a document."""
+        if self.data is not None:
+            return [dict(row) for row in self.data]
         found = [{(c.key or c.head): c.values[i] for c in self.columns} for i in range(len(self))]
         for column in self.columns:
-            if column.errors is not None:
+            if column.errors is not None and not isinstance(column.errors, str):
                 for record, error in zip(found, column.errors, strict=True):
                     record[f"{column.key or column.head}_error"] = error
         return found
@@ -151,8 +161,58 @@ def table(title: str, found: xr.Dataset, columns: Mapping[str, str | Column], er
     return Table(title, made)
 
 
-def rows_table(title: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> Table:
-    """A table of records: each column without values takes those under its key."""
+def rows_table(
+    title: str, rows: Iterable[Mapping[str, Any]], columns: Iterable[Column], key: str = "", empty: str = "none"
+) -> Table:
+    """A table of records, which stand in a document under `key`: each column takes the values, and the errors, under
+    its keys. Without a record there is a row that says `empty`."""
+    found, columns = list(rows), list(columns)
+    shown = found or [{columns[0].key or columns[0].head: empty}]
+    pick = lambda key: [row.get(key) for row in shown]
+
+    def filled(column: Column) -> Column:
+        errors = pick(column.errors) if isinstance(column.errors, str) else column.errors
+        return dataclasses.replace(column, values=pick(column.key or column.head), errors=errors)
+
+    return Table(title, [filled(column) for column in columns], key, found)
+
+
+@dataclasses.dataclass(frozen=True)
+class Scaled(Column):
+    """A column that shows its values times a ratio."""
+
+    ratio: float = 1.0
+
+    def _cell(self, value: Any, error: float | None) -> str:
+        return super()._cell(value if value is None or isinstance(value, str) else self.ratio * float(value), None)
+
+
+def speed_columns(
+    head: str, key: str, beside: Beside, errors: str | None = None, digits: int = 0, nothing: str = NOTHING
+) -> list[Column]:
+    """Columns for `rows_table` of a speed [rpm], or a difference of speeds, and of the speed that goes with it."""
+    own = Column(head, (), key=key, errors=errors, digits=None if errors else digits, nothing=nothing)
+    return [own] if beside is None else [own, Scaled(beside[0], (), key=key, digits=digits, ratio=beside[1])]
+
+
+def shares_table(title: str, sort: str, counts: Mapping[str, int]) -> Table:
+    """Numbers of each sort, and their shares of all."""
+    total = sum(counts.values())
+    shares = Column("share", [n / total for n in counts.values()], "1", "%", digits=1)
+    return Table(title, [Column(sort, list(counts)), Column("number", list(counts.values())), shares])
+
+
+def value_table(title: str, rows: Iterable[tuple[str, Any, str]], errors: Sequence[float] | None = None) -> Table:
+    """A table of quantities: their words, values and SI units, and standard errors."""
     found = list(rows)
-    pick = lambda column: [row.get(column.key or column.head) for row in found]
-    return Table(title, [dataclasses.replace(column, values=pick(column)) for column in columns])
+    each = [
+        Column("", [value], unit, errors=[e]) for (_, value, unit), e in zip(found, errors or [math.nan] * len(found))
+    ]
+    units = ["" if isinstance(column.values[0], str) else column.unit_shown for column in each]
+    words = Column("quantity", [what for what, _, _ in found])
+    return Table(title, [words, Column("value", [c.cells[0] for c in each]), Column("unit", units, nothing="")])
+
+
+def chosen(found: object, names: str) -> dict[str, Any]:
+    """Some attributes of a result by name."""
+    return {name: getattr(found, name) for name in names.split()}

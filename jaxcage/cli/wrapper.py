@@ -1,0 +1,208 @@
+"""The wrapper of all commands: it reads the options, runs a command, and turns what goes wrong into a sentence."""
+
+import contextlib
+import dataclasses
+import functools
+import gc
+import inspect
+import io
+import itertools
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from .. import __version__
+from .._cache import keep_compiled_programs
+from .._errors import ArgumentError, InputError, NoResult
+from . import case_commands, design_commands, orbit_commands, speed_commands
+from .answer import Answer, complete, print_answer
+from .options import ShowOptions, flag
+from .progress import (
+    BAD_INPUT,
+    FAILED,
+    FILES_ARE_WHOLE,
+    OK,
+    end_at_once_when_interrupted,
+    interrupted_status,
+    say,
+    shorten_cache_warnings,
+)
+
+
+COMMANDS: dict[str, Callable[..., Answer]] = {
+    "init": case_commands.init,
+    "simulate": speed_commands.simulate,
+    "sweep": speed_commands.sweep,
+    "zones": orbit_commands.zones,
+    "bifurcations": orbit_commands.bifurcations,
+    "gradient": orbit_commands.gradient,
+    "compare": speed_commands.compare,
+    "runup": speed_commands.runup,
+    "map": orbit_commands.map_,
+    "study": speed_commands.study,
+    "design": design_commands.design,
+    "sensitivity": design_commands.sensitivity,
+    "unknowns": design_commands.unknowns,
+    "identify": design_commands.identify,
+    "poincare": speed_commands.poincare,
+    "statics": case_commands.statics,
+    "impact": case_commands.impact,
+    "reproduce": case_commands.reproduce,
+    "report": case_commands.report,
+}
+COMPLETION, SHELLS = ("--tyro-print-completion", "--tyro-write-completion"), ("bash", "zsh", "tcsh", "fish")
+"""Options that tyro takes by itself, and the values that it asserts."""
+CALLED = {
+    "directions": "by",
+    "lanes": "chunk",
+    "samples": "sample",
+    "operating": "at",
+    "settle": "discard",
+    "centrifugal_force": "shaft_speed",
+    "confirm": "no_confirm",
+    "blocks": "revolutions",
+    "x": "points",
+    "y": "points",
+}
+"""Argument of the library -> option that it comes from, where no option has its name."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command with `arguments`, by default those of the process.
+
+    **Returns:** exit status: 0, 1 for a computation without a result, 2 for bad input, 130 when
+    interrupted, 143 when told to end.
+    """
+    if arguments is None:  # the process is ours, not a notebook's
+        _open_what_is_closed()
+        end_at_once_when_interrupted()
+        gc.set_threshold(200_000, 50, 100)  # looking for dead objects takes a tenth of the time otherwise
+    try:
+        call = _parse(sys.argv[1:] if arguments is None else list(arguments))
+        if call is not None:
+            _run(call)
+        return OK
+    except InputError as error:
+        say(str(error))
+        return BAD_INPUT
+    except (NoResult, OSError) as error:
+        say(str(error))
+        return FAILED
+    except MemoryError:
+        say("There is not enough memory for this: ask for fewer speeds, lanes or revolutions.")
+        return FAILED
+    except KeyboardInterrupt:
+        say(f"Interrupted: {FILES_ARE_WHOLE}.")
+        return interrupted_status()
+
+
+def _open_what_is_closed() -> None:
+    """A process that was started without standard output or error writes to the null device."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
+
+
+def _run(call: functools.partial[Answer]) -> None:
+    """Run a command, write its files, and print its answer."""
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA writes pages about each program that it finds compiled
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells where it stores fonts if there is no home folder
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    show: ShowOptions | None = call.keywords.get("show")
+    if show is not None and show.no_cache:
+        os.environ["JAXCAGE_CACHE"] = "off"
+    elif show is not None:
+        shorten_cache_warnings()
+        keep_compiled_programs()
+    began = time.perf_counter()
+    try:
+        answer = call()
+        name = next(name for name, command in COMMANDS.items() if command is call.func)
+        answer = complete(answer, name, show, time.perf_counter() - began)
+    except ArgumentError as error:
+        raise _about_options(error, call) from error
+    except jax.errors.JaxRuntimeError as error:
+        if "RESOURCE_EXHAUSTED" in str(error):
+            raise MemoryError from error
+        raise
+    print_answer(answer, call.keywords["json"] if show is None else show.json)
+    if answer.failure:
+        raise NoResult(answer.failure)
+
+
+def _about_options(error: ArgumentError, call: functools.partial[Answer]) -> Exception:
+    """A sentence about arguments of the library as one about the options that they come from.
+
+    An argument that comes from none is a mistake of ours.
+    """
+    options = {*call.keywords}
+    for group in filter(dataclasses.is_dataclass, call.keywords.values()):
+        options |= {field.name for field in dataclasses.fields(group)}  # pyright: ignore[reportArgumentType]
+    names = [name if name in options else CALLED.get(name, name) for name in error.names]
+    if not options.issuperset(names):
+        return RuntimeError(str(error))
+    return InputError(ArgumentError(*dict.fromkeys(names), said=error.said).about("Option", flag))
+
+
+def _later(command: Callable[..., Answer]) -> Callable[..., functools.partial[Answer]]:
+    """The command with its options bound, to be run after they have been read."""
+
+    @functools.wraps(command)
+    def bind(*args: Any, **kwargs: Any) -> functools.partial[Answer]:
+        bound = inspect.signature(command).bind(*args, **kwargs)
+        bound.apply_defaults()
+        return functools.partial(command, **bound.arguments)
+
+    return bind
+
+
+def _parse(arguments: list[str]) -> functools.partial[Answer] | None:
+    """The command with its options, or None if help or the version was asked for and given.
+
+    **Raises:** `InputError`.
+    """
+    import tyro
+
+    if arguments == ["--version"]:
+        print(f"jaxcage {__version__}")
+        return None
+    if len(arguments) > 1 and arguments[0].replace("_", "-") in COMPLETION and arguments[1] not in SHELLS:
+        raise InputError(
+            f"Option {arguments[0]} must be followed by {', '.join(SHELLS)}, but '{arguments[1]}' was given."
+        )
+    box = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(box):
+            return tyro.extras.subcommand_cli_from_dict(
+                {name: _later(command) for name, command in COMMANDS.items()},
+                prog="jaxcage",
+                description="Dynamics of rolling-bearing cages: where they move chaotically.",
+                args=arguments,
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes),
+            )
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            return None
+        raise InputError(_sentence(box.getvalue())) from stop
+
+
+def _sentence(box: str) -> str:
+    """The text of a box of tyro's as one sentence.
+
+    Its parts stand between rules, and the title in the upper border, or above a rule where the terminal has no line
+    drawing.
+    """
+    lines = [line.strip(" │") for line in box.splitlines()]
+    is_rule = lambda line: not line.strip("─-╭╮╰╯") or line[0] == "╭"
+    parts = [" ".join(" ".join(part).split()) for rule, part in itertools.groupby(lines, is_rule) if not rule]
+    said, *more = parts if box.startswith("╭") else parts[1:]
+    ours, found, why = said.removeprefix("Error parsing ").partition(": ")
+    if found and why.startswith("must "):
+        return f"Option {ours} {why}"
+    useful = [said, *(part for part in more[:1] if part.startswith("Available"))]
+    return "; ".join(part.rstrip(".") for part in useful) + " (see jaxcage --help)."

@@ -1,0 +1,289 @@
+"""Chances of chaos of a cage of which some values are known within ranges only.
+
+Each draw is a design with values from the ranges; it runs once at every speed, from the conventional start. At a speed
+the draws are independent, so that their chaotic share has the error bar of a binomial count; speeds are not.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Bool, Float
+
+from .._arguments import require_at_least
+from .._errors import ArgumentError
+from .._parameters import parameter_info, replace
+from .._sobol import sobol
+from ..analysis import chaotic_share, failed, restless, zones
+from ..files import Unknown, check_together
+from ..lanes import Progress, sweep
+from ..models import CageModel
+from ..solve import AbstractMethod, native
+
+
+DRAWS, ENSEMBLE_SPEEDS = 64, 40
+REVOLUTIONS = 100
+"""Revolutions left out, and observed: one lane is an example of a chance, and need not be known to three digits."""
+SETTLED = 64
+"""Revolutions after which a draw that is periodic is not run any further, which are three in five."""
+ERROR = 1e-2
+"""Error of a revolution [clearances] up to which a lane counts; with the default, a quarter of the draws fail."""
+RARE = 0.05
+"""Chance below which a speed is called calm, and above one less which it is called chaotic."""
+FEWEST = 29
+"""Draws without which nothing is called calm: if 10 % were chaotic, none of so many would be once in 20 times."""
+CONFIDENCE = 0.95
+BINS = 4
+"""Parts of a range whose chances are compared, to tell how much an unknown explains."""
+
+
+Verdict = Literal["calm", "chaotic", "calm as computed", "chaotic as computed", "not decided", "too few draws"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Band:
+    """Speeds between which an edge lies."""
+
+    name: str
+    share: float
+    """Share of the draws that have this edge."""
+    rpm: tuple[float, float, float]
+    """Speeds below which 5 %, 50 % and 95 % of the draws that have it lie."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Clue:
+    """Influence of an unknown on the verdict."""
+
+    label: str
+    share: float
+    """Share of the variance of the chaotic share that is due to it alone, as far as the draws can tell."""
+    source: str
+    """How to measure it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ensemble:
+    """Chaos of designs that are drawn from ranges."""
+
+    unknowns: tuple[Unknown, ...]
+    sources: tuple[str, ...]
+    """How to measure each unknown."""
+    place: Float[np.ndarray, "draws unknowns"]
+    """Place of each draw in each range, 0 to 1."""
+    speed: Float[np.ndarray, " speeds"]
+    """[rad/s]."""
+    chaotic: Bool[np.ndarray, "draws speeds"]
+    """True where a draw is chaotic while observed."""
+    failed: Bool[np.ndarray, "draws speeds"]
+    bands: tuple[Band, ...]
+    discard: int
+    revolutions: int
+    units: tuple[str, ...] = ()
+    """SI units of the unknowns."""
+
+    @property
+    def rpm(self) -> Float[np.ndarray, " speeds"]:
+        """Cage speeds in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    @property
+    def counts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Chaotic draws, and draws that finished, at each speed."""
+        return np.sum(self.chaotic & ~self.failed, axis=0), np.sum(~self.failed, axis=0)
+
+    @property
+    def chance(self) -> Float[np.ndarray, " speeds"]:
+        """Share of the draws that are chaotic at each speed; NaN where none finished."""
+        chaotic, of = self.counts
+        return np.where(of > 0, chaotic / np.maximum(of, 1), np.nan)
+
+    @property
+    def interval(self) -> tuple[Float[np.ndarray, " speeds"], Float[np.ndarray, " speeds"]]:
+        """Bounds of the chance with 95 % confidence, by Clopper and Pearson: the lower one as if all that failed were
+        calm, the upper one as if all were chaotic."""
+        (chaotic, of), draws = self.counts, len(self.place)
+        return binomial_interval(chaotic, draws)[0], binomial_interval(chaotic + draws - of, draws)[1]
+
+    @property
+    def verdict(self) -> list[Verdict]:
+        """Meaning of the chance at each speed, see `verdict_of`."""
+        return [verdict_of(int(k), int(n), len(self.place)) for k, n in zip(*self.counts, strict=True)]
+
+    @property
+    def undecided(self) -> Bool[np.ndarray, " speeds"]:
+        """Speeds at which the ranges are too wide to decide."""
+        return np.array([v == "not decided" for v in self.verdict], dtype=bool)
+
+    def clues(self, which: Bool[np.ndarray, " speeds"] | None = None) -> list[Clue]:
+        """Influence of each unknown on the chaotic share of the speeds `which`, by default all undecided ones, the
+        largest first; empty where there is nothing to decide."""
+        chosen = self.undecided if which is None else which
+        y = np.mean(self.chaotic[:, chosen], axis=1) if np.any(chosen) else np.zeros(len(self.chaotic))
+        if np.ptp(y) == 0:
+            return []
+        shares = [_explained(self.place[:, i], y) for i in range(len(self.unknowns))]
+        found = [Clue(u.label, s, of) for u, s, of in zip(self.unknowns, shares, self.sources, strict=True)]
+        return sorted(found, key=lambda clue: -clue.share)
+
+    def between(self, low_rpm: float, high_rpm: float) -> Bool[np.ndarray, " speeds"]:
+        """Speeds in a range, or the one that is nearest to it."""
+        inside = (self.rpm >= low_rpm) & (self.rpm <= high_rpm)
+        return inside if np.any(inside) else np.arange(self.rpm.size) == np.argmin(np.abs(self.rpm - low_rpm))
+
+
+def verdict_of(chaotic: int, finished: int, draws: int) -> Verdict:
+    """Meaning of `chaotic` draws among `finished` of `draws`.
+
+    `calm` and `chaotic` hold whatever the draws that failed would do: at most 5 %, or at least 95 %, of all draws are
+    chaotic then. `calm as computed` and `chaotic as computed` are about the draws that finished; those that failed are
+    often the ones that hit the land hardest, and others drawn in their place would not be like them. `not decided` is
+    in between.
+    """
+    if finished < FEWEST:
+        return "too few draws"
+    if chaotic + draws - finished <= RARE * draws:
+        return "calm"
+    if chaotic >= (1 - RARE) * draws:
+        return "chaotic"
+    if chaotic <= RARE * finished:
+        return "calm as computed"
+    return "chaotic as computed" if chaotic >= (1 - RARE) * finished else "not decided"
+
+
+def binomial_interval(
+    hits: np.ndarray | Sequence[int] | int, of: np.ndarray | Sequence[int] | int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Clopper and Pearson's bounds of a share, from `hits` among `of`."""
+    from scipy.stats import beta  # takes half a second to load
+
+    k, n, tail = np.asarray(hits, dtype=float), np.asarray(of, dtype=float), (1 - CONFIDENCE) / 2
+    low = np.where(k > 0, beta.ppf(tail, np.maximum(k, 1e-9), n - k + 1), 0.0)
+    high = np.where(k < n, beta.ppf(1 - tail, k + 1, np.maximum(n - k, 1e-9)), 1.0)
+    return low, high
+
+
+def _explained(place: np.ndarray, y: np.ndarray) -> float:
+    """Share of the variance of y between quarters of `place`, less what chance alone would put there."""
+    parts = np.array_split(y[np.argsort(place)], BINS)
+    between = sum(part.size * (part.mean() - y.mean()) ** 2 for part in parts)
+    within = sum(((part - part.mean()) ** 2).sum() for part in parts)
+    noise = (BINS - 1) * within / max(y.size - BINS, 1)
+    return float(max(between - noise, 0.0) / (between + within))
+
+
+def draw(model: CageModel, unknowns: Sequence[Unknown], place: Float[np.ndarray, "draws unknowns"]) -> list[CageModel]:
+    """Designs with the values at `place` in the ranges.
+
+    **Raises:** `ValueError` for values that do not go together.
+    """
+    models = []
+    for row in place:
+        values = {name: float(u.range.at(p)) for u, p in zip(unknowns, row, strict=True) for name in u.names}
+        models.append(replace(model, **values))
+        check_together(models[-1])
+    return models
+
+
+def ensemble(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    speeds: Float[np.ndarray, " speeds"],
+    *,
+    draws: int = DRAWS,
+    seed: int = 0,
+    discard: int = REVOLUTIONS,
+    revolutions: int = REVOLUTIONS,
+    blocks: int = 20,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> Ensemble:
+    """Run `draws` designs, spread evenly over the ranges, over speed.
+
+    **Arguments:** design; what is unknown of it; ascending speeds [rad/s]; number and seed of the draws (scrambled
+    Sobol points); revolutions left out and observed in `blocks` blocks; method and progress as in `sweep`.
+
+    **Returns:** `Ensemble`.
+
+    **Raises:** `ValueError` if nothing is unknown, nothing is drawn, or values from the ranges do not go together.
+    """
+    if not unknowns:
+        raise ArgumentError("unknowns", said="must hold at least one range, but it is empty.")
+    require_at_least(1, draws=draws)
+    place = sobol(len(unknowns), draws, seed)
+    found = run_draws(draw(model, unknowns, place), speeds, method, progress, discard, revolutions, blocks)
+    info = parameter_info(model)
+    return Ensemble(
+        tuple(unknowns),
+        tuple(info[u.names[0]].source for u in unknowns),
+        place,
+        np.asarray(speeds, dtype=float),
+        np.array([restless(each) for each in found]),
+        np.array([failed(each)[:, 0] for each in found]),
+        tuple(_bands(found)),
+        discard,
+        revolutions,
+        tuple(info[u.names[0]].unit for u in unknowns),
+    )
+
+
+def run_draws(
+    models: Sequence[CageModel],
+    speeds: Float[np.ndarray, " speeds"],
+    method: AbstractMethod | None,
+    progress: Progress | None,
+    discard: int = REVOLUTIONS,
+    revolutions: int = REVOLUTIONS,
+    blocks: int = 20,
+) -> list[xr.Dataset]:
+    """The sweep of each design, from its own conventional initial state: a state in which the cage of one design rests
+    on its rib would press that of another into it."""
+    found = sweep(
+        models,
+        speeds,
+        starts=1,
+        discard=discard,
+        revolutions=revolutions,
+        confirm=False,
+        horizon=0,
+        blocks=blocks,
+        keep=32,
+        settled=SETTLED if discard >= SETTLED else 0,
+        method=native(error=ERROR) if method is None else method,
+        progress=progress,
+    )
+    return [found.isel(design=i) for i in range(len(models))]
+
+
+def chaotic_shares(
+    model: CageModel,
+    unknowns: Sequence[Unknown],
+    speeds: Float[np.ndarray, " speeds"],
+    place: np.ndarray,
+    *,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """Share of the speeds at which each draw is chaotic; a lane that failed counts as the others of its draw do."""
+    flat = place.reshape(len(unknowns), -1)
+    models = draw(model, unknowns, flat.T)
+    found = run_draws(models, speeds, method, progress)
+    shares = [float(np.nanmean(chaotic_share(each))) if not np.all(failed(each)) else 0.0 for each in found]
+    return np.array(shares).reshape(1, *place.shape[1:])
+
+
+def _bands(found: Sequence[xr.Dataset]) -> list[Band]:
+    """Where the ends of the first two zones of each draw are."""
+    places: dict[str, list[float]] = {f"zone {i} {end}": [] for i in (1, 2) for end in ("onset", "exit")}
+    for swept in found:
+        for i, zone in enumerate(zones(swept).zones[:2], start=1):
+            for end, edge in (("onset", zone.onset), ("exit", zone.exit)):
+                if edge is not None:
+                    places[f"zone {i} {end}"].append(edge.speed_rpm)
+    return [
+        Band(name, len(rpm) / len(found), tuple(map(float, np.quantile(rpm, (0.05, 0.5, 0.95)))))  # pyright: ignore[reportArgumentType]
+        for name, rpm in places.items()
+        if rpm
+    ]

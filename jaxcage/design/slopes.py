@@ -1,0 +1,260 @@
+"""Slopes of statistics by parameters of the design, with standard errors.
+
+Designs are scattered around the given one and run from the same initial states. They come in pairs that mirror each
+other: half the difference of a pair holds no curvature, and least squares over all pairs gives the slopes, with errors
+that assume no law of the scatter: J. G. MacKinnon and H. White, J. Econometrics 29 (1985) 305, HC3.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from .._arguments import require_at_least
+from .._errors import ArgumentError
+from .._notebook import notebook_html
+from .._parameters import parameters, replace
+from ..models import AbstractForcedSystem
+from .objective import AbstractObjective
+from .statistics import STATISTICS, Runs, statistics_of
+
+
+DIRECTIONS = (
+    "guidance_gap",
+    "pocket_clearance",
+    "radial_clearance",
+    "eccentricity",
+    "cage_mass+cage_inertia",
+    "land_width",
+    "viscosity_1+viscosity_2",
+)
+"""Parameters of a whole bearing that a designer changes; those joined by + change together, by the same factor."""
+DESIGNS, SPREAD = 64, 0.05
+
+
+@dataclasses.dataclass(frozen=True)
+class StatisticGradient:
+    """A statistic, and its change with relative changes of parameters."""
+
+    name: str
+    unit: str
+    value: float
+    """Mean over all designs and initial states."""
+    value_error: float
+    """Its standard error, from the scatter of the pairs."""
+    drift: float
+    """Mean of the last block of the runs less that of the first: a value that drifts has not settled. NaN of one block.
+    """
+    drift_error: float
+    directions: tuple[str, ...]
+    by_relative_change: Float[np.ndarray, " n"]
+    """Derivative of the value by the logarithm of each parameter [unit]."""
+    covariance: Float[np.ndarray, "n n"]
+    """Covariance of those derivatives."""
+    explained: float
+    """Share of the scatter of the pairs that the slopes explain, 0 to 1."""
+
+    @property
+    def by_relative_change_error(self) -> Float[np.ndarray, " n"]:
+        """Standard error of each derivative."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def elasticity(self) -> Float[np.ndarray, " n"]:
+        """Relative change of the value by that of each parameter; NaN of a value that is 0."""
+        return self.by_relative_change / (self.value or math.nan)
+
+    @property
+    def elasticity_error(self) -> Float[np.ndarray, " n"]:
+        """Standard error of each elasticity."""
+        error = np.hypot(self.by_relative_change_error, self.elasticity * self.value_error)
+        return error / (abs(self.value) or math.nan)
+
+    @property
+    def settled(self) -> bool:
+        """True if first and last block differ by at most twice their error, or by less than a hundredth."""
+        return abs(self.drift) <= max(2 * self.drift_error, 0.01 * abs(self.value))
+
+
+@dataclasses.dataclass(frozen=True)
+class MeanGradient:
+    """Gradients of statistics around a design."""
+
+    statistics: dict[str, StatisticGradient]
+    values: dict[str, float]
+    """Parameters of the design [SI]."""
+    pairs: int
+    """Number of pairs of designs that were run to their ends."""
+    failed: int
+    """Number of designs that failed, and are left out with their partners."""
+    inaccurate: int
+    """Number of lanes that are `inaccurate`, which count."""
+    spread: float
+    runs: Runs
+
+    def slope(self, statistic: str, parameter: str) -> tuple[float, float]:
+        """Derivative by one parameter that changes alone [unit of the statistic per SI unit], with its standard error.
+
+        **Raises:** `ValueError` for a statistic or parameter that is not there.
+        """
+        found = self.statistics.get(statistic)
+        if found is None:
+            raise ArgumentError(
+                "statistic", said=f"must be one of {', '.join(self.statistics)}, but '{statistic}' was given."
+            )
+        alone = [name for name in found.directions if "+" not in name]
+        if parameter not in alone:
+            raise ArgumentError("parameter", said=f"must be one of {', '.join(alone)}, but '{parameter}' was given.")
+        i, value = found.directions.index(parameter), self.values[parameter]
+        return float(found.by_relative_change[i] / value), float(found.by_relative_change_error[i] / abs(value))
+
+    def __str__(self) -> str:
+        rpm = ", ".join(f"{speed * 30 / math.pi:.0f}" for speed in self.runs.speed.tolist())
+        lines = [f"{rpm} rpm, elasticities from {self.pairs} pairs of designs"]
+        for each in self.statistics.values():
+            lines.append(f"{each.name} {each.value:.4g} +- {each.value_error:.2g} {each.unit}")
+            rows = zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
+            lines += [f"  {name:<28} {value:+.3f} +- {error:.3f}" for name, value, error in rows]
+        return "\n".join(lines)
+
+    _repr_html_ = notebook_html
+
+
+def mean_gradient(
+    model: AbstractForcedSystem,
+    runs: Runs,
+    statistics: Sequence[str] | Mapping[str, AbstractObjective] = STATISTICS,
+    *,
+    directions: Sequence[str] = DIRECTIONS,
+    designs: int = DESIGNS,
+    spread: float = SPREAD,
+    seed: int = 0,
+) -> MeanGradient:
+    """Gradients of statistics by parameters of the design, with standard errors.
+
+    **Arguments:**
+
+    - `model`: the design; `runs`: how designs are run, in two blocks to see a drift.
+    - `statistics`: names, or statistics by name. The largest exponent need not depend smoothly on the design: its
+        slope is the mean slope over the box of designs.
+    - `directions`: parameters that are not 0; those joined by `+` change by the same factor.
+    - `designs`: number of designs, even; each parameter is moved up in half of them and down in the others, by half
+        of `spread` to all of it. More of them make errors smaller by their root, and so do more revolutions and a
+        larger spread.
+    - `spread`: relative half width of the box of designs, above 0 and at most 0.3. Finer structure is smoothed away;
+        the slope is off by at most a sixth of spread^2 times the third derivative.
+    - `seed`: seed of the designs.
+
+    **Returns:** `MeanGradient`. Standard errors are those of the designs' scatter around the fitted slopes: chaos,
+    motions that coexist, and curvature of third order are in them.
+
+    **Raises:** `ValueError` for parameters that are unknown or 0, a box of designs that leaves a parameter's range,
+    counts that are impossible, too few designs for the directions; if too many of them fail.
+    """
+    require_at_least(0, seed=seed)
+    chosen, values = statistics_of(runs, statistics), _values(model, directions)
+    least = 2 * (len(directions) + 2)
+    if designs % 2 or designs < least:
+        raise ArgumentError(
+            "designs", said=f"must be an even number from {least} on, for so many directions, but {designs} was given."
+        )
+    if not 0 < spread <= 0.3:
+        raise ArgumentError("spread", said=f"must be above 0 and at most 0.3, but {spread:g} was given.")
+    moved = spread * _moves(designs // 2, len(directions), seed)
+    boxed = [_design(model, values, directions, row) for row in np.concatenate([moved, -moved])]
+    found = {name: each.samples(boxed).mean(axis=1) for name, each in chosen.items()}
+    failed = ~np.all([np.isfinite(blocks).all(axis=1) for blocks in found.values()], axis=0)
+    whole = ~failed.reshape(2, -1).any(axis=0)
+    if whole.sum() <= len(directions) + 1:
+        raise ArgumentError(
+            "designs",
+            said=f"must be more: only {whole.sum()} pairs came to their ends, for {len(directions)} slopes.",
+        )
+    paired = {name: blocks.reshape(2, designs // 2, -1)[:, whole] for name, blocks in found.items()}
+    return MeanGradient(
+        statistics={
+            name: gradient_of_pairs(name, each.unit(model), tuple(directions), moved[whole], paired[name])
+            for name, each in chosen.items()
+        },
+        values=values,
+        pairs=int(whole.sum()),
+        failed=int(failed.sum()),
+        inaccurate=int((runs.run(boxed)["outcome"] == "inaccurate").sum()),
+        spread=spread,
+        runs=runs,
+    )
+
+
+def _values(model: AbstractForcedSystem, directions: Sequence[str]) -> dict[str, float]:
+    """Parameters in the directions. **Raises:** `ValueError` for none, and those that are unknown, 0 or named twice."""
+    known = parameters(model)
+    names = [name for direction in directions for name in direction.split("+")]
+    if not names:
+        raise ArgumentError("directions", said="must hold at least one parameter, but it is empty.")
+    for name in names:
+        if name not in known or not float(known[name]):
+            raise ArgumentError(
+                "directions", said=f"must hold parameters of the design that are not 0, but has '{name}'."
+            )
+        if names.count(name) > 1:
+            raise ArgumentError("directions", said=f"must name each parameter once, but has '{name}' twice.")
+    return {name: float(known[name]) for name in names}
+
+
+def _moves(pairs: int, directions: int, seed: int) -> Float[np.ndarray, "pairs directions"]:
+    """Places in the box, half way out or further: as many plus as minus in each column, in no order; of full rank."""
+    rng, even = np.random.default_rng(seed), np.resize([1.0, -1.0], pairs)
+    while True:
+        found = np.stack([rng.permutation(even) * rng.uniform(0.5, 1.0, pairs) for _ in range(directions)], axis=-1)
+        if np.linalg.matrix_rank(found) == directions:
+            return found
+
+
+def _design(
+    model: AbstractForcedSystem,
+    values: dict[str, float],
+    directions: Sequence[str],
+    moved: Float[np.ndarray, " n"],
+) -> AbstractForcedSystem:
+    """The design with all its directions moved by relative changes."""
+    shares = zip(directions, moved.tolist(), strict=True)
+    return replace(model, **{n: values[n] * (1 + share) for each, share in shares for n in each.split("+")})
+
+
+def gradient_of_pairs(
+    name: str,
+    unit: str,
+    directions: tuple[str, ...],
+    moved: Float[np.ndarray, "pairs n"],
+    blocks: Float[np.ndarray, "2 pairs blocks"],
+) -> StatisticGradient:
+    """Slopes of a statistic by least squares, from designs in pairs that mirror each other.
+
+    **Arguments:** name and unit of the statistic; names of the directions; relative changes of the first design of each
+    pair, those of the second being the opposite; the statistic of the first designs, and of the second, in each block
+    of the runs.
+    """
+    both = blocks.mean(axis=-1)
+    half, middle = (both[0] - both[1]) / 2, both.mean(axis=0)
+    drift = (blocks[..., -1] - blocks[..., 0]).mean(axis=0) if blocks.shape[-1] > 1 else np.full(len(half), np.nan)
+    inverse = np.linalg.inv(moved.T @ moved)
+    slopes = inverse @ moved.T @ half
+    left = half - moved @ slopes
+    weight = left / (1 - np.einsum("ij,jk,ik->i", moved, inverse, moved))  # HC3
+    bread = inverse @ moved.T
+    total = float(np.sum(half * half))
+    error = lambda x: float(np.std(x, ddof=1) / math.sqrt(len(half)))
+    return StatisticGradient(
+        name=name,
+        unit=unit,
+        value=float(middle.mean()),
+        value_error=error(middle),
+        drift=float(drift.mean()),
+        drift_error=error(drift),
+        directions=directions,
+        by_relative_change=slopes,
+        covariance=(bread * weight**2) @ bread.T,
+        explained=1 - float(np.sum(left * left)) / total if total > 0 else math.nan,
+    )

@@ -1,0 +1,52 @@
+"""Configuration files, with units, and files that are written whole or not at all.
+
+| module         | responsibility                                                            |
+|----------------|---------------------------------------------------------------------------|
+| `units`        | texts with a unit to SI numbers                                           |
+| `ranges`       | values that are known within a range only                                 |
+| `speeds`       | cage speed or shaft speed                                                 |
+| `schema`       | tables and keys of a configuration, from the fields of the modules        |
+| `plausibility` | values that must fit together                                             |
+| `config`       | TOML to `CageModel` or `BearingModel`, with every value checked           |
+| `toml`         | a model to nested mapping or TOML; a TOML file with other ranges          |
+| `template`     | a commented TOML file to start from                                       |
+| `measurements` | values measured on a machine, from CSV                                    |
+| `disk`         | whole files or none; is a folder writable                                 |
+"""
+
+from .config import (
+    BearingFile as BearingFile,
+    Unknown as Unknown,
+    load_model as load_model,
+    load_whole_bearing as load_whole_bearing,
+    model_from as model_from,
+    read_bearing as read_bearing,
+    read_whole_bearing as read_whole_bearing,
+    subject_of as subject_of,
+    whole_bearing_from as whole_bearing_from,
+)
+from .disk import (
+    check_writable as check_writable,
+    read_bytes as read_bytes,
+    replacing as replacing,
+    sync as sync,
+)
+from .measurements import Measurement as Measurement, read_measurements as read_measurements
+from .plausibility import check_together as check_together
+from .ranges import Range as Range, is_range as is_range, read_range as read_range
+from .schema import ConfigError as ConfigError
+from .speeds import (
+    SpeedOf as SpeedOf,
+    Whose as Whose,
+    cage_rpm as cage_rpm,
+    shaft_rpm as shaft_rpm,
+    split_owner as split_owner,
+)
+from .template import Subject as Subject, template as template, write_template as write_template
+from .toml import (
+    configuration as configuration,
+    save_model as save_model,
+    toml_text as toml_text,
+    with_ranges as with_ranges,
+)
+from .units import printable as printable, to_si as to_si

@@ -1,0 +1,97 @@
+"""Text such as "0.45 mm" as a number in SI. pint is loaded with the first text."""
+
+import functools
+import re
+from typing import TYPE_CHECKING, Any
+
+
+if TYPE_CHECKING:
+    import pint
+
+
+_SIZE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = rf"[-+]?{_SIZE}"
+_NUMBER_AND_UNIT = re.compile(rf"\s*({NUMBER})\s*(.*?)\s*")
+_UNIT = re.compile(r"[\w°µΩ%*/^().·⁻ +-]{1,60}")
+"""Characters of a unit; pint ignores a comment, a colon or a line end."""
+_COMMA = re.compile(r"\s*[-+]?\d*,\d")
+_DASH = re.compile(rf"\s*{_SIZE}(?:\s+[^\s\d]+)?\s+(?:-|–|to)\s+{_SIZE}")
+"""Two numbers with a dash between them."""
+_TOWER = re.compile(r"[\d)]\s*(?:\^|\*\*)|\d{3}")
+"""A power of a number, or a large number: pint would evaluate 9**9**9 to its last digit."""
+_LIKE = {"K": "degC"}
+"""Usual unit in place of the SI unit; "C" alone is a coulomb."""
+LONGEST = 100
+"""Characters of a value that a message shows."""
+
+
+@functools.cache
+def _registry() -> "pint.UnitRegistry":
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def to_si(text: str, unit: str) -> float:
+    """The number in `text`, e.g. "0.45 mm" or "40 degC", expressed in `unit` ("1" for a pure number).
+
+    A bare number is taken to be in `unit`. Frequencies in Hz are refused where an angular speed is wanted: units alone
+    cannot tell a revolution from a radian, so write rpm or rad/s.
+
+    **Raises:** `ValueError` with half a sentence ("is ...") for a text that is not a number with a unit, for an unknown
+    unit, and for one of another dimension, where the radian counts as a dimension: 3000 1/min may be revolutions.
+    """
+    if _COMMA.match(text):
+        raise ValueError(f'is "{printable(text)}", but numbers are written with a point and without commas')
+    if _DASH.match(text):
+        raise ValueError(f'is "{printable(text)}", but a range is written with two points, such as "1e4 .. 1e6 N/m"')
+    match = _NUMBER_AND_UNIT.fullmatch(text)
+    if match is None:
+        raise ValueError(f'is "{printable(text)}", which is not a number with a unit')
+    number, given = float(match.group(1)), match.group(2)
+    return number if not given else _convert(number, given, "" if unit == "1" else unit)
+
+
+def _convert(number: float, given: str, unit: str) -> float:
+    import pint
+
+    registry = _registry()
+    unknown = f'has the unknown unit "{printable(given)}"'
+    if _UNIT.fullmatch(given) is None or _TOWER.search(given):
+        raise ValueError(unknown)
+    try:
+        source = registry.parse_units(given)
+    except Exception as error:  # pint's parser leaks errors of many kinds
+        raise ValueError(unknown) from error
+    target = registry.parse_units(unit)
+    wanted = f'a unit like "{_LIKE.get(unit, unit)}"' if unit else "no unit"
+    speeds = '"rpm" or "rad/s"'
+    if unit in ("rad/s", "rpm") and any(name.endswith("hertz") for name in source._units):
+        raise ValueError(f"is in Hz, where {speeds} is wanted")
+    try:
+        found = float(registry.Quantity(number, source).to(target).magnitude)
+        same = _base_units(source) == _base_units(target)
+    except (pint.PintError, ArithmeticError, ValueError) as error:
+        raise ValueError(f'has the unit "{given}", where {wanted} is wanted') from error
+    if not same:
+        raise ValueError(f'has the unit "{given}", where {speeds if unit in ("rad/s", "rpm") else wanted} is wanted')
+    return found
+
+
+def _base_units(unit: Any) -> set[str]:
+    """Names of the base units of a unit, those without a dimension, such as the radian, among them."""
+    return set(_registry().Quantity(1.0, unit).to_root_units().units._units)
+
+
+def printable(text: str) -> str:
+    """`text` for a message: on one line, shortened, without control characters."""
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text[: LONGEST + 1])
+    return line if len(text) <= LONGEST else f"{line[:LONGEST]}..."
+
+
+def shown(value: Any) -> str:
+    """Any value for a message."""
+    try:
+        return printable(repr(value))
+    except (RecursionError, ValueError):  # nested a thousand times, or of thousands of digits
+        return f"a very large {type(value).__name__}"

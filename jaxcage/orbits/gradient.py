@@ -1,0 +1,330 @@
+"""Gradients of edges and of multipliers: derivatives, elasticities, and the identities that they must satisfy.
+
+An edge speed w is a rate. Whatever the units of mass, length and time, the same physics must come out, so that with the
+exponents a_i of a unit in every parameter p_i
+    sum a_i p_i dw/dp_i = 0 for mass and length, = -w for time.
+These hold for every kind of edge and test a gradient without any reference.
+
+With P(z, k) = z an orbit and M(z, k) its monodromy matrix, dz = -(M - 1)^-1 dP and dM = M_z dz + M_k dk; a simple
+multiplier mu with left and right vectors l, r moves by l dM r / l r. One expansion of the return map to second order
+gives all derivatives, for every kind of edge and for the largest multiplier of an orbit, by one compiled program.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._arguments import require_at_least
+from .._checks import require_x64
+from .._errors import ArgumentError
+from .._form import compiled
+from .._notebook import notebook_html
+from .._parameters import get, parameter_dimensions, parameter_paths, parameters
+from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
+from .bifurcation import TANGENTIAL, PointEquations, critical_rate
+from .branch import FEIGENBAUM, Cascade
+from .continuation import in_parallel
+from .implicit import FieldNumbers, around_root, expansion, numbers_around, numbers_of
+from .orbit import OrbitEquations, StateLike, periodic_orbit, sorted_multipliers
+from .point import Kind, Point, null_vectors, singular_matrix
+from .problem import SPEED, Given, OrbitProblem, make_problem
+from .step_counts import GIVEN_UP, MOST_OF_A_POINT, POINT, SETTLED, Counts, by_steps, with_fallback
+
+
+PER_RPM = np.pi / 30
+ITERATIONS = 6
+POLISHED, SETTLED_TO, NEARBY = 1e-11, 1e-7, 0.5
+"""Limits of Newton's method, in units of the system's scale and of a tenth of the speed: it ends with a step below the
+first, the step must be below the second, and it may lead no further from the guess than the third."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of an edge, or of the width between two edges, with respect to every parameter."""
+
+    name: str
+    kind: str
+    value_rpm: float
+    derivative: dict[str, float]
+    """d value [rpm] / d parameter [SI]."""
+    elasticity: dict[str, float]
+    """Relative change of the value over the relative change of the parameter."""
+    homogeneity: dict[str, float]
+    """Relative residuals of the identities for mass, length and time; NaN if a parameter's unit is not known."""
+    transversality: float
+    """d|mu|/d speed [s] (see `Point`); the smallest one for a width or a limit."""
+    status: str
+    state: Float[np.ndarray, " dim"] | None = None
+    """State of the orbit at phase 0 [SI]; None for a width or a limit."""
+    error_rpm: float = float("nan")
+    """Distance of the value to that by half the steps."""
+    steps: int = 0
+    """Steps per revolution; 0 for a width or a limit."""
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the value is a function of the design here."""
+        return self.status == "converged"
+
+    def __str__(self) -> str:
+        order = sorted(self.elasticity, key=lambda n: -abs(self.elasticity[n]))
+        rows = [f"  {n:<28} {self.elasticity[n]:+.6f}" for n in order if self.elasticity[n] != 0.0]
+        at = f"{self.kind} at {self.value_rpm:.3f} +- {self.error_rpm:.1g} rpm"
+        return "\n".join([f"{self.name}: {at}, elasticities", *rows])
+
+    _repr_html_ = notebook_html
+
+
+@compiled
+def _pull_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> AbstractForcedSystem:
+    """Return d(weight . k) / d system."""
+    row = lambda s: numbers_of(problem.prepare(u, Given(s, given.speed)))[0]
+    _, pull = eqx.filter_vjp(row, given.system)
+    return pull(weight)[0]
+
+
+def _pulled_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -> dict[str, float]:
+    """Return d(weight . k) / d parameter [SI]."""
+    pulled = _pull_back(problem, given, u, weight)
+    return {n: float(get(pulled, path)) for n, path in parameter_paths(given.system).items()}
+
+
+class _Edge(NamedTuple):
+    """An edge located to rounding, by some number of steps."""
+
+    problem: OrbitProblem
+    u: Array
+    residual: Array
+    """Newton's last step, in the unknowns' units."""
+    weight: Array
+    """Derivatives of the speed at the edge by the numbers of the field."""
+    rate: float
+    """d|mu| / d speed (at a fold: the drift along the critical direction)."""
+    error: float = float("nan")
+    """Distance of the speed to that by half the steps [rad/s]."""
+    steps: int = 0
+
+    @property
+    def speed(self) -> float:
+        return float(self.problem.values(self.u)[0])
+
+    @property
+    def found(self) -> bool:
+        return bool(jnp.max(jnp.abs(self.residual)) < SETTLED_TO)
+
+    @property
+    def status(self) -> str:
+        if not self.found:
+            return "no such point"
+        return "not converged" if self.error > SETTLED * self.speed else "converged"
+
+
+@compiled
+def _unfold(
+    kind: Kind, problem: OrbitProblem, u: Array, numbers: FieldNumbers, around: Any, slopes: Any
+) -> tuple[Array, Array, Array]:
+    """Return Newton's step to the bifurcation near the unknowns u, and weight and rate there (see `_Edge`)."""
+    n, m, unit = problem.dimension, u.size, problem.units[0]
+    borders = null_vectors(singular_matrix(kind, around[1]))
+    equations = PointEquations(problem, *borders, kind)
+    (r, known), (of_r, _) = around_root(equations, u, numbers, around, slopes)
+    jacobian = of_r[:, :m] + of_r[:, m:] @ numbers.of_u
+    adjoint = jnp.linalg.solve(jacobian.T, jnp.zeros(m).at[-1].set(1.0))
+    rate = critical_rate(kind, n, jacobian, known, borders) / unit
+    return jnp.linalg.solve(jacobian, r), -(adjoint @ of_r[:, m:]) * unit, rate
+
+
+def _located(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None) -> _Edge:
+    """Locate the edge near `point`, and again with twice the steps until it stays where it is."""
+
+    def find(chosen: AbstractMethod, counts: Counts) -> _Edge:
+        counts = counts.near(int(point.steps) or None)
+        given = Given(system, jnp.asarray(point.speed, dtype=float))
+        problem = make_problem(given, (SPEED,), [0.1 * given.speed], point.periods, chosen)
+        near = begin = jnp.append(jnp.asarray(point.state) / problem.scale, 10.0)
+        before, edge = None, None
+        for i in range(int(counts.tries)):
+            steps = int(counts.steps(i))
+            before, edge = edge, _polished(by_steps(problem, steps), given, point.kind, near)._replace(steps=steps)
+            if before is not None:
+                both = before.found and edge.found
+                edge = edge._replace(error=abs(edge.speed - before.speed) if both else float("inf"))
+            known = edge.found or (before is not None and before.found)
+            if edge.error <= POINT * edge.speed * float(counts.tolerance) or (steps >= GIVEN_UP and not known):
+                break
+            near = edge.u if edge.found else begin
+        assert edge is not None
+        return edge
+
+    return with_fallback(find, method, MOST_OF_A_POINT)
+
+
+def _polished(problem: OrbitProblem, given: Given, kind: Any, first: Array) -> _Edge:
+    """Locate the edge near the unknowns `first` by Newton's method, with the steps of the problem."""
+    u, orbit = first, OrbitEquations(problem)
+    for i in range(ITERATIONS + 1):
+        numbers = numbers_around(orbit, u, given)
+        step, weight, rate = _unfold(kind, problem, u, numbers, *expansion(problem, u, numbers))
+        leads = jnp.max(jnp.abs(u - step - first))
+        goes_on = (jnp.max(jnp.abs(step)) > POLISHED) & (leads < NEARBY)  # not if it is there, lost, or not a number
+        if i == ITERATIONS or not bool(goes_on):
+            break
+        u = u - step
+    return _Edge(problem, u, step, weight, float(rate))
+
+
+def edge_speed(system: AbstractForcedSystem, point: Point, method: AbstractMethod | None = None) -> float:
+    """Return the speed [rad/s] of the edge near `point`; NaN if it is not found, or elsewhere by half the steps."""
+    require_x64()
+    if point.kind == "branch-point":
+        said = "must be a period-doubling, Neimark-Sacker or fold, but it is a branch-point."
+        raise ArgumentError("point", said=said)
+    edge = _located(system, point, method)
+    return edge.speed if edge.status == "converged" else float("nan")
+
+
+def sensitivity(
+    system: AbstractForcedSystem, point: Point, name: str = "edge", method: AbstractMethod | None = None
+) -> Sensitivity:
+    """Return the derivatives of an edge speed with respect to every parameter, exact for the equations as integrated.
+
+    Newton's method locates the point first, and again with twice the steps until it no longer moves. `bifurcation`
+    gives the same derivatives, and higher ones.
+
+    **Arguments:** a system whose parameters are declared, such as `CageModel`; a bifurcation over speed, located.
+
+    **Returns:** `Sensitivity`; it is NaN for a branch point, and if Newton's method does not find the point again, or
+    finds it elsewhere with half the steps.
+    """
+    require_x64()
+    if point.kind == "branch-point":  # it is there for the symmetry alone, and no function of the design
+        return _nowhere(system, point.kind, name)
+    edge = _located(system, point, method)
+    if edge.status != "converged":
+        return _nowhere(system, point.kind, name, edge.status, edge.error / PER_RPM)
+    speed = edge.speed
+    slope = _pulled_back(edge.problem, Given(system, jnp.asarray(point.speed, dtype=float)), edge.u, edge.weight)
+    change = {n: slope[n] * float(v) / speed for n, v in parameters(system).items()}
+    units, bases = parameter_dimensions(system), {"mass": 0.0, "length": 0.0, "time": 1.0}
+    return Sensitivity(
+        name=name,
+        kind=point.kind,
+        value_rpm=speed / PER_RPM,
+        derivative={n: s / PER_RPM for n, s in slope.items()},
+        elasticity=change,
+        homogeneity={b: rate + sum(units[n][b] * e for n, e in change.items()) for b, rate in bases.items()},
+        transversality=edge.rate,
+        status="tangential" if abs(edge.rate * speed) < TANGENTIAL else "converged",
+        state=np.asarray(edge.problem.state(edge.u)),
+        error_rpm=edge.error / PER_RPM,
+        steps=edge.steps,
+    )
+
+
+def _nowhere(
+    system: AbstractForcedSystem, kind: str, name: str, status: str = "no such point", error_rpm: float = float("nan")
+) -> Sensitivity:
+    """Return the result for an edge that was not found again, or elsewhere."""
+    nan = float("nan")
+    row = dict.fromkeys(parameter_paths(system), nan)
+    broken: dict[str, float] = dict.fromkeys(("mass", "length", "time"), nan)
+    return Sensitivity(name, kind, nan, row, row, broken, nan, status, error_rpm=error_rpm)
+
+
+def sensitivities(
+    system: AbstractForcedSystem, points: Mapping[str, Point], method: AbstractMethod | None = None
+) -> dict[str, Sensitivity]:
+    """Return the sensitivity of each named edge; edges run on all cores."""
+    require_x64()
+    found = in_parallel(lambda name: sensitivity(system, points[name], name, method), list(points))
+    return dict(zip(points, found, strict=True))
+
+
+def limit_sensitivity(
+    system: AbstractForcedSystem, cascade: Cascade, name: str = "limit", method: AbstractMethod | None = None
+) -> Sensitivity:
+    """Return the sensitivity of the speed at which a cascade accumulates, extrapolated like that speed itself.
+
+    **Raises:** `ValueError` for a cascade over another parameter than speed, or of fewer than two points.
+    """
+    if len(cascade.points) < 2 or any(p.parameter != SPEED for p in cascade.points):
+        raise ArgumentError("cascade", said=f"must have two points over speed, but has {len(cascade.points)}.")
+    before, last = (sensitivity(system, p, name, method) for p in cascade.points[-2:])
+    return _combined(name, "period-doubling", ((1 + 1 / (FEIGENBAUM - 1), last), (-1 / (FEIGENBAUM - 1), before)))
+
+
+def width(onset: Sensitivity, exit_: Sensitivity, name: str = "width") -> Sensitivity:
+    """Return the sensitivity of the width between two edges."""
+    return _combined(name, "synchronous-loss", ((1.0, exit_), (-1.0, onset)))
+
+
+def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) -> Sensitivity:
+    """Return the sensitivity of a weighted sum of edges."""
+    total = sum(w * s.value_rpm for w, s in parts)
+    first = parts[0][1]
+    weighted = lambda rows: sum(w * s.value_rpm * row for (w, s), row in zip(parts, rows, strict=True)) / total
+    return Sensitivity(
+        name=name,
+        kind=kind,
+        value_rpm=total,
+        derivative={n: sum(w * s.derivative[n] for w, s in parts) for n in first.derivative},
+        elasticity={n: weighted([s.elasticity[n] for _, s in parts]) for n in first.elasticity},
+        homogeneity={b: weighted([s.homogeneity[b] for _, s in parts]) for b in first.homogeneity},
+        transversality=min(abs(s.transversality) for _, s in parts),
+        status=next((s.status for _, s in parts if not s.trusted), "converged"),
+        error_rpm=sum(abs(w) * s.error_rpm for w, s in parts),
+    )
+
+
+class LeadingMultiplier(NamedTuple):
+    """The largest multiplier of the orbit near a guess; NaN if there is none."""
+
+    size: float
+    """|mu|: below 1 the orbit is stable."""
+    derivative: dict[str, float]
+    """d|mu| / d parameter [SI]."""
+    state: Float[np.ndarray, " dim"]
+    """State of the orbit at phase 0 [SI]."""
+
+
+@compiled
+def _largest(monodromy: Array, of_r: Array, of_monodromy: Array) -> tuple[Array, Array]:
+    """Return |mu| of the largest multiplier, and its derivatives by the numbers of the field."""
+    n = monodromy.shape[0]
+    size, weight = jax.value_and_grad(lambda m: jnp.abs(sorted_multipliers(m)[0]))(monodromy)
+    moved = -jnp.linalg.solve(of_r[:, :n], of_r[:, n:])
+    return size, jnp.einsum("ij,ijk->k", weight, of_monodromy[..., n:] + of_monodromy[..., :n] @ moved)
+
+
+def leading_multiplier(
+    system: AbstractForcedSystem,
+    speed: float,
+    guess: StateLike,
+    *,
+    periods: int = 1,
+    method: AbstractMethod | None = None,
+) -> LeadingMultiplier:
+    """Return the size of the largest multiplier of the orbit near `guess` (a state, SI), and its derivatives.
+
+    **Arguments:** a system whose parameters are declared, such as `CageModel`; speed [rad/s]; guess; revolutions after
+    which the orbit closes; integration method. If two multipliers are equal in size, one of them is taken.
+    """
+    require_at_least(1, periods=periods)
+    orbit = periodic_orbit(system, speed, periods, guess=guess, method=method)
+    if not bool(orbit.converged):
+        nan = float("nan")
+        return LeadingMultiplier(nan, dict.fromkeys(parameter_paths(system), nan), np.asarray(orbit.state))
+    given = Given(system, jnp.asarray(speed, dtype=float))
+    problem = make_problem(given, (), jnp.ones(0), periods, orbit.method)
+    equations, u = OrbitEquations(problem), orbit.state / problem.scale
+    numbers = numbers_around(equations, u, given)
+    (_, monodromy), slopes = around_root(equations, u, numbers, *expansion(problem, u, numbers))
+    size, weight = _largest(monodromy, *slopes)
+    return LeadingMultiplier(float(size), _pulled_back(problem, given, u, weight), np.asarray(orbit.state))

@@ -1,0 +1,395 @@
+"""Bifurcations along a branch: seen between neighbouring orbits, located, and compared with the changes of stability.
+
+The Illinois variant of regula falsi locates them: the functions that vanish there are evaluated at orbits of the branch
+itself, on planes across the chord between two ends. All places are located at the same time.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from .continuation import ContinuationProblem, correct
+from .point import UNEXPLAINED, test_functions, to_critical
+from .step_control import Points
+from .step_counts import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
+
+
+WIDER = (0, 1, 3)
+"""A bifurcation that is not between the two orbits at which it was seen is looked for this many orbits further out."""
+BESIDE = 0.02
+"""By other steps it is first looked for this close to where it was, of the length between the two orbits, or twice as
+far as it moved last."""
+PART = 1e-3
+"""It is refined until it moves by this part of that, which leaves far less than its error."""
+CLEAR = 1e-4
+"""Orbits are counted if their multipliers are further than this from the unit circle: others may be on either side by
+rounding, or by Newton's last step."""
+HALVINGS, APART = 20, 1e-7
+"""Most halvings of a step, and the length below which it is not halved, in the unknowns' units."""
+NEARLY = 0.1
+"""Allowed error of a parabola through three points: of an extremum, over the function's change in the steps beside it,
+and of its place, over a step."""
+SUNK = 0.75
+"""A parabola that puts the extremum below this part of the lesser end is not accurate about the rest, either."""
+STEEP = 30.0
+"""A map whose derivative is larger than this may have another one at the orbit than at Newton's last iterate before."""
+LOOKED = 1e-4
+"""Steps below this length are not halved because of a parabola: where orbits cross, the functions are rounding."""
+MOST_ITERATIONS = 40
+LOCATED = 1e-9
+"""Accuracy of places, in the unknowns' units."""
+BRACKETED = 1e-5
+"""A branch point, at which the curve's equations are singular, is bracketed this closely, and interpolated."""
+
+
+@dataclasses.dataclass
+class Place:
+    """A bifurcation between two orbits of a branch."""
+
+    row: Points
+    """Orbits of the branch."""
+    after: int
+    """The orbit before it."""
+    kind: str
+    point: Points | None = None
+    """None if it was not found."""
+    error: float = float("inf")
+    """Distance to the place by half the steps, in the parameter's unit."""
+    steps: int = 0
+    """Steps per revolution with which it is looked for."""
+    moved: float = 0.0
+    """Expected distance to the place by other steps."""
+    within: float = LOCATED
+    """Accuracy with which it is looked for close to where it was."""
+
+    def ends(self, beyond: int | None) -> Points | None:
+        """Return points on both sides: orbits, so many further out, or close to where it was found; None if it was
+        not."""
+        if beyond is not None:
+            return self.row.take([max(self.after - beyond, 0), min(self.after + 1 + beyond, len(self.row.u) - 1)])
+        if self.point is None:
+            return None
+        both = Points.stacked([self.point, self.point])
+        return both._replace(u=self.point.u + np.outer([-2 * self.moved, 2 * self.moved], self.point.tangent))
+
+
+def bifurcations_of(problem: ContinuationProblem, rows: Sequence[Points]) -> list[tuple[Points, list[Place]]]:
+    """Return the orbits of branches, and their bifurcations in order; between any two there is an orbit.
+
+    If the number of unstable multipliers changes otherwise than by what was seen, as when two real multipliers pass -1
+    within a step, the step is halved. If it changes otherwise than by what was located, its orbits are solved for again
+    and bifurcations located once more. The rest is of the kind `unexplained`: the curve may not be a branch there.
+    """
+    rows = [_halved(problem, _at_the_root(problem, row)) for row in rows]
+    places = _located(problem, rows)
+    gaps = lambda i: _gaps(problem, rows[i], [(p.after, p.kind) for p in places[i]])
+    doubtful = [i for i in range(len(rows)) if gaps(i)]
+    again = [_halved(problem, _with_finer_steps(problem, rows[i], gaps(i))) for i in doubtful]
+    for i, row, mine in zip(doubtful, again, _located(problem, again), strict=True):
+        rows[i], places[i] = row, mine
+    found = []
+    for i in range(len(rows)):
+        rows[i], places[i] = row, mine = _parted(problem, rows[i], places[i])
+        for a, b in gaps(i):
+            k = a + int(np.argmax(np.diff(problem.unstable(row)[a : b + 1]) != 0))
+            far = float(np.max(np.abs(np.diff(row.u[a : b + 1, -1]))))
+            middle = row.take(k)._replace(u=(row.u[k] + row.u[k + 1]) / 2)
+            mine.append(Place(row, k, UNEXPLAINED, middle, far))
+        found.append((row, _in_order(row, mine)))
+    return found
+
+
+# --- orbits of a branch --------------------------------------------------------------------------------------------
+
+
+def _at_the_root(problem: ContinuationProblem, row: Points) -> Points:
+    """Return the orbits with derivatives at the root where those of Newton's last iterate before it may differ."""
+    steep = np.flatnonzero(np.max(np.abs(row.jacobian), axis=(1, 2)) > STEEP)
+    return _solved_again(problem, row, steep, row.steps[steep])
+
+
+def _with_finer_steps(problem: ContinuationProblem, row: Points, gaps: Sequence[tuple[int, int]]) -> Points:
+    """Return the orbits with those around the gaps solved for again, in each gap by twice the largest steps."""
+    for a, b in gaps:
+        near = np.arange(max(a - 1, 0), min(b + 2, len(row.u)))
+        steps = np.full(near.size, min(2 * int(row.steps[near].max()), int(problem.counts.last)))
+        row = _solved_again(problem, row, near, steps)
+    return row
+
+
+def _solved_again(problem: ContinuationProblem, row: Points, which: np.ndarray, steps: np.ndarray) -> Points:
+    """Return the orbits with some solved for once more by these steps, if that succeeds."""
+    if not which.size:
+        return row
+    got = correct(problem, row.u[which], row.tangent[which], steps)
+    good = got.converged
+    return row.put(which[good], got.take(good).with_errors_of(row.take(which[good])))
+
+
+def _with_middles(
+    problem: ContinuationProblem, row: Points, after: np.ndarray, one: Points, other: Points
+) -> tuple[Points, np.ndarray]:
+    """Return the orbits with further ones `after` these, halfway from `one` to `other`; and which were found."""
+    chord = other.u - one.u
+    length = np.linalg.norm(chord, axis=1)
+    middle, normal = one.u + chord / 2, chord / length[:, None]
+    got = correct(problem, middle, normal, np.maximum(one.steps, other.steps))
+    good = got.converged & (np.linalg.norm(got.u - middle, axis=1) < length / 2)
+    new = got.take(good).with_errors_of(row.take(after[good]))
+    return jax.tree.map(lambda x, y: np.insert(x, after[good] + 1, y, axis=0), row, new), good
+
+
+def _halved(problem: ContinuationProblem, row: Points) -> Points:
+    """Return the orbits with further ones in steps over which their stability changes unseen, or may change twice."""
+    for _ in range(HALVINGS):
+        gaps = sorted({*_gaps(problem, row, _likely(problem, row)), *_dips(problem, row)})
+        length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+        longest = sorted({a + int(np.argmax(length[a:b])) for a, b in gaps})
+        after = np.array([k for k in longest if length[k] > APART], dtype=int)
+        if not after.size:
+            break
+        row, good = _with_middles(problem, row, after, row.take(after), row.take(after + 1))
+        if not np.any(good):
+            break
+    return row
+
+
+def _in_order(row: Points, places: Sequence[Place]) -> list[Place]:
+    """Return bifurcations in their order along a branch."""
+    along = lambda p: float(np.dot(p.point.u - row.u[p.after], row.u[p.after + 1] - row.u[p.after]))
+    return sorted(places, key=lambda p: (p.after, along(p)))
+
+
+def _parted(problem: ContinuationProblem, row: Points, places: Sequence[Place]) -> tuple[Points, list[Place]]:
+    """Return the orbits with one more between bifurcations of the same step, and the bifurcations in order."""
+    places = _in_order(row, places)
+    far = lambda a, b: bool(np.linalg.norm(b.point.u - a.point.u) > APART)
+    pairs = np.flatnonzero([a.after == b.after and far(a, b) for a, b in itertools.pairwise(places)])
+    if not pairs.size:
+        return row, places
+    points = Points.stacked([p.point for p in places])
+    after = np.array([places[k].after for k in pairs])
+    row, good = _with_middles(problem, row, after, points.take(pairs), points.take(pairs + 1))
+    shifted = [p.after + int(np.sum(pairs[good] < k)) for k, p in enumerate(places)]
+    return row, [dataclasses.replace(p, after=k) for p, k in zip(places, shifted, strict=True)]
+
+
+# --- changes of stability ------------------------------------------------------------------------------------------
+
+
+def _signals(problem: ContinuationProblem, points: Points) -> dict[str, np.ndarray]:
+    """Return functions along a branch that change sign at its special points."""
+    tests = test_functions(problem.multipliers(points))
+    tests["branch-point"] = tests["fold"] * np.sign(points.tangent[..., -1])
+    tests["fold"] = points.tangent[..., -1]
+    return tests
+
+
+def sign_changes(problem: ContinuationProblem, row: Points) -> list[tuple[int, str]]:
+    """Return for each change of sign of a test function the orbit before it, and its kind."""
+    values = _signals(problem, row)
+    return sorted((int(k), kind) for kind, f in values.items() for k in np.flatnonzero(f[:-1] * f[1:] < 0))
+
+
+def _gaps(problem: ContinuationProblem, row: Points, seen: Sequence[tuple[int, str]]) -> list[tuple[int, int]]:
+    """Return pairs of orbits between which what was seen does not explain the change of the unstable multipliers."""
+    count = problem.unstable(row)
+    clear = np.flatnonzero(problem.unstable(row, 1 + CLEAR) == problem.unstable(row, 1 - CLEAR))
+    found = []
+    for a, b in itertools.pairwise(clear.tolist()):
+        crossing = sum(2 if kind == "Neimark-Sacker" else 1 for k, kind in seen if a <= k < b)
+        change = abs(int(count[b] - count[a]))
+        if change > crossing or (crossing - change) % 2:
+            found.append((a, b))
+    return found
+
+
+def _likely(problem: ContinuationProblem, row: Points) -> list[tuple[int, str]]:
+    """Return the changes of sign without products of two multipliers that pass 1 while no complex pair leaves."""
+    mu = problem.multipliers(row)
+    pairs = np.sum((np.abs(mu) >= 1) & (np.abs(np.imag(mu)) > 1e-9), axis=-1)
+    return [(k, kind) for k, kind in sign_changes(problem, row) if kind != "Neimark-Sacker" or pairs[k] != pairs[k + 1]]
+
+
+def _dips(problem: ContinuationProblem, row: Points) -> list[tuple[int, int]]:
+    """Return steps over which a test function may vanish twice, where the effects on the count may cancel."""
+    tests = test_functions(problem.multipliers(row))
+    length = np.linalg.norm(np.diff(row.u, axis=0), axis=1)
+    found = _sinking(np.stack([*tests.values(), row.tangent[:, -1]]), length)
+    return [(a, b) for a, b in found if length[a] > LOOKED]
+
+
+def _sinking(f: Float[np.ndarray, "functions points"], length: Float[np.ndarray, " steps"]) -> list[tuple[int, int]]:
+    """Return steps over which a function has one sign at both ends and, by a parabola through three points, the other
+    in between, or nearly."""
+    back, ahead = length[:-1], length[1:]
+    chord = np.diff(f) / length
+    bend = np.diff(chord) / (back + ahead)
+    slope = chord[:, 1:] - bend * ahead
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place, extreme = -slope / (2 * bend), f[:, 1:-1] - slope**2 / (4 * bend)
+    change = np.abs(np.diff(f))
+    nearly = NEARLY * np.maximum(change[:, :-1], change[:, 1:])
+    found = set()
+    before, after = (-back < place) & (place < NEARLY * ahead), (-NEARLY * back < place) & (place < ahead)
+    for first, inside in enumerate([before, after]):
+        one, other = f[:, first : first + back.size], f[:, first + 1 : first + 1 + back.size]
+        near = np.maximum(nearly, SUNK * np.minimum(np.abs(one), np.abs(other)))
+        twice = inside & (one * other > 0) & (extreme * np.sign(one) < near)
+        found |= {(int(k) + first, int(k) + first + 1) for k in np.flatnonzero(np.any(twice, axis=0))}
+    return sorted(found)
+
+
+# --- location ------------------------------------------------------------------------------------------------------
+
+
+def _located(problem: ContinuationProblem, rows: Sequence[Points]) -> list[list[Place]]:
+    """Return the bifurcations on each branch that were seen and found."""
+    places = [[Place(row, k, kind) for k, kind in sign_changes(problem, row)] for row in rows]
+    _locate(problem, [p for mine in places for p in mine])
+
+    def is_there(p: Place) -> bool:
+        near = 1e-4 if p.kind == "Neimark-Sacker" else 1e-3  # a double multiplier is known to the root of rounding
+        return p.point is not None and bool(to_critical(p.kind, jnp.asarray(problem.multipliers(p.point))) < near)
+
+    return [[p for p in mine if is_there(p)] for mine in places]
+
+
+def _locate(problem: ContinuationProblem, places: Sequence[Place]) -> None:
+    """Set point, steps and error of each place: doubled steps move it until that is less than allowed.
+
+    A branch point, where the curve's equations are singular, may be found by some steps and not by others: its error is
+    from those that find it.
+    """
+    counts, chooses = problem.counts, problem.counts.chooses
+    most = MOST_OF_A_POINT if chooses else int(counts.last)
+    for p in places:
+        p.steps = int(p.row.steps[p.after : p.after + 2].max()) if chooses else int(counts.first)
+        p.moved = BESIDE / 2 * float(np.linalg.norm(p.row.u[p.after + 1] - p.row.u[p.after]))
+        p.error = float("inf") if most > 1 else float("nan")
+    for p, point in zip(places, _found_at(problem, places), strict=True):
+        p.point = point
+    settled = lambda p: p.point is not None and p.error <= POINT * max(abs(p.point.u[-1]), 1.0) * chooses
+    while again := [p for p in places if not settled(p) and p.steps < most]:
+        for p in again:
+            p.steps = min(2 * p.steps, most)
+        for p, point in zip(again, _found_at(problem, again), strict=True):
+            before = p.point
+            if point is not None:
+                p.point = point
+            if point is not None and before is not None:
+                p.error = abs(point.u[-1] - before.u[-1])
+                p.moved = max(float(np.linalg.norm(point.u - before.u)), LOCATED)
+                p.within = max(PART * p.moved, LOCATED)
+            elif point is not None or p.kind != "branch-point":
+                p.error = float("inf")
+    there = [p for p in places if chooses and p.point is not None]
+    for p in there:
+        p.steps = other_steps(p.steps)
+    for p, point in zip(there, _found_at(problem, there), strict=True):
+        if point is not None:
+            least = LOCATED if p.kind == "branch-point" else 0.0
+            p.error = max(p.error, BY_OTHERS * abs(point.u[-1] - p.point.u[-1]), least)
+        elif p.kind != "branch-point":
+            p.error = float("inf")
+
+
+def _found_at(problem: ContinuationProblem, places: Sequence[Place]) -> list[Points | None]:
+    """Return where places are by their present steps, looked for close to where they were and then further out."""
+    found: dict[int, Points | None] = dict.fromkeys(range(len(places)))
+    for beyond in (None, *WIDER):
+        ends = {i: e for i, p in enumerate(places) if found[i] is None and (e := p.ends(beyond)) is not None}
+        if ends:
+            wanted = [(places[i], places[i].within if beyond is None else LOCATED, e) for i, e in ends.items()]
+            found.update(zip(ends, _zeros(problem, wanted), strict=True))
+    return list(found.values())
+
+
+def _zeros(problem: ContinuationProblem, wanted: Sequence[tuple[Place, float, Points]]) -> list[Points | None]:
+    """Return where the test functions vanish between two orbits each, these solved for again by the place's steps.
+
+    **Arguments:** place, accuracy, and orbits on both sides.
+
+    **Returns:** None where the function does not change sign, or the curve was lost.
+    """
+    both = jax.tree.map(lambda *x: np.concatenate(x), *(e for *_, e in wanted))
+    steps = np.repeat([place.steps for place, *_ in wanted], 2)
+    other = np.flatnonzero(both.steps != steps)
+    if other.size:
+        both = both.put(other, correct(problem, both.u[other], both.tangent[other], steps[other]))
+    falsi = [
+        _RegulaFalsi(problem, place.kind, within, both.take([2 * i, 2 * i + 1]))
+        for i, (place, within, _) in enumerate(wanted)
+    ]
+    for _ in range(MOST_ITERATIONS):
+        active = [(i, f) for i, f in enumerate(falsi) if f.active]
+        if not active:
+            break
+        at = np.stack([f.aim() for _, f in active])
+        got = correct(problem, at, np.stack([f.normal for _, f in active]), steps[[2 * i for i, _ in active]])
+        for k, (_, f) in enumerate(active):
+            f.update(got.take(k))
+    return [f.best for f in falsi]
+
+
+class _RegulaFalsi:
+    """The search for the zero of one test function between two points of a branch."""
+
+    def __init__(self, problem: ContinuationProblem, kind: str, within: float, ends: Points):
+        self.signal = lambda points: _signals(problem, points)[kind]
+        self.within, self.sides = within, [ends.take(0), ends.take(1)]
+        self.chord = ends.u[1] - ends.u[0]
+        self.begin, self.length = ends.u[0], float(np.linalg.norm(self.chord))
+        self.values = [float(x) for x in self.signal(ends)] if np.all(ends.converged) else [np.nan, np.nan]
+        self.shares, self.aimed, self.share, self.last, self.aside = [0.0, 1.0], 0.0, 0.0, 0.0, 0.0
+        self.best: Points | None = None
+        self.active = self.values[0] * self.values[1] < 0
+        self.normal = self.chord / self.length if self.active else self.chord
+
+    def aim(self) -> np.ndarray:
+        """Return where to evaluate the function next: on the cubic through the sides, where it passes the plane."""
+        (low, high), (f0, f1) = self.shares, self.values
+        margin = 1e-3 * (high - low)
+        self.aimed = min(max((low * f1 - high * f0) / (f1 - f0), low + margin), high - margin)
+        self.share = min(max(self.aimed + self.aside, low), high)
+        at, normal, (first, second) = self.begin + self.share * self.chord, self.normal, self.sides
+        chord = second.u - first.u
+        across = np.dot(chord, normal)
+        if not across > 0:
+            return at
+        share, length = np.dot(at - first.u, normal) / across, np.linalg.norm(chord)
+        out, back = length * first.tangent - chord, chord - length * second.tangent
+        found = first.u + share * chord + share * (1 - share) * ((1 - share) * out + share * back)
+        return found + np.dot(at - found, normal) * normal
+
+    def update(self, got: Points) -> None:
+        """Move one end of the bracket to a new point."""
+        low, high = self.shares
+        if not got.converged:  # near a branch point, where it is tried on both sides, and interpolated at last
+            near = (high - low) * self.length < 4 * BRACKETED
+            self.best = _mixed(self.sides, (self.aimed - low) / (high - low)) if near else None
+            self.active = not near and self.aside == 0.0
+            self.aside = BRACKETED / self.length
+            return
+        before, self.best = self.best, got
+        f = float(self.signal(got))
+        end = int(f * self.values[1] >= 0)
+        if self.aside != 0.0:
+            self.aside = -self.aside if self.aside > 0 else 0.0
+        if f * self.last > 0:  # the same end was kept twice
+            self.values[1 - end] /= 2
+        self.sides[end], self.shares[end], self.values[end], self.last = got, self.share, f, f
+        moved = np.inf if before is None else np.linalg.norm(got.u - before.u)
+        wide = (self.shares[1] - self.shares[0]) * self.length > self.within
+        self.active = self.aside != 0.0 or (f != 0.0 and bool(moved > self.within) and wide)
+
+
+def _mixed(sides: list[Points], share: float) -> Points:
+    """Return the linear interpolation of two near points."""
+    mix = lambda x, y: (1 - share) * x + share * y if np.issubdtype(np.asarray(x).dtype, np.floating) else x
+    return jax.tree.map(mix, *sides)

@@ -1,0 +1,315 @@
+"""Periodic orbits: fixed points of powers of the strobe map, with their Floquet multipliers."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import diffrax as dfx
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float, Int
+
+from .._arguments import require_at_least, shown
+from .._checks import require_x64
+from .._errors import ArgumentError
+from .._form import compiled
+from .._notebook import notebook_html
+from .._types import Scalar, State
+from ..models import AbstractForcedSystem, require_speeds
+from ..solve import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
+from .implicit import as_root
+from .newton import AbstractEquations, refined
+from .problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
+from .step_counts import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, with_fallback
+
+
+if TYPE_CHECKING:
+    from .point import Point
+
+ROUNDING = 1e-13
+AT_REST = 1e-3
+"""A simulation has led to an orbit if it moves by less, in units of the system's scale."""
+LIOUVILLE_TOLERANCE = 1e-3
+"""Largest disagreement in log|det M| at which multipliers are trusted."""
+ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
+"""Parts of a revolution for integrating the divergence: with a method that has no steps, and with steps that are a
+multiple of the second."""
+
+
+class OrbitEquations(AbstractEquations):
+    """P(z) = z: as many equations as unknowns or, if a parameter of the problem is free, the equations of a branch."""
+
+    problem: OrbitProblem
+
+    def prepare(self, u: Array, given: Given) -> Prepared:
+        return self.problem.prepare(u, given), []
+
+    def closing(self, u: Array, prepared: Prepared, image: Array, columns: Array) -> tuple[Array, Array]:
+        return image - u[: self.problem.dimension], columns
+
+    def linearised(self, u: Array, given: Given) -> tuple[Array, Array, Any]:
+        """Run one revolution with the state's tangents and a column for each other unknown, in one kernel."""
+        problem, n = self.problem, self.problem.dimension
+        drifts = [problem.drift(u, given, i) for i in range(n, u.size)]
+        image, columns = problem.returned(problem.prepare(u, given), u[:n], drifts)
+        return image - u[:n], columns - jnp.eye(n, u.size), None
+
+    def monodromy(self, found: Any) -> Any:
+        n = self.problem.dimension
+        return found.jacobian[..., :n, :n] + np.eye(n)
+
+    def apart(self, moved: Any, coarse: Any, fine: Any) -> tuple[Any, Any]:
+        """Compare by the change of the map, with the margin that simulations have, and of its relative derivative."""
+        n = self.problem.dimension
+        image = abs(fine @ moved[..., None])[..., 0].max(-1)
+        size = lambda m: abs(m[..., :n]).max((-2, -1))
+        return SURE * image, image / IMAGE + size(fine - coarse) / (1 + size(fine)) / SLOPE
+
+
+class Orbit(eqx.Module):
+    """A periodic orbit. If none was found its numbers are NaN and `status` says so."""
+
+    state: Float[Array, " dim"]
+    """State at phase 0 [SI]."""
+    speed: Scalar
+    """Speed [rad/s]."""
+    multipliers: Complex[Array, " dim"]
+    """Floquet multipliers over all its periods, the largest first."""
+    monodromy: Float[Array, "dim dim"]
+    """Derivative of the map, in units of the system's scale."""
+    residual: Float[Array, ""]
+    """Largest component of P(z) - z, in units of the system's scale."""
+    liouville: Float[Array, ""]
+    """log|det M| minus the integral of the field's divergence over the orbit, which must be equal. Both are limited to
+    what rounding resolves of the smallest multiplier, so that the others check an orbit with strong damping."""
+    steps: Int[Array, ""]
+    """Steps per revolution; 1 if the method has no such number."""
+    error: Float[Array, ""]
+    """Three times the largest component of the change of P at the orbit against half as many steps, in units of the
+    system's scale: at a grazing contact one difference of steps may be too small by chance. It is infinite if these
+    steps find no orbit, NaN if the method has no number of steps."""
+    converged: Bool[Array, ""]
+    iterations: Int[Array, ""]
+    periods: Int[Array, ""]
+    solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
+    """Solver that takes these steps, or the whole method if that chooses its steps itself."""
+
+    @property
+    def method(self) -> AbstractMethod:
+        """Integration method, with its steps."""
+        return self.solver if isinstance(self.solver, AbstractMethod) else FixedSteps(self.solver, self.steps)
+
+    @property
+    def period(self) -> Array:
+        """Duration [s]."""
+        return 2 * jnp.pi * self.periods.astype(float) / self.speed
+
+    @property
+    def stable(self) -> Bool[Array, ""]:
+        """Whether every multiplier is inside the unit circle."""
+        return self.converged & (jnp.max(jnp.abs(self.multipliers)) < 1.0)
+
+    @property
+    def status(self) -> str:
+        """`converged`, `no orbit` or `multipliers not trusted` (Liouville's identity is violated)."""
+        if not bool(self.converged):
+            return "no orbit"
+        return "converged" if abs(float(self.liouville)) <= LIOUVILLE_TOLERANCE else "multipliers not trusted"
+
+    def __str__(self) -> str:
+        if not bool(self.converged):
+            return f"No orbit found (residual {float(self.residual):.1e})"
+        what = "stable" if bool(self.stable) else "unstable"
+        mu = ", ".join(f"{complex(m):.4g}" for m in self.multipliers)
+        return (
+            f"Period-{int(self.periods)} orbit at {float(self.speed) * 30 / jnp.pi:.1f} rpm, {what}\n"
+            f"  state       {', '.join(f'{float(c):.6g}' for c in self.state)}\n"
+            f"  multipliers {mu}\n"
+            f"  residual {float(self.residual):.1e}, Liouville {float(self.liouville):.1e}, {self.status}\n"
+            f"  {int(self.steps)} steps per revolution, map to {float(self.error):.1e} of the scale"
+        )
+
+    _repr_html_ = notebook_html
+
+
+if TYPE_CHECKING:
+    StateLike: TypeAlias = State | Float[Array, " dim"] | Float[np.ndarray, " dim"]
+    """A state [SI]."""
+    Guess: TypeAlias = StateLike | Orbit
+    """A state near an orbit, or an orbit."""
+    NearOrbit: TypeAlias = Orbit | Point | tuple[StateLike, Scalar]
+    """An orbit, a bifurcation of one, or a state near one with the value of the parameter."""
+    PointGuess: TypeAlias = Scalar | NearOrbit
+    """A value of the parameter, or something near the bifurcation."""
+else:  # the functions check these arguments themselves
+    StateLike = Guess = NearOrbit = PointGuess = object
+
+
+@jax.custom_jvp
+def sorted_multipliers(monodromy: Float[Array, "dim dim"]) -> Complex[Array, " dim"]:
+    """Return the eigenvalues, the largest first; they are differentiable to any order where they are distinct."""
+    mu = jnp.linalg.eigvals(monodromy)
+    return mu[jnp.argsort(-jnp.abs(mu))]
+
+
+@sorted_multipliers.defjvp
+def _sorted_multipliers_jvp(primals: Any, tangents: Any) -> Any:
+    (m,), (m_dot,) = primals, tangents
+    mu, v = jax.lax.linalg.eig(m, compute_left_eigenvectors=False, enable_eigvec_derivs=True)
+    order = jnp.argsort(-jnp.abs(mu))
+    mu, v = mu[order], v[:, order]
+    return mu, jnp.diagonal(jnp.linalg.solve(v, m_dot.astype(v.dtype) @ v))
+
+
+def divergence_integral(
+    strobe: StrobeMap, state: Float[Array, " dim"], periods: Int[Array, ""] | int
+) -> Float[Array, ""]:
+    """Integrate the field's divergence over `periods` revolutions along the orbit through `state` [SI].
+
+    By Liouville's identity the result is log|det M|, which checks every monodromy matrix: errors of integration and of
+    differentiation and, in stiff systems, multipliers lost to rounding show as a disagreement. The trapezoidal rule, at
+    the integration steps or at enough of them, converges on a closed orbit faster than any power of the step.
+    """
+    parts = ADAPTIVE_PARTS
+    if isinstance(strobe.method, FixedSteps):
+        steps = jnp.asarray(strobe.method.steps)
+        parts = jnp.where(steps % MOST_PARTS == 0, MOST_PARTS, steps)
+    h = REVOLUTION / jnp.asarray(parts, dtype=float)
+
+    def part(i: Array, carry: tuple) -> tuple:
+        y, total = carry
+        tau = jnp.mod(i, parts).astype(float) * h
+        divergence = strobe.field.linearise(tau, y).divergence
+        return strobe.part(y, jnp.mod(i, parts), parts).y, total + divergence
+
+    start = tuple(state[i] for i in range(state.size)), jnp.zeros(())
+    _, total = jax.lax.fori_loop(0, periods * parts, part, start)
+    return total * h
+
+
+def simulated(
+    problem: OrbitProblem, given: Given, start: Array, revolutions: Any, counts: Counts
+) -> Float[Array, " dim"]:
+    """Return the state after `revolutions` from `start`, and as many with twice the steps until it is at rest."""
+    given = frozen(given)
+    counts = counts._replace(last=jnp.minimum(counts.last, ENOUGH))
+
+    def turn(i: Array, carry: tuple) -> tuple:
+        y, done = carry
+        strobe = strobe_map(given.system, given.speed, by_steps(problem, counts.steps(i)).method)
+        begin = jnp.where(jnp.all(jnp.isfinite(y)), y, start)
+        row = tuple(begin[k] for k in range(start.size))
+        spin = jnp.where(done, 0, revolutions)
+        z = jnp.stack(jax.lax.fori_loop(0, spin, lambda _, y: strobe(y).y, row))
+        return z, done | (jnp.max(jnp.abs(z - y) / problem.scale) < AT_REST * counts.tolerance)
+
+    return jax.lax.fori_loop(0, counts.tries, turn, (start, jnp.array(False)))[0]
+
+
+@compiled
+def _find(
+    problem: OrbitProblem, counts: Counts, spinning: Counts, given: Given, guess: Array, revolutions: Any
+) -> tuple[Orbit, OrbitEquations, Array]:
+    """Find the orbit, without derivatives; return its equations and unknowns, too."""
+    if revolutions is not None:
+        guess = simulated(problem, given, guess, revolutions, spinning)
+    equations = OrbitEquations(problem)
+    u, found = refined(equations, given, guess / problem.scale, counts, at_root=True)
+    converged = found.converged & ~((counts.tolerance > 0) & (found.error > SETTLED))
+    u, equations = jnp.where(converged, u, jnp.nan), by_steps(equations, found.steps)
+    n, at_root = problem.dimension, found.newton  # image and derivative of the map are those of the last evaluation
+    monodromy = jnp.where(converged, at_root.jacobian[:n, :n] + jnp.eye(n), jnp.nan)
+    state, multipliers = _place(equations, u, monodromy)
+    expected = divergence_integral(equations.problem.prepare(u, given), state, problem.periods)
+    size = jnp.linalg.svd(jnp.where(jnp.isfinite(monodromy), monodromy, 0.0), compute_uv=False)
+    # log|det| of a matrix like this one whose smallest singular value is at the level of rounding
+    floor = jnp.sum(jnp.log(size[:-1])) + jnp.log(size[0]) + jnp.log(ROUNDING)
+    orbit = Orbit(
+        state=state,
+        speed=given.speed,
+        multipliers=multipliers,
+        monodromy=monodromy,
+        residual=jnp.max(jnp.abs(at_root.residual[:n])),
+        liouville=jnp.maximum(jnp.linalg.slogdet(monodromy)[1], floor) - jnp.maximum(expected, floor),
+        steps=found.steps,
+        error=found.error,
+        converged=converged,
+        iterations=found.iterations,
+        periods=problem.periods,
+        solver=problem.method.solver if isinstance(problem.method, FixedSteps) else problem.method,
+    )
+    return orbit, equations, u
+
+
+@compiled
+def _place(equations: OrbitEquations, u: Array, monodromy: Array) -> tuple[Array, Array]:
+    """Return state and multipliers of an orbit."""
+    finite = jnp.isfinite(monodromy)
+    multipliers = jnp.where(jnp.all(finite), sorted_multipliers(jnp.where(finite, monodromy, 0.0)), jnp.nan)
+    return equations.problem.state(u), multipliers
+
+
+def periodic_orbit(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    periods: int = 1,
+    *,
+    guess: Guess | None = None,
+    revolutions: int | None = None,
+    method: AbstractMethod | None = None,
+) -> Orbit:
+    """Find the orbit that closes after `periods` revolutions, by damped Newton's method on the strobe map.
+
+    **Arguments:**
+
+    - `system`, `speed`: any forced system, and its speed [rad/s].
+    - `periods`: revolutions after which the orbit closes.
+    - `guess`: a state [SI] near the orbit, or an `Orbit`; by default the first of the system's own starts.
+    - `revolutions`: revolutions of simulation before Newton's method; by default 200 without a guess, none with one.
+    - `method`: integration method; by default as many steps as the orbit needs, by Runge-Kutta or, if that finds no
+        orbit that stays where it is with more steps, by Rodas4 (never under `jit` and `vmap`).
+
+    **Returns:** `Orbit`, with its steps and their error; it does not raise if there is none. The function works under
+    `jit` and `vmap`. State and multipliers have derivatives of every order with respect to `system` and `speed`.
+    """
+    require_x64()
+    require_at_least(1, periods=periods)
+    require_speeds(system, speed)
+    if revolutions is not None:
+        require_at_least(0, revolutions=revolutions)
+    given = Given(system, jnp.asarray(speed, dtype=float))
+    start = guess_state(system, given.speed, guess)
+    once = revolutions is not None  # no more revolutions than asked for
+    if revolutions is None and guess is None:
+        revolutions = 200
+    spin = None if revolutions is None else jnp.asarray(revolutions)
+
+    def find(method: AbstractMethod, counts: Counts) -> Orbit:
+        here, begin = frozen((given, start))
+        problem = make_problem(here, (), jnp.ones(0), periods, method)
+        counts = counts.near(guess.steps if isinstance(guess, Orbit) else None)
+        enough = jnp.minimum(counts.last, ENOUGH)
+        spinning = counts._replace(first=enough if once else jnp.minimum(counts.first * 2, enough), last=enough)
+        found, equations, u = _find(problem, counts, spinning, here, begin, spin)
+        if not is_traced(given):
+            return found
+        u, monodromy = as_root(given, equations=equations, u=u, aux=found.monodromy)
+        state, multipliers = _place(equations, u, monodromy)
+        return dataclasses.replace(found, state=state, speed=given.speed, multipliers=multipliers, monodromy=monodromy)
+
+    return with_fallback(find, method, serves=lambda found: found.converged)
+
+
+def guess_state(system: AbstractForcedSystem, speed: Scalar, guess: Guess | None) -> Float[Array, " dim"]:
+    """Return a guess as an array, without derivative."""
+    if guess is None:
+        guess = system.starts(speed)[0]
+    wanted = f"must be a state of {system.dimension} numbers"
+    try:
+        state = guess.state if isinstance(guess, Orbit) else jnp.stack([jnp.asarray(c, dtype=float) for c in guess])
+    except (TypeError, ValueError) as error:  # of another kind, or ragged
+        raise ArgumentError("guess", said=f"{wanted}, but {shown(guess)} was given.") from error
+    if state.shape != (system.dimension,):
+        raise ArgumentError("guess", said=f"{wanted}, but has shape {state.shape}.")
+    return jax.lax.stop_gradient(state)

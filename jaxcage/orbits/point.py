@@ -1,0 +1,241 @@
+"""Bifurcation points of periodic orbits: their kinds, the matrices and functions that vanish there, and what is known.
+
+With monodromy matrix M an orbit is at a
+- fold, where a multiplier is 1: M - I is singular;
+- period doubling, where a multiplier is -1: M + I is singular;
+- Neimark-Sacker bifurcation, where a complex pair is on the unit circle: the second compound matrix of M, whose
+  eigenvalues are the products mu_i mu_j (i < j), has the eigenvalue 1. It also has at a neutral saddle, a real pair
+  mu and 1/mu, which is no bifurcation; and it is regular where the pair meets at 1 or -1, unlike M - exp(i phi) I.
+The determinants are symmetric functions of all multipliers: nothing jumps when multipliers cross each other.
+"""
+
+import enum
+from typing import Any, Literal, get_args
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float, Int
+
+from .._errors import ArgumentError
+from .._notebook import notebook_html
+from .._types import Scalar
+from ..analysis import Edge
+from ..models import AbstractForcedSystem
+from .problem import SPEED, Parameter, value_of
+
+
+Kind = Literal["period-doubling", "Neimark-Sacker", "fold", "branch-point"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
+"""The critical multiplier of each kind that has a real one."""
+
+
+def _second_compound(m: Float[Array, "n n"]) -> Float[Array, "k k"]:
+    """Return all 2 x 2 minors of `m`, k = n (n - 1)/2: the eigenvalues are products of pairs of those of `m`."""
+    i, j = np.triu_indices(m.shape[0], 1)
+    return m[np.ix_(i, i)] * m[np.ix_(j, j)] - m[np.ix_(i, j)] * m[np.ix_(j, i)]
+
+
+def singular_matrix(kind: Kind, m: Float[Array, "n n"]) -> Float[Array, "k k"]:
+    """Return the matrix that is singular at a bifurcation of `kind` of an orbit with monodromy matrix `m`."""
+    if kind == "Neimark-Sacker":
+        c = _second_compound(m)
+        return c - np.eye(c.shape[0])
+    return m - CRITICAL[kind] * np.eye(m.shape[0])
+
+
+def null_vectors(a: Float[Array, "k k"]) -> tuple[Float[Array, " k"], Float[Array, " k"]]:
+    """Return the left and right singular vectors of the smallest singular value of `a`."""
+    u, _, vh = jnp.linalg.svd(a)
+    return u[:, -1], vh[-1]
+
+
+def bordered(
+    a: Float[Array, "k k"], left: Float[Array, " k"], right: Float[Array, " k"]
+) -> tuple[Float[Array, ""], Float[Array, " k"], Float[Array, " k"]]:
+    """Return a scalar that vanishes where `a` is singular, smooth and well scaled unlike the determinant.
+
+    **Arguments:** matrix; vectors not orthogonal to its left and right null vectors.
+
+    **Returns:** g and the vectors q, p of [[a, left], [right, 0]] [q; g] = [0; 1] and of the transposed system; where
+    g = 0, they are the right and left null vectors, and dg = -p da q.
+    """
+    k = a.shape[0]
+    whole = jnp.block([[a, left[:, None]], [right[None, :], jnp.zeros((1, 1))]])
+    one = jnp.zeros(k + 1).at[-1].set(1.0)
+    q = jnp.linalg.solve(whole, one)
+    p = jnp.linalg.solve(whole.T, one)
+    return q[-1], q[:-1], p[:-1]
+
+
+def test_functions(multipliers: Complex[np.ndarray, "*points n"]) -> dict[str, Float[np.ndarray, "*points"]]:
+    """Return real functions of all multipliers that change sign at a bifurcation of each kind."""
+    mu = np.asarray(multipliers)
+    i, j = np.triu_indices(mu.shape[-1], 1)
+    product = lambda factors: np.asarray(np.prod(factors, axis=-1).real)
+    return {
+        "period-doubling": product(mu + 1),
+        "Neimark-Sacker": product(mu[..., i] * mu[..., j] - 1),
+        "fold": product(mu - 1),
+    }
+
+
+def to_critical(kind: str, multipliers: Complex[Array, " n"]) -> Float[Array, ""]:
+    """Return the distance of the nearest multiplier from where a bifurcation of `kind` has one.
+
+    For a Neimark-Sacker bifurcation only complex multipliers count: a real pair whose product is 1 is a neutral saddle.
+    """
+    if kind == "Neimark-Sacker":
+        return jnp.min(jnp.where(jnp.abs(multipliers.imag) > 1e-9, jnp.abs(jnp.abs(multipliers) - 1), jnp.inf))
+    return jnp.min(jnp.abs(multipliers - CRITICAL[kind]))
+
+
+def eigenvalues(monodromy: np.ndarray) -> np.ndarray:
+    """Return the multipliers, the largest first."""
+    mu = np.linalg.eigvals(monodromy).astype(complex)
+    return np.take_along_axis(mu, np.argsort(-np.abs(mu), axis=-1), axis=-1)
+
+
+Numbers = np.ndarray | Array
+
+UNEXPLAINED = "unexplained"
+
+
+class Outcome(enum.IntEnum):
+    """Outcome of the search for a point."""
+
+    FOUND = 0
+    NO_SUCH_POINT = 1
+    """Newton's method found none."""
+    OTHER_KIND = 2
+    """The multipliers are not those of the kind asked for, as at a neutral saddle."""
+    TANGENTIAL = 3
+    """The multiplier hardly crosses, so that the place is not a function of the design."""
+    NOT_CONVERGED = 4
+    """Half the steps put it elsewhere."""
+    UNEXPLAINED = 5
+    """The number of unstable multipliers changes and no bifurcation is found."""
+    GIVEN = 6
+    """It is not solved for yet."""
+
+
+class Point(eqx.Module):
+    """A bifurcation of a periodic orbit. If none was found its numbers are NaN and `status` says so.
+
+    Kind, speed and state are enough to start Newton's method from.
+    """
+
+    kind: str = eqx.field(static=True)
+    """`period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also `unexplained`: the number of
+    unstable multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one."""
+    speed: Scalar
+    """Speed [rad/s]; differentiable."""
+    state: Float[Numbers, " dim"]
+    """State of the orbit at phase 0 [SI]; differentiable."""
+    periods: Int[Array, ""] | int = 1
+    """Revolutions after which the orbit closes."""
+    steps: Int[Array, ""] | int = 0
+    """Steps per revolution; 0 if they are not known."""
+    parameter: str = eqx.field(static=True, default=SPEED)
+    value: Scalar = float("nan")
+    """Value of the parameter [SI], which may be the speed; differentiable."""
+    error: Scalar = float("nan")
+    """Distance of the value to that by half the steps or, if that is more, twice the distance to that by three quarters
+    of them and one [SI]; infinite if these do not find it, NaN if the method has no number of steps; for an unexplained
+    change the distance within which it lies. Under `jit`, `vmap` and `grad` only half the steps are tried."""
+    multipliers: Complex[Numbers, " multipliers"] = eqx.field(default_factory=lambda: np.zeros(0, dtype=complex))
+    """Floquet multipliers, the largest first."""
+    direction: Float[Numbers, " coordinates"] = eqx.field(default_factory=lambda: np.zeros(0))
+    """Critical direction in the state [SI], of length 1 in units of the scale; zero for Neimark-Sacker bifurcations."""
+    residual: Scalar = float("nan")
+    """Largest component of the equations, in units of the system's scale."""
+    transversality: Scalar = float("nan")
+    """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
+    p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed on a branch."""
+    outcome: Int[Array, ""] | int = Outcome.GIVEN.value
+    """Code of the `Outcome`."""
+    iterations: Int[Array, ""] | int = 0
+    index: int = eqx.field(static=True, default=-1)
+    """For a point on a branch: the branch's orbit before it."""
+    edge: bool = eqx.field(static=True, default=False)
+    """For a point on a branch: whether a stable orbit is on one side of it."""
+    looked: str = eqx.field(static=True, default="")
+    """Where it was looked for, if neither Newton's method from the guess nor the branch led to it."""
+
+    def __post_init__(self) -> None:
+        if self.parameter == SPEED:
+            self.value = self.speed
+
+    @property
+    def speed_rpm(self) -> Scalar:
+        """Speed in revolutions per minute."""
+        return self.speed * 30 / np.pi
+
+    @property
+    def error_rpm(self) -> Scalar:
+        """Error of a speed in revolutions per minute."""
+        return self.error * 30 / np.pi
+
+    @property
+    def converged(self) -> Bool[Array, ""] | bool:
+        """Whether a point of the kind asked for was found."""
+        return (self.outcome == Outcome.FOUND.value) | (self.outcome == Outcome.TANGENTIAL.value)
+
+    @property
+    def trusted(self) -> Bool[Array, ""] | bool:
+        """Whether its place is a function of the design: it was found, and the multiplier crosses at a finite rate."""
+        return self.outcome == Outcome.FOUND.value
+
+    @property
+    def critical(self) -> complex:
+        """The multiplier on the unit circle, with a positive imaginary part."""
+        target, mu = CRITICAL.get(self.kind), np.asarray(self.multipliers)
+        if target is not None:
+            return complex(mu[np.argmin(np.abs(mu - target))])
+        mu = mu[np.imag(mu) > 0] if self.kind == "Neimark-Sacker" else mu
+        return complex(mu[np.argmin(np.abs(np.abs(mu) - 1))])
+
+    @property
+    def angle(self) -> float:
+        """Angle [rad] of the critical multiplier, pi at a period doubling; NaN if no point was found."""
+        return abs(float(np.angle(self.critical))) if bool(self.converged) else float("nan")
+
+    @property
+    def status(self) -> str:
+        """`converged`, or the name of another `Outcome` in words."""
+        outcome = Outcome(int(self.outcome))
+        return "converged" if outcome == Outcome.FOUND else outcome.name.lower().replace("_", " ")
+
+    def as_edge(self, kind: str) -> Edge:
+        """Return it as the edge of a zone, which is `chaotic` or `synchronous-loss`."""
+        return Edge(float(self.speed_rpm), float(self.error_rpm), kind, self.kind, "located")
+
+    def __str__(self) -> str:
+        if self.status == "given":
+            return f"{self.kind} near {float(self.speed_rpm):.3f} rpm, not solved for yet"
+        if not bool(self.converged):
+            looked = f"; {self.looked}" if self.looked else ""
+            return f"No {self.kind} found: {self.status} (residual {float(self.residual):.1e}){looked}"
+        angle = f", angle {np.degrees(self.angle):.2f} deg" if self.kind == "Neimark-Sacker" else ""
+        error = f" +- {float(self.error_rpm):.1g}" if self.parameter == SPEED else ""
+        return (
+            f"{self.kind} at {float(self.speed_rpm):.3f}{error} rpm, {self.parameter} = {float(self.value):.9g} "
+            f"+- {float(self.error):.1g}{angle}, {int(self.steps)} steps\n"
+            f"  residual {float(self.residual):.1e}, transversality {float(self.transversality):.3g}, {self.status}"
+        )
+
+    _repr_html_ = notebook_html
+
+
+def require_found(point: Point, name: str = "point") -> None:
+    """**Raises:** `ArgumentError` for a point that was looked for and not found, so that it has no value."""
+    if not np.isfinite(float(point.value)):
+        raise ArgumentError(name, said=f"must be one that was found, but this {point.kind} was not.")
+
+
+def value_at(orbit: Any, system: AbstractForcedSystem, speed: Any, parameter: Parameter) -> Array:
+    """Return the system's value of a parameter or, for a bifurcation in this parameter, the value found there."""
+    if isinstance(orbit, Point) and orbit.parameter == parameter:
+        return jnp.asarray(orbit.value, dtype=float)
+    return value_of(system, speed, parameter)

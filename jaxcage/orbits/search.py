@@ -1,0 +1,371 @@
+"""Search for orbits without a hint: synchronous (period-1) orbits over a range of speed, coexisting ones at one speed.
+
+Newton's method leads to stable orbits from the ends of simulations on a coarse grid of speeds. Each orbit is followed
+both ways, until every orbit that was met lies on a known branch. Stable stretches of the branches are bounded by
+bifurcations; between them are the unstable ranges of the synchronous orbit.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from .._arguments import require_at_least
+from .._checks import require_x64
+from .._form import compiled
+from .._notebook import notebook_html
+from .._types import Scalar
+from ..lanes import initial_states, sweep
+from ..models import AbstractForcedSystem, require_speeds
+from ..solve import AbstractMethod, strobe_map
+from .branch import Branch, follow_both_ways
+from .continuation import ContinuationProblem, orbit_curves
+from .orbit import Orbit, periodic_orbit
+from .point import Point
+from .problem import SPEED, Given
+from .step_control import StepControl
+
+
+ROUND, ROUNDS = 4, 8
+"""Branches followed at a time, and how often."""
+PATIENCE = 150
+"""Unstable orbits in a row after which a branch is not followed further."""
+ON_BRANCH = 0.03
+"""Largest distance of an orbit on a branch from the branch, in units of the system's scale."""
+SPREAD = 0.6
+"""Random initial states are spread over this share of the system's scale in every direction."""
+SAME = 1e-4
+"""Largest distance of equal orbits: an orbit that hardly attracts moves by a hundred times the error of its map."""
+NEARLY = 0.1
+"""A simulation that moves by less in its last revolution, in units of the scale, approaches an orbit."""
+Progress = Callable[[str, int, int], None]
+Scale = Callable[[float], np.ndarray]
+"""Units of the state at a speed [rad/s]."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stable part of a branch of synchronous orbits, with its ends, None if the range or the branch ends there.
+
+    Branches that are parts of one have the same `family`. `met` simulations settled on the stretch, `met_first` of them
+    from the system's conventional start, the first of its initial states.
+    """
+
+    lower: Point | None
+    upper: Point | None
+    lower_rpm: float
+    upper_rpm: float
+    branch: int
+    family: int = 0
+    met: int = 0
+    met_first: int = 0
+
+    @property
+    def width_rpm(self) -> float:
+        """Range of speed [rpm]."""
+        return self.upper_rpm - self.lower_rpm
+
+    @property
+    def error_rpm(self) -> float:
+        """Uncertainty of the width [rpm]: the errors of its ends."""
+        return sum((float(p.error_rpm) for p in (self.lower, self.upper) if p is not None), 0.0)
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether both ends are located to less than its width."""
+        return not self.error_rpm > self.width_rpm
+
+    def __str__(self) -> str:
+        end = lambda p, rpm: f"{rpm:.1f} ({'range' if p is None else p.kind})"
+        return f"{end(self.lower, self.lower_rpm)} to {end(self.upper, self.upper_rpm)} rpm, {self.met} settled"
+
+    _repr_html_ = notebook_html
+
+
+@dataclasses.dataclass(frozen=True)
+class SynchronousOrbits:
+    """All branches of synchronous orbits that were met, and their stable stretches, by the lower end.
+
+    `sweep` holds the simulations from which the branches begin, too short for labels that tell chaos. `missed` of them
+    settled on orbits that lie on no branch.
+    """
+
+    branches: tuple[Branch, ...]
+    stretches: tuple[Stretch, ...]
+    sweep: xr.Dataset
+    missed: int
+    lower_rpm: float
+    upper_rpm: float
+
+    @property
+    def edges(self) -> tuple[Point, ...]:
+        """Bifurcations at which a stable synchronous orbit ends, by speed."""
+        return _distinct([p for s in self.stretches for p in (s.lower, s.upper) if p is not None])
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """All bifurcations on all branches, by speed."""
+        return _distinct([p for b in self.branches for p in b.special])
+
+    @property
+    def unsettled(self) -> int:
+        """Number of bifurcations that half the steps put elsewhere: `points` has none of them."""
+        return sum(p.status == "not converged" for b in self.branches for p in b.special)
+
+    @property
+    def unexplained(self) -> tuple[Point, ...]:
+        """Places where the stability changes and no bifurcation is found: `points` has none of them."""
+        return tuple(p for b in self.branches for p in b.special if p.status == "unexplained")
+
+    def coexisting(self, speed: float) -> list[tuple[int, bool, np.ndarray, np.ndarray]]:
+        """Return the orbits at `speed` [rad/s], to the accuracy of the continuation's steps: the number of the branch,
+        whether the orbit is stable, its state [SI] and its multipliers."""
+        found: list[tuple[int, bool, np.ndarray, np.ndarray]] = []
+        for i, b in enumerate(self.branches):
+            for stable, state, multipliers in _crossings(b, speed):
+                if not any(np.allclose(state, other, rtol=1e-2) for _, _, other, _ in found):  # parts may overlap
+                    found.append((i, stable, state, multipliers))
+        return found
+
+    def __str__(self) -> str:
+        head = f"{len(self.branches)} branches of synchronous orbits, {len(self.stretches)} stable stretches"
+        return "\n".join([head, *(f"  {s}" for s in self.stretches)])
+
+    _repr_html_ = notebook_html
+
+
+def _crossings(branch: Branch, speed: float) -> list[tuple[bool, np.ndarray, np.ndarray]]:
+    """Return stability, state and multipliers where a branch passes `speed`, by linear interpolation."""
+    v, found = branch.value, []
+    for k in np.flatnonzero(((v[:-1] - speed) * (v[1:] - speed) < 0) | (v[:-1] == speed)):
+        share = 0.0 if v[k + 1] == v[k] else (speed - v[k]) / (v[k + 1] - v[k])
+        state = branch.state[k] + share * (branch.state[k + 1] - branch.state[k])
+        near = k + int(round(share))
+        found.append((bool(branch.stable[near]), state, branch.multipliers[near]))
+    return found
+
+
+def _distinct(points: Sequence[Point]) -> tuple[Point, ...]:
+    """Return points by speed, each once."""
+    kept: list[Point] = []
+    for p in sorted((p for p in points if p.status == "converged"), key=lambda p: p.value):
+        apart = lambda q: max(1e-6 * p.value, float(np.nan_to_num(p.error + q.error)))
+        same = lambda q: q.kind == p.kind and abs(q.value - p.value) < apart(q) and np.allclose(q.state, p.state, 1e-3)
+        if not any(same(q) for q in kept[-6:]):
+            kept.append(p)
+    return tuple(kept)
+
+
+def synchronous_orbits(
+    system: AbstractForcedSystem,
+    lower: float,
+    upper: float,
+    *,
+    count: int = 251,
+    discard: int = 250,
+    steps: StepControl = StepControl(most=1500),
+    settled: xr.Dataset | None = None,
+    method: AbstractMethod | None = None,
+    progress: Progress | None = None,
+) -> SynchronousOrbits:
+    """Find and follow the synchronous orbits between two speeds [rad/s].
+
+    **Arguments:** system and range; number of speeds that are simulated from each of the system's initial states, and
+    revolutions left out; steps of the continuation, in units of 1/20 of the range; a sweep that was made before,
+    instead of simulations. Simulations from the opposites of the initial states serve only to find orbits.
+
+    **Returns:** `SynchronousOrbits`. Simulations may miss stable orbits with a small basin.
+    """
+    require_at_least(1, count=count)
+    say = progress or (lambda what, done, of: None)
+    scale = functools.cache(lambda speed: np.array([float(c) for c in system.scale(speed)]))
+
+    def simulate(speeds: np.ndarray, sign: float) -> xr.Dataset:
+        short: dict[str, Any] = {"discard": discard, "revolutions": 8, "blocks": 1, "keep": 8, "exponents": 0}
+        starts, told = sign * initial_states(system, speeds, None), lambda done, of: say("simulations", done, of)
+        return sweep(system, speeds, starts=starts, **short, method=method, progress=told)
+
+    settled = simulate(np.linspace(lower, upper, count), 1.0) if settled is None else settled
+    speeds = settled["speed"].values
+    opposite = simulate(speeds[:: -(-speeds.size // count)], -1.0)
+    problem = orbit_curves(Given(system, jnp.asarray((lower + upper) / 2)), SPEED, lower, upper, method)
+    if met := _finished(settled):
+        i, j = met[len(met) // 2]
+        problem = problem.with_stable_steps((settled["last"].values[i, j], float(speeds[i])))
+    orbits = _stable_orbits(problem, settled, scale)
+    waiting = sorted(orbits + _stable_orbits(problem, opposite, scale), key=lambda o: o.speed)
+    branches: list[Branch] = []
+    for turn in range(ROUNDS):
+        if not waiting:
+            break
+        say("branches", turn, ROUNDS)
+        picked = np.unique(np.linspace(0, len(waiting) - 1, min(ROUND, len(waiting))).round().astype(int))
+        starts = [(waiting[i].state, waiting[i].speed) for i in picked]
+        branches += [b for b in follow_both_ways(problem, starts, steps, PATIENCE) if b is not None]
+        waiting = [w for w in waiting if not any(_covers(b, w.speed, w.state, scale) for b in branches)]
+    say("branches", ROUNDS, ROUNDS)
+    limits = lower * 30 / np.pi, upper * 30 / np.pi
+    families, stretches = _families(branches, scale), []
+    for piece in _merged([p for i, b in enumerate(branches) for p in _pieces(b, i, limits)], scale):
+        met = [o.start for o in orbits if o.settled and piece.holds(o.speed * 30 / np.pi, o.state, scale(o.speed))]
+        known = {"family": families[piece.stretch.branch], "met": len(met), "met_first": met.count(0)}
+        stretches.append(dataclasses.replace(piece.stretch, **known))
+    return SynchronousOrbits(tuple(branches), tuple(stretches), settled, len(waiting), *limits)
+
+
+# --- orbits from simulations ---------------------------------------------------------------------------------------
+
+
+class _Settled(NamedTuple):
+    """A stable orbit to which the end of a simulation led, which may have come near it before Newton's method."""
+
+    state: np.ndarray
+    speed: float
+    start: int
+    settled: bool
+
+
+def _finished(settled: xr.Dataset) -> list[list[int]]:
+    """Return numbers of speed and start of the simulations that ran to their end."""
+    return np.argwhere(np.all(np.isfinite(settled["last"].values), axis=-1)).tolist()
+
+
+def _stable_orbits(problem: ContinuationProblem, settled: xr.Dataset, scale: Scale) -> list[_Settled]:
+    """Return the stable orbits to which Newton's method leads from the ends of simulations, by speed."""
+    lanes = _finished(settled)
+    last, speeds = settled["last"].values, settled["speed"].values
+    met = [(last[i, j], float(speeds[i])) for i, j in lanes]
+    if not met:
+        return []
+    problem = problem.around(met[0][1])
+    strobe = settled["strobe"].values
+    moved = strobe[..., -1, :] - strobe[..., -2, :] if strobe.shape[2] > 1 else np.zeros_like(last)
+    near = np.max(np.abs(moved / settled["scale"].values), axis=-1) < NEARLY
+    points = problem.orbits_near(met, np.array([near[i, j] for i, j in lanes]))
+    good = points.converged.copy()
+    good[good] = problem.unstable(points.take(good)) == 0
+    states = problem.states(points.u)
+    apart = [np.max(np.abs(y - x) / scale(at)) for x, (y, at) in zip(states, met, strict=True)]
+    return [_Settled(states[i], met[i][1], lanes[i][1], bool(apart[i] < ON_BRANCH)) for i in np.flatnonzero(good)]
+
+
+def _covers(branch: Branch, speed: float, state: np.ndarray, scale: Scale) -> bool:
+    """Return whether an orbit lies on a branch."""
+    return any(np.max(np.abs(s - state) / scale(speed)) < ON_BRANCH for _, s, _ in _crossings(branch, speed))
+
+
+def _families(branches: Sequence[Branch], scale: Scale) -> list[int]:
+    """Return a number for each branch, the same for parts of one: the end of a stopped part lies on another part."""
+    family = list(range(len(branches)))
+    for i, b in enumerate(branches):
+        for end, why in zip((0, -1), b.ended, strict=True):
+            for j, other in enumerate(branches):
+                if why == "stopped" and i != j and _covers(other, float(b.speed[end]), b.state[end], scale):
+                    family = [family[j] if f == family[i] else f for f in family]
+    return family
+
+
+# --- stable stretches ----------------------------------------------------------------------------------------------
+
+
+class _Piece(NamedTuple):
+    """A stable part of one branch, its points by rising speed."""
+
+    stretch: Stretch
+    rpm: np.ndarray
+    state: np.ndarray
+
+    def state_at(self, rpm: float) -> np.ndarray:
+        return np.array([np.interp(rpm, self.rpm, c) for c in self.state.T])
+
+    def holds(self, rpm: float, state: np.ndarray, scale: np.ndarray) -> bool:
+        """Return whether the orbit `state` at `rpm` lies on this piece."""
+        inside = self.stretch.lower_rpm <= rpm <= self.stretch.upper_rpm
+        return inside and bool(np.max(np.abs(self.state_at(rpm) - state) / scale) < ON_BRANCH)
+
+
+def _pieces(branch: Branch, number: int, limits: tuple[float, float]) -> list[_Piece]:
+    """Return the stable parts of a branch over speed, cut to the limits [rpm]."""
+    found = []
+    edges = {p.index: p for p in branch.special if p.edge and p.status == "converged"}
+    bounds = [-1, *np.flatnonzero(np.diff(branch.stable.astype(int))).tolist(), branch.value.size - 1]
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        if last <= first or not branch.stable[last]:
+            continue
+        points = [edges.get(first), edges.get(last)]
+        rpm, state = branch.speed_rpm[first + 1 : last + 1], branch.state[first + 1 : last + 1]
+        if rpm[0] > rpm[-1]:
+            points, rpm, state = points[::-1], rpm[::-1], state[::-1]
+        low, high = (float(r if p is None else p.speed_rpm) for p, r in zip(points, (rpm[0], rpm[-1]), strict=True))
+        stretch = Stretch(points[0], points[1], max(low, limits[0]), min(high, limits[1]), number)
+        found.append(_Piece(stretch, rpm, state))
+    return found
+
+
+def _merged(pieces: Sequence[_Piece], scale: Scale) -> list[_Piece]:
+    """Return the pieces with those joined that two branches from different starts share."""
+    whole: list[_Piece] = []
+    for piece in sorted(pieces, key=lambda p: p.stretch.lower_rpm):
+        for i, other in enumerate(whole):
+            a, b = other.stretch, piece.stretch
+            rpm = (b.lower_rpm + min(a.upper_rpm, b.upper_rpm)) / 2
+            if b.lower_rpm <= rpm and other.holds(rpm, piece.state_at(rpm), scale(rpm * np.pi / 30)):
+                beyond, top = piece.rpm > other.rpm[-1], b if b.upper_rpm > a.upper_rpm else a
+                joined = dataclasses.replace(a, upper=top.upper, upper_rpm=top.upper_rpm)
+                both = (np.concatenate([x, y[beyond]]) for x, y in zip(other[1:], piece[1:], strict=True))
+                whole[i] = _Piece(joined, *both)
+                break
+        else:
+            whole.append(piece)
+    return whole
+
+
+# --- one speed -----------------------------------------------------------------------------------------------------
+
+
+def coexisting_orbits(
+    system: AbstractForcedSystem,
+    speed: Scalar,
+    periods: int = 1,
+    *,
+    count: int = 24,
+    revolutions: int = 5,
+    seed: int = 0,
+    method: AbstractMethod | None = None,
+) -> list[Orbit]:
+    """Find orbits that close after `periods` revolutions and not earlier, from the system's and random initial states.
+
+    **Arguments:** system and speed [rad/s]; number of random states and their seed; revolutions of simulation before
+    Newton's method: with few, unstable orbits are found as well.
+
+    **Returns:** distinct orbits, the stable ones first. There may be more.
+    """
+    require_x64()
+    require_at_least(0, seed=seed)
+    require_at_least(1, periods=periods, count=count)
+    require_speeds(system, speed)
+    scale = np.array([float(c) for c in system.scale(speed)])
+    own = np.array([[float(c) for c in y] for y in system.starts(speed)])
+    random = np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (count, scale.size)) * scale
+    find = lambda y: periodic_orbit(system, speed, periods, guess=y, revolutions=revolutions, method=method)
+    found = jax.vmap(find)(jnp.asarray(np.concatenate([own, random])))
+    strobe = lambda orbit, y: strobe_map(system, jnp.asarray(speed, dtype=float), orbit.method)(tuple(y))
+    advance = compiled(jax.vmap(lambda orbit, y: jnp.stack(strobe(orbit, y).y)))
+    rows = [found.state]
+    for _ in range(periods - 1):
+        rows.append(advance(found, rows[-1]))
+    images = np.stack([np.asarray(row) / scale for row in rows], axis=1)
+    near = lambda a, b: bool(np.max(np.abs(a - b)) < SAME)
+    kept: list[int] = []
+    for i in np.flatnonzero(np.asarray(found.converged)):
+        shorter = any(near(images[i, 0], images[i, j]) for j in range(1, periods))
+        if not shorter and not any(near(images[i, 0], image) for k in kept for image in images[k]):
+            kept.append(int(i))
+    orbits = [jax.tree.map(lambda x: x[i] if eqx.is_array(x) and x.ndim else x, found) for i in kept]
+    return sorted(orbits, key=lambda o: float(jnp.max(jnp.abs(o.multipliers))))

@@ -1,0 +1,154 @@
+"""Step control of continuation: predict the next point of a curve, accept or refuse it, and choose the next length.
+
+The prediction is the cubic through the last two points and their tangents. A point of the same curve has the tangent
+that belongs to its place, and the orientation of the curve; a point of another curve beside it has neither, and a step
+to it is refused.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from .._errors import ArgumentError
+
+
+AIM = 3e-3
+"""Distance from its prediction that the next point should have, in the unknowns' units."""
+VEER = 0.7
+"""Angle by which the next step should turn, over the largest angle allowed."""
+SHRINKAGE, GROWTH = 0.5, 1.8
+"""Smallest and largest ratio of a step to the one before, if that was accepted."""
+TURN, BEND, SWING = 0.9, 0.3, 0.5
+"""Limits of a step. The first is the smallest cosine of the angle between its tangents. The second is the largest
+correction, over its length: with more, Newton's method may have gone to another curve. The third is the largest change
+of the equations' derivative, over its size and one: with more, folds may have been passed over."""
+NEARBY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
+"""Largest distance of a point from where its tangent says that it is: in the unknowns' units, over the step's length,
+or over its distance from the prediction."""
+
+
+class Points(NamedTuple):
+    """Points of curves: NumPy arrays, with an axis of points first if there are several."""
+
+    u: Any
+    """Unknowns, shape (n,)."""
+    tangent: Any
+    """Unit tangent, shape (n,), on the side of the normal of the plane on which the point was found."""
+    jacobian: Any
+    """Derivative of the equations, shape (m, n)."""
+    converged: Any
+    aux: Any
+    """What else the equations tell at the point."""
+    steps: Any
+    """Steps per revolution."""
+    error: Any
+    """Distance to the point by half the steps (see `AbstractEquations.apart`)."""
+    excess: Any
+    """Ratio of this distance to what is allowed."""
+    moved: Any
+    """The same distance in the unknowns' units."""
+
+    @staticmethod
+    def stacked(points: Sequence["Points"]) -> "Points":
+        """Return single points as a row."""
+        return jax.tree.map(lambda *x: np.stack(x), *points)
+
+    def take(self, which: Any) -> "Points":
+        """Return some of the points."""
+        return jax.tree.map(lambda x: x[which], self)  # of NumPy: JAX takes a millisecond for each array
+
+    def put(self, which: np.ndarray, new: "Points") -> "Points":
+        """Return the points with `new` ones in these places."""
+        whole = jax.tree.map(np.array, self)
+        jax.tree.map(lambda x, y: x.__setitem__(which, y), whole, new)
+        return whole
+
+    def with_errors_of(self, old: "Points") -> "Points":
+        """Return the points with the errors of others."""
+        return self._replace(error=old.error, excess=old.excess, moved=old.moved)
+
+    def turned(self, sign: Any) -> "Points":
+        """Return the same points, to be followed the other way if `sign` is -1."""
+        return self._replace(tangent=self.tangent * np.asarray(sign)[..., None])
+
+    def after(self, back: "Points") -> "Points":
+        """Return in a row the points of two directions from one point, from the end of `back` on."""
+        back = back.take(slice(None, 0, -1)).turned(-1.0)
+        return jax.tree.map(lambda a, b: np.concatenate([a, b]), back, self)
+
+
+class Comparison(NamedTuple):
+    """A new point beside its prediction and the point before it."""
+
+    missed: float
+    """Distance of the point from its prediction."""
+    turned: float
+    """Angle between the tangents, over the largest angle allowed."""
+    sure: bool
+    """Whether the point is on the curve, or on one that crosses it."""
+    same: bool
+    """Whether the determinant of the equations with the tangent has the same sign."""
+
+
+@dataclasses.dataclass(frozen=True)
+class StepControl:
+    """Lengths of steps in the unknowns' units, and their largest number in each direction."""
+
+    first: float = 0.02
+    longest: float = 0.5
+    shortest: float = 1e-7
+    most: int = 400
+
+    def __post_init__(self):
+        if not 0 < self.shortest <= self.first <= self.longest:
+            given = f"{self.shortest:g}, {self.first:g} and {self.longest:g}"
+            raise ArgumentError("steps", said=f"must have 0 < shortest <= first <= longest, but has {given}.")
+
+    def predict(self, points: list[Points], length: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the point at a distance `length` beyond the last one, and the curve's unit tangent there."""
+        last, tangent = points[-1], points[-1].tangent
+        if len(points) == 1:
+            return last.u + length * tangent, tangent
+        chord = last.u - points[-2].u
+        apart = np.linalg.norm(chord)
+        off, bent = (apart * tangent - chord) / apart, tangent - points[-2].tangent
+        share = length / apart
+        square, cube = share * (3 * off - bent), share**2 * (2 * off - bent)
+        slope = tangent + 2 * square + 3 * cube
+        return last.u + length * (tangent + square + cube), slope / np.linalg.norm(slope)
+
+    def compare(
+        self, points: list[Points], new: Points, ahead: np.ndarray, normal: np.ndarray, length: float
+    ) -> Comparison:
+        """Compare a new point with its prediction and the last point.
+
+        The prediction over `length` from two points `apart` leaves out a s^2 (s + apart)^2, which is nearly as large in
+        the tangent as in the point: a point elsewhere than its tangent says is not of this curve. The determinant of
+        the equations with the tangent keeps its sign along a curve, at folds too, but not where it crosses another.
+        """
+        if not new.converged:
+            return Comparison(np.inf, np.inf, False, False)
+        last = points[-1]
+        apart = np.linalg.norm(last.u - points[-2].u) if len(points) > 1 else np.inf
+        turned = np.arccos(np.clip(new.tangent @ last.tangent, -1.0, 1.0)) / np.arccos(TURN)
+        way, slope = new.u - ahead, new.tangent - normal
+        missed = np.linalg.norm(way)
+        smooth = np.max(np.abs(new.jacobian - last.jacobian)) < SWING * (1 + np.max(np.abs(last.jacobian)))
+        share = 1 / (2 / length + 2 / (length + apart))
+        off = np.linalg.norm(way - share * (slope - (slope @ normal) * normal))
+        belongs = off < max(min(NEARBY, OF_LENGTH * length), OF_MISSED * missed)
+        sure = turned < 1 and missed < BEND * length and smooth and belongs
+        orientation = lambda p: np.linalg.slogdet(np.vstack([p.jacobian, p.tangent]))[0]
+        return Comparison(float(missed), float(turned), bool(sure), orientation(new) == orientation(last))
+
+    def after_success(self, length: float, step: Comparison) -> float:
+        """Return the length of the step after an accepted one. The cubic's error grows with its fourth power."""
+        growth = min((AIM / max(step.missed, 1e-12)) ** 0.25, VEER / max(step.turned, 1e-12))
+        return min(self.longest, length * float(np.clip(growth, SHRINKAGE, GROWTH)))
+
+    def after_failure(self, length: float, converged: bool) -> float:
+        """Return the length with which a refused step is repeated; below `shortest` the curve has no next point."""
+        return length / (2 if converged else 4)

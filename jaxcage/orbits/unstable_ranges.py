@@ -1,0 +1,189 @@
+"""Unstable ranges of the synchronous orbit, between its stable stretches, with exact edges; sources of chaotic edges.
+
+Several synchronous orbits coexist at many speeds, so a rule defines the ranges. The **principal** stretch is the one on
+which most simulations from the conventional start (a cage: at rest on the rib) settled. Stretches of its own branch
+belong to it if they overlap it or follow within a window that is closed. Others count if they do not overlap it;
+otherwise they are coexisting orbits, which a cage meets only from other initial states. The ranges are what is left.
+
+As for chaotic zones, stretches narrower than a stated width do not count and windows narrower than it are closed, but
+only between stretches wider than the window: a row of slivers would move an edge far from the stretch it belongs to, to
+a bifurcation that every solver puts elsewhere.
+
+Edges of chaotic zones, which are statistical, are compared with bifurcations and limits of cascades.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._notebook import notebook_html
+from ..analysis import Zone, Zones, closing_width
+from ..models import AbstractForcedSystem
+from ..solve import AbstractMethod
+from .branch import Cascade, cascade
+from .point import Point
+from .search import Stretch, SynchronousOrbits
+
+
+CASCADE_REACH_RPM = 500.0
+"""Period doublings this far on the calm side of a chaotic edge are tried for a cascade that ends there."""
+CASCADE_LEVELS = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class LossZones:
+    """Unstable ranges of the synchronous orbit between two speeds."""
+
+    zones: tuple[Zone, ...]
+    """Ascending; an edge is None if a range goes on beyond the speeds that were searched."""
+    edges: dict[str, Point]
+    """Edges by name: `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ..."""
+    coexisting: dict[str, list[tuple[int, bool, np.ndarray, np.ndarray]]]
+    """Orbits at each edge: branch, whether stable, state [SI], multipliers."""
+    principal: Stretch | None
+    """The stretch on which most simulations from the conventional start settled."""
+    close_below_rpm: float
+
+    def __str__(self) -> str:
+        rows = [f"Unstable ranges of the synchronous orbit, closed below {self.close_below_rpm:.0f} rpm"]
+        for i, zone in enumerate(self.zones, start=1):
+            width = "open" if zone.width_rpm is None else f"{zone.width_rpm:.2f} rpm wide"
+            rows.append(f"  zone {i}: {zone.onset or 'below the range'} to {zone.exit or 'above the range'}, {width}")
+        return "\n".join(rows if self.zones else [*rows, "  none"])
+
+    _repr_html_ = notebook_html
+
+
+@dataclasses.dataclass(frozen=True)
+class _Group:
+    """Stretches that count as one."""
+
+    stretches: tuple[Stretch, ...]
+
+    @property
+    def low(self) -> Stretch:
+        return min(self.stretches, key=lambda s: s.lower_rpm)
+
+    @property
+    def high(self) -> Stretch:
+        return max(self.stretches, key=lambda s: s.upper_rpm)
+
+    def apart(self, other: "_Group") -> float:
+        """Return the width of the gap between two groups [rpm], negative if they overlap."""
+        return max(other.low.lower_rpm - self.high.upper_rpm, self.low.lower_rpm - other.high.upper_rpm)
+
+    @property
+    def width(self) -> float:
+        return self.high.upper_rpm - self.low.lower_rpm
+
+
+def _joined(groups: Sequence[_Group], close: float) -> list[_Group]:
+    """Join groups that overlap or whose window is closed, narrowest window first."""
+    groups = list(groups)
+    while True:
+        pairs = [(a.apart(b), a, b) for i, a in enumerate(groups) for b in groups[:i]]
+        closed = [pair for pair in pairs if pair[0] < max(0.0, min(close, pair[1].width, pair[2].width))]
+        if not closed:
+            return groups
+        _, a, b = min(closed, key=lambda pair: pair[0])
+        groups = [g for g in groups if g is not a and g is not b] + [_Group((*a.stretches, *b.stretches))]
+
+
+def loss_zones(found: SynchronousOrbits, close_below_rpm: float | None = None) -> LossZones:
+    """Return the unstable ranges of the synchronous orbit, between the stable stretches that were found.
+
+    **Arguments:** result of `synchronous_orbits`; width below which windows and stretches are closed [rpm], by default
+    500 rpm and at most 5 % of the highest speed. Without any stretch nothing is known of the orbit, and there is none.
+    """
+    close_below_rpm = closing_width(found.sweep.rpm) if close_below_rpm is None else close_below_rpm
+    if not found.stretches:
+        return LossZones((), {}, {}, None, close_below_rpm)
+    principal = max(found.stretches, key=lambda s: (s.met_first, s.met, s.width_rpm))
+    own = _joined([_Group((s,)) for s in found.stretches if s.family == principal.family], close_below_rpm)
+    first = next(g for g in own if principal in g.stretches)
+    others = [_Group((s,)) for s in found.stretches if first.apart(_Group((s,))) >= 0]
+    groups = _joined([first, *others], close_below_rpm)
+    groups = [g for g in groups if principal in g.stretches or g.width >= close_below_rpm]
+    groups.sort(key=lambda g: g.low.lower_rpm)
+    tops = [None, *(g.high for g in groups)]
+    bottoms = [*(g.low for g in groups), None]
+    edge = lambda point: None if point is None else point.as_edge("synchronous-loss")
+    zones: list[Zone] = []
+    edges: dict[str, Point] = {}
+    for before, after in zip(tops, bottoms, strict=True):
+        onset = None if before is None else before.upper
+        leaves = None if after is None else after.lower
+        open_below = before is None and after is not None and after.lower_rpm - found.lower_rpm < close_below_rpm
+        open_above = after is None and before is not None and found.upper_rpm - before.upper_rpm < close_below_rpm
+        if open_below or open_above or (before is not None and onset is None):
+            continue
+        zones.append(Zone("synchronous-loss", edge(onset), edge(leaves), _share(found, onset, leaves)))
+        for name, point in (("onset", onset), ("exit", leaves)):
+            if point is not None:
+                edges[f"zone {len(zones)} {name}"] = point
+    coexisting = {name: found.coexisting(float(p.speed)) for name, p in edges.items()}
+    return LossZones(tuple(zones), edges, coexisting, principal, close_below_rpm)
+
+
+def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) -> float:
+    """Return the share of simulations in a range that did not settle on a synchronous orbit; NaN if there are none."""
+    rpm = found.sweep.rpm
+    inside = (rpm > (onset.speed_rpm if onset else 0.0)) & (rpm < (leaves.speed_rpm if leaves else np.inf))
+    return float(np.mean(found.sweep.label[inside] != "periodic-1")) if np.any(inside) else float("nan")
+
+
+@dataclasses.dataclass(frozen=True)
+class Explained:
+    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades behind these."""
+
+    zones: Zones
+    sources: dict[str, Point | Cascade]
+    """Bifurcation or cascade with which an edge, e.g. `zone 1 exit`, coincides. Other edges stay statistical."""
+
+
+def explain(
+    zones: Zones, found: SynchronousOrbits, system: AbstractForcedSystem, method: AbstractMethod | None = None
+) -> Explained:
+    """Give each chaotic edge the mechanism with which it coincides, within its uncertainty and the sweep's resolution.
+
+    A wider error bar, for mean lives near the horizon or failed trajectories, would coincide with anything. An onset
+    may be where a stable orbit ends, coming from below; an exit, where one begins. Bifurcations are tried first, then
+    the limits of cascades that begin at period doublings on the stable side. Other edges stay as they were.
+    """
+    sources: dict[str, Point | Cascade] = {}
+    changed: list[Zone] = []
+    for number, zone in enumerate(zones.zones, start=1):
+        ends = {}
+        for end, edge, calm in (("onset", zone.onset, -1), ("exit", zone.exit, 1)):
+            if edge is not None:
+                near = min(edge.uncertainty_rpm, zones.resolution_rpm)
+                points = [p for x in found.stretches if (p := x.upper if calm < 0 else x.lower) is not None]
+                source = _source(points, edge.speed_rpm, near, calm, system, method)
+                if source is not None:
+                    sources[f"zone {number} {end}"], edge = source, source.as_edge(edge.kind)
+            ends[end] = edge
+        changed.append(dataclasses.replace(zone, **ends))
+    return Explained(dataclasses.replace(zones, zones=tuple(changed)), sources)
+
+
+def _source(
+    points: list[Point], rpm: float, near: float, calm: int, system: AbstractForcedSystem, method: AbstractMethod | None
+) -> Point | Cascade | None:
+    """Return the point, or the cascade that begins at one, within `near` of an edge at `rpm`.
+
+    `calm` is 1 if the stable side is above the edge, and -1 if it is below.
+    """
+    away = lambda p: abs(p.speed_rpm - rpm)
+    here = [p for p in points if away(p) <= near + np.nan_to_num(p.error_rpm)]
+    if here:
+        return min(here, key=away)
+    beyond = lambda p: 0 < calm * (p.speed_rpm - rpm) <= CASCADE_REACH_RPM
+    doublings = [p for p in points if p.kind == "period-doubling" and beyond(p)]
+    reach = 2 * CASCADE_REACH_RPM * np.pi / 30
+    for point in sorted(doublings, key=away):
+        speed = float(point.speed)
+        tried = cascade(system, point, lower=speed - reach, upper=speed + reach, levels=CASCADE_LEVELS, method=method)
+        if np.isfinite(tried.error) and abs(tried.limit * 30 / np.pi - rpm) <= near:
+            return tried
+    return None

@@ -1,0 +1,143 @@
+"""Chances of chaos of a design that is known within ranges only, and ranges that measurements narrowed."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..design import Clue, Ensemble, Narrowed, verdict_of
+from ..files import Measurement, Range
+from .tables import Beside, Column, Table, chosen, rows_table, speed_columns
+
+
+MOST = 3
+"""Values that are advised to be measured."""
+WORDS = {
+    "not decided": "not decided by what is known",
+    "calm as computed": "calm where computed",
+    "chaotic as computed": "chaotic where computed",
+}
+"""Verdicts in words, where they differ."""
+
+
+def chances_document(found: Ensemble) -> dict[str, Any]:
+    """Chances by speed for a document."""
+    names = ("chance_lower", "chance_upper", "chaotic_draws", "finished_draws")
+    counts = dict(zip(names, (*found.interval, *found.counts), strict=True))
+    failed = {"draws": len(found.place), "failed": int(np.sum(found.failed)), "speeds_rpm": found.rpm}
+    return failed | {"chance_of_chaos": found.chance, **counts, "verdict": found.verdict}
+
+
+def chances_tables(name: str, found: Ensemble, beside: Beside = None) -> list[Table]:
+    """Stretches of speed with one verdict, bands of the edges, and the unknown values, the most telling first."""
+    (low, high), verdicts, lost = found.interval, found.verdict, len(found.place) - found.counts[1]
+    span = lambda x, unit="": " to ".join(dict.fromkeys(f"{end:.0f}" for end in (np.min(x), np.max(x)))) + unit
+    stretches = []
+    for verdict, places in itertools.groupby(range(len(verdicts)), key=verdicts.__getitem__):
+        part = list(places)
+        known = found.chance[part][np.isfinite(found.chance[part])]
+        row = {"from": float(found.rpm[part[0]]), "to": float(found.rpm[part[-1]]), "failed draws": span(lost[part])}
+        row |= {"verdict": WORDS.get(verdict, verdict), "chance": span(100 * known, " %") if known.size else None}
+        stretches.append(row | {"95 % bars": span(100 * np.concatenate([low[part], high[part]]), " %")})
+    columns = [column for end in ("from", "to") for column in speed_columns(end, end, beside)]
+    columns += [Column(head, ()) for head in ("verdict", "chance", "95 % bars", "failed draws")]
+    draws = f"{found.place.shape[0]} draws from {len(found.unknowns)} ranges"
+    chances = rows_table(f"Chance of chaos of {name}, {draws} [rpm]", stretches, columns)
+    levels = ("5 %", "middle", "95 %")
+    bands = [{"edge": b.name, "share": b.share, **dict(zip(levels, b.rpm, strict=True))} for b in found.bands]
+    ends = [column for head in levels for column in speed_columns(head, head, beside)]
+    share = Column("draws that have it", (), "1", "%", key="share", digits=0)
+    edges = rows_table(f"Chaotic edges of {name} [rpm]", bands, [Column("edge", ()), *ends, share], "bands")
+    return [chances, edges, _unknowns_table(found)]
+
+
+def _unknowns_table(found: Ensemble) -> Table:
+    shares = {c.label: c.share for c in found.clues()}
+    each = zip(found.unknowns, found.units or len(found.unknowns) * ("",), found.sources, strict=True)
+    rows = [
+        {"value": u.label, "range": range_words(u.range, unit), "share": shares.get(u.label), "measure": source}
+        for u, unit, source in sorted(each, key=lambda row: -shares.get(row[0].label, 0.0))
+    ]
+    columns = [Column("value", ()), Column("range", ()), Column("of the verdict", (), "1", "%", key="share", digits=0)]
+    return rows_table("Unknown values", rows, [*columns, Column("measure", ())], "unknowns")
+
+
+def range_words(found: Range, unit: str) -> str:
+    """The ends of a range with their unit."""
+    low, high = (f"{end:.4g}".replace("e+0", "e").replace("e+", "e") for end in (found.lower, found.upper))
+    return f"{low} to {high} {'' if unit == '1' else unit}".rstrip()
+
+
+def chances_answer(found: Ensemble) -> str:
+    """What the known values decide, and what to do about the rest, in a sentence."""
+    if count := int(np.sum(found.undecided)):
+        said = f"Known values do not decide between calm and chaotic at {count} of {found.rpm.size} speeds."
+        return f"{said} {measures_words(found.clues())}"
+    if "too few draws" in found.verdict:
+        return "Too few draws finished to call a speed calm or chaotic: take more --draws."
+    partly = any(v.endswith("as computed") for v in found.verdict)
+    return f"Known values decide at every speed{', as far as the draws could be computed' if partly else ''}."
+
+
+def chances_notes(found: Ensemble) -> list[str]:
+    """How the draws were run, and what became of those that failed."""
+    length = f"{found.discard} revolutions left out, {found.revolutions} observed"
+    notes = [f"One initial state for each draw, {length}: chaos that dies out later counts too."]
+    if np.any(found.failed):
+        lost = f"{int(np.sum(found.failed))} of {found.failed.size} simulations failed and are in no chance"
+        notes.append(f"{lost}; bars and the verdicts calm and chaotic hold whatever they would do.")
+    if partly := sum(v.endswith("as computed") for v in found.verdict):
+        notes.append(
+            f"At {partly} of {found.rpm.size} speeds the verdict is that of the draws that could be computed. "
+            "The rest are not like them, and more draws do not replace these: other steps may (--solver, --steps)."
+        )
+    return notes
+
+
+def measures_words(clues: Sequence[Clue]) -> str:
+    """The values to be measured, the most telling first."""
+    telling = [c for c in clues if c.share > 0][:MOST]
+    if not telling:
+        return "No single value decides: measure all, or draw more (--draws)."
+    return f"Measure {'; '.join(f'{c.label} ({c.source}), {c.share:.0%} of the verdict' for c in telling)}."
+
+
+def operating_chances(found: Ensemble, operating: Sequence[Any], ratio: float) -> Table:
+    """Verdicts at operating speeds; of a range, the chance that some speed in it is chaotic."""
+    rows = []
+    for at in operating:
+        which = found.between(at.low_rpm, at.high_rpm)
+        done = ~np.any(found.failed[:, which], axis=1) | np.any(found.chaotic[:, which], axis=1)
+        hits, of = int(np.sum(np.any(found.chaotic[done][:, which], axis=1))), int(np.sum(done))
+        verdict = verdict_of(hits, of, len(done))
+        row = {"cage speed": str(at), "shaft speed": str(at.of_shaft(ratio)), "verdict": WORDS.get(verdict, verdict)}
+        clues = measures_words(found.clues(which)) if verdict == "not decided" else None
+        rows.append(row | {"chance": hits / of if of else None, "measure": clues})
+    columns = [Column("cage speed", ()), Column("shaft speed", ()), Column("chance", (), "1", "%", digits=0)]
+    return rows_table(
+        "Operating speeds, by known values", rows, [*columns, Column("verdict", ()), Column("measure", ())]
+    )
+
+
+def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Beside = None) -> Table:
+    """The distance of the best draw from each measurement."""
+    rows = [
+        {"what": str(m), "measured": m.quantity, "rpm": m.cage_rpm, "value": m.words, "off_by_tolerances": float(off)}
+        for m, off in zip(measured, found.nearest, strict=True)
+    ]
+    columns = [Column("measured", ()), *speed_columns("cage [rpm]", "rpm", beside), Column("value", ())]
+    columns.append(Column("off", (), key="off_by_tolerances", digits=2))
+    title = "Measurements, and how far the nearest draw is off [tolerances]"
+    return rows_table(title, rows, columns, "measurements")
+
+
+def narrowed_table(found: Narrowed, units: Mapping[str, str]) -> Table:
+    """Each range before and after, with the unit of each value by its label."""
+    rows = []
+    for u, r, share, worth in zip(found.unknowns, found.ranges, found.share, found.narrowed, strict=True):
+        before, after = (range_words(each, units[u.label]) for each in (u.range, r))
+        row = {"value": u.label, "before": before, "after": after if worth else "as it was", "share": float(share)}
+        rows.append(row | chosen(r, "lower upper") | {"narrowed": bool(worth)})
+    columns = [Column("value", ()), Column("before", ()), Column("after", ())]
+    return rows_table("Ranges", rows, [*columns, Column("left of it", (), "1", "%", key="share", digits=0)], "ranges")

@@ -1,0 +1,188 @@
+"""Derivatives by the parameters of a design: of exact edges, of edges of lasting chaos, of means of a run."""
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .._parameters import EXTRA, parameter_info, parameters
+from ..design import LastingEdge, MeanGradient, SolvedEdge, ZoneWidth, zone_width
+from ..models import CageModel
+from ..orbits import Cascade, Explained, LossZones, Sensitivity, limit_sensitivity, sensitivities, sensitivity
+from ..solve import AbstractMethod
+from .tables import Beside, Column, Table, chosen, number, rows_table, speed_columns
+
+
+FIRST = ("guidance_gap", "eccentricity")
+"""Parameters whose rows are always on top."""
+FIXED_RHO = "gap at fixed rho"
+"""Change of the gap with which the eccentricity grows, so that rho = e/C_r stays.
+
+With the printed unbalance, 2 M rho omega^2, that leaves the excitation alone: what remains of the gap's effect is that
+of clearance, film and land. With the physical one it does not.
+"""
+TURNED = ("drawing", "catalogue", "oil", "operating")
+"""Kinds of parameters that a designer or a user chooses."""
+EXPECTED = ("zone 1 onset", "zone 1 exit", "zone 2 onset")
+
+
+def _asked(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Parameters alone, and gap and eccentricity together."""
+    asked: dict[str, tuple[str, ...]] = {n: (n,) for n in names}
+    return asked | ({FIXED_RHO: FIRST} if set(FIRST) <= set(asked) else {})
+
+
+def to_be_turned(model: CageModel, slopes: Iterable[Sensitivity]) -> list[Sensitivity]:
+    """Sensitivities with the parameters that a designer can choose; laws of one's own stay."""
+    info = parameter_info(model)
+    stays = lambda name: info[name].kind in TURNED or name.startswith(EXTRA)
+    return [
+        dataclasses.replace(s, elasticity={n: value for n, value in s.elasticity.items() if stays(n)}) for s in slopes
+    ]
+
+
+def not_fixed(model: CageModel, names: Iterable[str]) -> list[str]:
+    """Parameters that have a tolerance: all but definitions, units and constants of nature and of the numerics."""
+    info = parameter_info(model)
+    return [n for n in names if info[n].kind != "fixed" or n.startswith(EXTRA)]
+
+
+def edge_slopes(
+    model: CageModel, loss: LossZones, explained: Explained, method: AbstractMethod | None
+) -> dict[str, Sensitivity]:
+    """Sensitivities of the synchronous-loss edges, and of chaotic edges that coincide with something exact."""
+    slopes = sensitivities(model, loss.edges, method)
+    for name, source in explained.sources.items():
+        of: Any = limit_sensitivity if isinstance(source, Cascade) else sensitivity
+        slopes[f"chaotic {name}"] = of(model, source, f"chaotic {name}", method)
+    return slopes
+
+
+def slope_record(name: str, slope: Sensitivity) -> dict[str, Any]:
+    """The gradient of an edge or a width [rpm per SI unit] for tables and documents."""
+    fixed = sum(slope.elasticity.get(n, math.nan) for n in FIRST)
+    at = {"name": name, "speed_rpm": slope.value_rpm, "elasticity_gap_at_fixed_rho": fixed}
+    return at | chosen(slope, "kind error_rpm steps trusted status transversality derivative elasticity homogeneity")
+
+
+def elasticities_table(name: str, slopes: Mapping[str, Sensitivity], beside: Beside = None) -> Table:
+    """Relative change of each edge by that of the parameters that are always on top."""
+    rows = [slope_record(edge, slope) for edge, slope in slopes.items()]
+    shown = [row | {n: row["elasticity"].get(n) for n in FIRST} for row in rows]
+    columns = [
+        Column("edge", (), key="name"),
+        Column("by", (), key="kind"),
+        *speed_columns("speed [rpm]", "speed_rpm", beside, "error_rpm"),
+        *(Column(n.replace("_", " "), (), key=n, digits=4) for n in FIRST),
+        Column("status", ()),
+    ]
+    table = rows_table(f"Elasticities of the exact edges of {name}", shown, columns, "edges")
+    return dataclasses.replace(table, data=rows)
+
+
+def gradient_table(name: str, model: CageModel, slope: Sensitivity) -> Table:
+    """Derivatives of one edge or width: gap and eccentricity on top, then the largest elasticities first.
+
+    All is about the speed of the cage; that of the shaft also moves with all that enters their ratio.
+    """
+    change, info, value = slope.elasticity, parameter_info(model), parameters(model)
+    moving = [n for n in slope.derivative if slope.derivative[n] != 0.0 or n in FIRST]
+    moving.sort(key=lambda n: (FIRST.index(n) if n in FIRST else len(FIRST), -abs(change[n])))
+    rows: list[dict[str, Any]] = [
+        {"parameter": n, "value": float(value[n]), "unit": "" if info[n].unit == "1" else info[n].unit}
+        | {"slope": slope.derivative[n], "elasticity": change[n]}
+        for n in moving
+    ]
+    rows.insert(len(FIRST), {"parameter": FIXED_RHO, "elasticity": sum(change.get(n, math.nan) for n in FIRST)})
+    columns = [Column(head, ()) for head in ("parameter", "value", "unit")]
+    columns += [Column("rpm of the cage per unit", (), key="slope"), Column("elasticity", (), digits=6)]
+    title = f"{slope.name.capitalize()} of {name}: {number(slope.value_rpm, float(slope.error_rpm))} rpm, {slope.kind}"
+    still = len(slope.derivative) - len(moving)
+    return rows_table(title + (f"; {still} other parameters do not move it" if still else ""), rows, columns)
+
+
+def missing_notes(edges: Mapping[str, Sensitivity]) -> list[str]:
+    """Edges that one would expect and that are not there or not to be trusted, and how good the gradients are."""
+    notes = [f"There is no {name} in the range." for name in EXPECTED if name not in edges]
+    notes += [f"Left out: {n}, {e.kind} ({e.status})." for n, e in edges.items() if not e.trusted]
+    residuals = [abs(r) for e in edges.values() if e.trusted for r in e.homogeneity.values()]
+    worst = f"{max(residuals):.1e}" if residuals else "-"
+    return [*notes, f"Gradients against the scaling of units, largest relative residual: {worst}"]
+
+
+def source_notes(explained: Explained) -> list[str]:
+    """Sentences about the edges of chaotic zones that coincide with something exact."""
+    edges = [e for zone in explained.zones.zones for e in (zone.onset, zone.exit) if e is not None]
+    statistical = sum(e.basis == "statistical" for e in edges)
+    notes = [f"Chaotic edges that stay statistical: {statistical} of {len(edges)}"]
+    for name, source in explained.sources.items():
+        if isinstance(source, Cascade):
+            doublings = ", ".join(f"{float(p.speed_rpm):.1f}" for p in source.points)
+            notes.append(f"Chaotic {name}: limit of the cascade with period doublings at {doublings} rpm")
+        else:
+            notes.append(f"Chaotic {name}: coincides with the {source.kind} at {float(source.speed_rpm):.2f} rpm")
+    return notes
+
+
+def _error_columns(names: Iterable[str], digits: int | None = None) -> list[Column]:
+    return [Column(n.replace("_", " "), (), key=n, errors=f"{n}_error", digits=digits) for n in _asked(names)]
+
+
+def _with_errors(found: Mapping[str, tuple[float, float]], factor: float = 1.0) -> dict[str, float]:
+    return {f"{n}{end}": factor * x for n, pair in found.items() for end, x in zip(("", "_error"), pair, strict=True)}
+
+
+def lasting_table(name: str, edges: Mapping[str, LastingEdge], horizon: int, beside: Beside = None) -> Table:
+    """Edges of lasting chaos, and their elasticities."""
+    names = next(iter(edges.values())).names
+    rows = [
+        {"name": each, **chosen(edge, "speed_rpm standard_error_rpm horizon status")}
+        | {"escapes": f"{edge.fit.escapes} of {edge.fit.lanes}"}
+        | _with_errors({n: edge.sum_of(*of) for n, of in _asked(names).items()})
+        for each, edge in edges.items()
+    ]
+    columns = [Column("edge", (), key="name")]
+    columns += speed_columns("speed [rpm]", "speed_rpm", beside, "standard_error_rpm")
+    columns += [*_error_columns(names), Column("escapes", ()), Column("status", ())]
+    title = f"Elasticities of the edges of {name} at which the mean life of chaos passes {horizon} revolutions"
+    return rows_table(title, rows, columns, "edges")
+
+
+def width_table(title: str, edges: Mapping[str, SolvedEdge], names: Sequence[str]) -> Table:
+    """Widths of all zones of which an edge is known, and what 1 % more of a parameter adds."""
+    rows = []
+    for zone in dict.fromkeys(name.rpartition(" ")[0] for name in edges):
+        width: ZoneWidth = zone_width(edges, int(zone.rpartition(" ")[2]))
+        row = {"name": zone, **chosen(width, "open status")}
+        if width.trusted:
+            row |= chosen(width, "width_rpm standard_error_rpm")
+            row |= _with_errors({n: width.change(*of) for n, of in _asked(names).items()}, 0.01)
+        rows.append(row)
+    columns = [Column("zone", (), key="name"), Column("width", (), key="width_rpm", errors="standard_error_rpm")]
+    columns += [*_error_columns(names, 1), Column("status", ())]
+    return rows_table(f"{title}, and what 1 % more of a parameter adds [rpm]", rows, columns, "widths")
+
+
+def mean_gradient_tables(title: str, found: MeanGradient) -> list[Table]:
+    """Elasticities of means with their errors, the largest first, and the means."""
+    rows, moved = [], []
+    for name, each in found.statistics.items():
+        by = {
+            direction: dict(zip(("elasticity", "error"), pair, strict=True))
+            for direction, *pair in zip(each.directions, each.elasticity, each.elasticity_error, strict=True)
+        }
+        for direction in by:
+            if "+" not in direction:
+                by[direction] |= dict(zip(("slope", "slope_error"), found.slope(name, direction), strict=True))
+        names = "unit value value_error drift drift_error settled explained"
+        rows.append({"name": name, **chosen(each, names), "by": by})
+        order = sorted(by, key=lambda n: -abs(by[n]["elasticity"])) if each.value else []
+        words = lambda direction: direction.replace("_", " ").replace("+", ", ")
+        moved += [{"statistic": name, "by": words(n)} | by[n] for n in order]
+    elasticity = Column("elasticity", (), errors="error")
+    columns = [Column("statistic", (), key="name"), Column("mean", (), key="value", errors="value_error")]
+    columns += [Column("unit", ()), Column("explained", (), "1", "%", digits=0), Column("settled", ())]
+    return [
+        rows_table(f"Elasticities, {title}", moved, [Column("statistic", ()), Column("by", ()), elasticity]),
+        rows_table(f"Means, {title}", rows, columns, "statistics"),
+    ]

@@ -1,0 +1,205 @@
+"""Quantities that a run reports, measures of one speed, statics, and two designs beside each other, as tables."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Float
+
+from .._parameters import walk
+from ..analysis import Measures, OrderSpectrum, failed, scatter
+from ..analysis.rollers import Around, named_lines
+from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
+from ..files import configuration
+from ..forces import ImpactHistory
+from .tables import SHOWN, Column, Table, rows_table, value_table
+
+
+SURE = 2.0
+"""Standard errors by which two means must differ."""
+SHARES = ("cage_slip", "roller_slip_max")
+"""Quantities without a unit that are read in per cent."""
+
+
+def mean_over_starts(found: xr.Dataset, name: str) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, " rows"]]:
+    """Mean of a variable at each speed over the lanes that did not fail, and its standard error.
+
+    The error comes from the scatter of all blocks; it is NaN for a variable without blocks.
+    """
+    if name == "exponent":
+        values, blocks = found["exponents"].values[..., 0], found["block_growth"].values[..., 0]
+    else:
+        values = found[name].values
+        blocks = found[f"{name}_blocks"].values if f"{name}_blocks" in found else None
+    if values.ndim == 1:
+        return values, np.full(values.shape, np.nan)
+    lost, means, errors = failed(found), [], []
+    for i, row in enumerate(values):
+        known = row[~lost[i]]
+        means.append(float(np.mean(known)) if known.size else math.nan)
+        rest = np.zeros(0) if blocks is None else blocks[i][~lost[i]].ravel()
+        errors.append(float(scatter(rest)) if rest.size > 1 else math.nan)
+    return np.array(means), np.array(errors)
+
+
+def unit_of(found: xr.Dataset, name: str) -> tuple[str, str | None]:
+    """SI unit of a variable, and the unit in which it is shown; None for the usual one."""
+    return ("1", None) if name == "exponent" else (found[name].attrs["units"], "%" if name in SHARES else None)
+
+
+def head_of(name: str, unit: str) -> str:
+    """Name of a quantity as the head of a column, without its unit."""
+    return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
+
+
+def labels_at(found: xr.Dataset) -> list[str]:
+    """The labels at each speed, each once."""
+    return [" or ".join(sorted(set(row) - {"failed"}) or ["failed"]) for row in found["label"].values.tolist()]
+
+
+def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Table:
+    """Means over the lanes that did not fail at each speed with their standard errors, and the labels."""
+    columns = [Column("speed [rpm]", found["rpm"].values.tolist(), key="speed_rpm", digits=0)]
+    for name in names:
+        (unit, shown), (mean, error) = unit_of(found, name), mean_over_starts(found, name)
+        columns.append(Column(head_of(name, unit), mean.tolist(), unit, shown, error.tolist(), key=name))
+    return Table(title, [*columns, Column("motion", labels_at(found))])
+
+
+def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]) -> Table:
+    """Means of a quantity of two designs at each speed, and where they differ beyond doubt."""
+    unit, shown = unit_of(found[0], name)
+    pairs = [mean_over_starts(each, name) for each in found]
+    (a, a_error), (b, b_error) = pairs
+    differs = np.abs(a - b) > SURE * np.nan_to_num(np.hypot(a_error, b_error))
+    at = "shaft_rpm" if "shaft_rpm" in found[0].coords else "rpm"
+    columns = [Column("shaft [rpm]", found[0][at].values.tolist(), digits=0)]
+    for case, (mean, error) in zip(cases, pairs, strict=True):
+        columns.append(Column(case, mean.tolist(), unit, shown, error.tolist()))
+    title = head_of(name, unit)
+    return Table(title[:1].upper() + title[1:], [*columns, Column("differs", ["*" if d else "" for d in differs])])
+
+
+def measures_table(title: str, found: Measures) -> Table:
+    """Quantities of one run with their standard errors."""
+    rows = [(quantity.text, value, quantity.unit) for quantity, value, _ in found.values()]
+    return value_table(title, rows, [error for _, _, error in found.values()])
+
+
+def circumference_table(found: Around) -> Table:
+    """Slip, load and pocket force of the rollers around the bearing, an eighth of the circumference in a row."""
+    eighths = [np.floor(found.angle / (2 * np.pi) * 8).astype(int) == i for i in range(8)]
+    known = lambda f, x: [float(f(x[i])) if np.isfinite(x[i]).any() else math.nan for i in eighths]
+    columns = [Column("position, load at 270°", [f"{45 * i} to {45 * (i + 1)}°" for i in range(8)])]
+    columns.append(Column("slip", known(np.nanmean, found.roller_slip), "1", "%", digits=2))
+    for name, f in (("inner load", np.nanmean), ("driving force", np.nanmean), ("braking force", np.nanmean)):
+        columns.append(Column(name, known(f, getattr(found, name.replace(" ", "_"))), "N", digits=1))
+    columns.append(Column("largest force", known(np.nanmax, found.largest_force), "N", digits=0))
+    return Table("Rollers around the bearing: slip, load, pocket force", columns)
+
+
+def line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
+    """Lines of the spectra with the bearing's frequencies."""
+    words = {
+        "cage_place": "cage's vertical position over the clearance",
+        "pocket_force": "pockets on cage, vertical [N]",
+    }
+    columns = [Column("order of the cage's speed", (), key="order", digits=3), Column("amplitude", ())]
+    columns.append(Column("at the frequency of", (), key="name"))
+    each = {name: map(vars, named_lines(found, orders)) for name, found in spectra.items()}
+    return [rows_table(f"Spectrum, {words[name]}", rows, columns, f"spectrum_{name}") for name, rows in each.items()]
+
+
+def displacements(model: Any, shared: LoadDistribution) -> dict[str, float]:
+    """Static displacement of the cage [m] for the three types of guidance."""
+    given = {
+        "guidance_gap": model.guidance_gap,
+        "pocket_clearance": model.bearing.pocket_clearance,
+        "radial_clearance": model.bearing.radial_clearance,
+        "elastic_approach": shared.elastic_approach,
+    }
+    return {guidance: float(static_cage_displacement(guidance, **given)) for guidance in get_args(Guidance)}
+
+
+def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed: float | None = None) -> Table:
+    """Loads and displacements at rest, and the kinematics at a shaft speed [rad/s] if one is given."""
+    bearing = model.bearing
+    rows: list[tuple[str, Any, str]] = [
+        ("largest roller load", float(shared.max_load), "N"),
+        ("shift of the shaft", float(shared.shaft_shift), "m"),
+        ("elastic approach", float(shared.elastic_approach), "m"),
+        ("half angle of the loaded zone", float(shared.half_angle), "rad"),
+        *(
+            (f"cage displacement, {g.replace('_', ' ')} guidance", y, "m")
+            for g, y in displacements(model, shared).items()
+        ),
+        ("cage speed over shaft speed", float(bearing.cage_speed_ratio), "1"),
+    ]
+    if shaft_speed is not None:
+        surface = raceway_surface_speed(shaft_speed, bearing.inner_raceway_diameter)
+        rows += [
+            ("cage speed", float(bearing.cage_speed(shaft_speed)), "rad/s"),
+            ("surface speed of the inner raceway", float(surface), "m/s"),
+            ("centrifugal force of a roller", float(bearing.roller_centrifugal_force(shaft_speed)), "N"),
+        ]
+    return value_table(title, rows)
+
+
+def impact_table(title: str, history: ImpactHistory, approach_speed: float) -> tuple[Table, dict[str, Any]]:
+    """Peaks, time in contact and impulse of an impact over its whole history, as a table and for a document.
+
+    A bar that swings back may be hit again.
+    """
+    touching, bar = np.asarray(history.contact_force) > 0, np.asarray(history.bar_force)
+    duration = float(np.sum(touching)) * float(history.time[1] - history.time[0])
+    rows = {
+        "approach_speed": ("approach speed", approach_speed, "m/s"),
+        "peak_contact_force": ("peak contact force", float(np.max(history.contact_force)), "N"),
+        "peak_bar_force": ("peak bar force", float(np.max(bar)), "N"),
+        "lowest_bar_force": ("lowest bar force", float(np.min(bar)), "N"),
+        "contact_duration": ("time in contact", duration, "s"),
+        "contacts": ("contacts", int(np.sum(touching[1:] & ~touching[:-1])), "1"),
+        "impulse": ("impulse of the contact force", float(history.impulse), "N s"),
+        "ends_in_contact": ("still in contact at the end", bool(touching[-1]), "1"),
+    }
+    return value_table(title, rows.values()), {key: value for key, (_, value, _) in rows.items()}
+
+
+def differences(models: Sequence[Any]) -> list[dict[str, Any]]:
+    """Dotted name, text, both values [SI], unit and relative change of each parameter or choice in which two designs
+    differ."""
+    flat = [_flat(configuration(model)) for model in models]
+    about = {".".join(path): field.metadata for model in models for path, field in walk(model)}
+    found = []
+    for path in dict.fromkeys([*flat[0], *flat[1]]):
+        before, after = values = [each.get(path) for each in flat]
+        if before == after:
+            continue
+        info = about.get(path, {}).get("parameter")
+        row = {"name": path, "text": (info.text if info else about.get(path, {}).get("text")) or path, "values": values}
+        numbers = all(isinstance(v, float | int) and math.isfinite(v) for v in values)
+        change = after / before - 1 if numbers and before and (info is None or info.unit != "K") else None
+        found.append(row | {"unit": info.unit if info else "1", "change": change})
+    return found
+
+
+def differences_table(names: Sequence[str], models: Sequence[Any]) -> Table:
+    """Every value in which two designs differ."""
+    rows = differences(models)
+    for row in rows:
+        cells = Column(
+            "", [x if x is None or isinstance(x, float) else str(x) for x in row["values"]], row["unit"]
+        ).cells
+        row |= dict(zip(names, cells, strict=True)) | {"shown": SHOWN.get(row["unit"], row["unit"])}
+    columns = [Column("value", (), key="text"), *(Column(name, ()) for name in names), Column("unit", (), key="shown")]
+    columns.append(Column("change", (), "1", "%", digits=1))
+    return rows_table(f"Differences between {' and '.join(names)}", rows, columns, "differences", empty="nothing")
+
+
+def _flat(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        found |= _flat(value, (*path, key)) if isinstance(value, Mapping) else {".".join((*path, key)): value}
+    return found

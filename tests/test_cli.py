@@ -1,0 +1,239 @@
+"""The command line: bad input gets one sentence and exit status 2, hostile files are data, signals end a run."""
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from helpers import refused
+
+import jaxcage
+from jaxcage.cli import main
+from jaxcage.files import ConfigError, load_model, read_bytes
+
+
+COMMANDS = (
+    "init simulate sweep zones bifurcations gradient compare runup map study design sensitivity unknowns identify "
+    "poincare statics impact reproduce report"
+).split()
+STUDY = "study 1a --vary speed=9000:12000:3"
+GAP = f"{STUDY} --vary guidance_gap"
+WEIGHTS = " ".join(f"--{name} 0" for name in ("wear", "force", "impulse", "power", "slip", "balance"))
+REFUSED = [
+    ("", "Expected one of"),
+    ("spin 1a", "Unrecognized options: spin"),
+    ("sweep", "CASE"),
+    ("sweep 4z", "'4z'"),
+    (f"sweep {'x' * 300}", "is unknown"),
+    ("sweep nowhere.toml", "must be a readable TOML file"),
+    ("sweep 1a --sped 3", "--sped"),
+    ("sweep 1a --first 0", "--first"),
+    ("zones 1a --first 9000 --last 9000", "the range is 9000 to 9000 rpm"),
+    ("sweep 1a --count 2.5", "--count"),
+    ("sweep 1a --count 1000000000000", "--count must be at most"),
+    ("sweep 1a --revolutions 37", "--revolutions must be a multiple of 10"),
+    ("sweep 1a --exponents 9", "--exponents must be at most 4"),
+    ("sweep 1a --solver euler", "--solver must be one of"),
+    ("sweep 1a --tolerance 2", "--tolerance"),
+    ("sweep 1a --steps 64 --tolerance 1e-6", "--steps and --tolerance"),
+    ("sweep 1a --out=", "--out must name a folder"),
+    ("simulate 1a --speed 1e308", "--speed must be at most 1e+06 rpm"),
+    ("simulate 1a --speed 100000", "62516 rpm"),
+    ("simulate 1a --speed 8500 --load '300 N'", "--load goes with a whole bearing"),
+    ("poincare 1a", "--speed"),
+    ("impact 1a --speed 8500 --duration 0", "--duration"),
+    ("statics 1a --load -4450", "--load must be above 0 N"),
+    ("statics 1a --load heavy", '"heavy"'),
+    ("statics 1a --shaft-speed 1e6 --load 1e-6", "--load and --shaft-speed"),
+    ("statics 1a --style sepia", "--style"),
+    ("compare 1a 1b --at abc", "--at"),
+    ("runup 1a --rate 1e6", "--rate"),
+    ("map 1a --y gap", "--y must be one of"),
+    ("map 1a --x guidance_gap", "two different parameters"),
+    ("map 1a --lower 0.4kg", "--lower"),
+    ("map 1a --lower 0.5mm", "guidance_gap = 0.00045 m between them"),
+    ("map 1a --points 300", "--points must be ACROSSxUPWARDS"),
+    ("map 1a --points 9x7 --x eccentricity", "--speed must be given"),
+    ("map 1a --points 4x4 --persist 300", "--persist"),
+    ("map 1a --no-curves", "--points"),
+    ("study 1a", "--vary must be given for the speed"),
+    ("study 1a --vary speed=140Hz", "is in Hz"),
+    ("study 1a --vary speed=1:2:1000 --vary load=1:2:40000", "lanes"),
+    (f"{STUDY} --vary gap=0.4mm", "'gap'"),
+    (f"{STUDY} --vary speed=3000", "speed was given twice"),
+    (f"{STUDY} --vary eccentricity=0.5mm", "must be smaller than"),
+    (f"{GAP}=0.4kg", 'guidance_gap has the unit "kg"'),
+    (f"{GAP}=0.4mm:0.5mm:many", "'many'"),
+    (f"{GAP}=0.4mm,0.4mm", "distinct"),
+    (f"{GAP}=0.5mm:0.4mm --sample 4", "must ascend"),
+    (f"{GAP}=0.4mm:0.5mm", "--sample must say how many"),
+    (f"{STUDY} --sample 8", "--sample needs an interval or a tolerance"),
+    (f"{STUDY} --shard 1/{'9' * 5000}", "--shard must be I/N"),
+    (f"{STUDY} --workers 2", "--workers go with --executor dask"),
+    (f"{STUDY} --executor slurm", "--executor"),
+    (f"{STUDY} --store ../elsewhere", "--store must name a folder within --out"),
+    ("design 1a --starts 3 --scouts 1", "--scouts"),
+    ("design 1a --scatter eccentricity=weibull", "weibull"),
+    ("design 1a --worst 0.5", "--worst goes with --scatter"),
+    ("design 1a --vary load=1:2 --vary load=1:3", "load was given twice"),
+    ("design 1a --vary eccentricity=30um:60um", "--vary must let the eccentricity become smaller"),
+    ("sensitivity 1a --samples 3", "--samples must be a power of 2"),
+    ("unknowns 1a", "must be a TOML file with ranges"),
+    ("report 1a --operating fast", "--operating must be speeds"),
+    ("gradient 1a --speed 1e4", "--speed goes with a whole bearing"),
+    ("reproduce --constants best", "--constants"),
+    ("--tyro-print-completion nonsense", "'nonsense'"),
+    # Whole bearings.
+    ("bifurcations nu2310", "takes a cage"),
+    ("zones nu2310 --quick", "--quick does not go with a whole bearing"),
+    ("sweep nu2310 --exponents 2", "--exponents must be 1"),
+    ("runup nu2310 --last 200000", "at most 300 m/s"),
+    ("map nu2310 --rows 0", "--rows"),
+    ("compare nu2310 1a", "must be a whole bearing"),
+    ("gradient nu2310", "--speed must be given"),
+    ("gradient nu2310 --speed 1e4 --by gap", "--by"),
+    ("design nu2310 --speed 1e4 --vary load=1kN:5kN", "--vary must name one of"),
+    (f"design nu2310 --speed 1e4 {WEIGHTS}", "must not all be 0"),
+    ("sensitivity nu2310 --speed 1e4 --of noise", "--of must be one of"),
+    ("study nu2310 --vary load=1kN", "--vary must be given for the speed"),
+    ("study nu2310 --vary speed=9000 --vary oil=32", "--vary must name one of speed"),
+]
+
+
+@pytest.mark.parametrize("arguments, said", REFUSED, ids=[arguments[:60] for arguments, _ in REFUSED])
+def test_bad_arguments(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: str, said: str
+):
+    monkeypatch.chdir(tmp_path)
+    assert said.replace("`", "") in refused(capsys, *shlex.split(arguments)).replace("`", "")
+    assert not any(path.is_file() for path in tmp_path.rglob("*"))
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("guidance_gap = ", "must be valid TOML"),
+        ("base = '9'", "`base` must be one of"),
+        ("base = '1a'\n[film]\nwidth = 4e-3", "Key `width` in [film] must be one of"),
+        ("base = '1a'\nguidance_gap = '0.45 m'", 'but is 0.45 m (given as "0.45 m")'),
+        ("base = '1a'\nguidance_gap = '0.45 smoots'", '"smoots"'),
+        ("base = '1a'\nguidance_gap = nan", "but is nan m"),
+        ("base = '1a'\neccentricity = '0.5 mm'", "but is 0.5 mm in a gap of 0.45 mm"),
+    ],
+)
+def test_bad_configurations(capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, said: str):
+    path = tmp_path / "design.toml"
+    path.write_text(text)
+    sentence = refused(capsys, "sweep", str(path), "--out", str(tmp_path / "out"))
+    assert said in sentence and str(path) in sentence and not (tmp_path / "out").exists()
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "init"])
+def test_nan_and_infinity_are_refused_in_every_option(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, command: str
+):
+    """The options are those that `--help` lists with a number."""
+    monkeypatch.chdir(tmp_path)
+    assert main([command, "--help"]) == 0
+    listed = capsys.readouterr().out
+    flags = re.findall(r"^│ (--[a-z-]+) (?:INT|FLOAT|RPM)\b", listed, flags=re.M)
+    assert flags or command in ("unknowns", "identify", "reproduce")
+    cases = {"compare": ["1a", "1b"], "identify": ["1a", "data.csv"], "reproduce": []}.get(command, ["1a"])
+    speed = ["--speed=8500"] if command in ("simulate", "poincare", "impact") else []
+    for flag in flags:
+        for wrong in ("nan", "inf", "-inf"):
+            needed = cases + (speed if flag != "--speed" else [])
+            assert main([command, *needed, f"{flag}={wrong}"]) == 2, f"{flag}={wrong}"
+            assert flag in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("wrong", ["nan", "1e999"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "study 1a --vary speed={}",
+        "study 1a --vary speed=8500 --vary guidance_gap=0.4mm+-{} --sample 8",
+        "design 1a --vary guidance_gap={}:0.6mm",
+        "design 1a --scatter guidance_gap={}%",
+        "map 1a --points 4x4 --upper {}",
+        "report 1a --operating 8500-{}",
+    ],
+)
+def test_nan_and_infinity_are_refused_within_texts(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, line: str, wrong: str
+):
+    option = [word for word in line.partition("{}")[0].split() if word.startswith("--")][-1]
+    assert f"Option {option}" in refused(capsys, *line.format(wrong).split(), "--out", str(tmp_path))
+
+
+@pytest.mark.parametrize("below", ["", "results"])
+def test_unwritable_output_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path, below: str):
+    occupied = tmp_path / "occupied"
+    occupied.write_text("a file, not a folder")
+    for command in ("sweep 1a", "statics 1a"):
+        sentence = refused(capsys, *command.split(), "--out", str(occupied / below))
+        assert "must be a folder that can be written to" in sentence
+    assert occupied.read_text() == "a file, not a folder"
+
+
+def test_control_characters_of_a_name_are_not_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    path = tmp_path / "a\u202egpj.toml"
+    path.write_text("base = '1a'")
+    assert main(["statics", str(path), "--out", str(tmp_path / "\u202eout")]) == 0
+    out, err = capsys.readouterr()
+    assert "\u202e" not in out + err and r"\u202eout" in out
+    assert "\u202e" not in refused(capsys, "statics", str(path) + "x")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "large"])
+def test_only_files_of_a_sensible_size_are_read(capsys: pytest.CaptureFixture[str], tmp_path: Path, kind: str):
+    path = tmp_path / "design.toml"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with open(path, "wb") as file:
+            file.truncate(10**12)  # holds nothing, and is a terabyte long
+    why = "more than the 10000000 that are read" if kind == "large" else "no regular file"
+    with pytest.raises(ConfigError, match=f"must be a readable TOML file, but: .*{why}"):
+        load_model(path)
+    assert why in refused(capsys, "statics", str(path), "--out", str(tmp_path))
+    with pytest.raises(OSError):
+        read_bytes(path)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("sent, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_sweep_ends_at_once(tmp_path: Path, sent: signal.Signals, status: int):
+    command = [sys.executable, "-m", "jaxcage", "sweep", "1a", "--out", str(tmp_path)]
+    with subprocess.Popen(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stderr is not None and process.stderr.readline().startswith("Warning:")
+        time.sleep(2)  # the sweep itself begins right after the warning
+        process.send_signal(sent)
+        out, err = process.communicate(timeout=8)
+    assert (process.returncode, out) == (status, "")
+    assert err.startswith("Interrupted: ") and err.count("\n") == 1 and not any(tmp_path.iterdir())
+
+
+MODULES = """
+import sys
+from jaxcage.cli import main
+status = main(sys.argv[1:])
+print(status, sorted({"jax", "numpy", "scipy", "matplotlib"} & set(sys.modules)))
+"""
+
+
+@pytest.mark.parametrize("arguments, status", [("--version", 0), ("sweep --help", 0), ("sweep 1a --sped 3", 2)])
+def test_help_version_and_errors_of_typing_load_no_jax(arguments: str, status: int):
+    command = [sys.executable, "-c", MODULES, *arguments.split()]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert lines[-1] == f"{status} []"
+    if arguments == "--version":
+        assert lines[0] == f"jaxcage {jaxcage.__version__}"

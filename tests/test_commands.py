@@ -1,0 +1,253 @@
+"""What the commands for a cage compute, print and store, at small sizes, beside the same calls of the library."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from helpers import document, is_png, raw_sweep, refused
+
+import jaxcage as jc
+from jaxcage.cli import main
+from jaxcage.files import load_model, read_bearing, write_template
+from jaxcage.lanes import label_names, load
+from jaxcage.show import read_columns
+
+
+RK4 = ["--solver", "rk4", "--steps", "256"]
+LENGTH = ["--discard", "20", "--revolutions", "20"]
+TINY = ["--first", "12000", "--last", "13000", "--count", "3", *LENGTH, "--horizon", "0", "--no-confirm", *RK4]
+RATIO = (1 - 16 / 81) / 2
+"""(7)-(8) of an NU2310 whose outer ring stands still: half of 1 - d_w/d_m."""
+
+
+def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "sweep", "1a", *TINY, "--out", str(tmp_path))
+    stored = load(found["data"])
+    assert sum(found["labels"].values()) == 9 and found["failed"] == {} and is_png(found["figure"])
+    length = dict(discard=20, revolutions=20, blocks=20, horizon=0, confirm=False)
+    own = jc.sweep(jc.case("1a"), jc.rpm(12000, 13000, 3), method=jc.method("rk4", steps=256), **length)
+    np.testing.assert_allclose(stored.last, own.last, rtol=1e-9)
+    np.testing.assert_array_equal(stored.label, own.label)
+    assert json.loads(load(found["data"]).attrs["configuration"])["cage_mass"] == float(jc.case("1a").cage_mass)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep_1a.png", "sweep_1a.zarr"]
+
+
+@pytest.mark.wide
+def test_poincare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "poincare", "1a", "--speed", "15000", *LENGTH, *RK4, "--out", str(tmp_path))
+    columns = read_columns(found["data"])
+    assert columns["revolution"].tolist() == 3 * list(range(21, 41))
+    for start in found["starts"]:
+        rows = columns["start"] == start["start"]
+        assert columns["y_C [m]"][rows] == pytest.approx(np.array(start["y_C"]), rel=1e-10)
+    assert is_png(found["figure"])
+
+
+def test_simulate(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "simulate", "1a", "--speed", "15000", "--revolutions", "3", *RK4, "--out", str(tmp_path))
+    assert found["outcome"] == "successful" and found["measures"]["drag_power"] > 0 and is_png(found["figure"])
+    columns, mass = read_columns(found["data"]), float(jc.case("1a").cage_mass)
+    assert columns["time [s]"].size == 3 * 128
+    assert columns["time [s]"][128] == pytest.approx(60 / 15000, rel=1e-9)
+    assert columns["weight_y [N]"] == pytest.approx(np.full(384, -mass * 9.81), rel=1e-9)
+    amplitude = 2 * mass * 0.023 / 0.45 * 1e-3 * (15000 * np.pi / 30) ** 2  # (20) as printed, in mm
+    assert columns["unbalance_x [N]"].max() == pytest.approx(amplitude, rel=1e-9)
+
+
+@pytest.mark.wide
+def test_a_simulation_that_fails_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    arguments = ["--speed", "2500", "--solver", "rk4", "--steps", "8", "--out", str(tmp_path)]
+    assert main(["simulate", "1a", *arguments]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and "The simulation at 2500 rpm failed (" in err and not any(tmp_path.iterdir())
+
+
+def test_statics(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Three rollers carry 4450 N, as the physics page prints it."""
+    found = document(capsys, "statics", "1a", "--load", "4450", "--out", str(tmp_path))
+    assert found["max_load"] == pytest.approx(2420, rel=1e-3)
+    assert found["shaft_shift"] == pytest.approx(26.1e-6, rel=1e-3)
+    assert math.degrees(found["half_angle"]) == pytest.approx(40.0, rel=1e-3)
+    held = sum(r["inner_load"] * -math.sin(r["angle"]) for r in found["rollers"])
+    assert len(found["rollers"]) == 13 and held == pytest.approx(4450, rel=1e-9)
+    shift = found["shaft_shift"]
+    assert found["cage_displacement"] == pytest.approx(
+        {"outer_rib": 0.225e-3, "inner_rib": shift + 0.225e-3, "roller": shift + 0.3e-3}
+    )
+    assert found["kinematics"]["cage_speed_ratio"] == pytest.approx(RATIO, rel=1e-9)
+    assert read_columns(found["data"])["inner load [N]"].max() == pytest.approx(found["max_load"])
+    assert is_png(found["figure"])
+
+
+def test_a_speed_may_be_the_shafts_or_the_cages(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = lambda *given: document(capsys, *given, "--out", str(tmp_path))
+    cage = found("statics", "1a", "--shaft-speed", "10000 rpm cage")
+    shaft = found("statics", "1a", "--shaft-speed", f"{10000 / RATIO!r} rpm shaft")
+    assert cage["rollers"] == shaft["rollers"] and cage["kinematics"] == shaft["kinematics"]
+    assert cage["kinematics"]["cage_speed"] == pytest.approx(10000 * math.pi / 30)
+    hit = found("impact", "1a", "--speed", "20000 rpm shaft")
+    assert hit["shaft_speed_rpm"] == pytest.approx(20000) and hit["speed_rpm"] == pytest.approx(20000 * RATIO)
+    path = write_template(tmp_path / "mine.toml")  # its speeds are the shaft's
+    assert read_bearing(path).speeds == "shaft"
+    assert found("impact", str(path), "--speed", "20000")["speed_rpm"] == pytest.approx(20000 * RATIO)
+
+
+@pytest.mark.wide
+def test_impact(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "impact", "1a", "--speed", "8500", "--out", str(tmp_path))
+    assert found["approach_speed"] == pytest.approx(0.45 * 8500 * np.pi / 30 * 0.3e-3)
+    columns = read_columns(found["data"])
+    assert columns["contact_force [N]"].max() == pytest.approx(found["peak_contact_force"])
+    assert columns["contact_force [N]"].min() == 0
+    assert columns["bar_force [N]"].min() == pytest.approx(found["lowest_bar_force"])
+    # The roller leaves faster than it came by nothing: it cannot give more than twice its momentum.
+    assert 0 < found["impulse"] < 2 * 0.0424 * found["approach_speed"]
+
+
+def test_a_configuration_file_in_place_of_a_case(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    design = tmp_path / "wide.toml"
+    design.write_text('base = "1a"\nguidance_gap = "0.28 mm"\n')
+    assert main(["statics", str(design), "--out", str(tmp_path), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["case"] == "wide"
+    assert json.loads(out)["cage_displacement"]["outer_rib"] == pytest.approx(0.14e-3)
+    assert err == ""  # T = 0.3 mm > C_r = 0.28 mm: the design rule holds
+
+
+def test_init_writes_a_new_file_only(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    path = tmp_path / "my_bearing.toml"
+    assert document(capsys, "init", str(path)) == {"file": str(path)}
+    assert float(load_model(path).guidance_gap) == pytest.approx(0.45e-3)
+    path.write_text("mine")
+    assert "must be a new one" in refused(capsys, "init", str(path)) and path.read_text() == "mine"
+    assert "must end in .toml" in refused(capsys, "init", str(tmp_path / "bearing.txt"))
+    assert "No such file" in refused(capsys, "init", str(tmp_path / "no/such/b.toml"))
+
+
+# Synchronous orbits: from 10000 to 13500 rpm the one of case 1a is lost below a period doubling.
+
+RANGE = ["1a", "--first", "10000", "--last", "13500"]
+EXIT = 12355.5353
+
+
+@pytest.mark.wide
+def test_bifurcations(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "bifurcations", *RANGE, "--count", "8", "--out", str(tmp_path))
+    (point,), (zone,) = found["points"], found["zones"]
+    assert point["kind"] == "period-doubling" and point["speed_rpm"] == pytest.approx(EXIT, abs=2e-3)
+    assert point["multiplier"] == pytest.approx([-1.0, 0.0], abs=1e-6)
+    assert zone["onset_rpm"] is None and zone["exit_rpm"] == point["speed_rpm"]
+    columns = read_columns(found["data"])
+    size = np.hypot(columns["multiplier 1 (real part)"], columns["multiplier 1 (imaginary part)"])
+    assert np.array_equal(columns["stable"] == 1, size < 1)
+    assert is_png(found["figure"]) and is_png(found["multipliers"])
+
+
+@pytest.mark.wide
+def test_zones(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    small = ["--count", "8", "--discard", "50", "--revolutions", "50", "--quick"]
+    found = document(capsys, "zones", *RANGE, *small, "--out", str(tmp_path))
+    for zone in (found["zones"][0], found["synchronous_loss"][0]):
+        assert zone["exit_rpm"] == pytest.approx(EXIT, abs=2e-3) and zone["exit_mechanism"] == "period-doubling"
+    assert load(found["data"]).rpm == pytest.approx(np.linspace(10000, 13500, 8))
+    assert found["published"][0] == {"zone": 1, "onset_rpm": 9100.0, "exit_rpm": 12000.0}
+
+
+@pytest.mark.wide
+def test_gradient(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Elasticities of a speed by mass, length and time add up to the powers in its unit."""
+    found = document(capsys, "gradient", *RANGE, "--count", "8", "--out", str(tmp_path))
+    (edge,) = found["edges"]
+    assert edge["trusted"] and edge["speed_rpm"] == pytest.approx(EXIT, abs=2e-3) and is_png(found["figure"])
+    assert all(abs(left) < 1e-9 for left in found["homogeneity"].values())
+    gap = float(jc.case("1a").guidance_gap)
+    slope = edge["derivative"]["guidance_gap"]
+    assert edge["elasticity"]["guidance_gap"] == pytest.approx(slope * gap / edge["speed_rpm"], rel=1e-9)
+
+
+@pytest.mark.wide
+def test_map_of_an_edge(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    found = document(capsys, "map", *RANGE, "--rows", "0", "--steps", "128", "--out", str(tmp_path))
+    (edge,) = found["curves"]
+    assert (found["x"], found["y"], edge["kind"]) == ("speed", "guidance_gap", "period-doubling")
+    order = np.argsort(edge["y"])
+    assert np.interp(0.45e-3, np.array(edge["y"])[order], np.array(edge["x"])[order]) == pytest.approx(EXIT, abs=5.0)
+    assert read_columns(found["data"])["guidance_gap [mm]"] == pytest.approx(1e3 * np.array(edge["y"]))
+    assert is_png(found["figure"])
+
+
+@pytest.mark.wide
+def test_map_of_labels(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    asked = ["--points", "9x7", "--discard", "10", "--revolutions", "20", "--steps", "64", "--no-curves"]
+    found = document(capsys, "map", "1a", *asked, "--first", "3000", "--last", "9000", "--out", str(tmp_path))
+    assert found["points"] == [9, 7] and sum(found["kinds"].values()) == 63 and is_png(found["figure"])
+    data = xr.open_zarr(found["data"], consolidated=False, chunks=None)
+    assert data["label"].dims == ("speed", "guidance_gap", "start") and int(np.min(data["label"])) >= 0
+    np.testing.assert_allclose(data["speed"], jc.rpm(3000, 9000, 9), rtol=1e-14)
+
+
+@pytest.mark.wide
+def test_study_is_stored_and_goes_on(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    asked = ["study", "1a", "--vary", "speed=9000:12000rpm:6", "--vary", "guidance_gap=0.4mm:0.5mm:2", "--starts", "2"]
+    asked += ["--discard", "10", "--revolutions", "20", "--solver", "rk4", "--steps", "128", "--chunk", "6"]
+    asked += ["--out", str(tmp_path)]
+    half = document(capsys, *asked, "--shard", "2/2")
+    assert half["axes"] == {"speed": 6, "guidance_gap": 2, "start": 2}
+    assert (half["lanes"], half["stored"], half["stored_before"], half["chunks"]) == (24, 12, 0, 6)
+    whole = document(capsys, *asked)
+    assert (whole["stored"], whole["stored_before"]) == (24, 12)
+    assert "differs in discard" in refused(capsys, *asked, "--discard", "20")
+    (tmp_path / "mine").mkdir()
+    assert "--store must be a new folder" in refused(capsys, *asked, "--store", "mine")
+    stored = xr.open_zarr(whole["store"], chunks=None)
+    model, speeds = jc.replace(jc.case("1a"), guidance_gap=0.5e-3), jc.rpm(9000, 12000, 6)
+    starts = np.array([[[float(c) for c in y] for y in model.starts(s)[:2]] for s in speeds])
+    length = dict(discard=10, revolutions=20, blocks=20, keep=16, method=jc.method("rk4", steps=128))
+    swept = raw_sweep(model, speeds, starts=starts, **length)
+    mine = stored.isel(guidance_gap=1)
+    # rounding grows with the exponent: 30 revolutions are short enough
+    np.testing.assert_allclose(mine["largest_exponent"], swept.exponents[..., 0], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(mine["peak"], swept.peak, rtol=0, atol=1e-3)
+    counts = dict(zip(*np.unique(label_names(stored), return_counts=True), strict=True))
+    assert whole["labels"] == counts and sum(counts.values()) == 24
+
+
+@pytest.mark.wide
+def test_compare(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    other = tmp_path / "narrow.toml"
+    other.write_text('base = "1a"\nguidance_gap = "0.3 mm"\n[bearing]\nroller_diameter = "15 mm"\n')
+    found = document(capsys, "compare", "1a", str(other), *TINY, "--at", "12321", "--out", str(tmp_path))
+    assert set(found["differences"]) == {"guidance_gap", "bearing.roller_diameter"}
+    first, second = found["designs"]["1a"], found["designs"]["narrow"]
+    assert len(first["speeds_rpm"]) == 4 and any(abs(x - 12321) < 1e-6 for x in first["speeds_rpm"])
+    assert second["shaft_speeds_rpm"] == pytest.approx(first["shaft_speeds_rpm"])
+    assert is_png(found["figure"]) and is_png(found["measures"])
+
+
+@pytest.mark.wide
+def test_runup(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    asked = "--first 14000 --last 15000 --rate 2000 --windows 10 --discard 20".split()
+    found = document(capsys, "runup", "1a", *asked, *RK4, "--out", str(tmp_path))
+    up, down, columns = found["up"], found["down"], read_columns(found["data"])
+    assert found["ramp_seconds"] == pytest.approx(0.5, rel=0.1)
+    assert up["speeds_rpm"] == pytest.approx(down["speeds_rpm"], rel=2e-3) and up["speeds_rpm"][0] < 14100
+    assert columns["orbit size up [m]"] == pytest.approx(up["orbit_size_m"])
+    assert columns["shaft speed [rpm]"] * found["cage_speed_ratio"] == pytest.approx(columns["cage speed [rpm]"])
+
+
+@pytest.mark.wide
+def test_design_and_sensitivity(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """A search too short to find much: what is given stays or gets better, costs and balance in closed form."""
+    few = ["--first", "8000rpm", "--last", "14000rpm", "--speeds", "6", "--quick", "--out", str(tmp_path)]
+    search = ["--starts", "2", "--scouts", "2", "--steps", "1", "--batch", "4"]
+    found = document(capsys, "design", "1b", *few, *search)
+    assert found["objective"] <= found["objective_before"] and is_png(found["figure"])
+    assert found["vary"]["eccentricity"] == pytest.approx([4.6e-6, 23e-6])  # no worse balanced than it is
+    assert found["cost"]["before"] == pytest.approx(0.45 / 0.6 + 1)
+    grade = 23e-6 * 14000 * np.pi / 30 * 1e3  # [mm/s]
+    assert found["balance_grade_mm_per_s"]["before"] == pytest.approx(grade)
+    shares = document(capsys, "sensitivity", "1a", *few, "--samples", "2")
+    assert set(shares["sobol"]["total"]) == {"guidance_gap", "eccentricity"} and shares["edges"] == []

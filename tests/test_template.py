@@ -1,0 +1,141 @@
+"""Templates that `jaxcage init` writes: complete, correct as they are and with every option; bearings as files."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers import declared, elastic, roller_pass
+
+import jaxcage as jc
+from jaxcage.bearing import PUBLISHED_CASES
+from jaxcage.files import (
+    ConfigError,
+    configuration,
+    load_whole_bearing,
+    model_from,
+    read_whole_bearing,
+    save_model,
+    subject_of,
+    template,
+    whole_bearing_from,
+)
+
+
+jc.enable_x64()  # read while the tests are collected
+CAGE, WHOLE = template(), template("bearing")
+READERS = {CAGE: model_from, WHOLE: whole_bearing_from}
+TEMPLATES = pytest.mark.parametrize("text", READERS, ids=["cage", "whole bearing"])
+MODELS = (*map(jc.case, PUBLISHED_CASES), elastic(jc.case("2a")), roller_pass(jc.case("3b")))
+FIELDS = {path: field for model in MODELS for path, field in declared(model)}
+"""Everything that a file of a cage may give: its place and declaration."""
+OPTION = re.compile(r"# (?=[a-z_0-9]+ = )")
+
+
+def assert_alike(found: dict[str, Any], expected: dict[str, Any], rel: float = 1e-3) -> None:
+    assert set(found) == set(expected)
+    for key, value in found.items():
+        if isinstance(value, dict):
+            assert_alike(value, expected[key], rel)
+        else:
+            known = expected[key]
+            assert value == (known if isinstance(known, str | int) else pytest.approx(known, rel=rel)), key
+
+
+def read(template: str, text: str = "") -> dict[str, Any]:
+    """Configuration of what a text, or the template itself, describes."""
+    return configuration(READERS[template](tomllib.loads(text or template)))
+
+
+def test_they_describe_ready_made_bearings():
+    """Case 1a but for two readings of the paper that are misprints, and NU2310."""
+    own = jc.replace(jc.case("1a"), clearance_reading="radial", unbalance="physical")
+    assert_alike(read(CAGE), configuration(own))
+    assert_alike(read(WHOLE), configuration(jc.whole_bearing("nu2310")))
+    assert all("$" not in text and max(map(len, text.splitlines())) <= 140 for text in READERS)
+
+
+@pytest.mark.wide
+@TEMPLATES
+def test_every_option_is_accepted_and_shows_what_it_is_when_left_out(text: str):
+    lines, left_out = text.splitlines(), read(text)
+    options = [i for i, line in enumerate(lines) if OPTION.match(line)]
+    assert len(options) > 20
+    for i in options:
+        taken = [OPTION.sub("", line) if k == i else line for k, line in enumerate(lines)]
+        assert_alike(read(text, "\n".join(taken)), left_out)
+
+
+def merged(table: dict, new: dict) -> dict:
+    """The table with those of `new` in place of its own where they name another kind or designation."""
+    place = lambda old, value: merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    fresh = {"kind", "designation"} & set(new)
+    return new if fresh else table | {key: place(table.get(key), value) for key, value in new.items()}
+
+
+@TEMPLATES
+def test_every_table_that_can_be_put_in_place_of_another_is_accepted(text: str):
+    blocks = re.findall(r"(?:^#: .*\n?)+", text, flags=re.M)
+    assert len(blocks) > 1
+    for block in blocks:
+        given = tomllib.loads(re.sub(r"^#: ", "", block, flags=re.M))
+        found = configuration(READERS[text](merged(tomllib.loads(text), given)))
+        for key in re.findall(r"^\[(\w+)", re.sub("^#: ", "", block, flags=re.M), flags=re.M):
+            assert found[key].get("kind") == given[key].get("kind"), block
+
+
+def test_nothing_that_can_be_given_is_missing():
+    known = {path[-1] for path in FIELDS}
+    written = set(re.findall(r"^(?:# |#: )?([a-z_0-9]+) = ", CAGE, flags=re.M))
+    assert written == known | {"kind", "grade", "base", "designation", "speeds", "stiffness"}
+    for path, field in FIELDS.items():
+        assert all(f'"{option}"' in CAGE for option in field.metadata.get("choice", ())), path
+
+
+# Whole bearings.
+
+
+def test_every_parameter_and_choice_of_a_bearing_goes_there_and_back(tmp_path: Path):
+    """Each number changed a little, each choice to its last option."""
+    model, rng = jc.whole_bearing("nu2310"), np.random.default_rng(1)
+    info = jc.parameter_info(model)
+    shake = lambda name, x: float(np.clip(x * rng.uniform(0.98, 1.02), info[name].lower, info[name].upper))
+    last = {".".join(p): f.metadata["choice"][-1] for p, f in declared(model) if "choice" in f.metadata}
+    model = jc.replace(model, **{name: shake(name, float(x)) for name, x in jc.parameters(model).items()})
+    model = jc.replace(model, **last, **{"bearing.n_rollers": 12, "film.n_lands": 1})
+    again = load_whole_bearing(save_model(tmp_path / "mine.toml", model))
+    assert configuration(again) == configuration(model)
+
+
+def test_what_a_file_changes_of_a_ready_made_bearing(tmp_path: Path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'base = "nu2310"\nload = "300 N"\n[bearing]\npocket_clearance = "0.2 .. 0.6 mm"\n[ring]\nring_mass = 3'
+    )
+    file = read_whole_bearing(path)
+    expected = jc.replace(jc.whole_bearing("nu2310"), load=300.0, pocket_clearance=0.4e-3, ring_mass=3.0)
+    assert_alike(configuration(file.model), configuration(expected), 1e-12)
+    assert file.speeds == "shaft" and [u.names for u in file.unknowns] == [("pocket_clearance",)]
+    assert subject_of(path) == "bearing" and subject_of({"base": "1a"}) == "cage"
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ('model = "bearing"\nbase = "1a"', "`base` must be one of nu2310"),
+        ('model = "bearing"', "must be given, unless"),
+        ('base = "nu2310"\nlaod = 3', "Key `laod` at the top level must be one of"),
+        ('base = "nu2310"\n[traction]\npeak = 0.01', "`peak` must be above `rest` and `limit`"),
+        ('base = "nu2310"\nguidance = "inner"\ninner_land_diameter = "45 mm"', "above the bore, 50 mm"),
+        ('base = "nu2310"\ncage_mass = "90 kg"', "`cage_mass` must be at most"),
+        ('base = "nu2310"\n[film]\nland_width = "7 mm"', "must fit beside the rollers, in 6.5 mm"),
+    ],
+)
+def test_refusals(text: str, said: str, tmp_path: Path):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        load_whole_bearing(path)
+    assert said in str(refused.value) and str(path) in str(refused.value) and "\n" not in str(refused.value)
