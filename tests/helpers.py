@@ -192,6 +192,7 @@ def made_sweep(
         coords={
             "speed": ("speed", speed, {"units": "rad/s", "long_name": "cage speed"}),
             "rpm": ("speed", speed * 30 / np.pi, {"units": "rpm", "long_name": "cage speed"}),
+            "shaft_rpm": ("speed", speed * 30 / np.pi / attrs.pop("cage_speed_ratio", 0.4)),
             "component": np.array(component_names(dim), dtype=object),
             "revolution": np.arange(110 - keep + 1, 111),
         },
