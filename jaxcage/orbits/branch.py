@@ -45,7 +45,7 @@ AMPLITUDE, SMALLEST_AMPLITUDE = 0.02, 1e-5
 class Branch:
     """Orbits in order along a branch, and its bifurcations.
 
-    The parameter's values and the states at phase 0 are in SI units, speeds in rad/s; `steps` are those of a revolution,
+    Values of the parameter and states at phase 0 are in SI units, speeds in rad/s; `steps` are those of a revolution,
     and `error` is that of `Orbit`.
     """
 
