@@ -6,7 +6,7 @@ A step is written for a single lane, on scalars. What surrounds it decides what 
 - on a CPU it is machine code (`ir`) that JAX's program calls (`call`): a few microseconds, and no compilation by XLA;
   elsewhere, and for a step with an operation that has no translation, it is the same loop inside JAX.
 
-Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits.implicit.by_columns`).
+Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits.newton.by_columns`).
 """
 
 import dataclasses
