@@ -139,6 +139,9 @@ def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[t
         value, here = getattr(module, field.name), (*path, field.name)
         if isinstance(value, eqx.Module):
             yield from declared(value, here)
+        elif field.name == "forces":
+            for law in value:
+                yield from declared(law, (*path, law.law_name))
         elif {"parameter", "choice", "count"} & set(field.metadata):
             yield here, field
 
