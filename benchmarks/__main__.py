@@ -135,7 +135,7 @@ def extras(problem: Problem) -> str:
         "plain revolution": (turns, lambda: swept(0)),
         "with one exponent": (turns, lambda: swept(1)),
         "with four exponents": (turns, lambda: swept(4)),
-        "monodromy matrix": (1, lambda: jc.sweeps.monodromy(problem.model, problem.speeds, problem.states)),
+        "monodromy matrix": (1, lambda: jc.lanes.monodromy(problem.model, problem.speeds, problem.states)),
     }
     first = {name: seconds(run) for name, (_, run) in runs.items()}
     spent = [{name: seconds(run) for name, (_, run) in runs.items()} for _ in range(REPEATS)]

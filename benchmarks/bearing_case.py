@@ -15,7 +15,7 @@ import numpy as np
 
 import jaxcage as jc
 from benchmarks.common import commit
-from jaxcage.io import configuration
+from jaxcage.files import configuration
 from jaxcage.models import BearingState, Bodies, Rollers, state_scale
 
 

@@ -35,7 +35,7 @@ from jaxcage.design import (
     cost,
     relative,
 )
-from jaxcage.io import read_bearing
+from jaxcage.files import read_bearing
 from jaxcage.solve import DEFAULT_ERROR
 
 

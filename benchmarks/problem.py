@@ -87,7 +87,7 @@ def spread_out(problem: Problem, lanes: int) -> Problem:
     return Problem(problem.model, speeds, problem.states[nearest])
 
 
-def our_map(problem: Problem, method: jc.integrate.AbstractMethod | None, revolutions: int = 1) -> np.ndarray:
+def our_map(problem: Problem, method: jc.solve.AbstractMethod | None, revolutions: int = 1) -> np.ndarray:
     """End states of the library's own map, shape (lanes, 4)."""
     return jc.sweep(
         problem.model,

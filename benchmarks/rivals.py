@@ -73,7 +73,7 @@ class Jaxcage(Rival):
         super().__init__(f"jaxcage, {name}", settings, tight, revolutions=100 if solver.startswith(NATIVE) else 20)
         self.solver = solver
 
-    def method(self, setting: Any) -> jc.integrate.AbstractMethod | None:
+    def method(self, setting: Any) -> jc.solve.AbstractMethod | None:
         """The library's method; None for its default."""
         if setting is None:
             return None

@@ -22,7 +22,7 @@ import jax
 import jax.numpy as jnp
 from _size import save, small
 
-from jaxcage.plotting import elasticity_bars, new_figure
+from jaxcage.show import elasticity_bars, new_figure
 
 
 jc.enable_x64()

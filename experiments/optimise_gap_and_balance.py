@@ -20,7 +20,7 @@ import numpy as np
 from _size import save, small
 
 import jaxcage as jc
-from jaxcage.plotting import design_figure
+from jaxcage.show import design_figure
 
 
 jc.enable_x64()

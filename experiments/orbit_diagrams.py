@@ -18,7 +18,7 @@ from _size import save, small
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.plotting import exponent_strip, mark_published, new_figure, orbit_diagram
+from jaxcage.show import exponent_strip, mark_published, new_figure, orbit_diagram
 
 
 jc.enable_x64()

@@ -17,7 +17,7 @@ import numpy as np
 from _size import save, small
 
 import jaxcage as jc
-from jaxcage.plotting import new_figure
+from jaxcage.show import new_figure
 
 
 jc.enable_x64()

@@ -18,8 +18,8 @@ from pathlib import Path
 from _size import FOLDER, save, small
 
 import jaxcage as jc
-from jaxcage.io import load_model
-from jaxcage.plotting import new_figure, orbit_diagram
+from jaxcage.files import load_model
+from jaxcage.show import new_figure, orbit_diagram
 
 
 jc.enable_x64()

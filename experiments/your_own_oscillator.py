@@ -23,7 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from _size import save, small
 
-from jaxcage.plotting import new_figure
+from jaxcage.show import new_figure
 
 
 jc.enable_x64()

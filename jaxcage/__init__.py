@@ -11,7 +11,7 @@
 | `orbits`    | periodic orbits, branches, bifurcation points and their derivatives                 |
 | `design`    | constants identified from edges; objectives, optimisation, tolerances               |
 | `files`      | TOML in and out, units                                                              |
-| `io`, `plotting` | xarray, zarr and CSV out; figures                                               |
+
 | `studies`    | sweeps over any parameters, stored as they go; maps of labels                       |
 | `report`     | tables of what was found; one HTML page about a design                              |
 | `cli`        | the `jaxcage` command                                                               |

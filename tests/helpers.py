@@ -13,15 +13,18 @@ import jax.numpy as jnp
 import numpy as np
 import pint
 import pytest
+import xarray as xr
 
 import jaxcage as jc
+from jaxcage.analysis import label_lanes, scatter
 from jaxcage.cli import main
 from jaxcage.forces import parameter
+from jaxcage.quantities import component_names
+from jaxcage.solve import OUTCOMES
 
 
 raw_sweep = functools.partial(jc.sweep, confirm=False, horizon=0)
 """Lanes as they run, none confirmed or followed further."""
-raw_sweeps = functools.partial(jc.sweep_designs, confirm=False, horizon=0)
 
 
 @functools.cache
@@ -160,24 +163,51 @@ def is_png(path: str) -> bool:
     return Path(path).read_bytes().startswith(b"\x89PNG\r\n")
 
 
-def made_sweep(rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, **more: Any) -> Any:
+def made_sweep(
+    rpm: Any, strobe: np.ndarray, growth: np.ndarray, outcome: Any = None, scale: Any = None, **attrs: Any
+) -> xr.Dataset:
     """A sweep made by hand: strobe states (speeds, starts, revolutions, components) and growth in blocks."""
-    lanes, speeds = strobe.shape[:2], len(rpm)
+    lanes, dim = strobe.shape[:2], strobe.shape[-1]
     outcome = np.zeros(lanes, dtype=np.int32) if outcome is None else outcome
-    rest = dict(
-        last=strobe[:, :, -1],
-        peak=np.where(outcome == 0, 0.5, np.nan),
-        error=np.full(lanes, 1e-4),
-        doubt=np.zeros((*lanes, growth.shape[-1])),
-        scale=np.ones((speeds, strobe.shape[-1])),
-        discard=10,
-        revolutions=100,
+    scale = np.broadcast_to(np.ones(dim) if scale is None else np.asarray(scale)[:, None, :], (*lanes, dim))
+    exponents, error = growth.mean(axis=2), scatter(growth, axis=2)
+    label = label_lanes(outcome, strobe, scale, exponents[..., 0], error[..., 0])
+    at, lost = ("speed", "start"), outcome != 0
+    speed, keep = np.asarray(rpm) * np.pi / 30, strobe.shape[2]
+    return xr.Dataset(
+        {
+            "label": (at, label),
+            "outcome": (at, np.array(OUTCOMES)[outcome]),
+            "exponents": ((*at, "exponent"), exponents),
+            "standard_error": ((*at, "exponent"), error),
+            "block_growth": ((*at, "growth_block", "exponent"), growth),
+            "doubt": ((*at, "exponent"), np.zeros(exponents.shape)),
+            "peak": (at, np.where(lost, np.nan, 0.5)),
+            "error": (at, np.full(lanes, 1e-4)),
+            "steps": (at, np.full(lanes, 100.0)),
+            "last": ((*at, "component"), strobe[:, :, -1]),
+            "scale": ((*at, "component"), scale),
+            "strobe": ((*at, "revolution", "component"), strobe),
+        },
+        coords={
+            "speed": ("speed", speed, {"units": "rad/s", "long_name": "cage speed"}),
+            "rpm": ("speed", speed * 30 / np.pi, {"units": "rpm", "long_name": "cage speed"}),
+            "component": np.array(component_names(dim), dtype=object),
+            "revolution": np.arange(110 - keep + 1, 111),
+        },
+        attrs={"discard": 10, "revolutions": 100, "horizon": 0, "confirmed": "[]", "settings": "{}"} | attrs,
     )
-    speed = np.asarray(rpm) * np.pi / 30
-    return jc.Sweep(speed=speed, strobe=strobe, block_growth=growth, outcome=outcome, **rest | more)
 
 
-def cage_sweep() -> Any:
+def followed(sweep: xr.Dataset, escape: np.ndarray, horizon: int) -> xr.Dataset:
+    """The sweep with times after which its lanes are calm, as if they had been followed to a horizon."""
+    label = sweep["label"].values.copy()
+    label[(label == "chaotic") & np.isfinite(escape)] = "transient"
+    later = {"escape": (("speed", "start"), escape), "label": (("speed", "start"), label)}
+    return sweep.assign(later).assign_attrs(horizon=horizon)
+
+
+def cage_sweep() -> xr.Dataset:
     """Five speeds, three starts: the second speed chaotic, the others periodic, the last lane of the fourth failed."""
     rng = np.random.default_rng(0)
     strobe = np.repeat(rng.normal(size=(5, 3, 1, 4)), 16, axis=2) * 1e-4

@@ -15,7 +15,7 @@ from jaxcage.orbits import (
     SynchronousOrbits,
     loss_zones,
 )
-from jaxcage.report import Axis, Findings, Map
+from jaxcage.show import Axis, Findings, Map
 
 
 PER_RPM = np.pi / 30

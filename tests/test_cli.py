@@ -14,7 +14,7 @@ from helpers import refused
 
 import jaxcage
 from jaxcage.cli import main
-from jaxcage.io import ConfigError, load_model, read_bytes
+from jaxcage.files import ConfigError, load_model, read_bytes
 
 
 COMMANDS = (

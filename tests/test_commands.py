@@ -11,8 +11,10 @@ from helpers import document, is_png, raw_sweep, refused
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.io import load_model, load_sweep, open_sweep, read_bearing, read_columns, write_template
-from jaxcage.studies import label_names
+from jaxcage.files import load_model, read_bearing, write_template
+from jaxcage.lanes import load
+from jaxcage.show import read_columns
+from jaxcage.lanes import label_names
 
 
 RK4 = ["--solver", "rk4", "--steps", "256"]
@@ -24,13 +26,13 @@ RATIO = (1 - 16 / 81) / 2
 
 def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "sweep", "1a", *TINY, "--out", str(tmp_path))
-    stored = load_sweep(found["data"])
+    stored = load(found["data"])
     assert sum(found["labels"].values()) == 9 and found["failed"] == {} and is_png(found["figure"])
     length = dict(discard=20, revolutions=20, blocks=20, horizon=0, confirm=False)
     own = jc.sweep(jc.case("1a"), jc.rpm(12000, 13000, 3), method=jc.method("rk4", steps=256), **length)
     np.testing.assert_allclose(stored.last, own.last, rtol=1e-9)
     np.testing.assert_array_equal(stored.label, own.label)
-    assert json.loads(open_sweep(found["data"]).attrs["configuration"])["cage_mass"] == float(jc.case("1a").cage_mass)
+    assert json.loads(load(found["data"]).attrs["configuration"])["cage_mass"] == float(jc.case("1a").cage_mass)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sweep_1a.png", "sweep_1a.zarr"]
 
 
@@ -151,7 +153,7 @@ def test_zones(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = document(capsys, "zones", *RANGE, *small, "--out", str(tmp_path))
     for zone in (found["zones"][0], found["synchronous_loss"][0]):
         assert zone["exit_rpm"] == pytest.approx(EXIT, abs=2e-3) and zone["exit_mechanism"] == "period-doubling"
-    assert load_sweep(found["data"]).rpm == pytest.approx(np.linspace(10000, 13500, 8))
+    assert load(found["data"]).rpm == pytest.approx(np.linspace(10000, 13500, 8))
     assert found["published"][0] == {"zone": 1, "onset_rpm": 9100.0, "exit_rpm": 12000.0}
 
 

@@ -9,7 +9,7 @@ from helpers import made_sweep
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.report import (
+from jaxcage.show import (
     CONCLUSIONS,
     Runs,
     compare_edges,

@@ -5,10 +5,11 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import even, raw_sweep, wide_but
 
 import jaxcage as jc
-from jaxcage.integrate import OUTCOMES
+from jaxcage.analysis import chaotic_share, failed, summary, too_short
 
 
 MODEL = jc.case("1a", "preliminary")
@@ -25,15 +26,13 @@ FIELDS = "strobe", "last", "block_growth", "peak", "outcome"
 
 def assert_same_bytes(first, second, keep):
     for field in FIELDS:
-        here, there = (np.ascontiguousarray(getattr(r, field)[keep]) for r in (first, second))
+        here, there = (np.ascontiguousarray(r[field].values[keep]) for r in (first, second))
         assert here.tobytes() == there.tobytes(), field
 
 
 def assert_failed(result, lane):
-    assert 0 < result.outcome[lane] < len(OUTCOMES)
-    assert result.label[lane] == "failed"
-    assert np.all(np.isnan(result.last[lane])) and np.all(np.isnan(result.strobe[lane]))
-    assert np.all(np.isnan(result.exponents[lane]))
+    assert result["outcome"].values[lane] != "successful" and result["label"].values[lane] == "failed"
+    assert all(np.all(np.isnan(result[name].values[lane])) for name in ("last", "strobe", "exponents"))
 
 
 BAD_STARTS = {
@@ -52,26 +51,26 @@ def test_bad_start_fails_alone(bad, place, confirm):
     states = [HEALTHY, OTHER, THIRD]
     settings = SETTINGS | (dict(confirm=True, horizon=3000) if confirm else {})
     healthy = jc.sweep(MODEL, SPEEDS, starts=states, **settings)
-    assert not np.any(healthy.failed)
+    assert not np.any(failed(healthy))
     states[place] = start
     mixed = jc.sweep(MODEL, SPEEDS, starts=states, **settings)
     others = np.s_[:, [i for i in range(3) if i != place]]
     assert_same_bytes(mixed, healthy, others)
-    np.testing.assert_array_equal(mixed.label[others], healthy.label[others])
+    np.testing.assert_array_equal(mixed["label"].values[others], healthy["label"].values[others])
     for k in range(SPEEDS.size):
         assert_failed(mixed, (k, place))
         if outcome is not None:
-            assert OUTCOMES[mixed.outcome[k, place]] == outcome
+            assert mixed["outcome"].values[k, place] == outcome
     # Shares are of the starts that finished.
-    share = np.sum(healthy.label[others] == "chaotic", axis=1) / 2
-    np.testing.assert_array_equal(mixed.chaotic_share, share)
+    share = np.sum(healthy["label"].values[others] == "chaotic", axis=1) / 2
+    np.testing.assert_array_equal(chaotic_share(mixed), share)
 
 
 THROWS = np.array([1.0, 3.0, 10.0, 100.0])
 """Speeds [m/s] at which a cage leaves the middle: at the last one it has energy to cross the rib."""
 
 
-def thrown(model: jc.CageModel, method: jc.integrate.AbstractMethod) -> tuple[np.ndarray, jc.Sweep]:
+def thrown(model: jc.CageModel, method: jc.solve.AbstractMethod) -> tuple[np.ndarray, xr.Dataset]:
     """A revolution of cages that leave the middle in six directions, and the speed of each."""
     speed, angle = (x.ravel() for x in np.meshgrid(THROWS, np.arange(6) * np.pi / 3, indexing="ij"))
     starts = [(0.0, 0.0, float(v * np.cos(a)), float(v * np.sin(a))) for v, a in zip(speed, angle, strict=True)]
@@ -84,21 +83,21 @@ def thrown(model: jc.CageModel, method: jc.integrate.AbstractMethod) -> tuple[np
 def test_a_cage_thrown_at_the_rib_is_never_outside_in_silence(solver: str, steps: int):
     """With steps too large by far for the contact a lane is refused, or tells how far out it was."""
     speed, found = thrown(even(MODEL), jc.method(solver, steps=steps))
-    failed, peak = found.failed[0], found.peak[0]
-    assert np.all(failed[speed == 100.0]) and np.all(peak[~failed] <= 2)
-    assert np.all(np.isnan(found.last[0][failed])) and np.all(found.label[0][failed] == "failed")
-    assert np.any(failed[speed == 10.0] | ~(peak[speed == 10.0] <= 1))  # with steps like these some leave
+    lost, peak = failed(found)[0], found["peak"].values[0]
+    assert np.all(lost[speed == 100.0]) and np.all(peak[~lost] <= 2)
+    assert np.all(np.isnan(found["last"].values[0][lost])) and np.all(found["label"].values[0][lost] == "failed")
+    assert np.any(lost[speed == 10.0] | ~(peak[speed == 10.0] <= 1))  # with steps like these some leave
 
 
 @pytest.mark.wide
 def test_with_fine_steps_the_rib_turns_a_thrown_cage_back():
     """Nothing goes deeper than where the contact has taken all its energy; what has more than that is refused."""
     speed, found = thrown(MODEL, jc.method("rk4", steps=1024))
-    failed, peak, hard = found.failed[0], found.peak[0], speed < 100
+    lost, peak, hard = failed(found)[0], found["peak"].values[0], speed < 100
     energy = 0.5 * float(MODEL.cage_mass) * speed**2
     depth = (19 / 9 * energy / float(MODEL.contact.stiffness)) ** (9 / 19)
     limit = float(MODEL.contact.onset) + depth / float(MODEL.clearance)
-    assert np.all(limit[~hard] > 2) and np.array_equal(failed, ~hard) and np.all(peak[hard] < limit[hard])
+    assert np.all(limit[~hard] > 2) and np.array_equal(lost, ~hard) and np.all(peak[hard] < limit[hard])
     assert np.all(peak[hard] > float(MODEL.contact.onset))  # every one of them met the wall
     fast = speed == 10.0
     assert np.all(peak[fast] > 1 + 0.6 * (limit[fast] - 1))
@@ -118,7 +117,7 @@ def test_a_short_sweep_says_so_and_a_long_one_does_not():
         raw_sweep(system, np.array([1.0]), revolutions=n, blocks=blocks, **lengths)
         for n, blocks in ((100, 1), (400, 20))
     )
-    assert np.all(long.label == "chaotic") and not np.any(long.too_short)
-    assert "no certain label" not in str(long)
-    assert np.all(single.label == "undecided") and np.all(single.too_short)  # a single block has no error
-    assert "3 lanes have no certain label" in str(single)
+    assert np.all(long["label"] == "chaotic") and not np.any(too_short(long))
+    assert "no certain label" not in summary(long)
+    assert np.all(single["label"] == "undecided") and np.all(too_short(single))  # a single block has no error
+    assert "3 lanes have no certain label" in summary(single)

@@ -23,9 +23,11 @@ from report_example import swept
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.cli._job import save_figure
-from jaxcage.io import load_sweep, open_sweep, save_model, save_sweep, write_columns, write_template
-from jaxcage.plotting import new_figure
-from jaxcage.studies import Plan, Store, Study, open_study, run_study
+from jaxcage.files import save_model, write_template
+from jaxcage.lanes import load, save
+from jaxcage.show import write_columns
+from jaxcage.show import new_figure
+from jaxcage.lanes import Plan, Store, Study, open_study, run_study
 
 
 def contents(folder: Path) -> dict[str, bytes | None]:
@@ -58,7 +60,7 @@ def _figure(path: Path, n: int) -> Any:
 
 WRITERS: dict[str, Callable[[Path, int], Any]] = {
     "table.csv": lambda path, n: write_columns(path, {"a [m]": np.arange(40.0 * n), "b [N]": np.ones(40 * n)}),
-    "sweep.zarr": lambda path, n: save_sweep(path, swept(count=5 * n)),
+    "sweep.zarr": lambda path, n: save(path, swept(count=5 * n)),
     "design.toml": lambda path, n: save_model(path, jc.replace(jc.case("1a"), guidance_gap=4e-4 + n * 1e-6 / 3)),
     "figure.png": _figure,
 }

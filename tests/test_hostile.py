@@ -9,7 +9,8 @@ import pytest
 from helpers import elastic, roller_pass
 
 import jaxcage as jc
-from jaxcage.io import ConfigError, configuration, load_model, model_from, read_columns, save_model, to_si
+from jaxcage.files import ConfigError, configuration, load_model, model_from, save_model, to_si
+from jaxcage.show import read_columns
 
 
 def leaves(table: dict[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

@@ -8,16 +8,7 @@ import pytest
 from helpers import elastic, roller_pass
 
 import jaxcage as jc
-from jaxcage.io import (
-    ConfigError,
-    configuration,
-    load_model,
-    model_from,
-    read_bearing,
-    save_model,
-    to_si,
-    toml_text,
-)
+from jaxcage.files import ConfigError, configuration, load_model, model_from, read_bearing, save_model, to_si, toml_text
 
 
 @pytest.mark.parametrize(

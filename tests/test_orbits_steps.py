@@ -15,7 +15,7 @@ from literature import DUFFING_DOUBLINGS
 from reference import bifurcation as shooting
 
 import jaxcage as jc
-from jaxcage.io import load_model, write_template
+from jaxcage.files import load_model, write_template
 from jaxcage.orbits import Point, SynchronousOrbits, edge_speed, sensitivity
 from jaxcage.solve import FixedSteps, strobe_map
 

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import jaxcage as jc
 from jaxcage.forces import AbstractForce, AbstractForcing, parameter
-from jaxcage.io import ConfigError, configuration, save_model, to_dataset
+from jaxcage.files import ConfigError, configuration, save_model
 from jaxcage.orbits import Point, edge_speed
 
 

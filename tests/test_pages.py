@@ -68,7 +68,7 @@ def test_set_up_commands_are_those_of_the_check():
 
 
 def test_toml_of_the_pages_is_accepted(tmp_path: pathlib.Path):
-    from jaxcage.io import load_model, load_whole_bearing
+    from jaxcage.files import load_model, load_whole_bearing
 
     blocks = re.findall(r"```toml\n(.*?)```", "\n".join(PAGES.values()), flags=re.S)
     cage, whole = sorted(blocks, key=lambda block: "nu2310" in block)

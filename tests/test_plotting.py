@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Rectangle
 import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.orbits import Branch, Curve, Point
-from jaxcage.plotting import (
+from jaxcage.show import (
     BLACK,
     EDGE_COLOURS,
     FORCE_COLOURS,

@@ -10,8 +10,8 @@ import pytest
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.io import ConfigError, load_model, model_from, template
-from jaxcage.report import readings_words
+from jaxcage.files import ConfigError, load_model, model_from, template
+from jaxcage.show import readings_words
 
 
 READINGS = {

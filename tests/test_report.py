@@ -13,7 +13,7 @@ import pytest
 from report_example import findings, swept
 
 from jaxcage.analysis import Edge, Zone, Zones
-from jaxcage.report import (
+from jaxcage.show import (
     Findings,
     Operating,
     calmest,

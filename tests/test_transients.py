@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.stats
-from helpers import raw_sweep, raw_sweeps
+from helpers import raw_sweep
 
 import jaxcage as jc
 from jaxcage.analysis import (
@@ -14,6 +14,7 @@ from jaxcage.analysis import (
     calm_at_the_end,
     calm_threshold,
     escape_times,
+    failed,
     survival,
 )
 
@@ -171,10 +172,12 @@ def lives(forces, starts, steps, revolutions) -> list[Survival]:
     method = jc.method("rk4", steps=steps)
     length = dict(discard=0, revolutions=revolutions, blocks=revolutions // BLOCK)
     found = []
-    for s in raw_sweeps([ueda(f) for f in forces], 1.0, starts=starts, method=method, **length):
-        growth = s.block_growth[0, :, :, 0]
-        calm_end = calm_at_the_end(s.strobe[0], s.scale, growth, BLOCK)
-        times, horizon = escape_times(growth, calm_end, BLOCK, failed=s.failed[0])
+    swept = raw_sweep([ueda(f) for f in forces], 1.0, starts=starts, method=method, **length).isel(speed=0)
+    for i in range(len(forces)):
+        s = swept.isel(design=i)
+        growth = s["block_growth"].values[..., 0]
+        calm_end = calm_at_the_end(s["strobe"].values, s["scale"].values, growth, BLOCK)
+        times, horizon = escape_times(growth, calm_end, BLOCK, failed=failed(s))
         found.append(survival(times, horizon, t0=50, block=BLOCK))
     return found
 
@@ -186,9 +189,10 @@ def chaotic_starts():
     length = dict(discard=60, revolutions=60, blocks=6, method=jc.method("rk4", steps=128))
     s = raw_sweep(ueda(13.3), 1.0, starts=starts, **length)
     # By so few steps the error of a chaotic exponent may be large: such a lane is undecided.
-    share = {name: float(np.mean(s.label[0] == name)) for name in ("chaotic", "periodic-1", "undecided")}
+    label = s["label"].values[0]
+    share = {name: float(np.mean(label == name)) for name in ("chaotic", "periodic-1", "undecided")}
     assert sum(share.values()) == pytest.approx(1.0) and 0.3 < share["chaotic"] < 0.6 and share["undecided"] < 0.02
-    return [tuple(map(float, y)) for y in s.last[0][s.label[0] == "chaotic"][:80]]
+    return [tuple(map(float, y)) for y in s["last"].values[0][label == "chaotic"][:80]]
 
 
 @pytest.mark.wide

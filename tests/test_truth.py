@@ -13,7 +13,7 @@ from helpers import beyond_range
 
 import jaxcage as jc
 from benchmarks import truth, truth_exponents
-from jaxcage.io import model_from, template
+from jaxcage.files import model_from, template
 from jaxcage.models import fastest_speed
 
 

@@ -8,7 +8,7 @@ import pytest
 from jaxcage._errors import InputError
 from jaxcage.cli._main import _parse
 from jaxcage.cli._readers import read_quantity
-from jaxcage.io import model_from
+from jaxcage.files import model_from
 
 
 @pytest.mark.parametrize(

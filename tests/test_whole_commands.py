@@ -11,8 +11,10 @@ from helpers import document, is_png, refused
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.design import bearing_gradient
-from jaxcage.io import open_sweep, read_columns, stored_configuration, subject_of, whole_bearing_from
-from jaxcage.report import read_operating
+from jaxcage.files import subject_of, whole_bearing_from
+from jaxcage.lanes import load, stored_configuration
+from jaxcage.show import read_columns
+from jaxcage.show import read_operating
 
 
 jc.enable_x64()
@@ -48,7 +50,7 @@ def test_sweep(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path, mine:
     assert found["outcomes"] == {"successful": 6} and found["load_N"] == 1000 and is_png(found["figure"])
     for name in ("cage_slip", "exponent", "pocket_force_mean_sum_N", "synchronous_force_x_N"):
         np.testing.assert_allclose(found[name], getattr(expected, name), rtol=1e-9)
-    stored = open_sweep(found["data"])
+    stored = load(found["data"])
     np.testing.assert_allclose(stored["speed_rpm"].values, [8000, 12000])
     names = stored["state"].attrs["flag_meanings"].split()
     assert [names[code] for code in stored["state"].values.ravel()] == expected.state.ravel().tolist()

@@ -16,7 +16,7 @@ from test_whole_reference import everything
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.io import read_columns
+from jaxcage.show import read_columns
 from jaxcage.models import INTEGRATED, LEDGER, BearingState, Bodies, Rollers, rolling_start, state_scale
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxcage as jc
-from jaxcage.studies import Between, check_study
+from jaxcage.lanes import Between, check_study
 
 
 jc.enable_x64()

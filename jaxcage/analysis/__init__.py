@@ -19,13 +19,11 @@ from .equilibrium import (
     LARGEST_WHIRLING as LARGEST_WHIRLING,
     Equilibrium as Equilibrium,
     attitude_angle as attitude_angle,
-    dimensional as dimensional,
     eccentricity_ratio as eccentricity_ratio,
     equilibrium as equilibrium,
     film_coefficients as film_coefficients,
     film_whirl_speed as film_whirl_speed,
     load_number as load_number,
-    stability_chart as stability_chart,
     whirl_threshold as whirl_threshold,
 )
 from .escapes import (
@@ -112,5 +110,5 @@ from .zones import (
 check_layer(
     globals(),
     "around cage_forces cage_moments equilibrium film_coefficients film_whirl_speed "
-    "measures order_spectrum stability_chart survival zones",
+    "measures order_spectrum survival zones",
 )

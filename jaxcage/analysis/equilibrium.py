@@ -14,13 +14,11 @@ at M omega^2 c/W = omega^2 c/g = kappa/nu^2, with kappa = (K_xx C_yy + K_yy C_xx
 K_yx C_xy)/(C_xx + C_yy) and nu^2 = det(K - kappa I)/det C (Routh).
 """
 
-import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Complex, Float
 
@@ -110,17 +108,6 @@ def film_coefficients(eccentricity_ratio: Scalar, film: FilmModel = "fixed_half"
     return FilmCoefficients(number, angle, -k / number, -c / number)
 
 
-def dimensional(
-    coefficients: FilmCoefficients, *, load: Scalar, clearance: Scalar, speed: Scalar
-) -> tuple[Float[Array, "2 2"], Float[Array, "2 2"]]:
-    """Stiffness [N/m] and damping [N s/m] matrices of a film.
-
-    **Arguments:** dimensionless coefficients; load W [N]; radial clearance c [m]; speed [rad/s].
-    """
-    unit = load / clearance
-    return coefficients.stiffness * unit, coefficients.damping * (unit / speed)
-
-
 class WhirlThreshold(NamedTuple):
     """Where the equilibrium of a rigid mass in its film loses stability."""
 
@@ -144,47 +131,6 @@ def whirl_threshold(stiffness: Float[Array, "2 2"], damping: Float[Array, "2 2"]
     safe = jnp.where(whirls, square, 1.0)
     speed = jnp.where(whirls, jnp.sqrt(jnp.where(held, kappa, 1.0) / safe), jnp.inf)
     return WhirlThreshold(jnp.where(held, speed, 0.0), jnp.where(whirls, jnp.sqrt(safe), jnp.nan))
-
-
-@dataclasses.dataclass(frozen=True)
-class StabilityChart:
-    """Whirl threshold of a rigid mass in a film over its load, point by point."""
-
-    eccentricity_ratio: Float[np.ndarray, " points"]
-    load_number: Float[np.ndarray, " points"]
-    attitude_angle: Float[np.ndarray, " points"]
-    """[rad]"""
-    threshold: Float[np.ndarray, " points"]
-    """omega sqrt(c/g); infinite where the equilibrium is stable at every speed."""
-    whirl_ratio: Float[np.ndarray, " points"]
-
-
-@eqx.filter_jit
-def _chart(eps: Float[Array, " points"], film: FilmModel) -> tuple[FilmCoefficients, WhirlThreshold]:
-    coefficients = jax.vmap(lambda e: film_coefficients(e, film))(eps)
-    return coefficients, jax.vmap(whirl_threshold)(coefficients.stiffness, coefficients.damping)
-
-
-def stability_chart(
-    eccentricity_ratios: Float[np.ndarray, " points"] | None = None,
-    *,
-    film: FilmModel = "fixed_half",
-) -> StabilityChart:
-    """The chart of threshold speed against load number.
-
-    **Arguments:** eccentricity ratios, by default 0.005 to 0.95 in 190 steps; film model.
-
-    **Raises:** `ValueError` for ratios that are not between 0 and 1, or no row.
-    """
-    require_x64()
-    eps = np.asarray(np.linspace(0.005, 0.95, 190) if eccentricity_ratios is None else eccentricity_ratios, dtype=float)
-    if eps.ndim != 1 or eps.size == 0 or not np.all((eps > 0) & (eps < 1)):
-        raise ArgumentError(
-            "eccentricity_ratios", said=f"must be a row of numbers above 0 and below 1, but {eps} was given."
-        )
-    coefficients, threshold = _chart(jnp.asarray(eps), film)
-    columns = (coefficients.load_number, coefficients.attitude_angle, *threshold)
-    return StabilityChart(eps, *(np.asarray(a) for a in columns))
 
 
 @eqx.filter_jit

@@ -1,11 +1,12 @@
 """The answer of a command: a sentence, tables and notes for people, a document for programs, files."""
 
 import dataclasses
+import io
 import json
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from .progress import visible
 
 
 if TYPE_CHECKING:
-    from ..show.tables import Table
+    from ..show import Table
     from .subject import Subject
 
 
@@ -25,10 +26,10 @@ class Answer:
     sentence: str
     """The answer itself."""
     tables: Sequence["Table"] = ()
-    """The table that decides first."""
+    """The table that decides first. Those with a key stand in the document too."""
     notes: Sequence[str] = ()
     document: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """The same for programs, in SI units unless a name ends in another one."""
+    """More for programs, in SI units unless a name ends in another one."""
     subject: "Subject | None" = None
     files: Mapping[str, tuple[str, Any]] = dataclasses.field(default_factory=dict)
     """Key in the document -> end of the file's name, and a figure, columns of numbers, a data set or a text."""
@@ -40,15 +41,16 @@ class Answer:
 
 def complete(answer: Answer, command: str, show: ShowOptions | None, seconds: float) -> Answer:
     """Write the files of an answer, and add what every command prints."""
-    written = dict(answer.stored)
+    written, subject = dict(answer.stored), answer.subject
+    document = {table.key: table.records for table in answer.tables if table.key} | dict(answer.document)
+    notes = list(answer.notes)
     if show is not None:
-        name = f"{command}_{answer.subject.name}" if answer.subject else command
+        stem = f"{command}_{subject.name}" if subject else command
         for key, (ending, content) in answer.files.items():
-            written[key] = str(_write(Path(show.out) / f"{name}{ending}", content, show, answer.subject))
-    document, notes = dict(answer.document), list(answer.notes)
-    if answer.subject is not None:
-        document = {"case": answer.subject.name} | document | answer.subject.document
-        notes += answer.subject.notes
+            written[key] = str(_write(Path(show.out) / f"{stem}{ending}", content, show, subject))
+    if subject is not None:
+        document = {"case": subject.name} | document | subject.document
+        notes += subject.notes
     if show is not None:
         document["seconds"] = round(seconds, 2)
         notes.append(f"Time: {seconds:.1f} s")
@@ -61,8 +63,10 @@ def _write(path: Path, content: Any, show: ShowOptions, subject: "Subject | None
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from ..io import replacing, write_columns
+    from ..files import replacing
+    from ..show import write_columns
     from ..lanes import save
+    from ..show import add_shaft_axes, restyle
 
     if isinstance(content, xr.Dataset):
         return save(path, content)
@@ -70,8 +74,6 @@ def _write(path: Path, content: Any, show: ShowOptions, subject: "Subject | None
         return write_columns(path, content)
     with replacing(path) as temporary:
         if isinstance(content, Figure):
-            from ..plotting import add_shaft_axes, restyle
-
             if subject is not None and subject.shaft is not None:
                 add_shaft_axes(content, 1 / subject.shaft)
             restyle(content, show.style).savefig(temporary, dpi=content.dpi)
@@ -80,13 +82,21 @@ def _write(path: Path, content: Any, show: ShowOptions, subject: "Subject | None
     return path
 
 
+def drawn(title: str, draw: Callable[[Any], Any], width: float = 9.0, height: float = 5.0) -> Any:
+    """A figure of one diagram, which `draw` draws on its axes."""
+    from ..show import new_figure
+
+    figure = new_figure(width, height)
+    draw(figure.subplots())
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
 def print_answer(answer: Answer, as_json: bool) -> None:
     """Print an answer on standard output: one JSON document, or the sentence, the tables and the notes.
 
     **Raises:** `OSError` for a standard output that takes nothing.
     """
-    import io
-
     if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not be text
         sys.stdout.reconfigure(errors="backslashreplace")
     try:

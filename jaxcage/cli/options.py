@@ -16,7 +16,7 @@ from .progress import Say, progress
 
 
 if TYPE_CHECKING:
-    from ..integrate import AbstractMethod
+    from ..solve import AbstractMethod
 
 MOST = 10_000_000
 """Largest count: more lanes, speeds or revolutions end in no memory, or in no lifetime."""
@@ -51,7 +51,7 @@ def read_quantity(text: str, unit: str) -> float:
     """
     with contextlib.suppress(ValueError):
         return float(text)
-    from ..io import SpeedOf, split_owner, to_si  # loads pint
+    from ..files import SpeedOf, split_owner, to_si  # loads pint
 
     try:
         if unit != "rpm":
@@ -149,6 +149,7 @@ FromZero = Annotated[int, count(0)]
 FromOne = Annotated[int, count(1)]
 FromTwo = Annotated[int, count(2)]
 OptionalCount = Annotated[int | None, count(1)]
+OptionalTwo = Annotated[int | None, count(2), arg(help="Number of speeds that are simulated.")]
 OptionalText = Annotated[str | None, text()]
 Price = Annotated[float | None, number("be at least 0", lambda x: x >= 0)]
 Texts = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
@@ -176,7 +177,7 @@ class StepOptions:
         """The integration method that is asked for; None leaves the choice to what is computed."""
         if self.solver is None and self.steps is None and self.tolerance is None:
             return None
-        from ..integrate import method, native
+        from ..solve import method, native
 
         if self.solver is None and self.steps is None:
             return native(tolerance=self.tolerance)
@@ -253,7 +254,7 @@ class ShowOptions:
 
         `advice` is what is said to a user who interrupts it.
         """
-        from ..io import check_writable
+        from ..files import check_writable
 
         check_writable(self.out)
         with progress(what, advice) as say:

@@ -12,9 +12,8 @@ from jaxtyping import Float
 from .._errors import InputError
 from .._parameters import readings_of, replace
 from ..bearing import PUBLISHED_CASES, PublishedCase, design_rule_violations
-from ..io import BearingFile, Unknown, Whose, read_bearing, read_whole_bearing, subject_of
-from ..models import FASTEST, case, whole_bearing
-from ..models.whole import WHOLE_BEARINGS
+from ..files import BearingFile, Unknown, Whose, read_bearing, read_whole_bearing, subject_of
+from ..models import FASTEST, WHOLE_BEARINGS, case, whole_bearing
 from .options import flag
 from .progress import say
 
@@ -56,33 +55,41 @@ class Subject:
         """One of two defaults: of a forced system, or of a model that reports quantities of its own."""
         return with_rollers if self.reports_means else forced
 
-    def _other(self, speed: float) -> float:
-        """The speed that goes with one of the model's, both in the same unit."""
-        found = self.model.other_speed(speed / RPM)
-        return float(found[1]) * RPM
+    def _other(self, speed: Any) -> Any:
+        """The speed that goes with the model's, both in rpm."""
+        return np.asarray(self.model.other_speed(speed / RPM)[1]) * RPM
 
     @property
     def shaft(self) -> float | None:
         """Shaft speed over the model's; None if that is the shaft's itself."""
-        return self._other(1.0) if self.own == "cage" else None
+        return float(self._other(1.0)) if self.own == "cage" else None
 
     @property
     def beside(self) -> tuple[str, float] | None:
         """The speed that tables show beside the model's, and its ratio to it."""
         return None if self.shaft is None else ("shaft", self.shaft)
 
-    def both(self, speed: float) -> dict[str, float]:
-        """A speed of the model [rad/s] as speeds of cage and shaft [rpm], for a document."""
-        own = speed * RPM
-        other = self._other(own)
-        pair = {"cage": own, "shaft": other} if self.own == "cage" else {"cage": other, "shaft": own}
-        return {"speed_rpm": own, **{f"{whose}_speed_rpm": value for whose, value in pair.items()}}
+    @property
+    def design_words(self) -> str:
+        """Gap and eccentricity, for titles."""
+        gap, eccentricity = 1e3 * float(self.model.guidance_gap), 1e6 * float(self.model.eccentricity)
+        return f"guidance gap {gap:.3g} mm, eccentricity {eccentricity:.3g} µm"
+
+    def both(self, speed: Any) -> dict[str, Any]:
+        """Speeds of the model [rad/s] as speeds of cage and shaft [rpm], for a document."""
+        own = np.asarray(speed) * RPM
+        cage, shaft = (own, self._other(own)) if self.own == "cage" else (self._other(own), own)
+        return {"speed_rpm": own, "cage_speed_rpm": cage, "shaft_speed_rpm": shaft}
 
     def at(self, speed: float) -> str:
         """A speed of the model [rad/s] in words."""
-        both = self.both(speed)
         other = "shaft" if self.own == "cage" else "cage"
-        return f"{both['speed_rpm']:g} rpm of the {self.own} ({other} {both[f'{other}_speed_rpm']:.0f} rpm)"
+        return f"{speed * RPM:g} rpm of the {self.own} ({other} {float(self._other(speed * RPM)):.0f} rpm)"
+
+    def rate(self, given: float) -> float:
+        """Rate of the model's speed [rad/s^2] from one [rpm/s] of the speed that bare numbers are."""
+        slope = 1.0 if self.speeds == self.own else float(self._other(1.0) - self._other(0.0))
+        return given / slope / RPM
 
     def speed(self, given: float, option: str = "speed") -> float:
         """The speed of the model [rad/s] that an option means, by the model's own relation of cage and shaft.
@@ -91,14 +98,14 @@ class Subject:
         """
         speed = float(given)
         if getattr(given, "whose", self.speeds) != self.own:
-            at_rest = self._other(0.0)
-            speed = (speed - at_rest) / (self._other(1.0) - at_rest)
+            at_rest = float(self._other(0.0))
+            speed = (speed - at_rest) / (float(self._other(1.0)) - at_rest)
             if speed <= 0:
                 raise InputError(
                     f"Option {flag(option)} must be above {at_rest:g} rpm of the cage, which the outer ring makes by "
                     f"itself, but {float(given):g} rpm was given."
                 )
-        cage = speed if self.own == "cage" else self._other(speed)
+        cage = speed if self.own == "cage" else float(self._other(speed))
         limit = FASTEST / float(self.model.land_radius) * RPM
         if abs(cage) > limit:
             raise InputError(
@@ -146,7 +153,9 @@ class Subject:
     @property
     def certain(self) -> "Subject":
         """The same without ranges, for answers that have taken them into account."""
-        return self if self.file is None else dataclasses.replace(self, file=dataclasses.replace(self.file, unknowns=()))
+        return (
+            self if self.file is None else dataclasses.replace(self, file=dataclasses.replace(self.file, unknowns=()))
+        )
 
     @property
     def document(self) -> dict[str, Any]:
@@ -157,23 +166,19 @@ class Subject:
         if self.reports_means:
             found["load_N"] = float(self.model.load)
         if self.file is not None:
-            found["left_as_in_template"] = self.file.left
-        if self.unknowns:
-            found["best_guesses"] = [u.label for u in self.unknowns]
+            found |= {"left_as_in_template": self.file.left, "best_guesses": [u.label for u in self.unknowns]}
         return found
 
     @property
     def notes(self) -> list[str]:
         """The same in sentences."""
-        each = ", ".join(
-            f'{name.replace("_", " ")} {words} ("{chosen}")' for name, (chosen, words) in readings_of(self.model).items()
-        )
-        found = [f"Readings: {each}"] if each else []
-        if self.file is not None and self.file.left:
-            found.append(f"As the template has them, of another bearing: {', '.join(self.file.left)}")
-        if self.unknowns:
-            found.append(f"Best guesses of values known within ranges only: {', '.join(self.document['best_guesses'])}")
-        return found
+        words, readings = self.document, readings_of(self.model).items()
+        each = {
+            "Readings": [f'{name.replace("_", " ")} {words} ("{chosen}")' for name, (chosen, words) in readings],
+            "As the template has them, of another bearing": words.get("left_as_in_template"),
+            "Best guesses of values known within ranges only": words.get("best_guesses"),
+        }
+        return [f"{what}: {', '.join(values)}" for what, values in each.items() if values]
 
 
 def read_case(given: str, load: float | None = None) -> Subject:

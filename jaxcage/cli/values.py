@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,12 @@ FORMS = "values such as 4000rpm:27500rpm:100, 0.3mm:0.6mm, 20um+-3um or 32,56,78
 GRADES = (2.0, 10000.0)
 MOST_CORNERS = 256
 """Combinations of smallest and largest values that are checked beforehand."""
-USUAL = {"guidance_gap": (0.7, 1.4), "eccentricity": (0.2, 2.5)}
+USUAL = {
+    "guidance_gap": (0.7, 1.4),
+    "eccentricity": (0.2, 2.5),
+    "pocket_clearance": (0.7, 1.4),
+    "land_width": (0.7, 1.4),
+}
 """Parameters that are varied if none is named, and the bounds as parts of their values."""
 
 Vary = dict[str, np.ndarray | Spread]
@@ -37,15 +42,15 @@ def read_vary(given: Sequence[str], subject: Subject) -> Vary:
     return found
 
 
-def read_bounds(
-    given: Sequence[str], subject: Subject, usual: Mapping[str, tuple[float, float]], names: Sequence[str] = ()
-) -> dict[str, tuple[float, float]]:
-    """Every `NAME=LOWER:UPPER` of parameters that are to be chosen, in SI units; `usual` if nothing is given.
+def read_bounds(given: Sequence[str], subject: Subject, names: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
+    """Every `NAME=LOWER:UPPER` of parameters that are to be chosen, in SI units; the usual ones if nothing is given.
 
     **Raises:** `InputError`, also for a parameter that is not one of `names`, if there are any.
     """
     if not given:
-        return dict(usual)
+        now = {name: float(value) for name, value in parameters(subject.model).items() if name in USUAL}
+        chosen = [name for name in now if now[name] > 0 and (name in names or name in ("guidance_gap", "eccentricity"))]
+        return {name: (USUAL[name][0] * now[name], USUAL[name][1] * now[name]) for name in chosen}
 
     def read(name: str, text: str) -> Between:
         between = None if name in (SPEED, OIL) else _read(name, text, subject)
@@ -60,10 +65,24 @@ def read_bounds(
     return {name: between.bounds for name, between in found.items()}
 
 
-def usual_bounds(model: Any) -> dict[str, tuple[float, float]]:
-    """Bounds of the parameters that are varied if none is named [SI]."""
-    now = {name: float(value) for name, value in parameters(model).items() if name in USUAL and float(value) > 0}
-    return {name: (USUAL[name][0] * value, USUAL[name][1] * value) for name, value in now.items()}
+def read_scatter(names: Sequence[str], name: str, law: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Manufacturing scatter of one of `names`: `10%` (evenly within so much of the value) or `rayleigh`.
+
+    **Raises:** `ValueError` with the words that follow the name.
+    """
+    from ..design import rayleigh, uniform
+
+    if name not in names:
+        raise InputError(f"Option --scatter must name one of {', '.join(names)}, but '{name}={law}' was given.")
+    if law == "rayleigh":
+        return rayleigh()
+    try:
+        share = float(law.removesuffix("%")) / 100 if law.endswith("%") else math.nan
+    except ValueError:
+        share = math.nan
+    if not 0 < share < 1:
+        raise ValueError(f"must be a share such as 10% or rayleigh, but '{law}' was given.")
+    return uniform(share)
 
 
 def no_worse_balance(model: Any, vary: dict[str, tuple[float, float]]) -> list[str]:
@@ -129,7 +148,7 @@ def _number(name: str, subject: Subject) -> Callable[[str], float]:
     own = [SPEED, OIL, *known]
     if name not in own:
         raise InputError(f"Option --vary must name one of {', '.join(own)}, but names '{name}'.")
-    from ..io import to_si
+    from ..files import to_si
 
     return lambda text: to_si(text, "1" if name == OIL else known[name].unit)
 
@@ -153,7 +172,7 @@ def _check_range(name: str, values: Sequence[float] | np.ndarray, subject: Subje
 
 def _check_corners(vary: Vary, subject: Subject) -> None:
     """Check what ranges of single values cannot tell, at the corners of all that is varied."""
-    from ..io import check_together
+    from ..files import check_together
 
     ends = {
         name: sorted(set(how.bounds if isinstance(how, Spread) else (how.min(), how.max())))

@@ -3,6 +3,7 @@
 | module            | responsibility                                                        |
 |-------------------|-----------------------------------------------------------------------|
 | `tables`          | columns of numbers with units                                         |
+| `columns`         | time histories, strobe points and branches as CSV                     |
 | `style`           | colours, frames, legends; light, dark and print style                 |
 | `speed_axes`      | axes of speed: shaft speed, zones, published edges, operating speeds  |
 | `diagrams`        | sweeps over speed: orbit diagram, exponents, quantities; comparisons  |
@@ -17,6 +18,13 @@
 | `findings`        | everything that a report shows, computed                              |
 | `sections`        | sections of the report                                                |
 | `checks`          | tables of the report that no command prints                           |
+| `zone_tables`     | zones found in a sweep or by a search                                 |
+| `orbit_tables`    | bifurcations, stable stretches, zones without a synchronous orbit     |
+| `gradient_tables` | derivatives of edges, of lasting chaos, of means                      |
+| `quantity_tables` | quantities over speed and of one run, statics, two designs compared   |
+| `design_tables`   | designs before and after a search, shares of variance, tolerances     |
+| `chance_tables`   | chances of chaos, ranges that measurements narrowed                   |
+| `parameter_axes`  | axes of a stability map, bifurcations followed over them              |
 | `page`            | the report as HTML                                                    |
 """
 
@@ -26,6 +34,24 @@ from .bearing_figures import (
     impact_forces as impact_forces,
     load_bars as load_bars,
 )
+from .chance_tables import (
+    chances_answer as chances_answer,
+    chances_document as chances_document,
+    chances_notes as chances_notes,
+    chances_tables as chances_tables,
+    measured_table as measured_table,
+    measures_words as measures_words,
+    narrowed_table as narrowed_table,
+    operating_chances as operating_chances,
+    range_words as range_words,
+)
+from .columns import (
+    branch_columns as branch_columns,
+    read_columns as read_columns,
+    strobe_columns as strobe_columns,
+    trajectory_columns as trajectory_columns,
+    write_columns as write_columns,
+)
 from .design_figures import (
     EDGE_COLOURS as EDGE_COLOURS,
     chance_of_chaos as chance_of_chaos,
@@ -33,6 +59,14 @@ from .design_figures import (
     elasticity_bars as elasticity_bars,
     optimum_figure as optimum_figure,
     statistic_bars as statistic_bars,
+)
+from .design_tables import (
+    before_and_after_table as before_and_after_table,
+    budget_record as budget_record,
+    budget_table as budget_table,
+    optima_table as optima_table,
+    parameters_table as parameters_table,
+    sobol_table as sobol_table,
 )
 from .diagrams import (
     exponent_strip as exponent_strip,
@@ -44,6 +78,20 @@ from .diagrams import (
     sweeps_beside as sweeps_beside,
 )
 from .findings import AllFailed as AllFailed, Findings as Findings, examine as examine, require_some as require_some
+from .gradient_tables import (
+    FIRST as FIRST,
+    edge_slopes as edge_slopes,
+    elasticities_table as elasticities_table,
+    gradient_table as gradient_table,
+    lasting_table as lasting_table,
+    mean_gradient_tables as mean_gradient_tables,
+    missing_notes as missing_notes,
+    not_fixed as not_fixed,
+    slope_record as slope_record,
+    source_notes as source_notes,
+    to_be_turned as to_be_turned,
+    width_table as width_table,
+)
 from .history_figures import (
     START_COLOURS as START_COLOURS,
     orbit as orbit,
@@ -60,7 +108,40 @@ from .orbit_figures import (
     multiplier_circle as multiplier_circle,
     orbit_diagram_with_branches as orbit_diagram_with_branches,
 )
+from .orbit_tables import (
+    coexisting_notes as coexisting_notes,
+    contact_notes as contact_notes,
+    edge_table as edge_table,
+    loss_table as loss_table,
+    orbits_document as orbits_document,
+    point_record as point_record,
+    stretch_table as stretch_table,
+    unsettled_notes as unsettled_notes,
+)
 from .page import page as page
+from .parameter_axes import (
+    SPEED as SPEED,
+    Axis as Axis,
+    curves_table as curves_table,
+    follow_edges as follow_edges,
+    parameter_axis as parameter_axis,
+)
+from .quantity_tables import (
+    circumference_table as circumference_table,
+    differences as differences,
+    differences_table as differences_table,
+    displacements as displacements,
+    head_of as head_of,
+    impact_table as impact_table,
+    labels_at as labels_at,
+    line_tables as line_tables,
+    mean_over_starts as mean_over_starts,
+    measures_table as measures_table,
+    quantities_table as quantities_table,
+    quantity_beside as quantity_beside,
+    statics_table as statics_table,
+    unit_of as unit_of,
+)
 from .sections import Section as Section, assess as assess, verdict_table as verdict_table
 from .sources import parameter_rows as parameter_rows
 from .speed_axes import (
@@ -81,4 +162,26 @@ from .style import (
     new_figure as new_figure,
     restyle as restyle,
 )
-from .tables import Column as Column, Table as Table
+from .tables import (
+    Column as Column,
+    Scaled as Scaled,
+    Table as Table,
+    chosen as chosen,
+    number as number,
+    rows_table as rows_table,
+    shares_table as shares_table,
+    speed_columns as speed_columns,
+    table as table,
+    value_table as value_table,
+)
+from .zone_tables import (
+    beside_published as beside_published,
+    published_zones as published_zones,
+    stretches_table as stretches_table,
+    transient_tables as transient_tables,
+    zone_details as zone_details,
+    zone_record as zone_record,
+    zone_span as zone_span,
+    zone_words as zone_words,
+    zones_table as zones_table,
+)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..design import Clue, Ensemble, Narrowed, verdict_of
-from ..files import Range
-from ..files import Measurement
+from ..files import Measurement, Range
 from .tables import Beside, Column, Table, chosen, rows_table, speed_columns
 
 
@@ -116,7 +115,9 @@ def operating_chances(found: Ensemble, operating: Sequence[Any], ratio: float) -
         clues = measures_words(found.clues(which)) if verdict == "not decided" else None
         rows.append(row | {"chance": hits / of if of else None, "measure": clues})
     columns = [Column("cage speed", ()), Column("shaft speed", ()), Column("chance", (), "1", "%", digits=0)]
-    return rows_table("Operating speeds, by known values", rows, [*columns, Column("verdict", ()), Column("measure", ())])
+    return rows_table(
+        "Operating speeds, by known values", rows, [*columns, Column("verdict", ()), Column("measure", ())]
+    )
 
 
 def measured_table(found: Narrowed, measured: Sequence[Measurement], beside: Beside = None) -> Table:

@@ -42,7 +42,12 @@ class Axis:
 
     def told(self, values: Any) -> Any:
         """Values for a document: a speed in rpm, all else in SI units."""
-        return self.shown(np.asarray(values)) if self.name == SPEED else np.asarray(values)
+        return self.shown(values) if self.name == SPEED else np.asarray(values)
+
+    @property
+    def range(self) -> Any:
+        """The ends for a document."""
+        return self.told([self.lower, self.upper])
 
 
 def parameter_axis(model: Any, name: str, lower: float | None = None, upper: float | None = None) -> Axis:
@@ -95,6 +100,7 @@ def curves_table(title: str, curves: list[Curve], x: Axis, y: Axis) -> Table:
     """The ranges that curves cover, and how they end."""
     rows = [
         {"edge": c.name, "kind": c.kind, "points": int(np.size(c.x_value)), "ends": " / ".join(c.ended)}
+        | {"x": x.told(c.x_value), "y": y.told(c.y_value), "genuine": c.genuine}
         | {"x_low": float(np.min(c.x_value)), "x_high": float(np.max(c.x_value))}
         | {"y_low": float(np.min(c.y_value)), "y_high": float(np.max(c.y_value))}
         for c in curves
@@ -104,4 +110,6 @@ def curves_table(title: str, curves: list[Curve], x: Axis, y: Axis) -> Table:
         for which, axis in (("x", x), ("y", y))
         for end in ("low", "high")
     ]
-    return rows_table(title, rows, [Column("edge", ()), Column("kind", ()), *ends, Column("points", ()), Column("ends", ())])
+    return rows_table(
+        title, rows, [Column("edge", ()), Column("kind", ()), *ends, Column("points", ()), Column("ends", ())], "curves"
+    )

@@ -9,7 +9,8 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._parameters import walk
-from ..analysis import Around, Measures, OrderSpectrum, failed, named_lines, scatter
+from ..analysis import Measures, OrderSpectrum, failed, scatter
+from ..analysis.rollers import Around, named_lines
 from ..bearing import Guidance, LoadDistribution, raceway_surface_speed, static_cage_displacement
 from ..files import configuration
 from ..forces import ImpactHistory
@@ -101,7 +102,10 @@ def circumference_table(found: Around) -> Table:
 
 def line_tables(spectra: Mapping[str, OrderSpectrum], orders: Mapping[str, float]) -> list[Table]:
     """Lines of the spectra with the bearing's frequencies."""
-    words = {"cage_place": "cage's vertical position over the clearance", "pocket_force": "pockets on cage, vertical [N]"}
+    words = {
+        "cage_place": "cage's vertical position over the clearance",
+        "pocket_force": "pockets on cage, vertical [N]",
+    }
     columns = [Column("order of the cage's speed", (), key="order", digits=3), Column("amplitude", ())]
     columns.append(Column("at the frequency of", (), key="name"))
     each = {name: map(vars, named_lines(found, orders)) for name, found in spectra.items()}
@@ -127,7 +131,10 @@ def statics_table(title: str, model: Any, shared: LoadDistribution, shaft_speed:
         ("shift of the shaft", float(shared.shaft_shift), "m"),
         ("elastic approach", float(shared.elastic_approach), "m"),
         ("half angle of the loaded zone", float(shared.half_angle), "rad"),
-        *((f"cage displacement, {g.replace('_', ' ')} guidance", y, "m") for g, y in displacements(model, shared).items()),
+        *(
+            (f"cage displacement, {g.replace('_', ' ')} guidance", y, "m")
+            for g, y in displacements(model, shared).items()
+        ),
         ("cage speed over shaft speed", float(bearing.cage_speed_ratio), "1"),
     ]
     if shaft_speed is not None:
@@ -182,7 +189,9 @@ def differences_table(names: Sequence[str], models: Sequence[Any]) -> Table:
     """Every value in which two designs differ."""
     rows = differences(models)
     for row in rows:
-        cells = Column("", [x if x is None or isinstance(x, float) else str(x) for x in row["values"]], row["unit"]).cells
+        cells = Column(
+            "", [x if x is None or isinstance(x, float) else str(x) for x in row["values"]], row["unit"]
+        ).cells
         row |= dict(zip(names, cells, strict=True)) | {"shown": SHOWN.get(row["unit"], row["unit"])}
     columns = [Column("value", (), key="text"), *(Column(name, ()) for name in names), Column("unit", (), key="shown")]
     columns.append(Column("change", (), "1", "%", digits=1))

@@ -29,9 +29,9 @@ def factor(unit: str, shown: str) -> float:
         return 1.0
     if (unit, shown) == ("1", "%"):
         return 100.0
-    from ..files import unit_registry  # pint takes a while to load
+    from ..files import to_si  # pint takes a while to load
 
-    return float(unit_registry().Quantity(1.0, unit.replace("^", "**")).to(shown.replace("^", "**")).magnitude)
+    return to_si(f"1 {unit}", shown)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -205,7 +205,9 @@ def shares_table(title: str, sort: str, counts: Mapping[str, int]) -> Table:
 def value_table(title: str, rows: Iterable[tuple[str, Any, str]], errors: Sequence[float] | None = None) -> Table:
     """A table of quantities: their words, values and SI units, and standard errors."""
     found = list(rows)
-    each = [Column("", [value], unit, errors=[e]) for (_, value, unit), e in zip(found, errors or [math.nan] * len(found))]
+    each = [
+        Column("", [value], unit, errors=[e]) for (_, value, unit), e in zip(found, errors or [math.nan] * len(found))
+    ]
     units = ["" if isinstance(column.values[0], str) else column.unit_shown for column in each]
     words = Column("quantity", [what for what, _, _ in found])
     return Table(title, [words, Column("value", [c.cells[0] for c in each]), Column("unit", units, nothing="")])

@@ -25,7 +25,9 @@ def zone_record(zone: Zone) -> dict[str, Any]:
     found: dict[str, Any] = {"kind": zone.kind, "width_rpm": zone.width_rpm, "share": zone.share}
     for end, edge in zip(ENDS, (zone.onset, zone.exit), strict=True):
         values = (None,) * 4 if edge is None else (edge.speed_rpm, edge.uncertainty_rpm, edge.mechanism, edge.basis)
-        found |= {f"{end}_{n}": x for n, x in zip(("rpm", "uncertainty_rpm", "mechanism", "basis"), values, strict=True)}
+        found |= {
+            f"{end}_{n}": x for n, x in zip(("rpm", "uncertainty_rpm", "mechanism", "basis"), values, strict=True)
+        }
     for name in ("revolutions", "seconds", "bound"):
         found[f"mean_life_{name}"] = None if zone.life is None else [getattr(life, name) for life in zone.life]
     return found

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import jaxcage as jc
-from jaxcage.io import configuration
+from jaxcage.files import configuration
 
 from ._land import Number, land_force
 from ._pulses import train
