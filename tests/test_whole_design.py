@@ -1,5 +1,6 @@
 """Designs of the whole bearing beside sweeps of the same runs: objective, change, shares of the variance, budgets."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -14,7 +15,8 @@ from jaxcage.design import (
     measure,
     tolerance_budget,
 )
-from jaxcage.models import drawn_places, rolling_start
+from jaxcage.design.statistics import rolling_states
+from jaxcage.models import drawn_places
 
 
 jc.enable_x64()
@@ -28,8 +30,8 @@ VARY = {"guidance_gap": (0.3e-3, 0.6e-3), "eccentricity": (5e-6, 23e-6)}
 def swept(model: jc.BearingModel):
     """The runs that `RUNS` stands for."""
     length = dict(discard=RUNS.discard, revolutions=RUNS.revolutions, blocks=2, exponents=0)
-    starts = [tuple(rolling_start(model, SPEED, place=place).row) for place in drawn_places(RUNS.starts)]
-    return jc.sweep(model, SPEED, starts=starts, tolerance=RUNS.tolerance, **length)
+    states = rolling_states(model, jnp.asarray([SPEED]), jnp.asarray(drawn_places(RUNS.starts)))
+    return jc.sweep(model, SPEED, starts=np.asarray(states), tolerance=RUNS.tolerance, **length)
 
 
 @pytest.mark.wide

@@ -145,14 +145,14 @@ class Runs:
         if self.seed is None:
             return Plan.over_speed(list(models), self.speed, self.starts)
         places = jnp.asarray(drawn_places(self.starts, self.seed))
-        placed = [_placed(model, jnp.asarray(self.speed), places) for model in models]
+        placed = [rolling_states(model, jnp.asarray(self.speed), places) for model in models]
         anywhere = [(0.0,) * models[0].dimension] * self.starts
         plan = Plan.over_speed(list(models), self.speed, anywhere)
         return dataclasses.replace(plan, states=np.concatenate(placed).reshape(plan.states.shape))
 
 
 @compiled
-def _placed(model: BearingModel, speeds: Array, places: Array) -> Float[Array, "speeds starts dim"]:
+def rolling_states(model: BearingModel, speeds: Array, places: Array) -> Float[Array, "speeds starts dim"]:
     """States of a bearing that rolls, with its cage at given places."""
     one = lambda speed, place: rolling_start(model, speed, place=place).row
     return jax.vmap(lambda speed: jax.vmap(lambda place: one(speed, place))(places))(speeds)
