@@ -4,10 +4,10 @@ import math
 from pathlib import Path
 
 import pytest
-from jaxcage.cli._main import _parse
-from jaxcage.cli._readers import read_quantity
 
 from jaxcage._errors import InputError
+from jaxcage.cli._main import _parse
+from jaxcage.cli._readers import read_quantity
 from jaxcage.files import model_from
 
 
