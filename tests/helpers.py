@@ -139,6 +139,9 @@ def declared(module: eqx.Module, path: tuple[str, ...] = ()) -> Iterator[tuple[t
         value, here = getattr(module, field.name), (*path, field.name)
         if isinstance(value, eqx.Module):
             yield from declared(value, here)
+        elif field.name == "forces":
+            for law in value:
+                yield from declared(law, (*path, law.law_name))
         elif {"parameter", "choice", "count"} & set(field.metadata):
             yield here, field
 
@@ -192,6 +195,7 @@ def made_sweep(
         coords={
             "speed": ("speed", speed, {"units": "rad/s", "long_name": "cage speed"}),
             "rpm": ("speed", speed * 30 / np.pi, {"units": "rpm", "long_name": "cage speed"}),
+            "shaft_rpm": ("speed", speed * 30 / np.pi / attrs.pop("cage_speed_ratio", 0.4)),
             "component": np.array(component_names(dim), dtype=object),
             "revolution": np.arange(110 - keep + 1, 111),
         },

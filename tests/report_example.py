@@ -1,24 +1,22 @@
 """Findings made by hand for the tests of the report: nothing is computed."""
 
+import json
+
 import numpy as np
+import xarray as xr
 from helpers import made_sweep
 
 import jaxcage as jc
+from jaxcage.analysis import zones
 from jaxcage.bearing import PUBLISHED_CASES, load_distribution
-from jaxcage.orbits import (
-    Branch,
-    Curve,
-    Explained,
-    Point,
-    Sensitivity,
-    Stretch,
-    SynchronousOrbits,
-    loss_zones,
-)
-from jaxcage.show import Axis, Findings, Map
+from jaxcage.orbits import Branch, Curve, Point, Sensitivity, Stretch, SynchronousOrbits, loss_zones
+from jaxcage.show import Findings, Operating
+from jaxcage.show.findings import Map, Orbits
+from jaxcage.show.parameter_axes import Axis
 
 
 PER_RPM = np.pi / 30
+RATIO = (1 - 16 / 81) / 2
 VERSIONS = {"method": "by hand", "version_jaxcage": "0.1.0", "version_jax": "0.10.1"}
 
 
@@ -36,18 +34,19 @@ def point(kind: str, rpm: float, critical: complex, index: int, edge: bool = Tru
     return Point(kind, rpm * PER_RPM, state, **known)
 
 
-def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> jc.Sweep:
+def swept(first: float = 2500.0, last: float = 27500.0, count: int = 251) -> xr.Dataset:
     """Three starts: chaotic from 9050 to 12050 and from 20050 rpm on, calm elsewhere."""
     rpm = np.linspace(first, last, count)
     chaotic = ((rpm > 9050) & (rpm < 12050)) | (rpm > 20050)
     wild = np.random.default_rng(1).uniform(-2e-4, 2e-4, (count, 3, 8, 4))
     calm = np.broadcast_to(1e-4 * np.sin(rpm / 5e3)[:, None, None, None], wild.shape)
     growth = np.where(chaotic, 0.3, -0.4)[:, None, None, None] * np.ones((count, 3, 10, 1))
-    settled = dict(scale=np.full((count, 4), 1e-4), discard=300, revolutions=300, settings=VERSIONS)
+    settled = dict(scale=np.full((count, 4), 1e-4), discard=300, revolutions=300, cage_speed_ratio=RATIO)
+    settled["settings"] = json.dumps(VERSIONS)
     return made_sweep(rpm, np.where(chaotic[:, None, None, None], wild, calm), growth, **settled)
 
 
-def orbits(sweep: jc.Sweep) -> SynchronousOrbits:
+def orbits(sweep: xr.Dataset) -> SynchronousOrbits:
     """One orbit that is lost from 7000 to 12000 rpm and from 20000 rpm on."""
     rpm = np.linspace(2500.0, 27500.0, 101)
     special = (
@@ -79,14 +78,14 @@ def slopes(model: jc.CageModel, name: str, kind: str, rpm: float, turn: float) -
     return Sensitivity(name, kind, rpm, slope, change, balance, 0.1, "converged")
 
 
-def findings(name: str = "1a", quick: bool = False) -> Findings:
+def findings(name: str = "1a", quick: bool = False, operating: tuple[Operating, ...] = ()) -> Findings:
     """Everything that a page shows, of a design whose zones are known."""
     model = jc.case("1a")
     sweep = swept()
     found = orbits(sweep)
     loss = loss_zones(found)
-    gaps, across = np.linspace(0.36e-3, 0.56e-3, 9), np.linspace(2500, 27500, 20)
-    grid = 0.3 * np.sin(across[:, None] / 3e3) * np.ones((1, 9))
+    gaps, across = np.linspace(0.36e-3, 0.56e-3, 9), np.linspace(2500, 27500, 20) * PER_RPM
+    grid = 0.3 * np.sin(across[:, None, None, None] / PER_RPM / 3e3) * np.ones((1, 9, 1, 1))
     line = np.linspace(7000, 8000, 9) * PER_RPM
     curve = Curve(
         name="zone 1 onset",
@@ -100,7 +99,12 @@ def findings(name: str = "1a", quick: bool = False) -> Findings:
         ended=("range", "range"),
         multipliers=np.zeros((9, 4), dtype=complex),
     )
-    chart = Map(Axis("guidance_gap", gaps[0], gaps[-1], "mm", 1e3), (across, gaps, grid), [] if quick else [curve], {})
+    axes = ("speed", "guidance_gap", "start")
+    labels = np.where(grid[..., 0] > 0.02, "chaotic", "periodic-1")
+    mapped = xr.Dataset(
+        {"label": (axes, labels), "exponents": ((*axes, "exponent"), grid)}, {"speed": across, "guidance_gap": gaps}
+    )
+    chart = Map(Axis("guidance_gap", gaps[0], gaps[-1], "m"), mapped, [] if quick else [curve], {})
     located = [] if quick else list(loss.edges.items())
     edges = {n: slopes(model, n, p.kind, p.speed_rpm, 0.5 + i) for i, (n, p) in enumerate(located)}
     return Findings(
@@ -108,13 +112,10 @@ def findings(name: str = "1a", quick: bool = False) -> Findings:
         model=model,
         published=PUBLISHED_CASES.get(name),
         sweep=sweep,
-        found=found,
-        loss=loss,
-        explained=Explained(jc.zones(sweep), {}),
-        slopes=edges,
-        map=chart,
+        operating=operating,
+        zones=zones(sweep),
+        orbits=Orbits(found, loss, edges, chart, "by hand"),
         statics=load_distribution(model.bearing, model.load),
         quick=quick,
-        orbit_method="by hand",
         seconds={"sweep": 12.0, "synchronous orbits": 34.0},
     )

@@ -45,15 +45,6 @@ def test_equations_in_c_are_those_of_the_field(name: str, tmp_path: pathlib.Path
     assert touching > 1 or name != "cage"
 
 
-@pytest.mark.wide
-@needs_compiler
-def test_shooting_finds_a_published_doubling(tmp_path: pathlib.Path):
-    found = shooting.follow(law("duffing-doubling", tmp_path), START, DOUBLING.end / DOUBLING.begin)
-    ((kind, ratio),) = found["special"]
-    assert kind == "period-doubling"
-    assert ratio * DOUBLING.begin == pytest.approx(DOUBLING.published[0], abs=1e-6)
-
-
 @pytest.mark.skipif(auto.missing() is not None, reason=f"AUTO-07p: {auto.missing()}")
 def test_auto_finds_a_published_doubling(tmp_path: pathlib.Path):
     rates = law("duffing-doubling", tmp_path)
@@ -87,12 +78,3 @@ def test_a_missing_point_is_not_within_any_error():
     assert orbits.within(row("period-doubling", 1.0), autos) == np.inf
     assert orbits.off(row("fold", 0.0), autos[-1]) == pytest.approx(0.003)
     assert orbits.off(row("period-doubling", 1.0), autos[-1]) == np.inf
-
-
-def test_absence_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path):
-    monkeypatch.setattr(auto, "LIBRARY", tmp_path)
-    (row,) = orbits.by_auto(DOUBLING, tmp_path, np.zeros((1, 5)))
-    assert orbits.line(DOUBLING, row, row)[1:3] == ["AUTO-07p", "not installed"]
-    ours = orbits.Row("ours", special=(("period-doubling", 1.25),), errors=(0.1,))
-    assert "AUTO" not in orbits.verdict(DOUBLING, ours, [row])
-    assert "Published 1.2: off by 5.0e-02, error bar 1.0e-01." in orbits.verdict(DOUBLING, ours, [row])

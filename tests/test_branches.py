@@ -26,12 +26,6 @@ def kinds(branch):
     return [p.kind for p in branch.special]
 
 
-def image(system, speed, state, method=METHOD):
-    """The state a revolution later."""
-    strobe = jc.strobe_map(system, jnp.asarray(speed), method)
-    return np.stack(strobe(tuple(jnp.asarray(c) for c in state)).y)
-
-
 @pytest.fixture(scope="module")
 def over_speed():
     orbit = jc.periodic_orbit(hardening(), 0.8, guess=(0.5, 0.0), revolutions=200, method=METHOD)
@@ -51,48 +45,12 @@ def test_branch_passes_the_folds_of_the_hardening_duffing(over_speed):
     assert abs(upper.value - DUFFING_FOLDS["up"].value) < 1e-7
     assert abs(lower.value - DUFFING_FOLDS["down"].value) < 1e-7
     assert upper.speed == upper.value and upper.parameter == "speed"
-    for fold in (upper, lower):
-        assert abs(fold.critical - 1) < 1e-6
-        np.testing.assert_allclose(image(hardening(), fold.speed, fold.state), fold.state, atol=1e-9)
-        # Along the critical direction the map moves as the state does, to first order.
-        h = 1e-4 * fold.direction / np.linalg.norm(fold.direction)
-        moved = image(hardening(), fold.speed, fold.state + h) - image(hardening(), fold.speed, fold.state - h)
-        np.testing.assert_allclose(moved, 2 * h, atol=1e-4 * np.linalg.norm(h))
+    assert max(abs(upper.critical - 1), abs(lower.critical - 1)) < 1e-6
     assert over_speed.ended == ("range", "range")
     assert over_speed.value[0] <= 0.5 and over_speed.value[-1] >= 2.5
-
-
-def test_stability_changes_at_the_folds_and_nowhere_else(over_speed):
-    first, second = (p.index for p in over_speed.special)
     stable = np.ones(over_speed.value.size, dtype=bool)
-    stable[first + 1 : second + 1] = False
-    assert np.array_equal(over_speed.stable, stable)
-    assert second - first > 5
-    # From fold to fold the speed goes down.
-    assert np.all(np.diff(over_speed.value[first + 1 : second + 1]) < 0)
-    assert np.all(np.diff(over_speed.value[: first + 1]) > 0) and np.all(np.diff(over_speed.value[second + 1 :]) > 0)
-    largest = np.abs(over_speed.multipliers[:, 0])
-    assert np.array_equal(largest < 1, stable)
-
-
-@pytest.mark.wide
-def test_points_of_a_branch_are_orbits_with_the_right_multipliers(over_speed):
-    """Damping is all that shrinks areas; the strobe map does not know of the continuation."""
-    np.testing.assert_allclose(over_speed.speed_rpm / 60 * 2 * np.pi, over_speed.speed, rtol=1e-14)
-    product = np.prod(over_speed.multipliers, axis=1)
-    np.testing.assert_allclose(product, np.exp(-0.1 * 2 * np.pi / over_speed.speed), rtol=1e-6)
-    map_of = eqx.filter_jit(jax.vmap(lambda w, y: jnp.stack(jc.strobe_map(hardening(), w, METHOD)((y[0], y[1])).y)))
-    images = map_of(jnp.asarray(over_speed.speed), jnp.asarray(over_speed.state))
-    np.testing.assert_allclose(images, over_speed.state, atol=1e-9)
-
-
-@pytest.mark.wide
-def test_period_doublings_over_the_force(over_force):
-    points = [p for p in over_force.special if p.kind == "period-doubling"]
-    first = min(points, key=lambda p: abs(p.value - DOUBLING))
-    assert abs(first.value - DOUBLING) < 1e-7
-    assert first.edge and first.speed == 1.2 and abs(first.critical + 1) < 1e-8
-    assert over_force.stable[first.index] != over_force.stable[first.index + 1]
+    stable[upper.index + 1 : lower.index + 1] = False
+    assert np.array_equal(over_speed.stable, stable) and lower.index - upper.index > 5
 
 
 @pytest.fixture(scope="module")
@@ -108,23 +66,6 @@ def test_a_branch_from_a_point_begins_at_the_value_where_that_was_found(doubling
     assert min(abs(p.value - DOUBLING) for p in found.special) < 1e-7
 
 
-def test_doubled_branch_has_twice_the_period(doubling):
-    system = double_well()
-    doubled = jc.orbits.doubled_branch(system, doubling, "g", lower=0.1, upper=0.35, until_doubling=True, method=FINE)
-    assert doubled.periods == 2 and doubled.ended[0] == "doubling"
-    np.testing.assert_allclose(np.prod(doubled.multipliers, axis=1), np.exp(-0.3 * 4 * np.pi / 1.2), rtol=1e-6)
-    away = []
-    for value, state in zip(doubled.value[::3], doubled.state[::3], strict=True):
-        once = image(double_well(value), 1.2, state, FINE)
-        np.testing.assert_allclose(image(double_well(value), 1.2, once, FINE), state, atol=1e-8)
-        away.append(np.linalg.norm(once - state) / np.sqrt(value - DOUBLING))
-    # Born of amplitude zero with the square root of the distance.
-    assert np.all(np.array(away) > 1) and abs(away[1] / away[0] - 1) < 0.1
-    second = [p for p in doubled.special if p.kind == "period-doubling"]
-    assert len(second) == 1 and second[0].periods == 2
-    assert abs(second[0].value - DUFFING_DOUBLINGS[2][1].value) < DUFFING_DOUBLINGS[2][1].tolerance
-
-
 def test_cascade_of_the_double_well_duffing(doubling):
     """DOP853, all printed digits; the limit is where chaos sets in, 0.2923 on a grid of simulations."""
     found = jc.orbits.cascade(double_well(), doubling, "g", lower=0.1, upper=0.35, levels=4, method=FINE)
@@ -135,13 +76,9 @@ def test_cascade_of_the_double_well_duffing(doubling):
     np.testing.assert_allclose(apart[:-1] / apart[1:], [4.80, 4.672], atol=0.005)
     assert found.error < 1e-6
     assert abs(found.limit - 0.29228749) < found.error + 5e-9
-
-
-def test_cascade_that_does_not_go_on_is_shorter(doubling):
-    """The range ends before the third doubling: what was found is returned, the limit from two points."""
-    found = jc.orbits.cascade(double_well(), doubling, "g", lower=0.1, upper=0.29, levels=4, method=FINE)
-    assert len(found.points) == 2
-    assert found.error == np.inf and abs(found.limit - 0.2924) < 2e-4
+    shorter = jc.orbits.cascade(double_well(), doubling, "g", lower=0.1, upper=0.29, levels=4, method=FINE)
+    assert len(shorter.points) == 2  # the range ends before the third doubling
+    assert shorter.error == np.inf and abs(shorter.limit - 0.2924) < 2e-4
 
 
 class Bend(eqx.Module):
@@ -247,36 +184,6 @@ def planted_branch(speed=1.1, lower=-0.2, upper=0.2, how=dict(method=METHOD), **
     return jc.branch(planted(**settings), start, "p", lower=lower, upper=upper, speed=speed, **how)
 
 
-def planted_multipliers(branch, a, c, s=(0.0, 0.0), b=(0.0, 0.0)):
-    """Exact, at all points of a branch."""
-    rows = []
-    for i, sign in enumerate((1, -1)):
-        root = np.sqrt(complex(s[i] ** 2 - b[i] ** 2))
-        rows += [sign * np.exp((a[i] + c[i] * branch.value + r) * 2 * np.pi / branch.speed) for r in (root, -root)]
-    return np.array(rows).T
-
-
-def assert_same_sets(found, exact, rtol):
-    """Each exact multiplier is there, point by point."""
-    away = np.abs(found[:, :, None] - exact[:, None, :]) / np.max(np.abs(exact), axis=1)[:, None, None]
-    assert np.max(np.min(away, axis=1)) < rtol
-
-
-@pytest.mark.wide
-def test_torus_of_a_planted_orbit():
-    """The pair exp((p - 0.03 +- 0.4i) T) crosses at p = 0.03; the real pair of the other block stays inside."""
-    settings = dict(a=(-0.03, -0.3), c=(1.0, 0.2), s=(0.0, 0.1), b=(0.4, 0.0))
-    branch = planted_branch(**settings)
-    (point,) = branch.special
-    assert point.kind == "Neimark-Sacker" and point.edge
-    assert abs(point.value - 0.03) < 1e-9
-    assert abs(point.critical - np.exp(0.4j * 2 * np.pi / 1.1)) < 1e-8
-    np.testing.assert_array_equal(point.direction, 0.0)
-    np.testing.assert_allclose(point.state, [1, 0, 1, 0], atol=1e-8)
-    assert np.array_equal(branch.stable, branch.value < 0.03)
-    assert_same_sets(branch.multipliers, planted_multipliers(branch, **settings), 1e-7)
-
-
 # What happens inside the unit circle, or outside, without anything crossing it.
 QUIET = {
     "real pair and complex pair change order": dict(a=(-0.3, -0.3), c=(1.0, -1.0), s=(0.0, 0.05), b=(0.4, 0.0)),
@@ -289,34 +196,19 @@ QUIET = {
 @pytest.mark.parametrize("name", QUIET)
 def test_nothing_is_found_where_no_multiplier_crosses_the_circle(name):
     branch = planted_branch(**QUIET[name])
-    exact = planted_multipliers(branch, **QUIET[name])
-    assert_same_sets(branch.multipliers, exact, 1e-7)
-    if "saddle" in name:  # the product of some two passes 1, of opposite signs in the last
-        assert not np.any(branch.stable)
-    else:
-        order = np.sign(np.abs(exact[:, 0]) - np.abs(exact[:, 3]))
-        assert order[0] != order[-1] and np.all(branch.stable)
     assert branch.special == ()
+    assert np.all(branch.stable != ("saddle" in name))  # where the product of some two passes 1
 
 
 @pytest.mark.parametrize("first", wide_but(["period-doubling", "branch-point"], "period-doubling"))
 def test_crossings_within_one_step_are_in_order(first):
     """One at p = 0.02 and one at 0.0201, with one orbit put between them: only the first is next to stable orbits."""
     places = [0.02, 0.0201] if first == "period-doubling" else [0.0201, 0.02]
-    a = (-places[1] - 0.2, -places[0] - 0.2)
-    branch = planted_branch(a=a, c=(1.0, 1.0), s=(0.2, 0.2))
+    branch = planted_branch(a=(-places[1] - 0.2, -places[0] - 0.2), c=(1.0, 1.0), s=(0.2, 0.2))
     assert branch.special[0].index + 1 == branch.special[1].index
-    assert np.sum((branch.value > 0.02) & (branch.value < 0.0201)) == 1
     np.testing.assert_allclose([p.value for p in branch.special], [0.02, 0.0201], rtol=0, atol=1e-8)
     assert branch.special[0].kind == first and sorted(kinds(branch)) == ["branch-point", "period-doubling"]
     assert [p.edge for p in branch.special] == [True, False]
-
-
-def test_stable_orbits_within_one_step_are_found():
-    """The doubling at p = 0.02 is passed on the way in, the other bifurcation at 0.0201 on the way out."""
-    branch = planted_branch(a=(-0.0201 - 0.2, 0.02 - 0.2), c=(1.0, -1.0), s=(0.2, 0.2))
-    assert kinds(branch) == ["period-doubling", "branch-point"] and all(p.edge for p in branch.special)
-    assert np.array_equal(branch.stable, (branch.value > 0.02) & (branch.value < 0.0201)) and np.any(branch.stable)
 
 
 @pytest.mark.wide
@@ -358,39 +250,24 @@ def test_crossing_that_is_not_found_is_said_to_be_unexplained():
         (dict(lower=0.5, upper=np.inf), "`lower` and `upper` must be finite, but are 0.5 and inf"),
         (dict(lower=1.0, upper=2.0), "`orbit` must begin from 1 to 2, `lower` and `upper`, but is at 0.8"),
         (dict(parameter="a", lower=0.0, upper=1.0), "`parameter` must be one of speed, m, d, k, b, g, but 'a' was"),
+        (dict(parameter="g", lower=0.1, upper=1.0, speed=None), "`speed` must be given where the parameter is"),
     ],
 )
 def test_bad_arguments(settings, sentence):
     with pytest.raises(ValueError, match=sentence):
-        jc.branch(hardening(), ((0.5, 0.0), 0.8), method=METHOD, speed=0.8, **settings)
+        jc.branch(hardening(), ((0.5, 0.0), 0.8), **(dict(method=METHOD, speed=0.8) | settings))
 
 
-def test_an_orbit_at_the_end_of_the_range_is_followed():
-    """Also where rounding puts it just beyond."""
-    beyond = np.nextafter(0.8, 0.0)
+def test_an_orbit_at_the_end_of_the_range_is_followed_and_other_starts_are_refused(over_speed):
+    """The first also where rounding puts it just beyond; x' = p^2 + x^2 has no orbit for p > 0."""
     steps = jc.orbits.StepControl(most=2)
-    branch = jc.branch(hardening(), ((0.5, 0.0), beyond), lower=0.8, upper=1.5, steps=steps, method=METHOD)
+    start = (0.5, 0.0), np.nextafter(0.8, 0.0)
+    branch = jc.branch(hardening(), start, lower=0.8, upper=1.5, steps=steps, method=METHOD)
     assert branch.value.max() > 0.8 and branch.ended == ("range", "steps")
-
-
-def test_parameter_without_a_speed():
-    with pytest.raises(ValueError, match="`speed` must be given where the parameter is"):
-        jc.branch(hardening(), ((0.5, 0.0), 0.3), "g", lower=0.1, upper=0.5, method=METHOD)
-
-
-def test_no_orbit_to_start_from():
-    """x' = p^2 + x^2 has none for p > 0."""
     system = jc.ForcedSystem(Ring(**numbers(p=2.5, r=0.0)), dimension=2)
     with pytest.raises(ValueError, match="`orbit` must be near a periodic orbit, but none is near it at 2.5"):
         jc.branch(system, ((0.1, 0.0), 2.5), "p", lower=1.5, upper=3.0, speed=1.5, method=METHOD)
-
-
-def test_no_doubled_branch_begins_at_a_fold(over_speed):
     with pytest.raises(ValueError, match="`point` must be a period doubling, but"):
-        jc.orbits.doubled_branch(hardening(), over_speed.special[0], lower=0.5, upper=2.5, method=METHOD)
-
-
-@pytest.mark.parametrize("steps", [dict(first=0.6), dict(shortest=0.05), dict(shortest=0.0), dict(longest=0.01)])
-def test_lengths_of_steps_must_be_in_order(steps):
+        jc.orbits.cascade(hardening(), over_speed.special[0], lower=0.5, upper=2.5, method=METHOD)
     with pytest.raises(ValueError, match="`steps` must have 0 < shortest <= first <= longest, but has"):
-        jc.orbits.StepControl(**steps)
+        jc.orbits.StepControl(first=0.6)

@@ -14,6 +14,7 @@ from scipy.integrate import simpson
 
 import jaxcage as jc
 from jaxcage.models import FORCES
+from jaxcage.solve.kernel import Pieces
 
 
 CASE = jc.case("1a", "preliminary")
@@ -206,7 +207,7 @@ def revolution(system, scale, speed, state, phase):
     """One revolution from `phase` on, in units of `scale`."""
     strobe = jc.strobe_map(system, speed, DEFAULT)
     start = tuple(state * jnp.stack(scale))
-    end = strobe.method.advance(strobe.field, strobe.system, strobe.scale, start, phase, 1)
+    end = strobe.method.advance(Pieces(strobe.field, strobe.system, strobe.scale), start, phase, 1)
     return jnp.stack(end.y) / jnp.stack(scale)
 
 

@@ -76,38 +76,6 @@ def test_jacobian_of_state_and_multipliers(name):
     np.testing.assert_allclose(reverse, forward, rtol=1e-10, atol=1e-12)
 
 
-@pytest.mark.wide
-@pytest.mark.parametrize("name", ORBITS)
-def test_scaling_identities_of_an_orbit(name):
-    """x in other units, time in other units, and the whole equation multiplied by a number."""
-    theta, guess = ORBITS[name]
-    m, d, _, k, b, g, w = theta
-    j = np.asarray(REVERSE(jnp.asarray(theta), guess))
-    x, u, *_ = np.asarray(VALUE(jnp.asarray(theta), guess))
-    one, zero = np.array([x, u, 0, 0]), np.zeros(4)
-    columns = dict(zip(NAMES, j.T, strict=True))
-    np.testing.assert_allclose(g * columns["g"] - 2 * b * columns["b"], one, atol=1e-9)
-    time = 2 * m * columns["m"] + d * columns["d"] - w * columns["w"]
-    np.testing.assert_allclose(time, [0, -u, 0, 0], atol=1e-9)
-    number = m * columns["m"] + d * columns["d"] + k * columns["k"] + b * columns["b"] + g * columns["g"]
-    np.testing.assert_allclose(number, zero, atol=1e-9)
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("name", ORBITS)
-def test_hessian_of_state_and_multipliers(name):
-    theta, guess = ORBITS[name]
-    hessian = HESSIAN(jnp.asarray(theta), guess)
-    expected = differences(lambda x: REVERSE(x, guess), theta, 1e-4)
-    assert np.max(np.abs(expected)) > 10
-    assert np.max(np.abs(hessian - expected) / (1 + np.abs(expected))) < 1e-7
-    symmetric = np.swapaxes(hessian, 1, 2)
-    np.testing.assert_allclose(hessian, symmetric, rtol=1e-8, atol=1e-8)
-
-
-HESSIAN = jax.jit(jax.jacfwd(jax.jacrev(orbit_numbers)))
-
-
 @pytest.mark.parametrize("periods", [1, 2, 3])
 @pytest.mark.parametrize("name", ["double well", "hardening"])
 def test_determinant_of_the_monodromy_matrix(name, periods):

@@ -17,24 +17,6 @@ import jaxcage as jc
 METHOD = jc.method("rk4", steps=1024)
 
 
-@pytest.mark.wide
-def test_orbits_in_other_units_are_the_same():
-    """Both wells of an oscillator, and in thousandths: Newton's method starts at its guess, not between the two."""
-
-    def duffing(unit):
-        def law(tau, q, v, speed):
-            return (-0.3 * v[0] + q[0] - q[0] ** 3 / unit**2 + 0.26 * unit * jnp.cos(tau),)
-
-        return jc.ForcedOscillator(law, coordinates=1, scale=unit)
-
-    for well in (1.0, -1.0):
-        whole = jc.periodic_orbit(duffing(1.0), 1.2, guess=(well, 0.0), revolutions=400, method=METHOD)
-        assert float(whole.state[0]) * well > 0
-        found = jc.periodic_orbit(duffing(1e-3), 1.2, guess=1.001e-3 * whole.state, method=METHOD)
-        np.testing.assert_allclose(1e3 * found.state, whole.state, rtol=1e-9)
-        np.testing.assert_allclose(found.multipliers, whole.multipliers, rtol=1e-8)
-
-
 class Mathieu(eqx.Module):
     """x'' + 2 z x' + (a - 2 q cos 2t) x = 0 with tau = 2 t."""
 

@@ -17,8 +17,9 @@ from helpers import beyond_range, raw_sweep
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.forces import AbstractForce, AbstractForcing, parameter
 from jaxcage.files import ConfigError, configuration, save_model
+from jaxcage.forces import AbstractForce, AbstractForcing, parameter
+from jaxcage.files import to_dataset
 from jaxcage.orbits import Point, edge_speed
 
 
@@ -96,14 +97,10 @@ TORUS = Point("Neimark-Sacker", float(jc.rpm(11023.07)), np.array([1.33877e-5, -
 """An edge of case 1a, as `test_edges_of_the_cage` has it."""
 
 
-@pytest.fixture(scope="module")
-def torus() -> jc.orbits.Sensitivity:
-    return jc.sensitivity(OWN, TORUS, method=METHOD)
-
-
 @pytest.mark.wide
-def test_an_edge_moves_with_a_drag_as_with_the_damping(torus: jc.orbits.Sensitivity):
+def test_an_edge_moves_with_a_drag_as_with_the_damping():
     """And as differences say; the arm of the torque moves nothing, at a speed that is given."""
+    torus = jc.sensitivity(OWN, TORUS, method=METHOD)
     slope = torus.derivative["extra.ViscousDrag.coefficient"]
     assert torus.trusted and slope == pytest.approx(torus.derivative["damping"], rel=1e-9)
     at = lambda value: edge_speed(jc.replace(OWN, **{"extra.ViscousDrag.coefficient": value}), TORUS, METHOD)
@@ -198,10 +195,6 @@ def test_what_is_not_honoured_is_refused():
         def at(self, cage, speed):
             raise NotImplementedError
 
-    class OwnSupport(jc.forces.Support):
-        def force(self, motion):
-            return 0.0, 0.0, 0.0
-
     class film(ViscousDrag):  # noqa: N801
         pass
 
@@ -210,10 +203,7 @@ def test_what_is_not_honoured_is_refused():
             return motion.vx, motion.vy
 
     drag = ViscousDrag(1.0, arm=0.0)
-    support = OwnSupport(stiffness_x=1e4, stiffness_y=1e4, damping=1.0)
-    with pytest.raises(ValueError, match="`support` must be a `Support`, but is a `OwnSupport`; a force of your own"):
-        jc.replace(CASE, support=support)
-    with pytest.raises(ValueError, match="`film` must be a `RibFilm`, but is a `OwnFilm`"):
+    with pytest.raises(ValueError, match="`film` must be a `RibFilm`, but is a `OwnFilm`; a force of your own goes in"):
         jc.replace(CASE, film=OwnFilm(land_width=2e-3))
     with pytest.raises(ValueError, match="`ViscousDrag` is there twice.*a subclass gives it another name"):
         with_extra(drag, drag)

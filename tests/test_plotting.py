@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import cage_sweep
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
@@ -14,17 +15,14 @@ import jaxcage as jc
 from jaxcage.analysis import Edge, Zone, Zones
 from jaxcage.orbits import Branch, Curve, Point
 from jaxcage.show import (
-    BLACK,
     EDGE_COLOURS,
     FORCE_COLOURS,
     KIND_COLOURS,
     MARKS,
     OWN_COLOURS,
-    PAPER,
     PERIOD_COLOURS,
     START_COLOURS,
     STYLES,
-    ZONE,
     branch_diagram,
     exponent_strip,
     multiplier_circle,
@@ -34,6 +32,7 @@ from jaxcage.show import (
     stability_map,
     time_history,
 )
+from jaxcage.show.style import BLACK, PAPER, ZONE
 
 
 PER_RPM = np.pi / 30
@@ -61,7 +60,7 @@ def test_orbit_diagram_shows_every_strobe_point_of_every_start():
     chaotic = points(ax, "chaotic")
     assert len(chaotic) == 3 * 16 and len(points(ax, "periodic")) == (4 * 3 - 1) * 16
     np.testing.assert_allclose(np.unique(chaotic[:, 0]), [8100])
-    np.testing.assert_allclose(np.sort(chaotic[:, 1]), np.sort(sweep.strobe[1, :, :, 1].ravel()) * 1e3)
+    np.testing.assert_allclose(np.sort(chaotic[:, 1]), np.sort(sweep["strobe"].values[1, :, :, 1].ravel()) * 1e3)
     np.testing.assert_allclose(points(ax, "failed")[:, 0], [8300])
     assert ax.get_xlabel() == "Cage speed $n$ [rpm]" and ax.get_ylabel() == "Vertical displacement $Y_C$ [mm]"
 
@@ -69,13 +68,13 @@ def test_orbit_diagram_shows_every_strobe_point_of_every_start():
 def test_exponent_strip():
     """The largest exponent with a band of two standard errors; a speed at which all starts failed is a gap."""
     sweep = cage_sweep()
-    sweep.outcome[4], sweep.block_growth[4], sweep.strobe[4] = 1, np.nan, np.nan
-    ax, every = exponent_strip(sweep), sweep.exponents[..., 0]
+    sweep["label"].values[4], sweep["exponents"].values[4], sweep["standard_error"].values[4] = "failed", np.nan, np.nan
+    ax, every = exponent_strip(sweep), sweep["exponents"].values[..., 0]
     largest = points(ax, "largest of the starts")
     assert largest[:, 0] == pytest.approx([8000, 8100, 8200, 8300])
     np.testing.assert_allclose(largest[:, 1], np.nanmax(every[:4], axis=1))
     (band,) = ax.collections
-    error = 2 * sweep.standard_error[1, np.argmax(every[1]), 0]
+    error = 2 * float(sweep["standard_error"][1, np.argmax(every[1]), 0])
     assert np.asarray(band.get_paths()[0].get_extents())[1, 1] == pytest.approx(np.max(every[1]) + error)
 
 
@@ -193,9 +192,12 @@ def two_curves() -> list[Curve]:
 def test_curves_and_exponents_share_their_axes():
     """Curves in the parameter's unit; exponents beneath them are white at zero, red above, blue below."""
     rpm, gap = np.linspace(9000, 11000, 5), np.array([4e-4, 5e-4, 6e-4])
-    largest = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3])
-    largest[0, 0] = np.nan
-    ax = stability_map(two_curves(), exponents=(rpm, gap, largest), y_unit="mm", y_factor=1e3)
+    largest, axes = np.outer(np.linspace(-1, 1, 5), [0.1, 0.2, 0.3]), ("speed", "guidance_gap", "start")
+    label = np.full((5, 3, 1), "undecided")
+    label[0, 0], largest[0, 0] = "failed", np.nan
+    values = {"label": (axes, label), "exponents": ((*axes, "exponent"), largest[..., None, None])}
+    found = xr.Dataset(values, {"speed": rpm * PER_RPM, "guidance_gap": gap})
+    ax = stability_map(two_curves(), found=found, unit="m")
     np.testing.assert_allclose(points(ax, "Neimark-Sacker")[[0, -1]], [[10000, 0.5], [10900, 0.42]])
     assert ax.get_ylabel() == "Guidance gap [mm]"
     (mesh,) = [c for c in ax.collections if isinstance(c, QuadMesh)]

@@ -1,11 +1,10 @@
 """Support, unbalance and roller impacts against hand-written NumPy, SciPy and closed forms."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 from scipy.special import gamma
 
 import jaxcage as jc
@@ -29,16 +28,13 @@ from jaxcage.forces import (
     synchronous_force,
     unbalance_force,
 )
-from jaxcage.models import case
 
 
 POINTS = np.random.default_rng(7).normal(scale=2e-4, size=(5, 2))
 
 
 def cage_with(speed=900.0, **parts):
-    model = case("1a", "preliminary")
-    for name, part in parts.items():
-        model = eqx.tree_at(lambda m, name=name: getattr(m, name), model, part)
+    model = jc.replace(jc.case("1a", "preliminary"), **parts)
     return model, model.cage_at(speed)
 
 
@@ -47,36 +43,17 @@ def cage_with(speed=900.0, **parts):
 
 @pytest.mark.parametrize("r", POINTS)
 def test_support_in_the_cage_against_numpy(r):
-    """Isotropic cubic stiffness, K_x and K_y apart, damping and circulatory cross-coupling."""
-    given = Support(stiffness_x=3e4, stiffness_y=5e4, damping=3.0, cubic_stiffness=1e13, cross_stiffness=-40.0)
-    _, cage = cage_with(support=given)
-    x, y = r
-    vx, vy = 0.1, -0.3
-    hardening = 1e13 * (x**2 + y**2)
-    expected = (
-        -(3e4 + hardening) * x - 3.0 * vx + 40.0 * y,
-        -(5e4 + hardening) * y - 3.0 * vy - 40.0 * x,
-    )
-    np.testing.assert_allclose(cage.forces(0.0, x, y, vx, vy)["support"][:2], expected, rtol=1e-13)
-
-
-@pytest.mark.parametrize("r", POINTS)
-def test_support_with_the_cross_coupling_of_20_as_printed(r):
-    given = Support(
-        stiffness_x=3e4,
-        stiffness_y=3e4,
-        damping=0.0,
-        cross_stiffness=700.0,
-        cross_cubic=3e10,
-        cross="as_printed",
-    )
-    _, cage = cage_with(support=given)
-    x, y = r
-    expected = (
-        -3e4 * x - 700.0 * y - 3e10 * y**3,
-        -3e4 * y - 700.0 * x - 3e10 * x**3,
-    )
-    np.testing.assert_allclose(cage.forces(0.0, x, y, 0.0, 0.0)["support"][:2], expected, rtol=1e-13)
+    """Isotropic cubic stiffness, K_x and K_y apart, damping; cross-coupling that circulates and as (20) prints it."""
+    (x, y), (vx, vy), k3, kxy, odd = r, (0.1, -0.3), 1e13, -40.0, 3e10
+    hardening = k3 * (x**2 + y**2)
+    for cross, push in (
+        ("circulatory", (-kxy * y, kxy * x)),
+        ("as_printed", (-kxy * y, -kxy * x) - odd * r[::-1] ** 3),
+    ):
+        given = Support(3e4, 5e4, 3.0, cubic_stiffness=k3, cross_stiffness=kxy, cross_cubic=odd, cross=cross)
+        expected = np.array([-(3e4 + hardening) * x - 3.0 * vx, -(5e4 + hardening) * y - 3.0 * vy]) + push
+        _, cage = cage_with(support=given)
+        np.testing.assert_allclose(cage.forces(0.0, x, y, vx, vy)["support"][:2], expected, rtol=1e-13)
 
 
 def work_around_circle(force, radius, points=64):
@@ -111,7 +88,7 @@ def test_readings_of_the_cubic_stiffness():
 
 @pytest.mark.parametrize("reading, name", [("absolute", "cubic_stiffness"), ("dimensionless", "cubic_ratio")])
 def test_a_linear_support_is_a_cubic_term_of_zero(reading, name):
-    model = jc.replace(case("1a"), **{"support.cubic": reading, name: 0.0, "cross_stiffness": 0.0})
+    model = jc.replace(jc.case("1a"), **{"support.cubic": reading, name: 0.0, "cross_stiffness": 0.0})
     support, (x, y) = model.support, POINTS[0]
     held = model.cage_at(900.0).forces(0.0, x, y, 0.0, 0.0)["support"][:2]
     np.testing.assert_allclose(held, (-support.stiffness_x * x, -support.stiffness_y * y), rtol=1e-13)
@@ -122,8 +99,7 @@ def test_a_linear_support_is_a_cubic_term_of_zero(reading, name):
 def test_elastic_rib_feels_the_reaction_of_what_acts_between():
     """Momentum: the internal forces cancel in M_C a_C + M_O a_O."""
     rib = ElasticRib(mass=2.0, stiffness=1e6, damping=50.0)
-    model, cage = cage_with(rib=rib)
-    model = eqx.tree_at(lambda m: m.film.supply_pressure, model, jnp.asarray(2e4))
+    model, cage = cage_with(rib=rib, supply_pressure=2e4)
     q, v, tau, speed = (1e-4, -2e-4, 3e-5, 1e-5), (0.1, -0.2, 0.02, 0.05), 0.7, 900.0
     rates = [float(c) * speed for c in model.at_speed(speed)(tau, (*q, *v))]
     assert rates[:4] == pytest.approx(v, rel=1e-12)
@@ -200,31 +176,20 @@ def solve_14(impact, roller, v0, times):
 # belong to the default 511 x 4 steps, and to 16 times as many.
 @pytest.mark.wide
 @pytest.mark.parametrize("samples, tolerance", [(512, 3e-4), (4089, 1e-5)])
-def test_impact_against_scipy(samples, tolerance):
+def test_impact_against_scipy_and_its_energy(samples, tolerance):
     h = history(samples=samples, substeps=4 if samples == 512 else 8)
     q, y = solve_14(IMPACT, ROLLER, SPEED, np.asarray(h.time))
-    atol = tolerance * q.max()
-    np.testing.assert_allclose(h.contact_force, q, atol=atol)
-    np.testing.assert_allclose(h.bar_force, float(IMPACT.bar_stiffness) * y[1], atol=atol)
-    assert np.min(h.bar_force) < -0.01 * q.max()  # the bar swings back, as in fig. 5
-
-
-@pytest.mark.wide
-@pytest.mark.parametrize("samples, tolerance", [(512, 3e-5), (4089, 1e-6)])
-def test_impact_keeps_energy(samples, tolerance):
-    h = history(samples=samples, substeps=4 if samples == 512 else 8)
     k, kc, mc = constants(IMPACT)
+    np.testing.assert_allclose(h.contact_force, q, atol=tolerance * q.max())
+    np.testing.assert_allclose(h.bar_force, kc * y[1], atol=tolerance * q.max())
+    assert np.min(h.bar_force) < -0.01 * q.max()  # the bar swings back, as in fig. 5
     depth = np.maximum(h.roller_position - h.bar_position, 0.0)
     kinetic = 0.5 * ROLLER * h.roller_velocity**2 + 0.5 * mc * h.bar_velocity**2
     energy = kinetic + 0.5 * kc * h.bar_position**2 + 9 / 19 * k * depth ** (19 / 9)
-    np.testing.assert_allclose(energy, 0.5 * ROLLER * SPEED**2, rtol=tolerance)
+    np.testing.assert_allclose(energy, 0.5 * ROLLER * SPEED**2, rtol=tolerance / 10)
 
 
-RIGID = eqx.tree_at(
-    lambda p: (p.contact_stiffness, p.bar_stiffness, p.bar_mass),
-    IMPACT,
-    (jnp.asarray(1e6), jnp.asarray(1e12), jnp.asarray(100.0)),
-)
+RIGID = PocketImpact(contact_stiffness=1e6, bar_stiffness=1e12, bar_mass=100.0, approach_ratio=0.6)
 
 
 @pytest.mark.wide
@@ -237,8 +202,6 @@ def test_rigid_bar_gives_the_hertz_impact_in_closed_form():
     assert float(h.contact_force.max()) == pytest.approx(k * depth ** (10 / 9), rel=1e-5)
     p = 19 / 9
     duration = 2 * depth / v0 * np.sqrt(np.pi) * gamma(1 + 1 / p) / gamma(0.5 + 1 / p)
-    by_quadrature = 2 * depth / v0 * quad(lambda x: 1 / np.sqrt(1 - x**p), 0, 1)[0]
-    assert duration == pytest.approx(by_quadrature, rel=1e-6)
     depths = np.asarray(h.roller_position - h.bar_position)
     after = int(np.argmax((depths <= 0) & (np.asarray(h.time) > 0.5 * duration)))
     before = after - 1
@@ -284,25 +247,15 @@ OMEGAS = 500.0, 2880.0  # 4800 rpm, and 27500 rpm where pulses overlap
 
 def train(omega, harmonics=24):
     law = RollerPassImpact(oscillator=IMPACT, harmonics=harmonics)
-    args = omega, HALF_ANGLE, Z, ROLLER, CLEARANCE
-    return law, pulse_train(law, *args)
-
-
-def truncated(omega, harmonics=24):
-    """The superposed force on a fine grid of tau, all of it and its first harmonics of passing."""
-    tau = 2 * np.pi * np.arange(Z * 512) / (Z * 512)
-    force = superposed(IMPACT, omega, tau)
-    spectrum = np.fft.rfft(force, axis=1)
-    kept = spectrum.copy()
-    kept[:, harmonics * Z + 1 :] = 0
-    return tau, force, spectrum / tau.size, np.fft.irfft(kept, tau.size, axis=1)
+    return pulse_train(law, omega, HALF_ANGLE, Z, ROLLER, CLEARANCE)
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_pulse_train_has_the_spectrum_of_the_superposed_pulses(omega):
-    _, force, spectrum, _ = truncated(omega)
-    _, coefficients = train(omega)
+    tau = 2 * np.pi * np.arange(Z * 512) / (Z * 512)
+    force = superposed(IMPACT, omega, tau)
+    spectrum, coefficients = np.fft.rfft(force, axis=1) / tau.size, train(omega)
     peak = np.abs(force).max()
     # Nothing lies between the multiples of Z.
     others = np.ones(spectrum.shape[1], bool)
@@ -320,7 +273,7 @@ def test_pulse_train_has_the_spectrum_of_the_superposed_pulses(omega):
 
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_mean_force_of_the_pulse_train_is_impulse_times_rate(omega):
-    _, coefficients = train(omega)
+    coefficients = train(omega)
     v0 = approach_speed(IMPACT.approach_ratio, omega, CLEARANCE)
     # the roller's change of momentum, exact whatever the shape of the pulse
     duration = 8 * float(impact_time_scale(IMPACT, ROLLER, v0))

@@ -86,7 +86,7 @@ def test_run_up_and_run_down_show_the_hysteresis_of_a_hardening_oscillator():
     """Between the folds of the hardening Duffing oscillator run-up stays on the large orbit and run-down on the small
     one; outside they agree."""
     speeds = np.linspace(1.1, 2.0, 37)
-    up, down = jc.run_up_down(HARDENING, speeds, starts=[(0.5, 0.0)], discard=150, revolutions=20, method=FAST)
+    up, down = jc.run_up_down(HARDENING, speeds, start=(0.5, 0.0), discard=150, revolutions=20, method=FAST)
     apart = np.abs(up["strobe"].mean("revolution") - down["strobe"].mean("revolution")).max("component")[:, 0] > 0.1
     inside = (speeds > DUFFING_FOLDS["down"].value) & (speeds < DUFFING_FOLDS["up"].value)
     assert np.array_equal(apart, inside)

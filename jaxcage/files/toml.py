@@ -9,7 +9,7 @@ from typing import Any
 
 import equinox as eqx
 
-from ..models import BearingModel, CageModel
+from ..models import AbstractForcedSystem, BearingModel, CageModel
 from .disk import replacing
 from .ranges import Range
 from .schema import ConfigError, submodules, values
@@ -18,7 +18,7 @@ from .schema import ConfigError, submodules, values
 _TABLE = re.compile(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?")
 
 
-def configuration(model: CageModel | BearingModel) -> dict[str, Any]:
+def configuration(model: AbstractForcedSystem) -> dict[str, Any]:
     """Every parameter, choice and count of `model` in SI units, nested as the tables of its TOML file.
 
     **Raises:** `ConfigError` for a model with laws of a user, which no table can hold.

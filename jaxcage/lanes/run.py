@@ -8,6 +8,7 @@ import xarray as xr
 from jaxtyping import Float
 
 from .._checks import require_x64
+from .._types import State
 from ..analysis import label_lanes, motion_label
 from ..models import INSTEAD, AbstractForcedSystem, require_known
 from ..solve import OUTCOMES, AbstractMethod
@@ -126,20 +127,25 @@ def sweep(
 
 
 def run_up_down(
-    model: AbstractForcedSystem, speeds: Speeds, *, progress: Progress | None = None, **settings: Any
+    model: AbstractForcedSystem,
+    speeds: Speeds,
+    *,
+    start: State | None = None,
+    progress: Progress | None = None,
+    **settings: Any,
 ) -> tuple[xr.Dataset, xr.Dataset]:
     """Sweep up and down in speed, each speed begun in the final state of the one before, which shows hysteresis.
 
     After a failure the next speed begins in the model's own initial state, so that one failure does not spoil the rest.
 
-    **Arguments:** model; ascending speeds [rad/s]; called with speeds done and speeds in all; fields of
-    `jaxcage.lanes.Run`.
+    **Arguments:** model; ascending speeds [rad/s]; initial state, by default the model's first; called with speeds done
+    and speeds in all; fields of `jaxcage.lanes.Run`.
 
     **Returns:** the sweep upwards and the sweep downwards, both at ascending speeds.
     """
     require_x64()
     run = Run.of(model, **{"confirm": False, "horizon": 0, **settings})
-    up = Plan.over_speed(model, speeds, 1)
+    up = Plan.over_speed(model, speeds, 1 if start is None else [start])
     speed, state, seen = up.lanes.speed, None, []
     for n in range(speed.size):  # one lane goes up, one comes down
         place = np.array([n, speed.size - 1 - n])

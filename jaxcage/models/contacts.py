@@ -202,11 +202,11 @@ def magnitude(x: Float[Array, "*n"], y: Float[Array, "*n"]) -> Float[Array, "*n"
 
 
 OfRoller = Scalar
-"""Of one roller; over all of them under `jax.vmap`."""
+"""A number of one roller."""
 
 
 class RacewayForces(NamedTuple):
-    """Of one raceway on a roller."""
+    """Forces of one raceway on a roller."""
 
     load: OfRoller
     """Q [N], pressing roller and raceway apart."""
@@ -215,7 +215,7 @@ class RacewayForces(NamedTuple):
     arm: OfRoller
     """h from the roller's centre [m]."""
     race_arm: OfRoller
-    """From the ring's centre [m]."""
+    """Distance of the contact from the ring's centre [m]."""
     lost_in_sliding: OfRoller
     """Power of the traction [W]."""
     lost_in_damping: OfRoller
@@ -225,14 +225,14 @@ class RacewayForces(NamedTuple):
 
 
 class RacewayConstants(NamedTuple):
-    """What a raceway contact needs to know."""
+    """Constants of a raceway contact."""
 
     half: Scalar
     """D/2 [m]."""
     radius: Scalar
-    """Of the raceway [m]."""
+    """Radius of the raceway [m]."""
     speed: Scalar
-    """Of its ring [rad/s]."""
+    """Speed of its ring [rad/s]."""
     stiffness: Scalar
     damping: Scalar
     smoothing: Scalar
@@ -270,7 +270,7 @@ def inner_contact(
 
 
 class PocketForces(NamedTuple):
-    """Of the bars on a roller."""
+    """Forces of the bars on a roller."""
 
     along: OfRoller
     """Force on the roller along the pocket's tangent t_j [N]."""
@@ -289,7 +289,7 @@ class PocketForces(NamedTuple):
 
 
 class PocketConstants(NamedTuple):
-    """What a pocket contact needs to know."""
+    """Constants of a pocket contact."""
 
     half: Scalar
     """D/2 [m]."""
@@ -333,14 +333,14 @@ def pocket_contact(
 
 
 class LandForces(NamedTuple):
-    """Of the land on the cage; the land gets the opposite force at its centre, and its own moment."""
+    """Forces of the land on the cage; the land gets the opposite force at its centre, and its own moment."""
 
     x: Scalar
     y: Scalar
     moment: Scalar
-    """On the cage about its centre [N m]."""
+    """Moment on the cage about its centre [N m]."""
     land_moment: Scalar
-    """On the land about its centre [N m]."""
+    """Moment on the land about its centre [N m]."""
     lost_in_film: Scalar
     lost_in_contact: Scalar
     rubbing: Scalar
@@ -362,7 +362,7 @@ class Guide(eqx.Module):
     friction: Scalar
     saturation_speed: Scalar
     arm: Scalar
-    """From the cage's centre to where it touches, along the line of centres; negative for a land inside it [m]."""
+    """Distance from the cage's centre to the contact along the line of centres; negative for a land inside it [m]."""
 
 
 def land_forces(

@@ -66,8 +66,8 @@ class InnerRing(eqx.Module):
 
 
 class Wear(eqx.Module):
-    """What the cage loses where it is rubbed by Archard's law, worn volume = K times load times sliding distance over
-    hardness; nothing that moves depends on it.
+    """Wear of the cage by Archard's law: worn volume = K times load times sliding distance over hardness. The motion
+    does not depend on it.
 
     J. F. Archard, J. Appl. Phys. 24 (1953) 981. The default is dry 60/40 leaded brass on tool steel, K = 6e-4 and
     95 kg/mm^2 (J. F. Archard and W. Hirst, Proc. R. Soc. A 236 (1956) 397): an upper bound, as oil makes it a hundred
@@ -236,13 +236,13 @@ class BearingModel(AbstractForcedSystem):
             "wear_mm3_per_h_per_W": 1e9 * 3600 * self.wear.volume(1.0),
         }
 
-    def scale(self, speed: Scalar) -> State:
-        return tuple(state_scale(self, speed).row)
+    def scale(self, speed: Scalar) -> Float[Array, " dim"]:
+        return state_scale(self, speed).row
 
-    def starts(self, speed: Scalar) -> tuple[State, ...]:
-        return tuple(tuple(row) for row in _starts(self, jnp.asarray(speed)))
+    def starts(self, speed: Scalar) -> tuple[Float[Array, " dim"], ...]:
+        return tuple(_starts(self, jnp.asarray(speed)))
 
-    def excursion(self, y: State) -> Scalar:
+    def excursion(self, y: Any) -> Scalar:
         """Eccentricity ratio of the cage in its land."""
         return jnp.hypot(*self.centre(y))
 
@@ -253,7 +253,7 @@ class BearingModel(AbstractForcedSystem):
         vibration on its raceway (NU2310 below 4000 rpm), 10 such periods: neighbouring motions diverge over time, not
         over revolutions.
         """
-        slow = float(_slowness(self, jnp.asarray(speed)))
+        slow = float(slowness(*map(np.asarray, _vibration(self, jnp.asarray(speed)))))
         return COMPARED / PERIODS * SPACING / slow if slow > 1 else SPACING
 
     def at_speed(self, speed: Scalar) -> BearingAtSpeed:
@@ -304,24 +304,26 @@ class BearingModel(AbstractForcedSystem):
         )
 
 
-def slowness(depth: Scalar, radial: Scalar, cage_speed: Scalar) -> Array:
+def slowness(
+    depth: Float[np.ndarray, "*lanes"], radial: Float[np.ndarray, "*lanes"], cage_speed: Float[np.ndarray, "*lanes"]
+) -> Float[np.ndarray, "*lanes"]:
     """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`.
 
     **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s].
     """
-    turned = PERIODS * TURN * depth / radial * jnp.abs(cage_speed)
-    return jnp.clip(SPACING / turned, 1.0, SLOWEST)
+    turned = PERIODS * TURN * depth / radial * np.abs(cage_speed)
+    return np.clip(SPACING / turned, 1.0, SLOWEST)
 
 
 @compiled
-def _slowness(model: BearingModel, speed: Scalar) -> Array:
+def _vibration(model: BearingModel, speed: Scalar) -> tuple[Array, Array, Array]:
     scale = state_scale(model, speed).row
-    return slowness(scale[2], scale[3], model.rolling_cage_speed(speed))
+    return scale[2], scale[3], model.rolling_cage_speed(speed)
 
 
 @compiled
 def _starts(model: BearingModel, speed: Scalar) -> Array:
-    return jnp.stack([rolling_start(model, speed, k).row for k in range(len(CAGE_STARTS))])
+    return jax.vmap(lambda place: rolling_start(model, speed, place=place).row)(jnp.array(CAGE_STARTS))
 
 
 class BearingOverTime(BearingModel):
@@ -338,19 +340,14 @@ class BearingOverTime(BearingModel):
 CagePlace = tuple[float, float, float, float]
 """Place of the cage's centre in clearances, and its velocity in clearances times the cage's speed."""
 CAGE_STARTS: tuple[CagePlace, ...] = ((0.0, -0.9, 0.0, 0.0), (0.4, 0.3, 0.0, 0.0), (-0.6, 0.1, 0.2, -0.3))
-"""Near its lowest place, and twice inside the clearance."""
-
-
+"""One start near the cage's lowest place, two inside the clearance."""
 WITHIN = 0.8
-"""Of the clearance, in which drawn starts lie."""
-
-
+"""Part of the clearance in which drawn starts lie."""
 LEAST_DEPTH, LEAST_SPEED = 1e-5, 1e-3
-"""Of a contact over the roller's diameter, and of the cage over the radial frequency of the rollers, for a scale."""
-
-
+"""Lower bounds of the scale: depth of a contact over the roller's diameter, cage speed over the radial frequency of the
+rollers."""
 LEAST_LOAD = 1e-3
-"""By which the inner ring is placed where there is no load [N]."""
+"""Load [N] by which the inner ring of a bearing without load is placed."""
 
 
 def drawn_places(count: int, seed: int = 0) -> tuple[CagePlace, ...]:

@@ -49,17 +49,17 @@ IMBALANCE = 1e-6
 
 
 class Geometry(NamedTuple):
-    """Where things are: directions of pockets, and of rollers from both ring centres."""
+    """Directions of pockets, and of rollers from both ring centres."""
 
     pocket_cos: Many
     pocket_sin: Many
     lag_cos: Many
     lag_sin: Many
     cos: Many
-    """Of the angle of the roller about the outer ring's centre."""
+    """Cosine of the roller's angle about the outer ring's centre."""
     sin: Many
     distance: Many
-    """From the inner ring's centre [m]."""
+    """Distance of the roller from the inner ring's centre [m]."""
     inner_out: Many
     """Direction from the inner ring's centre to the roller, along the roller's radius and across."""
     inner_across: Many
@@ -80,18 +80,18 @@ class Forces(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """What a roller passes on to cage and rings, and to the ledger; of all of them, the sums."""
+    """Forces, moments and powers that a roller passes on to cage, rings and ledger, or their sums over all rollers."""
 
     x: Many
     """Force of the cage on the roller [N]."""
     y: Many
     cage_moment: Many
-    """On the cage about its centre [N m]."""
+    """Moment on the cage about its centre [N m]."""
     inner_x: Many
     """Force of the inner ring on the roller [N]."""
     inner_y: Many
     inner_moment: Many
-    """Of the traction about the ring's centre [N m]."""
+    """Moment of the traction about the ring's centre [N m]."""
     outer_moment: Many
     traction: Many
     """Powers that are lost [W], to `drag`."""
@@ -108,7 +108,7 @@ class Passed(NamedTuple):
 
 
 MOVING = 7
-"""So many of them, the first, move cage and rings."""
+"""Number of entries of `Passed`, the first ones, that move cage and rings."""
 
 
 class BearingAtSpeed(AbstractField):
@@ -230,7 +230,7 @@ class BearingAtSpeed(AbstractField):
         return land_forces(self.guide, cage.x, cage.y, cage.vx, cage.vy, cage.cage_speed, self.outer_speed)
 
     def geometry(self, state: BearingState) -> Geometry:
-        """Where all rollers are."""
+        """Places of all rollers."""
         each = jax.vmap(self._geometry, in_axes=(0, None, 0, 0))
         return each(Rollers(*state.rollers), Bodies(*state.bodies), *self.pockets(state.clock[0]))
 
@@ -293,7 +293,7 @@ class BearingAtSpeed(AbstractField):
         return Rates(moved, jnp.stack(integrals), watched)
 
     def slip(self, spin: Scalar) -> Array:
-        """Of a roller's spin against pure rolling."""
+        """Slip of a roller's spin against pure rolling."""
         turns = self.rolling_spin != 0
         return jnp.where(turns, 1 - spin / jnp.where(turns, self.rolling_spin, 1.0), 0.0)
 

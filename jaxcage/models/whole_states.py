@@ -21,7 +21,7 @@ class Rollers(NamedTuple):
     radius: Float[Array, " rollers"]
     """Distance from the outer ring's centre [m]."""
     radial: Float[Array, " rollers"]
-    """Its rate [m/s]."""
+    """Rate of the radius [m/s]."""
     orbit: Float[Array, " rollers"]
     """Absolute angular speed psi' about the outer ring's centre [rad/s]."""
 

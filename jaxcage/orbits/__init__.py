@@ -4,8 +4,7 @@
 |-------------------|-------------------------------------------------------------------------------------|
 | `problem`         | the equations of an orbit, their unknowns, and parameters by name                   |
 | `step_counts`     | how many steps a revolution takes                                                   |
-| `newton`          | Newton's method for orbits, damped                                                  |
-| `implicit`        | derivatives of roots by the implicit function theorem                               |
+| `newton`          | Newton's method for orbits, damped; derivatives by the implicit function theorem    |
 | `orbit`           | periodic orbits, their multipliers, and the determinant these must have             |
 | `point`           | bifurcation points: kinds, and matrices and functions that vanish there             |
 | `step_control`    | step control of continuation: predictions, accepted and refused steps               |

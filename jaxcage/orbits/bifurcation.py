@@ -1,7 +1,7 @@
 """Bifurcation points of periodic orbits, by Newton's method on the orbit together with a scalar that vanishes there."""
 
 import dataclasses
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,22 +17,10 @@ from ..models import AbstractForcedSystem, require_speeds
 from ..solve import AbstractMethod
 from .branch import follow_both_ways
 from .continuation import Path, orbit_curves
-from .implicit import as_root
 from .location import sign_changes
-from .newton import AbstractEquations, Found, refined
-from .orbit import Orbit, OrbitEquations, PointGuess, guess_state, periodic_orbit, simulated, sorted_multipliers
-from .point import (
-    KINDS,
-    Kind,
-    Outcome,
-    Point,
-    bordered,
-    null_vectors,
-    require_found,
-    singular_matrix,
-    to_critical,
-    value_at,
-)
+from .newton import AbstractEquations, Found, as_root, refined
+from .orbit import Orbit, PointGuess, guess_state, periodic_orbit, sorted_multipliers
+from .point import Kind, Outcome, Point, bordered, null_vectors, require_found, singular_matrix, to_critical, value_at
 from .problem import SPEED, Given, OrbitProblem, Parameter, Prepared, frozen, is_traced, make_problem, name_of
 from .step_control import Points, StepControl
 from .step_counts import (
@@ -48,14 +36,10 @@ from .step_counts import (
 )
 
 
-TANGENTIAL = 1e-2
-"""A crossing is tangential if |mu| changes by less than this for a relative change of the parameter by 1."""
-ON_CIRCLE = 1e-5
-"""Largest squared distance of a critical multiplier from its place: a double one is known to the root of rounding."""
-SPUN = 200
-"""Revolutions of the simulation that finds an orbit."""
-WALK = StepControl(first=0.05, longest=0.25, most=250)
-"""Steps along a branch on which a bifurcation is looked for."""
+TANGENTIAL = 1e-2  # smallest change of |mu| for a relative change of the parameter by 1 at a crossing
+ON_CIRCLE = 1e-5  # largest squared distance of a critical multiplier: a double one is known to the root of rounding
+SPUN = 200  # revolutions of the simulation that finds an orbit
+WALK = StepControl(first=0.05, longest=0.25, most=250)  # along a branch on which a bifurcation is looked for
 
 
 class Singular(NamedTuple):
@@ -135,12 +119,12 @@ def bifurcation(
         require_at_least(1, periods=periods)
     if not 0 <= reach < float("inf"):
         raise ArgumentError("reach", said=f"must be at least 0 and finite, but {reach:g} was given.")
-    if kind not in KINDS:
-        raise ArgumentError("kind", said=f"must be one of {', '.join(KINDS)}, but '{kind}' was given.")
-    start = _read_guess(system, guess, parameter, speed)
-    given = Given(system, jnp.asarray(start.speed if speed is None else speed, dtype=float))
+    if kind not in get_args(Kind):
+        raise ArgumentError("kind", said=f"must be one of {', '.join(get_args(Kind))}, but '{kind}' was given.")
     near = guess if isinstance(guess, Orbit | Point) else None
-    periods = jnp.asarray((1 if near is None else near.periods) if periods is None else periods)
+    periods = (1 if near is None else near.periods) if periods is None else periods
+    start = _read_guess(system, guess, parameter, speed, periods, method)
+    given = Given(system, jnp.asarray(start.speed if speed is None else speed, dtype=float))
 
     def newton(method: AbstractMethod, counts: Counts, begin: _Begin) -> Any:
         """Return what `_find_point` finds from there."""
@@ -148,7 +132,7 @@ def bifurcation(
         there = Given(known.system, begin.speed).changed(parameter, begin.at)
         unit = jnp.where(begin.at == 0, 0.1, 0.1 * jnp.abs(begin.at))
         problem = make_problem(there, (parameter,), unit[None], periods, method)
-        return _find_point(problem, counts, cast(Kind, kind), known, there, begin)
+        return _find_point(problem, counts, cast(Kind, kind), known, begin)
 
     def find(begin: _Begin) -> Point:
         def by(method: AbstractMethod, counts: Counts) -> Point:
@@ -173,18 +157,8 @@ def bifurcation(
         return dataclasses.replace(found, error=error, outcome=jnp.where(far, Outcome.NOT_CONVERGED, found.outcome))
 
     found = find(start)
-    if (
-        is_traced((found, given, start))
-        or not reach
-        or int(found.outcome) not in (Outcome.NO_SUCH_POINT, Outcome.OTHER_KIND)
-    ):
+    if is_traced((found, given, start)) or not reach or found.status not in ("no such point", "other kind"):
         return found
-    if start.spin:
-        here = Given(system, start.speed).changed(parameter, start.at)
-        orbit = periodic_orbit(
-            here.system, here.speed, int(periods), guess=start.state, revolutions=SPUN, method=method
-        )
-        start = start._replace(state=orbit.state)
     there, looked = _along_branch(given, parameter, int(periods), start, kind, reach, method)
     if there is not None:
         again = find(_Begin(jnp.asarray(there.state), jnp.asarray(there.speed), jnp.asarray(there.value)))
@@ -193,15 +167,11 @@ def bifurcation(
 
 
 class _Begin(NamedTuple):
-    """Where Newton's method for a point begins."""
+    """Where Newton's method for a point begins: state [SI], speed [rad/s], value of the parameter [SI]."""
 
     state: Array
-    """State [SI]."""
     speed: Array
     at: Array
-    """Value of the parameter."""
-    spin: bool = False
-    """Whether the orbit at this value is to be found by simulation from the state."""
 
 
 def _along_branch(
@@ -244,18 +214,25 @@ def _along_branch(
     return min(mine, key=lambda p: abs(p.value - at), default=None), looked
 
 
-def _read_guess(system: AbstractForcedSystem, guess: PointGuess, parameter: Parameter, speed: Scalar | None) -> _Begin:
-    """Return where Newton's method begins."""
-    spin, known_speed = False, speed
+def _read_guess(
+    system: AbstractForcedSystem,
+    guess: PointGuess,
+    parameter: Parameter,
+    speed: Scalar | None,
+    periods: int | Int[Array, ""],
+    method: AbstractMethod | None,
+) -> _Begin:
+    """Return where Newton's method begins: on an orbit that simulation finds, if only a value is given."""
+    known_speed, state, simulated = speed, None, False
     if isinstance(guess, Orbit | Point):
         state, known_speed = guess.state, guess.speed
         at = value_at(guess, system, known_speed, parameter)
+        if isinstance(guess, Point) and not is_traced((guess, at)):
+            require_found(guess, "guess")
     elif isinstance(guess, tuple) and len(guess) == 2:
         state, at = guess
     else:
-        spin, state, at = True, None, guess
-    if isinstance(guess, Point) and not is_traced((guess, at)):
-        require_found(guess, "guess")
+        simulated, at = True, guess
     if wrong(Scalar, at):
         said = "must be a number, a state and a number, an `Orbit` or a `Point`"
         raise ArgumentError("guess", said=f"{said}, but {shown(guess)} was given.")
@@ -264,25 +241,21 @@ def _read_guess(system: AbstractForcedSystem, guess: PointGuess, parameter: Para
     if known_speed is None:
         raise ArgumentError("speed", said=f"must be given where the parameter is `{parameter}`, but it is not.")
     require_speeds(system, known_speed)
+    state = guess_state(system, known_speed, state)
     speed, at = jnp.asarray(known_speed, dtype=float), frozen(jnp.asarray(at, dtype=float))
-    return _Begin(guess_state(system, known_speed, state), speed, at, spin)
+    if simulated:
+        here = frozen(Given(system, speed)).changed(parameter, at)
+        orbit = periodic_orbit(here.system, here.speed, periods, guess=state, revolutions=SPUN, method=method)
+        state = jnp.where(orbit.converged, orbit.state, state)
+    return _Begin(state, speed, at)
 
 
 @compiled
 def _find_point(
-    problem: OrbitProblem, counts: Counts, kind: Kind, given: Given, there: Given, begin: _Begin
+    problem: OrbitProblem, counts: Counts, kind: Kind, given: Given, begin: _Begin
 ) -> tuple[Point, PointEquations, Array, Singular]:
-    """Find the point, without derivatives; return its equations, its unknowns and what else is known there, too.
-
-    **Arguments:** problem and numbers of steps; kind; system as it is, and as it is at the guess; the guess.
-    """
-    u0 = begin.state / problem.scale
-    if begin.spin:  # on the orbit itself, if there is one here
-        u0 = simulated(problem, there, begin.state, SPUN, counts) / problem.scale
-        fixed = dataclasses.replace(problem, parameters=(), units=jnp.ones(0))
-        u1, found = refined(OrbitEquations(fixed), there, u0, counts)
-        u0 = jnp.where(found.converged, u1, u0)
-    u0 = jnp.append(u0, begin.at / problem.units)
+    """Find the point, without derivatives; return its equations, its unknowns and what else is known there, too."""
+    u0 = jnp.append(begin.state / problem.scale, begin.at / problem.units)
     strobe = by_steps(problem, jnp.minimum(counts.last, ENOUGH)).prepare(u0, given)
     _, monodromy = problem.returned(strobe, u0[: problem.dimension])
     a = singular_matrix(kind, monodromy)

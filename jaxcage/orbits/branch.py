@@ -43,8 +43,11 @@ AMPLITUDE, SMALLEST_AMPLITUDE = 0.02, 1e-5
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Orbits in order along a branch: values of the parameter [SI], speeds [rad/s], states at phase 0 [SI], multipliers,
-    steps per revolution, and errors as in `Orbit`; bifurcations in order along the branch."""
+    """Orbits in order along a branch, and its bifurcations.
+
+    Values of the parameter and states at phase 0 are in SI units, speeds in rad/s; `steps` are those of a revolution,
+    and `error` is that of `Orbit`.
+    """
 
     parameter: str
     value: Float[np.ndarray, " points"]

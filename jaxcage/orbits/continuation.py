@@ -29,26 +29,17 @@ from .step_control import Points, StepControl
 from .step_counts import GIVEN_UP, SETTLED, Counts, by_rodas4, by_steps, counted
 
 
-CHUNK = 8
-"""Points per call: up to eight cost what one does, since they share the processor's instructions."""
-FOLLOWING, OF_A_STEP = 1e-6, 1e-5
-"""Newton's last step during continuation, in the unknowns' units, and over the step's length if that is less: points
-are then good to about its square."""
-ONCE = 1e300
-"""Tolerance that asks for a single step of Newton's method; infinity would give NaN where an unknown is zero."""
+CHUNK = 8  # points per call: up to eight cost what one does, since they share the processor's instructions
+FOLLOWING, OF_A_STEP = 1e-6, 1e-5  # Newton's last step, in the unknowns' units, or over a shorter step's length
+ONCE = 1e300  # tolerance for a single step of Newton's method; infinity would give NaN where an unknown is zero
 CORRECTIONS = 8
-LOOSE, COARSER = 10.0, 100.0
-"""During continuation errors may be larger than allowed by the first factor; if they are smaller than that by the
-second, half as many steps per revolution are taken."""
-MOVED = 0.1
-"""Largest change of a point by half the steps, over the step's length: with more, the followed curve may be the error
-of the steps."""
+LOOSE = 10.0  # errors may be larger than allowed by this factor
+COARSER = 100.0  # half as many steps per revolution are taken if errors are smaller than that by this factor
+MOVED = 0.1  # largest change by half the steps over the step's length: with more, the curve may be the steps' error
 CROSSED, ASIDE = 1e-4, 0.01
 """A step across which the orientation changes is halved down to the first length. If it changes all the same the curve
 crosses another one, and is left by one step from the second distance before the crossing, near which tangents are lost
 to rounding."""
-
-
 Start = tuple[np.ndarray, float]
 """A state [SI] and the value of the parameter."""
 
@@ -258,20 +249,16 @@ def first_points(
 
 @dataclasses.dataclass
 class Path:
-    """A curve while it is followed."""
+    """A curve while it is followed: its points, the length of its next step, its steps per revolution, its number, and
+    why it ended, empty while it has not (see `Branch.ended`). `crosses` allows the next point to be beyond a crossing.
+    """
 
     points: list[Points]
     length: float
-    """Length of the next step."""
     steps: int
-    """Steps per revolution."""
     number: int = 0
     ended: str = ""
-    """Why it ended, empty while it has not. `range`: it left the range. `closed`: it came back to its first point.
-    `steps`: the largest number of steps was reached. `stopped`: an event stopped it. `stuck`: the shortest step found
-    no further point. `inaccurate`: even the finest steps per revolution do not tell where the next point is."""
     crosses: bool = False
-    """Whether the next point may be beyond a curve that crosses."""
 
     @property
     def row(self) -> Points:

@@ -31,7 +31,7 @@ from ..solve import AbstractMethod
 from .bifurcation import TANGENTIAL, PointEquations, critical_rate
 from .branch import FEIGENBAUM, Cascade
 from .continuation import in_parallel
-from .implicit import FieldNumbers, around_root, expansion, numbers_around, numbers_of
+from .newton import FieldNumbers, around_root, expansion, numbers_around, numbers_of
 from .orbit import OrbitEquations, StateLike, periodic_orbit, sorted_multipliers
 from .point import Kind, Point, null_vectors, singular_matrix
 from .problem import SPEED, Given, OrbitProblem, make_problem
@@ -47,26 +47,26 @@ first, the step must be below the second, and it may lead no further from the gu
 
 @dataclasses.dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of an edge, or of the width between two edges, with respect to every parameter."""
+    """Derivatives of an edge, or of the width between two edges, with respect to every parameter.
+
+    `derivative` is d value [rpm] / d parameter [SI], `elasticity` the relative change of the value over that of the
+    parameter, and `homogeneity` holds the relative residuals of the identities for mass, length and time, NaN if a
+    parameter's unit is not known. `transversality` is d|mu|/d speed [s] (see `Point`), for a width or a limit the
+    smallest one; `error_rpm` is the distance of the value to that by half the `steps` per revolution. The `state` of
+    the orbit at phase 0 [SI] is None for a width or a limit.
+    """
 
     name: str
     kind: str
     value_rpm: float
     derivative: dict[str, float]
-    """d value [rpm] / d parameter [SI]."""
     elasticity: dict[str, float]
-    """Relative change of the value over the relative change of the parameter."""
     homogeneity: dict[str, float]
-    """Relative residuals of the identities for mass, length and time; NaN if a parameter's unit is not known."""
     transversality: float
-    """d|mu|/d speed [s] (see `Point`); the smallest one for a width or a limit."""
     status: str
     state: Float[np.ndarray, " dim"] | None = None
-    """State of the orbit at phase 0 [SI]; None for a width or a limit."""
     error_rpm: float = float("nan")
-    """Distance of the value to that by half the steps."""
     steps: int = 0
-    """Steps per revolution; 0 for a width or a limit."""
 
     @property
     def trusted(self) -> bool:
@@ -97,18 +97,16 @@ def _pulled_back(problem: OrbitProblem, given: Given, u: Array, weight: Array) -
 
 
 class _Edge(NamedTuple):
-    """An edge located to rounding, by some number of steps."""
+    """An edge located to rounding, by some number of steps: Newton's last step in the unknowns' units (`residual`), the
+    derivatives of the speed by the field's numbers (`weight`), the rate d|mu| / d speed (at a fold the drift along the
+    critical direction), and the distance of the speed to that by half the steps [rad/s] (`error`)."""
 
     problem: OrbitProblem
     u: Array
     residual: Array
-    """Newton's last step, in the unknowns' units."""
     weight: Array
-    """Derivatives of the speed at the edge by the numbers of the field."""
     rate: float
-    """d|mu| / d speed (at a fold: the drift along the critical direction)."""
     error: float = float("nan")
-    """Distance of the speed to that by half the steps [rad/s]."""
     steps: int = 0
 
     @property
@@ -284,14 +282,12 @@ def _combined(name: str, kind: str, parts: Sequence[tuple[float, Sensitivity]]) 
 
 
 class LeadingMultiplier(NamedTuple):
-    """The largest multiplier of the orbit near a guess; NaN if there is none."""
+    """The largest multiplier of the orbit near a guess, NaN if there is none: its size |mu|, d|mu| / d parameter [SI],
+    and the state of the orbit at phase 0 [SI]."""
 
     size: float
-    """|mu|: below 1 the orbit is stable."""
     derivative: dict[str, float]
-    """d|mu| / d parameter [SI]."""
     state: Float[np.ndarray, " dim"]
-    """State of the orbit at phase 0 [SI]."""
 
 
 @compiled

@@ -19,53 +19,35 @@ from .step_control import Points
 from .step_counts import BY_OTHERS, MOST_OF_A_POINT, POINT, other_steps
 
 
-WIDER = (0, 1, 3)
-"""A bifurcation that is not between the two orbits at which it was seen is looked for this many orbits further out."""
-BESIDE = 0.02
-"""By other steps it is first looked for this close to where it was, of the length between the two orbits, or twice as
-far as it moved last."""
-PART = 1e-3
-"""It is refined until it moves by this part of that, which leaves far less than its error."""
-CLEAR = 1e-4
-"""Orbits are counted if their multipliers are further than this from the unit circle: others may be on either side by
-rounding, or by Newton's last step."""
-HALVINGS, APART = 20, 1e-7
-"""Most halvings of a step, and the length below which it is not halved, in the unknowns' units."""
-NEARLY = 0.1
-"""Allowed error of a parabola through three points: of an extremum, over the function's change in the steps beside it,
-and of its place, over a step."""
-SUNK = 0.75
-"""A parabola that puts the extremum below this part of the lesser end is not accurate about the rest, either."""
-STEEP = 30.0
-"""A map whose derivative is larger than this may have another one at the orbit than at Newton's last iterate before."""
-LOOKED = 1e-4
-"""Steps below this length are not halved because of a parabola: where orbits cross, the functions are rounding."""
+WIDER = (0, 1, 3)  # a bifurcation that is not where it was seen is looked for this many orbits further out
+BESIDE = 0.02  # by other steps it is first looked for this close to where it was, over the length between the orbits
+PART = 1e-3  # it is refined until it moves by this part of its last move
+CLEAR = 1e-4  # orbits with a multiplier this close to the unit circle are not counted as stable or unstable
+HALVINGS, APART = 20, 1e-7  # most halvings of a step, and the length below which it is not halved
+NEARLY = 0.1  # allowed error of a parabola: of its extremum over the function's change, of its place over a step
+SUNK = 0.75  # a parabola that puts the extremum below this part of the lesser end is not accurate about the rest
+LOOKED = 1e-4  # shorter steps are not halved because of a parabola: where orbits cross, the functions are rounding
+STEEP = 30.0  # a steeper map may have another derivative at the orbit than at Newton's last iterate before
 MOST_ITERATIONS = 40
-LOCATED = 1e-9
-"""Accuracy of places, in the unknowns' units."""
-BRACKETED = 1e-5
-"""A branch point, at which the curve's equations are singular, is bracketed this closely, and interpolated."""
+LOCATED, BRACKETED = 1e-9, 1e-5  # accuracy of places; of branch points, where the curve's equations are singular
 
 
 @dataclasses.dataclass
 class Place:
-    """A bifurcation between two orbits of a branch."""
+    """A bifurcation of some kind in a row of orbits, after one of them; `point` is None if it was not found.
+
+    It is looked for by so many `steps` per revolution, close to where it was to the accuracy `within`. `error` is its
+    distance to the place by half the steps, and `moved` the expected one by other steps, both in the unknowns' units.
+    """
 
     row: Points
-    """Orbits of the branch."""
     after: int
-    """The orbit before it."""
     kind: str
     point: Points | None = None
-    """None if it was not found."""
     error: float = float("inf")
-    """Distance to the place by half the steps, in the parameter's unit."""
     steps: int = 0
-    """Steps per revolution with which it is looked for."""
     moved: float = 0.0
-    """Expected distance to the place by other steps."""
     within: float = LOCATED
-    """Accuracy with which it is looked for close to where it was."""
 
     def ends(self, beyond: int | None) -> Points | None:
         """Return points on both sides: orbits, so many further out, or close to where it was found; None if it was

@@ -18,8 +18,7 @@ from .._notebook import notebook_html
 from .._types import Scalar, State
 from ..models import AbstractForcedSystem, require_speeds
 from ..solve import REVOLUTION, SURE, AbstractMethod, FixedSteps, StrobeMap, strobe_map
-from .implicit import as_root
-from .newton import AbstractEquations, refined
+from .newton import AbstractEquations, as_root, refined
 from .problem import Given, OrbitProblem, Prepared, frozen, is_traced, make_problem
 from .step_counts import ENOUGH, IMAGE, SETTLED, SLOPE, Counts, by_steps, with_fallback
 
@@ -28,10 +27,8 @@ if TYPE_CHECKING:
     from .point import Point
 
 ROUNDING = 1e-13
-AT_REST = 1e-3
-"""A simulation has led to an orbit if it moves by less, in units of the system's scale."""
-LIOUVILLE_TOLERANCE = 1e-3
-"""Largest disagreement in log|det M| at which multipliers are trusted."""
+AT_REST = 1e-3  # a simulation has led to an orbit if it moves by less, in units of the system's scale
+LIOUVILLE_TOLERANCE = 1e-3  # largest disagreement in log|det M| at which multipliers are trusted
 ADAPTIVE_PARTS, MOST_PARTS = 256, 4096
 """Parts of a revolution for integrating the divergence: with a method that has no steps, and with steps that are a
 multiple of the second."""
@@ -68,32 +65,31 @@ class OrbitEquations(AbstractEquations):
 
 
 class Orbit(eqx.Module):
-    """A periodic orbit. If none was found its numbers are NaN and `status` says so."""
+    """A periodic orbit. If none was found its numbers are NaN and `status` says so.
+
+    - `state`: state at phase 0 [SI]; `speed` [rad/s].
+    - `multipliers`: Floquet multipliers over all its `periods`, the largest first; `monodromy` is the derivative of the
+        map, in units of the system's scale, in which `residual` is the largest component of P(z) - z.
+    - `liouville`: log|det M| minus the integral of the field's divergence over the orbit, which must be equal. Both are
+        limited to what rounding resolves of the smallest multiplier, so that the others check a strongly damped orbit.
+    - `steps`: steps per revolution of `solver`; 1 if the method has no such number and is `solver` itself.
+    - `error`: three times the largest component of the change of P at the orbit against half as many steps, in units of
+        the scale: at a grazing contact one difference of steps may be too small by chance. It is infinite if these
+        steps find no orbit, NaN if the method has no number of steps.
+    """
 
     state: Float[Array, " dim"]
-    """State at phase 0 [SI]."""
     speed: Scalar
-    """Speed [rad/s]."""
     multipliers: Complex[Array, " dim"]
-    """Floquet multipliers over all its periods, the largest first."""
     monodromy: Float[Array, "dim dim"]
-    """Derivative of the map, in units of the system's scale."""
     residual: Float[Array, ""]
-    """Largest component of P(z) - z, in units of the system's scale."""
     liouville: Float[Array, ""]
-    """log|det M| minus the integral of the field's divergence over the orbit, which must be equal. Both are limited to
-    what rounding resolves of the smallest multiplier, so that the others check an orbit with strong damping."""
     steps: Int[Array, ""]
-    """Steps per revolution; 1 if the method has no such number."""
     error: Float[Array, ""]
-    """Three times the largest component of the change of P at the orbit against half as many steps, in units of the
-    system's scale: at a grazing contact one difference of steps may be too small by chance. It is infinite if these
-    steps find no orbit, NaN if the method has no number of steps."""
     converged: Bool[Array, ""]
     iterations: Int[Array, ""]
     periods: Int[Array, ""]
     solver: dfx.AbstractSolver | AbstractMethod = eqx.field(static=True)
-    """Solver that takes these steps, or the whole method if that chooses its steps itself."""
 
     @property
     def method(self) -> AbstractMethod:
@@ -253,7 +249,7 @@ def _place(equations: OrbitEquations, u: Array, monodromy: Array) -> tuple[Array
 def periodic_orbit(
     system: AbstractForcedSystem,
     speed: Scalar,
-    periods: int = 1,
+    periods: int | Int[Array, ""] = 1,
     *,
     guess: Guess | None = None,
     revolutions: int | None = None,

@@ -10,7 +10,7 @@ The determinants are symmetric functions of all multipliers: nothing jumps when 
 """
 
 import enum
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -26,7 +26,6 @@ from .problem import SPEED, Parameter, value_of
 
 
 Kind = Literal["period-doubling", "Neimark-Sacker", "fold", "branch-point"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 CRITICAL = {"period-doubling": -1.0, "fold": 1.0, "branch-point": 1.0}
 """The critical multiplier of each kind that has a real one."""
 
@@ -106,62 +105,52 @@ class Outcome(enum.IntEnum):
     """Outcome of the search for a point."""
 
     FOUND = 0
-    NO_SUCH_POINT = 1
-    """Newton's method found none."""
-    OTHER_KIND = 2
-    """The multipliers are not those of the kind asked for, as at a neutral saddle."""
-    TANGENTIAL = 3
-    """The multiplier hardly crosses, so that the place is not a function of the design."""
-    NOT_CONVERGED = 4
-    """Half the steps put it elsewhere."""
-    UNEXPLAINED = 5
-    """The number of unstable multipliers changes and no bifurcation is found."""
-    GIVEN = 6
-    """It is not solved for yet."""
+    NO_SUCH_POINT = 1  # Newton's method found none
+    OTHER_KIND = 2  # the multipliers are not those of the kind asked for, as at a neutral saddle
+    TANGENTIAL = 3  # the multiplier hardly crosses, so that the place is not a function of the design
+    NOT_CONVERGED = 4  # half the steps put it elsewhere
+    UNEXPLAINED = 5  # the number of unstable multipliers changes and no bifurcation is found
+    GIVEN = 6  # it is not solved for yet
 
 
 class Point(eqx.Module):
     """A bifurcation of a periodic orbit. If none was found its numbers are NaN and `status` says so.
 
-    Kind, speed and state are enough to start Newton's method from.
+    - `kind`: `period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also `unexplained`: the number
+        of unstable multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one.
+        Kind, speed and state are enough to start Newton's method from.
+    - `speed` [rad/s], `state` at phase 0 [SI] and `value` of the `parameter` [SI], which may be the speed, are
+        differentiable. `periods` are the revolutions after which the orbit closes; `steps` are those of a revolution.
+    - `error`: distance of the value to that by half the steps or, if that is more, twice the distance to that by three
+        quarters of them and one [SI]; infinite if these do not find it, NaN if the method has no number of steps; for
+        an unexplained change the distance within which it lies. Under `jit`, `vmap` and `grad` only half the steps are
+        tried.
+    - `direction`: critical direction in the state [SI], of length 1 in units of the scale; zero for a Neimark-Sacker
+        bifurcation. `residual`: largest component of the equations, in units of the scale.
+    - `transversality`: d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is
+        infinite, the drift p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed
+        on a branch.
+    - `index` and `edge`, on a branch: the orbit before the point, and whether a stable orbit is on one side of it.
+    - `looked`: where it was looked for, if neither Newton's method nor the branch led to it.
     """
 
     kind: str = eqx.field(static=True)
-    """`period-doubling`, `Neimark-Sacker`, `fold` or `branch-point`; on a branch also `unexplained`: the number of
-    unstable multipliers changes and no bifurcation is found, so that one was missed, or the branch is not one."""
     speed: Scalar
-    """Speed [rad/s]; differentiable."""
     state: Float[Numbers, " dim"]
-    """State of the orbit at phase 0 [SI]; differentiable."""
     periods: Int[Array, ""] | int = 1
-    """Revolutions after which the orbit closes."""
     steps: Int[Array, ""] | int = 0
-    """Steps per revolution; 0 if they are not known."""
     parameter: str = eqx.field(static=True, default=SPEED)
     value: Scalar = float("nan")
-    """Value of the parameter [SI], which may be the speed; differentiable."""
     error: Scalar = float("nan")
-    """Distance of the value to that by half the steps or, if that is more, twice the distance to that by three quarters
-    of them and one [SI]; infinite if these do not find it, NaN if the method has no number of steps; for an unexplained
-    change the distance within which it lies. Under `jit`, `vmap` and `grad` only half the steps are tried."""
     multipliers: Complex[Numbers, " multipliers"] = eqx.field(default_factory=lambda: np.zeros(0, dtype=complex))
-    """Floquet multipliers, the largest first."""
     direction: Float[Numbers, " coordinates"] = eqx.field(default_factory=lambda: np.zeros(0))
-    """Critical direction in the state [SI], of length 1 in units of the scale; zero for Neimark-Sacker bifurcations."""
     residual: Scalar = float("nan")
-    """Largest component of the equations, in units of the system's scale."""
     transversality: Scalar = float("nan")
-    """d|mu|/d parameter of the critical multiplier along the orbit [1/SI]; at a fold, where that is infinite, the drift
-    p dP/d parameter of the map along the critical direction, with p q = 1. It is not computed on a branch."""
     outcome: Int[Array, ""] | int = Outcome.GIVEN.value
-    """Code of the `Outcome`."""
     iterations: Int[Array, ""] | int = 0
     index: int = eqx.field(static=True, default=-1)
-    """For a point on a branch: the branch's orbit before it."""
     edge: bool = eqx.field(static=True, default=False)
-    """For a point on a branch: whether a stable orbit is on one side of it."""
     looked: str = eqx.field(static=True, default="")
-    """Where it was looked for, if neither Newton's method from the guess nor the branch led to it."""
 
     def __post_init__(self) -> None:
         if self.parameter == SPEED:

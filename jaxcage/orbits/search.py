@@ -32,18 +32,12 @@ from .problem import SPEED, Given
 from .step_control import StepControl
 
 
-ROUND, ROUNDS = 4, 8
-"""Branches followed at a time, and how often."""
-PATIENCE = 150
-"""Unstable orbits in a row after which a branch is not followed further."""
-ON_BRANCH = 0.03
-"""Largest distance of an orbit on a branch from the branch, in units of the system's scale."""
-SPREAD = 0.6
-"""Random initial states are spread over this share of the system's scale in every direction."""
-SAME = 1e-4
-"""Largest distance of equal orbits: an orbit that hardly attracts moves by a hundred times the error of its map."""
-NEARLY = 0.1
-"""A simulation that moves by less in its last revolution, in units of the scale, approaches an orbit."""
+ROUND, ROUNDS = 4, 8  # branches followed at a time, and how often
+PATIENCE = 150  # unstable orbits in a row after which a branch is not followed further
+ON_BRANCH = 0.03  # largest distance of an orbit on a branch from the branch, in units of the system's scale
+SPREAD = 0.6  # random initial states are spread over this share of the system's scale in every direction
+SAME = 1e-4  # largest distance of equal orbits: one that hardly attracts moves by a hundred times its map's error
+NEARLY = 0.1  # a simulation that moves by less in its last revolution, in units of the scale, approaches an orbit
 Progress = Callable[[str, int, int], None]
 Scale = Callable[[float], np.ndarray]
 """Units of the state at a speed [rad/s]."""

@@ -15,41 +15,35 @@ import numpy as np
 from .._errors import ArgumentError
 
 
-AIM = 3e-3
-"""Distance from its prediction that the next point should have, in the unknowns' units."""
-VEER = 0.7
-"""Angle by which the next step should turn, over the largest angle allowed."""
-SHRINKAGE, GROWTH = 0.5, 1.8
-"""Smallest and largest ratio of a step to the one before, if that was accepted."""
-TURN, BEND, SWING = 0.9, 0.3, 0.5
-"""Limits of a step. The first is the smallest cosine of the angle between its tangents. The second is the largest
-correction, over its length: with more, Newton's method may have gone to another curve. The third is the largest change
-of the equations' derivative, over its size and one: with more, folds may have been passed over."""
+AIM = 3e-3  # distance from its prediction that the next point should have, in the unknowns' units
+VEER = 0.7  # angle by which the next step should turn, over the largest angle allowed
+SHRINKAGE, GROWTH = 0.5, 1.8  # smallest and largest ratio of a step to the one before, if that was accepted
+TURN = 0.9  # smallest cosine of the angle between the tangents of a step
+BEND = 0.3  # largest correction over the step's length: with more, Newton's method may have gone to another curve
+SWING = 0.5  # largest change of the derivative, over its size and one: with more, folds may have been passed over
 NEARBY, OF_LENGTH, OF_MISSED = 1e-4, 1e-2, 0.5
 """Largest distance of a point from where its tangent says that it is: in the unknowns' units, over the step's length,
 or over its distance from the prediction."""
 
 
 class Points(NamedTuple):
-    """Points of curves: NumPy arrays, with an axis of points first if there are several."""
+    """Points of curves: NumPy arrays, with an axis of points first if there are several.
+
+    There are the unknowns u, shape (n,), the unit tangent on the side of the plane's normal, the derivative of the
+    equations, shape (m, n), what else the equations tell (`aux`), and the steps per revolution. The error is the
+    distance to the point by half the steps (see `AbstractEquations.apart`), `excess` its ratio to what is allowed, and
+    `moved` the same distance in the unknowns' units.
+    """
 
     u: Any
-    """Unknowns, shape (n,)."""
     tangent: Any
-    """Unit tangent, shape (n,), on the side of the normal of the plane on which the point was found."""
     jacobian: Any
-    """Derivative of the equations, shape (m, n)."""
     converged: Any
     aux: Any
-    """What else the equations tell at the point."""
     steps: Any
-    """Steps per revolution."""
     error: Any
-    """Distance to the point by half the steps (see `AbstractEquations.apart`)."""
     excess: Any
-    """Ratio of this distance to what is allowed."""
     moved: Any
-    """The same distance in the unknowns' units."""
 
     @staticmethod
     def stacked(points: Sequence["Points"]) -> "Points":
@@ -81,16 +75,14 @@ class Points(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A new point beside its prediction and the point before it."""
+    """A new point beside its prediction and the last point: its distance from the prediction, the angle between the
+    tangents over the largest allowed, whether it is sure to be on the curve or on one that crosses it, and whether the
+    determinant of the equations with the tangent has the same sign."""
 
     missed: float
-    """Distance of the point from its prediction."""
     turned: float
-    """Angle between the tangents, over the largest angle allowed."""
     sure: bool
-    """Whether the point is on the curve, or on one that crosses it."""
     same: bool
-    """Whether the determinant of the equations with the tangent has the same sign."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,21 +18,15 @@ from ..solve import AbstractMethod, FixedSteps, method as make_method
 
 
 FIRST, FIRST_OF_RODAS4, MOST = 256, 512, 16384
-MOST_OF_A_POINT = 2 * MOST
-"""A bifurcation point by 16384 steps is confirmed by twice as many."""
-ENOUGH = 4096
-"""Most steps of a computation that only leads to an orbit."""
-GIVEN_UP = 2048
-"""If this many steps find nothing, more are not tried."""
+MOST_OF_A_POINT = 2 * MOST  # a bifurcation point by 16384 steps is confirmed by twice as many
+ENOUGH = 4096  # most steps of a computation that only leads to an orbit
+GIVEN_UP = 2048  # if this many steps find nothing, more are not tried
 IMAGE, SLOPE = 1e-6, 1e-3
 """Largest change of the map, in units of the system's scale, and of its derivative, relative to one plus its size,
 between an orbit's steps and half as many."""
-POINT = 1e-7
-"""Largest change of the place of a bifurcation, relative."""
-SETTLED = 2e-4
-"""A point whose place changes by more than this, relative, is not known; nor is an orbit with a larger error."""
-BY_OTHERS = 2.0
-"""The stated error of a point is at least this many times its distance to the point by `other_steps`."""
+POINT = 1e-7  # largest change of the place of a bifurcation, relative
+SETTLED = 2e-4  # a point whose place changes by more, relative, is not known; nor is an orbit with a larger error
+BY_OTHERS = 2.0  # the stated error of a point is at least this many times its distance to that by `other_steps`
 
 
 def other_steps(steps: Any) -> Any:

@@ -33,16 +33,17 @@ CASCADE_LEVELS = 4
 
 @dataclasses.dataclass(frozen=True)
 class LossZones:
-    """Unstable ranges of the synchronous orbit between two speeds."""
+    """Unstable ranges of the synchronous orbit between two speeds, ascending.
+
+    An edge is None if a range goes on beyond the speeds that were searched. `edges` has them by name, `zone 1 onset`,
+    `zone 1 exit`, `zone 2 onset`, ..., and `coexisting` the orbits there, as `SynchronousOrbits.coexisting` gives them.
+    `principal` is the stretch on which most simulations from the conventional start settled.
+    """
 
     zones: tuple[Zone, ...]
-    """Ascending; an edge is None if a range goes on beyond the speeds that were searched."""
     edges: dict[str, Point]
-    """Edges by name: `zone 1 onset`, `zone 1 exit`, `zone 2 onset`, ..."""
     coexisting: dict[str, list[tuple[int, bool, np.ndarray, np.ndarray]]]
-    """Orbits at each edge: branch, whether stable, state [SI], multipliers."""
     principal: Stretch | None
-    """The stretch on which most simulations from the conventional start settled."""
     close_below_rpm: float
 
     def __str__(self) -> str:
@@ -135,11 +136,11 @@ def _share(found: SynchronousOrbits, onset: Point | None, leaves: Point | None) 
 
 @dataclasses.dataclass(frozen=True)
 class Explained:
-    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades behind these."""
+    """Chaotic zones with the mechanisms of their edges, and the bifurcations or cascades with which these coincide, by
+    edge, e.g. `zone 1 exit`. Other edges stay statistical."""
 
     zones: Zones
     sources: dict[str, Point | Cascade]
-    """Bifurcation or cascade with which an edge, e.g. `zone 1 exit`, coincides. Other edges stay statistical."""
 
 
 def explain(

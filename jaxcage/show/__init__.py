@@ -17,7 +17,7 @@
 | `reproduction`    | the paper's edges, conclusions and diagrams beside the model's        |
 | `findings`        | everything that a report shows, computed                              |
 | `sections`        | sections of the report                                                |
-| `checks`          | tables of the report that no command prints                           |
+| `checks`          | tables of checks and settings for the report                          |
 | `zone_tables`     | zones found in a sweep or by a search                                 |
 | `orbit_tables`    | bifurcations, stable stretches, zones without a synchronous orbit     |
 | `gradient_tables` | derivatives of edges, of lasting chaos, of means                      |
@@ -143,7 +143,7 @@ from .quantity_tables import (
     unit_of as unit_of,
 )
 from .sections import Section as Section, assess as assess, verdict_table as verdict_table
-from .sources import parameter_rows as parameter_rows
+from .sources import sources_table as sources_table
 from .speed_axes import (
     add_shaft_axes as add_shaft_axes,
     mark_operating as mark_operating,

@@ -1,90 +1,20 @@
-"""Tables of the report that no command prints: orbits at operating speeds, elasticities, checks, provenance."""
+"""Tables of the report that say how sure its numbers are and how they were computed."""
 
-import dataclasses
 import json
 import os
 import platform
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from .._parameters import parameter_info, parameter_paths, parameters
 from ..analysis import Zones, failed, length, resolution_rpm
-from ..orbits import Sensitivity
-from .design_figures import largest_first
-from .findings import Findings, Orbits
-from .reproduction import compare_edges
-from .sources import readings_words, shown
-from .style import readable
-from .tables import Column, Table, rows_table
-
-
-MOST = 14
-"""Number of parameters in a table of elasticities."""
+from .findings import Findings
+from .sources import readings_words
+from .tables import Column, Table
 
 
 def _pairs(title: str, heads: tuple[str, str], rows: Mapping[str, str]) -> Table:
     return Table(title, [Column(heads[0], list(rows)), Column(heads[1], list(rows.values()))])
-
-
-def at_speeds_table(findings: Findings, orbits: Orbits) -> Table:
-    """Synchronous orbits and simulations at the operating speeds, of a range at both its ends."""
-    sweep, rows = findings.sweep, []
-    rpm = sweep["rpm"].values
-    for at in sorted({end for at in findings.operating for end in (at.low_rpm, at.high_rpm)}):
-        if not rpm[0] <= at <= rpm[-1]:
-            continue
-        near = int(np.argmin(np.abs(rpm - at)))
-        known = orbits.found.coexisting(at * np.pi / 30)
-        sizes = [f"{float(np.max(np.abs(mu))):.3f}" for _, stable, _, mu in known if stable]
-        labels = f"{', '.join(sweep['label'].values[near].tolist())} at {rpm[near]:.0f} rpm"
-        unstable = sum(not stable for _, stable, _, _ in known)
-        rows.append({"speed": at, "stable": ", ".join(sizes) or "none", "unstable": unstable, "labels": labels})
-    columns = [
-        Column("speed [rpm]", (), key="speed", digits=0),
-        Column("stable orbits, by largest |multiplier|", (), key="stable"),
-        Column("unstable orbits", (), key="unstable"),
-        Column("simulations by initial state", (), key="labels"),
-    ]
-    return rows_table("Orbits and simulations at the operating speeds", rows, columns)
-
-
-def elasticity_tables(model: Any, slopes: Mapping[str, Sensitivity]) -> list[Table]:
-    """Elasticities of the edges of both kinds, guidance gap and eccentricity on top, then the largest."""
-    trusted = {n: with_full_names(model, s) for n, s in slopes.items() if s.trusted}
-    kinds = {
-        "Elasticities of the synchronous-loss edges": {n: s for n, s in trusted.items() if not n.startswith("chaotic")},
-        "Elasticities of the chaotic edges that coincide with a bifurcation or the limit of a cascade": {
-            n.removeprefix("chaotic "): s for n, s in trusted.items() if n.startswith("chaotic")
-        },
-    }
-    return [_elasticities(model, title, edges) for title, edges in kinds.items() if edges]
-
-
-def with_full_names(model: Any, slopes: Sensitivity) -> Sensitivity:
-    """Parameters named with the part of the model that they belong to: `contact.onset` and not `onset`."""
-    paths = parameter_paths(model)
-    change = {".".join(paths[name]): value for name, value in slopes.elasticity.items()}
-    return dataclasses.replace(slopes, elasticity=change)
-
-
-def _elasticities(model: Any, title: str, edges: dict[str, Sensitivity]) -> Table:
-    info, value = parameter_info(model), parameters(model)
-    short = {".".join(path): name for name, path in parameter_paths(model).items()}
-    names = largest_first(list(edges.values()), MOST)
-    values = [shown(float(value[short[name]]), info[short[name]].unit) for name in names]
-    return Table(
-        title,
-        [
-            Column("parameter", [readable(name) for name in names]),
-            Column("value", [f"{number:.4g} {unit}".strip() for unit, number in values]),
-            *(
-                Column(f"{edge} ({s.value_rpm:.0f} rpm)", [s.elasticity[name] for name in names], digits=3)
-                for edge, s in edges.items()
-            ),
-        ],
-    )
 
 
 def checks_table(findings: Findings) -> Table:
@@ -110,26 +40,6 @@ def checks_table(findings: Findings) -> Table:
             rows["gradients against the scaling of units, largest relative residual"] = worst
             rows["edges whose gradient is not to be trusted"] = ", ".join(untrusted) or "none"
     return _pairs("Checks of this report", ("check", "result"), rows)
-
-
-def published_table(findings: Findings) -> list[Table]:
-    """Edges beside those of a published case; nothing for another design."""
-    published, orbits, zones = findings.published, findings.orbits, findings.zones
-    if published is None or orbits is None or not isinstance(zones, Zones):
-        return []
-    edges = [
-        *compare_edges(published, orbits.loss.zones, "synchronous-loss"),
-        *compare_edges(published, zones.zones, "chaotic"),
-    ]
-    rows = [vars(e) | {"here": e.ours_rpm, "difference": e.error_percent} for e in edges]
-    columns = [
-        Column("edge", ()),
-        Column("kind", ()),
-        Column("published", (), key="published_rpm", digits=0),
-        Column("here", (), digits=0),
-        Column("difference [%]", (), key="difference", digits=1),
-    ]
-    return [rows_table("Against the published edges [rpm]", rows, columns)]
 
 
 def provenance_table(findings: Findings) -> Table:

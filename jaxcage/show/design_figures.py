@@ -68,7 +68,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
         label = f"{s.name} ({s.value_rpm:.0f} rpm{note})"
         at = place + (i - (count - 1) / 2) * thick
         bars = ax.barh(at, value, height=0.9 * thick, **style, edgecolor="white", linewidth=0, label=label)
-        ax.bar_label(bars, [_two_digits(v) for v in value], padding=3, fontsize=size, color=BLACK)
+        ax.bar_label(bars, fmt="{:+.2g}", padding=3, fontsize=size, color=BLACK)
     for k in range(0, len(names), 2):
         ax.axhspan(k - 0.5, k + 0.5, color=BAND, linewidth=0, zorder=0)
     _named_rows(ax, [readable(name) for name in names])
@@ -81,7 +81,7 @@ def elasticity_bars(sensitivities: Sequence[Sensitivity], ax: Axes | None = None
     return ax
 
 
-def _named_rows(ax: Axes, names: Sequence[str], size: float = 9) -> None:
+def _named_rows(ax: Axes, names: Sequence[str], size: float | int = 9) -> None:
     """Names of horizontal bars, the first on top, and a line at zero."""
     ax.axvline(0, color=BLACK, linewidth=0.8)
     ax.set_yticks(np.arange(len(names)), names, fontsize=size)
@@ -99,15 +99,6 @@ def largest_first(sensitivities: Sequence[Sensitivity], most: int) -> list[str]:
     first = [name for name in FIRST if name in largest]
     rest = sorted((n for n in largest if n not in FIRST and largest[n] > 0), key=lambda n: -largest[n])
     return [*first, *rest][:most]
-
-
-def _two_digits(value: float) -> str:
-    """A number with two digits and at most three decimals."""
-    if not np.isfinite(value):
-        return ""
-    if abs(value) < 5e-4:
-        return "0" if value == 0 else "≈0"
-    return (f"{value:+.2f}" if abs(value) >= 0.1 else f"{value:+.3f}").replace("-", "−")
 
 
 def statistic_bars(found: "BearingGradient", title: str = "") -> Figure:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from ..analysis import CHAOS_THRESHOLD, Stretch, Zones, failed, scatter
 from ..bearing import PublishedCase
 from ..quantities import quantity
-from .quantity_tables import mean_over_starts
+from .quantity_tables import SHARES, head_of, mean_over_starts
 from .speed_axes import Span, add_shaft_axes, label_speed, mark_published, shade_zones, speed_limits
 from .style import (
     BLACK,
@@ -41,8 +41,6 @@ from .tables import SHOWN, factor
 SWEPT = ("cage_slip", "pocket_force_mean_sum_N", "pocket_force_max_N", "friction_power_W", "synchronous_force_x_N")
 COMPARED = ("cage_slip", "friction_power_W", "pocket_impulse_N_s", "land_impulse_N_s", "pocket_wear_mm3_per_h")
 """Quantities of a whole bearing in the figure of a sweep and in that of several bearings."""
-PERCENT = ("cage_slip", "roller_slip_max")
-"""Quantities that are shown in per cent."""
 BESIDE_COLOURS = (BLUE, VERMILION, *LINE_COLOURS[1:4])
 """Colours of designs beside each other."""
 
@@ -50,9 +48,10 @@ BESIDE_COLOURS = (BLUE, VERMILION, *LINE_COLOURS[1:4])
 def labelled(values: xr.DataArray) -> tuple[str, float]:
     """Axis label of a variable with the unit in which it is shown, and the factor from its SI unit to that."""
     unit, name = values.attrs.get("units", "1"), str(values.name)
-    shown = "%" if name in PERCENT else SHOWN.get(unit, unit)
-    text = values.attrs.get("long_name", name).split(":")[0].split(",")[0]
-    return f"{text[:1].upper()}{text[1:]}{f' [{shown}]' if shown else ''}", factor(unit, shown)
+    if name == "exponents":
+        return quantity("largest_exponent").label, 1.0
+    shown = "%" if name in SHARES else SHOWN.get(unit, unit)
+    return f"{head_of(name, unit).capitalize()}{f' [{shown}]' if shown else ''}", factor(unit, shown)
 
 
 def reported(sweep: xr.Dataset, wanted: Sequence[str]) -> list[str]:

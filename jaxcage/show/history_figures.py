@@ -37,29 +37,26 @@ START_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY)
 
 def time_history(trajectory: Trajectory, ax: Axes | None = None) -> Axes:
     """Horizontal and vertical displacement of the cage over time."""
-    ax = axes_or_new(ax, height=3.0)
-    for i, name, colour in ((0, "x_C", VERMILION), (1, "y_C", BLUE)):
-        style = {"color": colour, "linewidth": 0.9, "label": quantity(name).symbol}
-        ax.plot(_milliseconds(trajectory), trajectory.state[:, i] * quantity(name).factor, **style)
-    return _over_time(ax, trajectory, f"Displacement [{quantity('x_C').shown_unit}]")
+    place = [(quantity(name), i) for i, name in enumerate(("x_C", "y_C"))]
+    lines = {q.symbol: (q.factor * trajectory.state[:, i], (VERMILION, BLUE)[i], "-") for q, i in place}
+    return _over_time(trajectory, lines, f"Displacement [{quantity('x_C').shown_unit}]", ax)
 
 
 def force_history(trajectory: Trajectory, forces: Forces, axis: int = 1, ax: Axes | None = None) -> Axes:
     """Each force on the cage over time, its horizontal (`axis` 0) or vertical (1) component."""
-    ax = axes_or_new(ax, height=3.0)
     own = cycle(OWN_COLOURS)
-    for name, force in forces.items():
-        colour, line = (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
-        ax.plot(_milliseconds(trajectory), force[:, axis], color=colour, linestyle=line, linewidth=0.9, label=name)
-    return _over_time(ax, trajectory, f"{('Horizontal', 'Vertical')[axis]} force [N]")
+    looks = lambda name: (FORCE_COLOURS[name], "-") if name in FORCE_COLOURS else (next(own), "--")
+    lines = {name: (force[:, axis], *looks(name)) for name, force in forces.items()}
+    return _over_time(trajectory, lines, f"{('Horizontal', 'Vertical')[axis]} force [N]", ax)
 
 
-def _milliseconds(trajectory: Trajectory) -> np.ndarray:
-    return trajectory.time * quantity("time").factor
-
-
-def _over_time(ax: Axes, trajectory: Trajectory, ylabel: str) -> Axes:
-    time = _milliseconds(trajectory)
+def _over_time(
+    trajectory: Trajectory, lines: Mapping[str, tuple[np.ndarray, str, str]], ylabel: str, ax: Axes | None
+) -> Axes:
+    ax = axes_or_new(ax, height=3.0)
+    time = trajectory.time * quantity("time").factor
+    for label, (values, colour, dash) in lines.items():
+        ax.plot(time, values, color=colour, linestyle=dash, linewidth=0.9, label=label)
     ends = (float(time[0]), float(time[-1]) if time.size > 1 else float(time[0]) + 1.0)
     ax.set(xlabel=quantity("time").label, ylabel=ylabel, xlim=ends)
     legend_beside(ax)
@@ -108,23 +105,16 @@ def simulation_figure(
 
 
 def strobe_section(
-    states: Float[np.ndarray, "starts revolutions dim"],
-    ax: Axes | None = None,
-    *,
-    coordinate: int = 1,
-    names: Sequence[str] = (),
+    states: Float[np.ndarray, "starts revolutions dim"], ax: Axes | None = None, names: Sequence[str] = ()
 ) -> Axes:
-    """Strobe states in the plane of a coordinate and its velocity, one colour for each initial state.
+    """Strobe states in the plane of vertical displacement and velocity, one colour for each initial state.
 
-    **Arguments:** states at tau = 2 pi n [SI], coordinates before velocities; axes; coordinate (1: vertical); names of
-    the initial states.
+    **Arguments:** states at tau = 2 pi n [SI], coordinates before velocities; axes; names of the initial states.
     """
     ax = axes_or_new(ax, 6.5, 5.0)
-    dimension = states.shape[-1]
-    components = [quantity(name) for name in component_names(dimension)]
-    place, velocity = components[coordinate], components[coordinate + dimension // 2]
-    x = states[..., coordinate] * place.factor
-    y = states[..., coordinate + dimension // 2] * velocity.factor
+    along = (1, 1 + states.shape[-1] // 2)
+    place, velocity = (quantity(component_names(states.shape[-1])[i]) for i in along)
+    x, y = (states[..., i] * named.factor for i, named in zip(along, (place, velocity), strict=True))
     for i, (across, up) in enumerate(zip(x, y, strict=True)):
         # Closed orbits of several initial states may coincide: the later ones are drawn smaller, on top.
         closed = _spread(across) < 1e-3 * _spread(x)

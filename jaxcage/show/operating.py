@@ -42,7 +42,8 @@ class Verdict:
     """Place of an operating speed among the zones of one kind."""
 
     state: str
-    """`inside`, `partly inside`, `in transient chaos`, `partly in transient chaos`, `close`, `clear` or `unknown`."""
+    """`inside`, `partly inside`, `in transient chaos`, `partly in transient chaos`, `chaotic`, `close`, `clear` or
+    `unknown`."""
     where: str
     """The zone, or the reason why nothing is known."""
     edge: str = ""
@@ -52,11 +53,6 @@ class Verdict:
     """Distance from the operating speed to the nearest edge, 0 where a range includes one."""
     percent: float | None = None
     """The same, in per cent of the nearer end of the operating speed."""
-
-    def __str__(self) -> str:
-        if self.distance_rpm is None or self.edge_rpm is None:
-            return self.where
-        return f"{self.where}; nearest edge: {self.edge}, {self.distance_rpm:.0f} rpm ({self.percent:.1f} %) away"
 
 
 def read_operating(text: str, model: AbstractForcedSystem, unsaid: Whose | None = None) -> tuple[Operating, ...]:
@@ -123,10 +119,10 @@ def loss_verdict(at: Operating, zones: Sequence[Zone], lower_rpm: float, upper_r
 
 
 def motion_verdict(at: Operating, stretches: Sequence[Stretch], sweep: xr.Dataset) -> Verdict:
-    """Motion of the cage at `at`, `inside` where the largest exponent is positive beyond doubt."""
+    """Motion of the cage at `at`, `chaotic` where the largest exponent is positive beyond doubt."""
     met = [s for s in stretches if s.low_rpm <= at.high_rpm and at.low_rpm <= s.high_rpm]
     motions = dict.fromkeys(" or ".join(s.labels).replace("_", " ") for s in met)
-    state = "inside" if any(s.chaotic for s in met) else "clear"
+    state = "chaotic" if any(s.chaotic for s in met) else "clear"
     return _beyond(at, sweep["rpm"].values) or Verdict(state, ", ".join(motions))
 
 

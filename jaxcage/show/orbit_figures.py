@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.transforms import offset_copy
@@ -16,7 +16,7 @@ from .._errors import ArgumentError
 from ..orbits import Branch, Point
 from ..quantities import component_names, quantity
 from .diagrams import orbit_diagram
-from .speed_axes import Span, label_speed
+from .speed_axes import label_speed
 from .style import (
     BLACK,
     BLUE,
@@ -53,7 +53,8 @@ MARKS = {
 """Marks of bifurcations in every figure."""
 PERIOD_COLOURS = {1: BLUE, 2: ORANGE, 3: PURPLE, 4: SKY}
 LABEL_SIZE = 7.5
-MOST_LABELS = 40
+FARTHEST = 2.0
+"""Largest distance of a label from its place, in widths of a label."""
 REACH = 1.6
 """Largest real and imaginary part of the multipliers that are shown."""
 
@@ -68,20 +69,12 @@ def words(kind: str) -> str:
     return f"{kind.replace('branch-p', 'branch p')} ({mark_of(kind).short})" if kind in MARKS else kind
 
 
-def branch_diagram(
-    branches: Sequence[Branch],
-    component: int = 1,
-    ax: Axes | None = None,
-    *,
-    label_points: bool = True,
-    limits_rpm: Span | None = None,
-) -> Axes:
+def branch_diagram(branches: Sequence[Branch], component: int = 1, ax: Axes | None = None) -> Axes:
     """Strobe value of periodic orbits over speed: stable parts thick, unstable parts thin and light, one colour for
     each number of periods. Bifurcations that bound a stable part are filled markers with their speed above the frame,
     others are small and hollow.
 
-    **Arguments:** branches over speed; component of the state (1: vertical displacement); axes; True to write the
-    speeds of the edges above the frame; range of speed for a zoomed diagram, whose vertical limits then fit it.
+    **Arguments:** branches over speed; component of the state (1: vertical displacement); axes.
 
     **Raises:** `ValueError` if a branch is not over speed, or there is none.
     """
@@ -91,48 +84,35 @@ def branch_diagram(
     ax = axes_or_new(ax, 9.0, 5.0)
     named = quantity(component_names(branches[0].state.shape[-1])[component])
     paths = [(b.periods, *polyline(b, component)) for b in branches]
-    everywhere = np.concatenate([x for _, x, _, _ in paths])
-    low, high = (float(everywhere.min()), float(everywhere.max())) if limits_rpm is None else limits_rpm
-    inside = [y[(x >= low) & (x <= high)] for _, x, y, _ in paths]
-    met = [path for path in paths if path[1].min() <= high and path[1].max() >= low]
-    for periods in sorted({path[0] for path in met}):
-        _draw_paths(ax, periods, [path[1:] for path in met if path[0] == periods])
-    ax.set(xlim=(low, high), ylim=padded_limits(np.concatenate(inside)), ylabel=named.label)
-    special = [p for b in branches for p in b.special if low <= p.speed_rpm <= high]
-    place = lambda p: [(float(p.speed_rpm), float(p.state[component]) * named.factor)]
-    _mark_points(ax, special, place)
+    for periods in sorted({path[0] for path in paths}):
+        _draw_paths(ax, periods, [path[1:] for path in paths if path[0] == periods])
+    speeds, values = (np.concatenate([path[i] for path in paths]) for i in (1, 2))
+    ax.set(xlim=(speeds.min(), speeds.max()), ylim=padded_limits(values), ylabel=named.label)
+    special = [p for b in branches for p in b.special]
+    _mark_points(ax, special, lambda p: [(float(p.speed_rpm), float(p.state[component]) * named.factor)])
     if any(not p.edge for p in special):
         style: dict[str, Any] = {"color": GREY, "markersize": 4.5, "markerfacecolor": "white"}
         ax.plot([], [], "o", **style, label="hollow: unstable on both sides")
-    if label_points:
-        _write_above(ax, [p for p in special if p.edge])
+    _write_above(ax, [p for p in special if p.edge])
     below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 4}
     enlarge_dots(ax.legend(**below, frameon=False, fontsize=8.5, handlelength=2.0, columnspacing=1.6))
     return label_speed(ax)
 
 
 def orbit_diagram_with_branches(
-    sweep: xr.Dataset,
-    branches: Sequence[Branch],
-    component: int = 1,
-    ax: Axes | None = None,
-    *,
-    label_points: bool = True,
-    limits_rpm: Span | None = None,
+    sweep: xr.Dataset, branches: Sequence[Branch], component: int = 1, ax: Axes | None = None
 ) -> Axes:
-    """Branches of periodic orbits over the orbit diagram, whose points are grey.
-
-    **Arguments:** as for `orbit_diagram` and `branch_diagram`.
-    """
-    ax = orbit_diagram(sweep, component, axes_or_new(ax, 9.0, 5.0), limits_rpm=limits_rpm)
+    """Branches of periodic orbits over the orbit diagram, whose points are grey."""
+    ax = orbit_diagram(sweep, component, axes_or_new(ax, 9.0, 5.0))
     clouds = [line for line in ax.get_lines() if line.get_label() in KIND_COLOURS]
     for i, line in enumerate(clouds):
         label = "simulated" if i == 0 else "_simulated"
         line.set(color=GREY, alpha=0.5, markersize=1.4 * line.get_markersize(), zorder=1, label=label)
-    limits, (low, high) = ax.get_xlim(), ax.get_ylim()
-    branch_diagram(branches, component, ax, label_points=label_points, limits_rpm=limits)
-    bottom, top = ax.get_ylim()
-    ax.set_ylim(min(low, bottom), max(high, top))
+    limits = np.array([ax.get_xlim(), ax.get_ylim()])
+    branch_diagram(branches, component, ax)
+    both = np.array([limits, [ax.get_xlim(), ax.get_ylim()]])
+    (left, right), (low, high) = np.transpose([both[..., 0].min(axis=0), both[..., 1].max(axis=0)])
+    ax.set(xlim=(left, right), ylim=(low, high))
     return ax
 
 
@@ -201,54 +181,54 @@ def _mark_points(ax: Axes, points: Sequence[Point], places: Any) -> None:
 def _write_above(ax: Axes, points: Iterable[Point]) -> None:
     """Write kind and speed of points in a row above the frame, moved apart, with lines to their places.
 
-    Equal texts, as on branches that share a part, are written once; of too many points only the first are named.
+    Equal texts, as on branches that share a part, are written once; where there is no room for all near their places,
+    those with the nearest neighbours are left out.
     """
     texts = {f"{mark_of(p.kind).short} {p.speed_rpm:.0f}": p for p in points}
-    row = sorted(texts.items(), key=lambda item: item[1].speed_rpm)[:MOST_LABELS]
+    row = sorted(texts.items(), key=lambda item: item[1].speed_rpm)
     low, high = ax.get_xlim()
     gap = 1.3 * LABEL_SIZE / (ax.get_window_extent().width * 72 / ax.figure.dpi)
     at = np.array([(p.speed_rpm - low) / (high - low) for _, p in row])
+    while at.size and np.max(np.abs(move_apart(at, gap) - at)) > FARTHEST * gap:
+        crowded = int(np.argmin(np.diff(at)))
+        at = np.delete(at, crowded)
+        row.pop(crowded)
     upright = at.size > 1 and float(np.min(np.diff(at))) < 4 * gap
     above = offset_copy(ax.transAxes, ax.figure, y=16, units="points")  # pyright: ignore[reportArgumentType]
     line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.5, 0.0)}
     style = {"ha": "center", "va": "bottom", "fontsize": LABEL_SIZE, "annotation_clip": False, "arrowprops": line}
-    for (text, p), where in zip(row, move_apart(at, gap, 0.0, 1.0) if upright else at, strict=True):
+    for (text, p), where in zip(row, move_apart(at, gap) if upright else at, strict=True):
         places = {"xycoords": ax.get_xaxis_transform(), "textcoords": above, "rotation": 90 if upright else 0}
         ax.annotate(text, (p.speed_rpm, 1.0), (where, 1.0), **places, **style, color=mark_of(p.kind).colour)
 
 
-def move_apart(at: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
-    """Ascending places at least `gap` apart and within limits, as near (least squares) to `at` as possible."""
+def move_apart(at: np.ndarray, gap: float) -> np.ndarray:
+    """Ascending places at least `gap` apart and from 0 to 1, as near (least squares) to `at` as possible."""
     steps = gap * np.arange(at.size)
     if at.size == 0:
         return at
-    return np.clip(isotonic_regression(at - steps).x, low, max(low, high - steps[-1])) + steps
+    return np.clip(isotonic_regression(at - steps).x, 0.0, max(0.0, 1.0 - steps[-1])) + steps
 
 
-def multiplier_circle(branch: Branch | Complex[np.ndarray, "*points dim"], ax: Axes | None = None) -> Axes:
+def multiplier_circle(branch: Branch, ax: Axes | None = None) -> Axes:
     """Multipliers along a branch, coloured by speed, with the unit circle; critical multipliers of its bifurcations are
-    marked, filled where a stable orbit is on one side.
-
-    **Arguments:** branch, or multipliers alone; axes. Multipliers beyond 1.6 are not shown.
+    marked, filled where a stable orbit is on one side. Multipliers beyond 1.6 are not shown.
     """
     ax = axes_or_new(ax, 7.0, 5.6)
     ax.add_patch(Circle((0, 0), 1.0, fill=False, color=BLACK, linewidth=1.0, zorder=2))
     for line in (ax.axhline, ax.axvline):
         line(0, color=GREY, linewidth=0.6, zorder=1)
-    mu = branch.multipliers if isinstance(branch, Branch) else branch
+    mu = branch.multipliers
     shown = (np.abs(np.real(mu)) <= REACH) & (np.abs(np.imag(mu)) <= REACH)
-    if isinstance(branch, Branch):
-        speed = np.repeat(branch.speed_rpm, mu.shape[1]).reshape(mu.shape)
-        style = {"c": speed[shown], "s": 7, "cmap": "viridis", "linewidths": 0}
-        cloud = ax.scatter(np.real(mu)[shown], np.imag(mu)[shown], **style)
-        cloud.set(clim=(float(speed.min()), float(speed.max())), zorder=3)
-        beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-        ax.figure.colorbar(cloud, cax=beside, label=quantity("speed_rpm").label, format="{x:.0f}")
-        _mark_points(ax, branch.special, _critical)
-        if branch.special:
-            legend_above(ax, size=8)
-    else:
-        ax.plot(np.real(mu)[shown], np.imag(mu)[shown], "o", color=BLUE, markersize=4, zorder=3, label="multipliers")
+    speed = np.repeat(branch.speed_rpm, mu.shape[1]).reshape(mu.shape)
+    style = {"c": speed[shown], "s": 7, "cmap": "viridis", "linewidths": 0}
+    cloud = ax.scatter(np.real(mu)[shown], np.imag(mu)[shown], **style)
+    cloud.set(clim=(float(speed.min()), float(speed.max())), zorder=3)
+    beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+    ax.figure.colorbar(cloud, cax=beside, label=quantity("speed_rpm").label, format="{x:.0f}")
+    _mark_points(ax, branch.special, _critical)
+    if branch.special:
+        legend_above(ax, size=8)
     limits = (-REACH, REACH)
     ax.set(xlim=limits, ylim=limits, aspect="equal")
     ax.set(xlabel=r"Real part of the multiplier $\mu$", ylabel=r"Imaginary part of the multiplier $\mu$")

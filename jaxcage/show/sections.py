@@ -13,17 +13,17 @@ from ..analysis import Zones, failed, resolution_rpm, restless
 from ..bearing import design_rule_violations
 from .bearing_figures import load_bars
 from .chance_tables import chances_notes, chances_tables, operating_chances
-from .checks import at_speeds_table, checks_table, elasticity_tables, provenance_table, published_table, with_full_names
+from .checks import checks_table, provenance_table
 from .design_figures import chance_of_chaos, elasticity_bars
 from .diagrams import SWEPT, reported, sweep_figure
 from .findings import Findings, Orbits
-from .gradient_tables import to_be_turned
+from .gradient_tables import elasticities_table, to_be_turned
 from .maps import stability_map
 from .operating import CLOSE, Operating, Verdict, chaotic_verdict, loss_verdict, motion_verdict
 from .orbit_figures import multiplier_circle, orbit_diagram_with_branches
 from .orbit_tables import coexisting_notes, edge_table, loss_table
 from .quantity_tables import quantities_table, statics_table
-from .sources import parameters_table, readings_words, shown
+from .sources import readings_words, shown, sources_table
 from .speed_axes import mark_operating, zone_strip
 from .style import new_figure
 from .tables import Beside, Column, Table, rows_table
@@ -67,7 +67,7 @@ def sections_of(
     orbits = findings.orbits
     return [
         _result(findings, chances, left),
-        *([_operating(findings)] if findings.operating else []),
+        *([Section("operating", "Operating speeds", tables=[verdict_table(findings)])] if findings.operating else []),
         *([_known(findings, chances)] if chances is not None else []),
         _zones(findings),
         *([_synchronous(findings, orbits), _map(findings, orbits)] if orbits is not None else []),
@@ -75,7 +75,7 @@ def sections_of(
         *more,
         *([_statics(findings)] if findings.statics is not None else []),
         _design(findings, table, left),
-        Section("checks", "How sure this is", tables=[checks_table(findings), *published_table(findings)]),
+        Section("checks", "How sure this is", tables=[checks_table(findings)]),
         Section("computed", "How it was computed", tables=[provenance_table(findings)], notes=[PAPER]),
     ]
 
@@ -196,13 +196,6 @@ def _key_figures(model: Any) -> list[tuple[str, str]]:
     return [*named, ("viscosity of the oil", f"{oil:.3g} mPa s"), ("rollers", rollers)]
 
 
-def _operating(findings: Findings) -> Section:
-    tables = [verdict_table(findings)]
-    if findings.orbits is not None:
-        tables.append(at_speeds_table(findings, findings.orbits))
-    return Section("operating", "Operating speeds", tables=tables)
-
-
 def _known(findings: Findings, chances: "Ensemble") -> Section:
     """What draws from the ranges of a design do."""
     other = beside(findings)
@@ -275,7 +268,7 @@ def _synchronous(findings: Findings, orbits: Orbits) -> Section:
 def _map(findings: Findings, orbits: Orbits) -> Section:
     chart = orbits.map
     figure = _alone(9.5, 5.0, lambda ax: stability_map(chart.curves, ax, found=chart.found, unit=chart.axis.unit))
-    own = float(chart.axis.shown(np.asarray(parameters(findings.model)[chart.axis.name], dtype=float)))
+    own = chart.axis.shown(np.array([float(parameters(findings.model)[chart.axis.name])]))[0]
     figure.axes[0].axhline(own, color="#000000", linewidth=1.0, linestyle=":")
     _mark(figure, findings)
     curves = " The lines are its edges, solved for." if chart.curves else ""
@@ -288,34 +281,20 @@ def _map(findings: Findings, orbits: Orbits) -> Section:
 
 def _gradients(findings: Findings, orbits: Orbits) -> Section:
     edges = [s for name, s in orbits.slopes.items() if s.trusted and name in orbits.loss.edges]
-    trusted = [with_full_names(findings.model, s) for s in to_be_turned(findings.model, edges)]
-    figures = {}
+    trusted, figures = to_be_turned(findings.model, edges), {}
     if trusted:
-
-        def bars(ax: Axes) -> None:
-            """Small elasticities are visible beside those that are a hundred times larger."""
-            elasticity_bars(trusted, ax)
-            largest = max(abs(x) for s in trusted for x in s.elasticity.values() if np.isfinite(x))
-            reach = 2.5 * max(largest, 0.1)
-            ax.set_xscale("symlog", linthresh=0.1, linscale=0.7)
-            ticks = [t for t in (0.1, 1.0, 10.0, 100.0) if t < reach]
-            both = [-t for t in reversed(ticks)] + [0.0, *ticks]
-            ax.set(xlim=(-reach, reach))
-            ax.set_xticks(both, [f"{t:g}".replace("-", "−") for t in both])
-            ax.minorticks_off()
-
         caption = (
             "Change of the synchronous-loss edges: per cent of speed for one per cent of a parameter that a designer "
-            "can choose. The axis is logarithmic beyond ±0.1."
+            "can choose."
         )
-        figures["elasticities"] = _alone(9.5, 2.2 + 0.95 * len(trusted), bars), caption
+        height = 2.2 + 0.95 * len(trusted)
+        figures["elasticities"] = _alone(9.5, height, lambda ax: elasticity_bars(trusted, ax)), caption
     said = (
         "Exact derivatives of the edges with respect to every parameter. An elasticity of 0.10 means that one per cent "
         "more of the parameter moves the edge up by a tenth of a per cent."
     )
-    return Section(
-        "gradients", "What moves the edges", [said], figures, elasticity_tables(findings.model, orbits.slopes)
-    )
+    tables = [elasticities_table(findings.name, orbits.slopes, beside(findings))]
+    return Section("gradients", "What moves the edges", [said], figures, tables)
 
 
 def _statics(findings: Findings) -> Section:
@@ -329,7 +308,7 @@ def _design(findings: Findings, table: Mapping[str, Any] | None, left: Sequence[
     model = findings.model
     warnings = [*design_rule_violations(model.bearing, model.guidance_gap), *model.lubricant.doubts()]
     said = [f"Warning: {warning}" for warning in warnings]
-    return Section("design", "The design", said, tables=[parameters_table(model, table, left)])
+    return Section("design", "The design", said, tables=[sources_table(model, table, left)])
 
 
 def _alone(width: float, height: float, draw: Callable[[Axes], Any]) -> Figure:

@@ -27,24 +27,8 @@ PUBLISHED = {
 READINGS = {"clearance_reading": "radial clearance", "unbalance": "unbalance"}
 
 
-@dataclasses.dataclass(frozen=True)
-class Row:
-    """One parameter, choice or count."""
-
-    path: tuple[str, ...]
-    text: str
-    value: str
-    unit: str
-    source: str
-
-    @property
-    def group(self) -> str:
-        """The part of the model that it belongs to."""
-        return self.path[0].replace("_", " ") if len(self.path) > 1 else "model"
-
-
-def parameter_rows(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> list[Row]:
-    """All parameters of `model` in the units in which they are read.
+def sources_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
+    """All parameters of `model` in the units in which they are read, with their sources.
 
     **Arguments:** the model; the nested mapping that it was read from, None for a published case; values that are still
     those of the template, by dotted name.
@@ -56,26 +40,16 @@ def parameter_rows(model: AbstractForcedSystem, table: Mapping[str, Any] | None,
         if info is not None:
             unit, number = shown(float(value), info.unit)
             text, value = info.text, f"{number:.6g}"
-        name = ".".join(path)
+        name, part = ".".join(path), path[0].replace("_", " ") if len(path) > 1 else "model"
         if {name, name.removesuffix("_x").removesuffix("_y")} & set(left):
             source = "the template's, not yours"
         elif path[0] == EXTRA:
             source = "a force of your own"
-        elif table is None:
-            source = _published(model, path, field)
         else:
-            source = _in_file(path, table)
-        rows.append(Row(path, text, str(value), unit, source))
-    return rows
-
-
-def parameters_table(model: AbstractForcedSystem, table: Mapping[str, Any] | None, left: Sequence[str] = ()) -> Table:
-    """The parameters of `parameter_rows` as a table, each part of the model named once."""
-    rows = parameter_rows(model, table, left)
-    before = [None, *(row.group for row in rows)]
-    records = [vars(row) | {"part": row.group if row.group != b else ""} for row, b in zip(rows, before, strict=False)]
-    heads = {"part": "part", "text": "parameter", "value": "value", "unit": "unit", "source": "from"}
-    return rows_table("All parameters", records, [Column(head, (), key=key) for key, head in heads.items()])
+            source = _published(model, path, field) if table is None else _in_file(path, table)
+        rows.append({"part": part, "parameter": text, "value": str(value), "unit": unit, "from": source, "name": name})
+    heads = ("part", "parameter", "value", "unit", "from")
+    return rows_table("All parameters", rows, [Column(head, ()) for head in heads])
 
 
 def shown(value: float, unit: str) -> tuple[str, float]:

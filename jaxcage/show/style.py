@@ -124,13 +124,13 @@ def enlarge_dots(legend: Legend) -> Legend:
     return legend
 
 
-def legend_above(ax: Axes, ncols: int = 4, size: float = 9) -> Legend:
+def legend_above(ax: Axes, ncols: int = 4, size: float | int = 9) -> Legend:
     """A legend above the frame, where it hides nothing."""
     place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": ncols}
     return enlarge_dots(ax.legend(**place, frameon=False, fontsize=size))
 
 
-def legend_beside(ax: Axes, size: float = 9) -> Legend:
+def legend_beside(ax: Axes, size: float | int = 9) -> Legend:
     """A legend to the right of the frame."""
     place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
     return ax.legend(**place, frameon=False, fontsize=size, handlelength=1.4)

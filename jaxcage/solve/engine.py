@@ -195,7 +195,7 @@ class Engine:
             return first, longest, shortest, TIME_MOST * more
         wide, shared = iter(numbers[0][SAMPLED:]), iter(numbers[1])
         at, _, scale = self.numbers.form.filled([next(wide if w else shared) for w in self.numbers.wide])
-        slow = float(np.max(slowness(scale[2], scale[3], at.rolling_cage_speed)))
+        slow = float(np.max(slowness(*map(np.asarray, (scale[2], scale[3], at.rolling_cage_speed)))))
         return *BEARING_STEPS, BEARING_MOST * turn / REVOLUTION * slow * more
 
 
@@ -263,7 +263,7 @@ def cores() -> int:
 
 
 class Lanes:
-    """Lanes by number: which design and which speed each has."""
+    """Lanes by number, each a design at a speed."""
 
     def __init__(
         self,
@@ -318,7 +318,7 @@ class Lanes:
         return engine.picked(self._numbers[type(engine)], self._place[some])
 
     def engine(self, tangents: int, method: AbstractMethod, samples: int = 1) -> Engine | JaxEngine:
-        """What runs these lanes with so many tangent vectors."""
+        """The engine of these lanes with a number of tangent vectors."""
         return engine_of(self.system, tangents, self.several, method, samples)
 
     def completed(self, y: Float[np.ndarray, "some dim"]) -> Float[np.ndarray, "some numbers"]:
@@ -346,7 +346,9 @@ def _scales(form: Any, several: bool) -> Any:
 
     def of(speed: Any, row: Any, y: Any) -> tuple[Any, Any]:
         system = form.filled(row)
-        return jnp.stack([jnp.asarray(s, float) for s in system.scale(speed)]), jnp.asarray(system.excursion(tuple(y)))
+        scale, state = system.scale(speed), y if system.beside else tuple(y)
+        row = scale if system.beside else jnp.stack([jnp.asarray(s, float) for s in scale])
+        return row, jnp.asarray(system.excursion(state))
 
     return jax.jit(jax.vmap(of, in_axes=(0, 0 if several else None, 0)))
 

@@ -137,8 +137,13 @@ def _hoisted(program: Program, moving: int) -> tuple[Program, Program]:
 
 
 def _pieces(system: AbstractForcedSystem, speed: Any) -> tuple[Form, list[Any]]:
-    """What is integrated at a speed, and its numbers."""
-    return split((system.at_speed(speed), system, system.scale(speed)), eqx.is_inexact_array)
+    """Field, system and scale at a speed, and their numbers; of a whole bearing the scale of one roller and the bodies,
+    and no system."""
+    field, scale = system.at_speed(speed), system.scale(speed)
+    if system.beside:
+        short = tuple(scale[i] for i in (*range(OF_ROLLER), *range(-OF_BODIES, 0)))
+        return split((field, None, short), eqx.is_inexact_array)
+    return split((field, system, scale), eqx.is_inexact_array)
 
 
 def room_for(lanes: int) -> int:
@@ -219,8 +224,7 @@ class _Roller:
 
     def __call__(self, i: Any, moved: Any, watched: Any, fixed: Any) -> Any:
         (cos_j, sin_j, cos, sin), numbers = moved[:4], moved[4:]
-        at, _, scale = self.form.filled(fixed[SAMPLED:])
-        units = (*scale[:OF_ROLLER], *scale[-OF_BODIES:])
+        at, _, units = self.form.filled(fixed[SAMPLED:])
         pocket = cos * cos_j - sin * sin_j, sin * cos_j + cos * sin_j
         size = OF_ROLLER + OF_BODIES
 
@@ -249,7 +253,7 @@ class _Bodies:
     def __call__(self, i: Any, moved: Any, watched: Any, fixed: Any) -> Any:
         (cos, sin), numbers = moved[:2], moved[2:]
         at, _, scale = self.form.filled(fixed[SAMPLED:])
-        units = scale[-OF_BODIES:]
+        units = scale[OF_ROLLER:]
         size = OF_BODIES + MOVING
         numbers, rest, (normal, slip) = (
             numbers[: size * (1 + self.tangents)],

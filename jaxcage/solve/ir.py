@@ -266,7 +266,7 @@ class Writer:
         return half if n == 1 or n % 2 == 0 else self.mul(half, x)
 
     def any(self, mask: Value) -> Value:
-        """Whether a mask holds for some lane."""
+        """True if a mask holds for some lane."""
         if not mask.wide:
             return mask
         bits = self.let(f"bitcast {self.typed(mask)} to i{self.width}", f"i{self.width}", False)
@@ -403,7 +403,7 @@ class Code(Writer):
     def over(
         self, count: int, begin: Sequence[Value], body: Callable[[Callable[[int], int | Value], list[Value]], Any]
     ) -> list[Value]:
-        """What `body` makes of `begin`, row after row: written out if they are few, else as a loop.
+        """Apply `body` to `begin` and its results, row after row: written out if they are few, else as a loop.
 
         `body(row, values)` returns new values; `row(k)` is the row of its number behind the k-th.
         """

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from .._form import Form, compiled, split
 from ..models import AbstractForcedSystem, divide, multiply
-from .method import REVOLUTION, AbstractMethod, Beside, moved_by
+from .method import REVOLUTION, AbstractMethod, BesideField, moved_by
 from .outcomes import MARKS, OUTCOMES, March
 from .revolution import StrobeMap
 
@@ -38,12 +38,14 @@ def _strobe(
     def lane(own: Any, y: Array, tangents: Array, i: Array, parts: Any) -> tuple[Array, Array, Array, Array]:
         speed, *numbers = own
         system = form.filled(numbers if several else shared)
-        wrapped = Beside(system) if system.beside else system
-        strobe = StrobeMap(wrapped.at_speed(speed), wrapped, wrapped.scale(speed), method)
-        state = lambda row: multiply(wrapped.parts(row) if system.beside else tuple(row), strobe.scale)
+        field, scale, dim = system.at_speed(speed), system.scale(speed), system.dimension
+        if system.beside:
+            field, scale = BesideField(field), (scale, jnp.ones(len(system.beside)))
+        strobe = StrobeMap(field, system, scale, method)
+        state = lambda row: multiply((row[:dim], row[dim:]) if system.beside else tuple(row), scale)
         moved = moved_by(lambda z: strobe.part(z, i, parts), state(y), [state(t) for t in tangents])
         joined = jnp.concatenate if system.beside else jnp.stack
-        row = lambda z: joined(divide(z, strobe.scale))
+        row = lambda z: joined(divide(z, scale))
         after = jnp.stack([row(t) for t in moved.tangents]) if moved.tangents else tangents
         return row(moved.y), after, jnp.atleast_1d(moved.peak), moved.outcome
 

@@ -6,7 +6,7 @@ The numbers of field, system and scale are what is fixed; the rest (structure, t
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any, TypeGuard
+from typing import Any, NamedTuple, TypeGuard
 
 import diffrax as dfx
 import equinox as eqx
@@ -23,12 +23,18 @@ from .steps import march_with_tangents
 
 
 KernelSolver = AbstractRosenbrock | NewmarkBeta | dfx.AbstractERK
-Pieces = tuple[AbstractField, AbstractForcedSystem, State]
-"""What is integrated: field, system and its scale."""
+
+
+class Pieces(NamedTuple):
+    """The field, the model and its scale, as passed to the solver."""
+
+    field: AbstractField
+    system: AbstractForcedSystem
+    scale: State
 
 
 def can_be_kernel(solver: Any) -> TypeGuard[KernelSolver]:
-    """Whether a step of `solver` is a plain formula: ours, and explicit methods with the first stage last."""
+    """True if a step of `solver` is a plain formula: our own, and explicit methods whose last stage is the next first."""
     if isinstance(solver, dfx.AbstractERK):
         return isinstance(solver.tableau, dfx.ButcherTableau) and solver.tableau.fsal
     return isinstance(solver, AbstractRosenbrock | NewmarkBeta)
@@ -39,7 +45,7 @@ NEARNESS = 0.2
 FAR = 0.5
 """Time [rad] from which on they are not shortened."""
 SHORTEST = 1 / 1024
-"""Of a step, what is left of it at least."""
+"""Smallest allowed step, as a fraction of the nominal step."""
 MORE = 8
 """Steps are added by so many parts of a revolution's, until all lanes are through."""
 
@@ -85,10 +91,10 @@ class KernelStep:
     solver: KernelSolver
     structure: Form
     abrupt: bool
-    """Whether the law changes abruptly somewhere, and steps are shortened there."""
+    """True if the law changes abruptly somewhere: steps are shortened there."""
 
     def watched(self, phase: Any) -> Numbers:
-        """What is watched, at the beginning: the excursion, the phase and the length of the step, or the defect."""
+        """First values of the watched numbers: the excursion, the phase and the length of the step, or the defect."""
         zero = jnp.zeros(())
         if isinstance(self.solver, NewmarkBeta):
             return zero, zero

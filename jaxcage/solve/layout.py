@@ -1,4 +1,4 @@
-"""What the integration loop is given: methods, the programs of a model, and the rows of its working memory."""
+"""Inputs of the integration loop: methods, the programs of a model, and the rows of its working memory."""
 
 import dataclasses
 import math
@@ -55,7 +55,7 @@ class Tableau(NamedTuple):
 
     @property
     def implicit(self) -> bool:
-        """Whether a step is one program of its own (`Field.step`)."""
+        """True if a step is one program of its own (`Field.step`)."""
         return not self.error
 
     @classmethod
@@ -97,13 +97,13 @@ class Field(NamedTuple):
     watched: int = 1
     """Numbers whose largest values are kept; where there are more than the excursion, from one strobe to the next."""
     phased: bool = False
-    """Whether a lane's phase at a strobe follows from their number, and from the second fixed number."""
+    """True if a lane's phase at a strobe follows from their number, and from the second fixed number."""
     own_turn: bool = False
-    """Whether the first fixed number is how far a lane goes from strobe to strobe, instead of a revolution."""
+    """True if the first fixed number is the phase from strobe to strobe, instead of a revolution."""
     relative: bool = True
-    """Whether errors are measured relative to the state and to one, or in units of the scale alone."""
+    """True if errors are measured relative to the state and to one, false for units of the scale alone."""
     careful: bool = True
-    """Whether the errors of tangent vectors control the steps too."""
+    """True if the errors of tangent vectors control the steps too."""
 
     @property
     def moving(self) -> int:

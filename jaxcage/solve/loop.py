@@ -356,7 +356,7 @@ def _orthonormalise(w: Code, field: Field, rows: Layout, over: Value, revolution
     place = w.convert("fptosi", w.mul(revolution, number(float(field.tangents))), "i64")
 
     def dot(a: int, b: int) -> Value:
-        """Of the vectors whose first rows these are."""
+        """Scalar product of the vectors with these first rows."""
         product = lambda at, sums: [w.add(sums[0], w.mul(w.get(at(a)), w.get(at(b))))]
         return w.over(n, [number(0.0)], product)[0]
 

@@ -17,7 +17,6 @@ from .._types import Scalar, State
 from ..models import (
     ESCAPE,
     AbstractField,
-    AbstractForcedSystem,
     AbstractLinearisation,
     ScaledField,
     divide,
@@ -118,20 +117,12 @@ class AbstractMethod(eqx.Module):
         """The same with steps at most half as long, `times` over, for what it is to be confirmed by."""
 
     @abc.abstractmethod
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | int,
-    ) -> Stretch:
-        """Go one `parts`-th of a revolution from state `y` at `phase`; `scale` is the magnitude of the components."""
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        """Go one `parts`-th of a revolution from state `y` at `phase`."""
 
 
 def result_at(result: Any, y: State, excursion: Scalar, limit: Scalar) -> RESULTS:
-    """What to say of a state that a solver returned with one of diffrax's results."""
+    """The result of a state that a solver returned with one of diffrax's results."""
     finite = jnp.isfinite(sum(jnp.sum(jnp.abs(c)) for c in y))
     state = RESULTS.where(excursion <= limit, RESULTS.successful, RESULTS.outside)  # pyright: ignore
     state = RESULTS.where(finite, state, RESULTS.not_finite)  # pyright: ignore
@@ -147,7 +138,7 @@ def run_steps(
     pieces: Pieces,
     y: State,
     phase: Scalar,
-    parts: Int[Array, ""] | int,
+    parts: Int[Array, ""] | Scalar,
 ) -> Stretch:
     """One `parts`-th of a revolution of so many equal steps, in a single lane."""
     if isinstance(steps, int) and isinstance(parts, int):
@@ -202,32 +193,6 @@ class BesideField(AbstractField):
         return self.field.rates_beside(*y)[2]
 
 
-class Beside(AbstractForcedSystem):
-    """A model with the quantities that are integrated beside its state."""
-
-    system: AbstractForcedSystem
-
-    @property
-    def dimension(self) -> int:
-        return self.system.dimension
-
-    def at_speed(self, speed: Scalar) -> BesideField:
-        return BesideField(self.system.at_speed(speed))
-
-    def scale(self, speed: Scalar) -> Any:
-        return jnp.stack(self.system.scale(speed)), jnp.ones(len(self.system.beside))
-
-    def starts(self, speed: Scalar) -> Any:
-        return tuple((jnp.stack(y), jnp.array(self.system.beside_start)) for y in self.system.starts(speed))
-
-    def excursion(self, y: Any) -> Scalar:
-        return self.system.excursion(tuple(y[0]))
-
-    def parts(self, row: Array) -> tuple[Array, Array]:
-        """A row of numbers as state and quantities beside it."""
-        return row[: self.dimension], row[self.dimension :]
-
-
 class FixedSteps(AbstractMethod):
     """The same number of equal steps in every revolution: the strobe map is as smooth as the field."""
 
@@ -247,16 +212,8 @@ class FixedSteps(AbstractMethod):
         """With twice the steps, `times` over."""
         return FixedSteps(self.solver, self.steps << times)
 
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | int,
-    ) -> Stretch:
-        return run_steps(self.solver, self.steps, (field, system, scale), y, phase, parts)
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        return run_steps(self.solver, self.steps, pieces, y, phase, parts)
 
 
 class AdaptiveSteps(AbstractMethod):
@@ -271,7 +228,7 @@ class AdaptiveSteps(AbstractMethod):
 
     @property
     def tolerance(self) -> float:
-        """What no error is measured below."""
+        """Lower bound of a measured error."""
         return self.atol
 
     @property
@@ -285,15 +242,8 @@ class AdaptiveSteps(AbstractMethod):
     def _with(self, factor: float) -> "AdaptiveSteps":
         return AdaptiveSteps(self.solver, factor * self.rtol, factor * self.atol, self.max_steps)
 
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | int,
-    ) -> Stretch:
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        field, system, scale = pieces
         length = REVOLUTION / jnp.asarray(parts, dtype=float)
         watches = isinstance(field, BesideField)
         saved, norm = dfx.SubSaveAt(t1=True), optx.rms_norm
@@ -355,16 +305,8 @@ class NativeSteps(AbstractMethod):
         """The same by the implicit method, for stiff laws."""
         return NativeSteps(self.tolerance, self.error, IMPLICIT)
 
-    def advance(
-        self,
-        field: AbstractField,
-        system: AbstractForcedSystem,
-        scale: State,
-        y: State,
-        phase: Scalar,
-        parts: Int[Array, ""] | int,
-    ) -> Stretch:
-        return self.in_jax.advance(field, system, scale, y, phase, parts)
+    def advance(self, pieces: Pieces, y: State, phase: Scalar, parts: Int[Array, ""] | Scalar) -> Stretch:
+        return self.in_jax.advance(pieces, y, phase, parts)
 
     def finer(self, times: int = 1) -> "NativeSteps":
         """The same with tolerances 16 times smaller, `times` over."""

@@ -40,7 +40,7 @@ def _compiled(ir: str) -> bytes:
 
 
 def cache_folder() -> pathlib.Path | None:
-    """Where object code is kept; None where `JAXCAGE_CACHE=off` says that nothing is, or others may write there."""
+    """The folder of object code; None with `JAXCAGE_CACHE=off`, and for a folder that others may write to."""
     given = os.environ.get("JAXCAGE_CACHE", "")
     if given == "off":
         return None

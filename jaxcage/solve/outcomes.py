@@ -1,6 +1,6 @@
 """Results of an integration, and how it ended: diffrax's outcomes and our own, each a sentence with the cure."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import diffrax as dfx
 import jax.numpy as jnp
@@ -66,14 +66,6 @@ def outcome_code(result: RESULTS) -> Int[Array, ""]:
     for name, i in _KNOWN.items():
         code = jnp.where(result == getattr(RESULTS, name), jnp.int32(i), code)
     return code
-
-
-def result_of(code: Int[Array, ""]) -> RESULTS:
-    """The outcome whose place in `OUTCOMES` is `code`."""
-    result: Any = RESULTS.internal_error
-    for name, i in _KNOWN.items():
-        result = RESULTS.where(code == i, getattr(RESULTS, name), result)
-    return result
 
 
 class March(NamedTuple):

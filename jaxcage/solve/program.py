@@ -26,7 +26,7 @@ STAYS_CALL = "evaluated_often"
 _variables = lambda atoms: {v for v in atoms if not isinstance(v, jex.core.Literal)}
 _read = lambda equation: _variables(equation.invars)
 _identity = lambda x: id(x) if isinstance(x, Tracer) else (np.asarray(x).dtype.str, np.asarray(x).tobytes())
-"""What two numbers must have in common to be the same one."""
+"""Key of a number: equal keys mean the same number."""
 
 
 class Sizes(NamedTuple):
@@ -55,7 +55,7 @@ class Program(NamedTuple):
 
 
 def program_of(step: Any, sizes: Sizes, rules: bool = False) -> Program:
-    """What a step computes; with `rules`, functions that have a derivative of their own, and those that are evaluated
+    """The program of a step; with `rules`, functions that have a derivative of their own, and those that are evaluated
     often, stay calls: to be differentiated, for which a program is traced much faster than the code that it came from.
     """
     write_out: Callable[..., Program] = _kept if dataclasses.is_dataclass(step) else _written_out

@@ -6,7 +6,6 @@ once. It is differentiable (forward mode) with respect to state, speed and every
 
 from collections.abc import Sequence
 
-import diffrax as dfx
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Int
@@ -15,7 +14,7 @@ from .._checks import require_x64
 from .._form import split
 from .._types import Scalar, State
 from ..models import ESCAPE, AbstractField, AbstractForcedSystem, require_speeds
-from .kernel import REVOLUTION, can_be_kernel, steps_through
+from .kernel import REVOLUTION, Pieces, can_be_kernel, steps_through
 from .method import (
     DEFAULT_SOLVER,
     DEFAULT_STEPS,
@@ -28,7 +27,7 @@ from .method import (
     moved_by,
     result_at,
 )
-from .outcomes import RESULTS, outcome_code
+from .outcomes import outcome_code
 
 
 class StrobeMap(eqx.Module):
@@ -43,14 +42,10 @@ class StrobeMap(eqx.Module):
         """One revolution from `y`: state after it, largest excursion on the way, outcome."""
         return self.part(y, 0, 1)
 
-    def part(self, y: State, i: Int[Array, ""] | int, parts: Int[Array, ""] | int) -> Stretch:
+    def part(self, y: State, i: Int[Array, ""] | int, parts: Int[Array, ""] | Scalar) -> Stretch:
         """The `i`-th of `parts` equal parts of a revolution."""
         phase = jnp.asarray(i, dtype=float) * (REVOLUTION / jnp.asarray(parts, dtype=float))
-        return self.method.advance(self.field, self.system, self.scale, y, phase, parts)
-
-    def admit(self, y: State, limit: Scalar = 1.0) -> RESULTS:
-        """Whether a lane may start from `y`: no further out than `limit`."""
-        return result_at(dfx.RESULTS.successful, y, self.system.excursion(y), limit)
+        return self.method.advance(Pieces(self.field, self.system, self.scale), y, phase, parts)
 
 
 def strobe_map(system: AbstractForcedSystem, speed: Scalar, method: AbstractMethod | None = None) -> StrobeMap:
@@ -78,7 +73,7 @@ def pushed(strobe: StrobeMap, y: State, tangents: Tangents, drifts: Sequence[Dri
     """
     method = strobe.method
     if isinstance(method, FixedSteps) and can_be_kernel(method.solver):
-        pieces = (strobe.field, strobe.system, strobe.scale)
+        pieces = Pieces(strobe.field, strobe.system, strobe.scale)
         y, peak, result, after = steps_through(method.solver, method.steps, pieces, y, tangents, drifts)
         return Moved(y, after, peak, outcome_code(result_at(result, y, peak, ESCAPE)))
     form, row = split(strobe.field, eqx.is_inexact_array)

@@ -320,7 +320,7 @@ def ramp(
         time = states[:, dim + system.beside.index("time")]
     else:
         states = states[:-1]
-    excursion = course.lanes.begin(np.arange(0, speeds.size, places), ran.states[:-1:places])[1]
+    excursion = course.lanes.begin(np.arange(speeds.size), ran.states[:-1])[1][::places]
     peak = float(np.fmax.reduce([*ran.peaks[discard * places :, -1], *excursion[discard:]]))
     return Trajectory(
         time,

@@ -25,7 +25,7 @@ class Tried(NamedTuple):
 
     step: Value
     limited: Value
-    """Its size before it was shortened."""
+    """Size of the step before it was shortened."""
     ends: Value
     """Mask: it was shortened to end at the strobe state."""
     halves: Value

@@ -6,7 +6,7 @@ A step is written for a single lane, on scalars. What surrounds it decides what 
 - on a CPU it is machine code (`ir`) that JAX's program calls (`call`): a few microseconds, and no compilation by XLA;
   elsewhere, and for a step with an operation that has no translation, it is the same loop inside JAX.
 
-Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits.implicit.by_columns`).
+Reverse mode is had by columns: a Jacobian matrix in forward mode, transposed (`orbits.newton.by_columns`).
 """
 
 import dataclasses
@@ -35,7 +35,7 @@ DIRECTIONS = 8
 
 
 class How(NamedTuple):
-    """What a march is of."""
+    """Arguments of the integration loop."""
 
     step: Any
     sizes: Sizes
@@ -182,12 +182,12 @@ def _one_more(sizes: Sizes) -> Sizes:
 
 
 def _share(tangent: Tangent) -> bool:
-    """Whether all directions of a step are computed together: of higher derivatives one is enough for a program."""
+    """True if all directions of a step are computed together; a program of higher derivatives has one."""
     return not isinstance(tangent.step, Tangent) and len(tangent.known) <= DIRECTIONS
 
 
 def is_elementary(step: Step, sizes: Sizes, fixed: Sequence[Any]) -> bool:
-    """Whether `step` is made of elementary operations on scalars alone."""
+    """True if `step` is made of elementary operations on scalars alone."""
     if any(jnp.ndim(x) for x in fixed):
         return False
     if isinstance(step, Tangent):
