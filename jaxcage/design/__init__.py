@@ -18,7 +18,6 @@
 
 from .._arguments import check_layer
 from .chances import (
-    ENSEMBLE_SPEEDS as ENSEMBLE_SPEEDS,
     REVOLUTIONS as REVOLUTIONS,
     Band as Band,
     Clue as Clue,
@@ -38,7 +37,6 @@ from .loads import (
     averages as averages,
     land_loads as land_loads,
     motions as motions,
-    negligible_load as negligible_load,
 )
 from .objective import (
     COSTS as COSTS,
@@ -54,14 +52,12 @@ from .objective import (
     uniform as uniform,
 )
 from .optimisation import (
-    UNCONFIRMED as UNCONFIRMED,
     Optimised as Optimised,
     Optimum as Optimum,
     SurrogateSearch as SurrogateSearch,
     confirmed as confirmed,
     optimise as optimise,
     surrogate_search as surrogate_search,
-    unchanged as unchanged,
 )
 from .shares import (
     SobolIndices as SobolIndices,
@@ -84,7 +80,6 @@ from .statistics import (
     COMPARED as COMPARED,
     OBJECTIVE as OBJECTIVE,
     STATISTICS as STATISTICS,
-    TERMS as TERMS,
     BeforeAfter as BeforeAfter,
     Chaos as Chaos,
     LandLoad as LandLoad,
@@ -97,7 +92,6 @@ from .statistics import (
     measure as measure,
     relative as relative,
     statistic as statistic,
-    usual_bounds as usual_bounds,
 )
 from .widths import SolvedEdge as SolvedEdge, ZoneWidth as ZoneWidth, zone_width as zone_width
 

@@ -23,7 +23,7 @@ from ..models import CageModel
 from ..solve import AbstractMethod, native
 
 
-DRAWS, ENSEMBLE_SPEEDS = 64, 40
+DRAWS = 64
 REVOLUTIONS = 100
 """Revolutions left out, and observed: one lane is an example of a chance, and need not be known to three digits."""
 SETTLED = 64

@@ -49,8 +49,6 @@ LENGTH, NOISE = 0.7, 0.05
 """Prior of the process: its correlation length in each parameter, and the variance of its noise beside its own."""
 AMONG = 4
 """Number of the best designs of a search that a finer objective compares."""
-UNCONFIRMED = "not confirmed"
-"""Status of a search whose best design is no better than the design as it is."""
 OFFSET = 5e-3
 """Part of the first value that is added to all of them, so that the logarithm of a small one has no cliff."""
 
@@ -427,10 +425,3 @@ def confirmed(found: Optimised[Design], objective: AbstractObjective) -> tuple[O
         best = min([itself, *finer], key=lambda s: np.nan_to_num(s.value, nan=np.inf))
         optima.append(Optimum.at(space, best, o.history, "nothing better found" if best is itself else o.status))
     return Optimised.of(space, optima), itself.value
-
-
-def unchanged(found: Optimised[Design], value: float) -> Optimised[Design]:
-    """The same searches, none of which found a better design, with the design as it is and its value in front."""
-    place = tuple(np.clip(found.space.place, 0.0, 1.0).tolist())
-    own = Optimum.at(found.space, Step(place, value), found.best.history, UNCONFIRMED)
-    return Optimised((own, *found.optima), found.space)

@@ -19,7 +19,6 @@ from scipy.special import expit
 from .._arguments import require_at_least
 from .._errors import ArgumentError
 from .._form import compiled
-from .._parameters import parameters
 from ..analysis import CHAOS_THRESHOLD, failed
 from ..lanes import Plan, Progress, Run, Speeds, rpm, run_lanes
 from ..models import AbstractForcedSystem, BearingModel, drawn_places, rolling_start
@@ -199,25 +198,25 @@ class Chaos(AbstractStatistic):
         return self.times * self.runs.mean(self.levels(models))[:, None, None]
 
 
-def _chaos(speeds: np.ndarray, weights: np.ndarray, times: float, softness: float = Chaos.softness, **runs: Any):
-    return Chaos(Runs(speeds, weights=weights, **runs), times, softness)
-
-
-def chaotic_width(first_rpm: float, last_rpm: float, count: int = 48, **options: Any) -> Chaos:
+def chaotic_width(
+    first_rpm: float, last_rpm: float, count: int = 48, softness: float = Chaos.softness, **runs: Any
+) -> Chaos:
     """Chaotic speeds between two [rpm], on a grid of `count` speeds: a smoothed width of the zones in that range.
 
-    **Arguments:** range and speeds; `softness` and fields of `Runs`.
+    **Arguments:** range and speeds; half width of the step; fields of `Runs`.
 
     **Returns:** an objective in rpm, at the resolution of the grid.
     """
-    return _chaos(rpm(first_rpm, last_rpm, count), np.ones(count), last_rpm - first_rpm, **options)
+    return Chaos(Runs(rpm(first_rpm, last_rpm, count), **runs), last_rpm - first_rpm, softness)
 
 
-def chaotic_share(spectrum: Sequence[tuple[float, float, float]], count: int = 12, **options: Any) -> Chaos:
+def chaotic_share(
+    spectrum: Sequence[tuple[float, float, float]], count: int = 12, softness: float = Chaos.softness, **runs: Any
+) -> Chaos:
     """Share of its running time that a cage is chaotic.
 
-    **Arguments:** operating spectrum as rows (first rpm, last rpm, hours), `count` speeds in each; ranges must not
-    overlap; `softness` and fields of `Runs`.
+    **Arguments:** operating spectrum as rows (first rpm, last rpm, hours), `count` speeds in each; half width of the
+    step; fields of `Runs`.
 
     **Raises:** `ValueError` for ranges that overlap or descend.
     """
@@ -226,7 +225,7 @@ def chaotic_share(spectrum: Sequence[tuple[float, float, float]], count: int = 1
     if not rows or any(b <= a for a, b in zip(ends[:-1], ends[1:], strict=True)):
         raise ArgumentError("spectrum", said=f"must hold ranges that ascend and do not overlap, but is {spectrum}.")
     speeds = np.concatenate([rpm(first, last, count) for first, last, _ in rows])
-    return _chaos(speeds, np.repeat([hours for *_, hours in rows], count), 1.0, **options)
+    return Chaos(Runs(speeds, weights=np.repeat([hours for *_, hours in rows], count), **runs), 1.0, softness)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -375,15 +374,6 @@ def bearing_objective(
     if not np.any(np.isfinite(objective.samples([model]))):
         raise ArgumentError("model", said="must run through from one of the starts at least, but fails from all.")
     return objective
-
-
-def usual_bounds(model: BearingModel) -> dict[str, tuple[float, float]]:
-    """Bounds of what a designer changes first [SI]: gap, pocket clearance and land width from 0.7 to 1.4 of what they
-    are, and the eccentricity from a fifth to the present value."""
-    now = {name: float(value) for name, value in parameters(model).items() if name in CAGE_PARAMETERS}
-    names = [name for name in ("guidance_gap", "pocket_clearance", "land_width", "eccentricity") if now[name] > 0]
-    shares = {name: (0.2, 1.0) if name == "eccentricity" else (0.7, 1.4) for name in names}
-    return {name: (low * now[name], high * now[name]) for name, (low, high) in shares.items()}
 
 
 @dataclasses.dataclass(frozen=True)
