@@ -8,8 +8,8 @@ import numpy as np
 
 from .._errors import ArgumentError
 from .._parameters import parameter_info, parameters, within
-from ..solve import AbstractMethod
 from ..orbits import Curve, Point, bifurcation, curve
+from ..solve import AbstractMethod
 from .tables import SHOWN, Column, Table, factor, rows_table
 
 
