@@ -153,7 +153,9 @@ def show_sweep(model: jc.BearingModel, speeds: np.ndarray, discard: int, revolut
     mean = lambda name: f"{np.nanmin(found[name]):.3g} to {np.nanmax(found[name]):.3g}"
     print(f"\nSlip {mean('cage_slip')}, largest pocket force {mean('pocket_force_max_N')} N")
     print(f"Exponent {mean('exponents')}, its error {mean('standard_error')}; steps {mean('steps')}")
-    failed, inaccurate = (int((found[name] == word).sum()) for name, word in (("label", "failed"), ("outcome", "inaccurate")))
+    failed, inaccurate = (
+        int((found[name] == word).sum()) for name, word in (("label", "failed"), ("outcome", "inaccurate"))
+    )
     print(f"Error {mean('error')}; failed {failed}, inaccurate {inaccurate}")
 
 

@@ -111,7 +111,15 @@ def report(found: Sequence[Subject], quick: bool) -> list[str]:
             chaos = [int(np.sum(label == "chaotic")) for label in labels]
             beside = [int(np.sum(labels[0] == name)) for name in ("inaccurate", "failed")]
             differ = int(np.sum((labels[0] != labels[1]) & ~failed(ours) & ~failed(theirs)))
-            row = (ours.sizes["speed"], labels[0].size, *chaos, differ, *beside, len(new), sum(d.explained for d in new))
+            row = (
+                ours.sizes["speed"],
+                labels[0].size,
+                *chaos,
+                differ,
+                *beside,
+                len(new),
+                sum(d.explained for d in new),
+            )
             print(f"{subject.name:44s}" + "".join(f"{x:10d}" for x in row), flush=True)
             every += new
             speeds += ours.sizes["speed"]

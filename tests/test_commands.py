@@ -12,9 +12,8 @@ from helpers import document, is_png, raw_sweep, refused
 import jaxcage as jc
 from jaxcage.cli import main
 from jaxcage.files import load_model, read_bearing, write_template
-from jaxcage.lanes import load
+from jaxcage.lanes import label_names, load
 from jaxcage.show import read_columns
-from jaxcage.lanes import label_names
 
 
 RK4 = ["--solver", "rk4", "--steps", "256"]

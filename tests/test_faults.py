@@ -18,16 +18,14 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
+from jaxcage.cli._job import save_figure
 from report_example import swept
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.cli._job import save_figure
 from jaxcage.files import save_model, write_template
-from jaxcage.lanes import load, save
-from jaxcage.show import write_columns
-from jaxcage.show import new_figure
-from jaxcage.lanes import Plan, Store, Study, open_study, run_study
+from jaxcage.lanes import Plan, Store, Study, open_study, run_study, save
+from jaxcage.show import new_figure, write_columns
 
 
 def contents(folder: Path) -> dict[str, bytes | None]:

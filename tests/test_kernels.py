@@ -12,7 +12,6 @@ from helpers import even, raw_sweep, raw_sweeps, wide_but
 
 import jaxcage as jc
 from jaxcage._form import compiled
-from jaxcage.models._field import _columns
 from jaxcage.solve import OUTCOMES, march, method, native, strobe_map
 from jaxcage.solve.method import TERM, moved_by
 

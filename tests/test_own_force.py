@@ -17,8 +17,8 @@ from helpers import beyond_range, raw_sweep
 from scipy.integrate import solve_ivp
 
 import jaxcage as jc
-from jaxcage.forces import AbstractForce, AbstractForcing, parameter
 from jaxcage.files import ConfigError, configuration, save_model
+from jaxcage.forces import AbstractForce, AbstractForcing, parameter
 from jaxcage.orbits import Point, edge_speed
 
 

@@ -11,7 +11,17 @@ from helpers import declared, elastic, roller_pass
 
 import jaxcage as jc
 from jaxcage.bearing import PUBLISHED_CASES
-from jaxcage.files import ConfigError, configuration, load_whole_bearing, model_from, read_whole_bearing, save_model, subject_of, template, whole_bearing_from
+from jaxcage.files import (
+    ConfigError,
+    configuration,
+    load_whole_bearing,
+    model_from,
+    read_whole_bearing,
+    save_model,
+    subject_of,
+    template,
+    whole_bearing_from,
+)
 
 
 jc.enable_x64()  # read while the tests are collected

@@ -13,8 +13,7 @@ from jaxcage.cli import main
 from jaxcage.design import bearing_gradient
 from jaxcage.files import subject_of, whole_bearing_from
 from jaxcage.lanes import load, stored_configuration
-from jaxcage.show import read_columns
-from jaxcage.show import read_operating
+from jaxcage.show import read_columns, read_operating
 
 
 jc.enable_x64()

@@ -16,8 +16,8 @@ from test_whole_reference import everything
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.show import read_columns
 from jaxcage.models import INTEGRATED, LEDGER, BearingState, Bodies, Rollers, rolling_start, state_scale
+from jaxcage.show import read_columns
 
 
 SPEED = jc.rpm(10000)

@@ -7,9 +7,8 @@ import pytest
 from test_whole_motion import SPEED, bearing
 
 import jaxcage as jc
-from jaxcage.solve import SAMPLES, SPACING, STALLED, limits_of
 from jaxcage.models.whole import BearingState, rolling_start, state_scale
-from jaxcage.solve import FINISHED, Bearings
+from jaxcage.solve import FINISHED, SAMPLES, SPACING, STALLED, Bearings, limits_of
 
 
 SHORT = {"discard": 0, "revolutions": 1, "blocks": 1}
