@@ -74,9 +74,9 @@ def beside_published(
         columns += speed_columns(end, f"{end}_rpm", beside, f"{end}_uncertainty_rpm", nothing="past range")
     columns += speed_columns("width", "width_rpm", None, nothing="open")
     columns += [] if published is None else [Column("published", ())]
-    missing = {None: "published but not found", -1: "published beyond the range"}
+    missing = {None: "Published, but not found", -1: "Published beyond this range"}
     notes = [f"{words}: {_words(partners[which])}" for which, words in missing.items() if which in partners]
-    return rows_table("; ".join([title, *notes]), rows, columns, key)
+    return rows_table("\n".join([title, *notes]), rows, columns, key)
 
 
 def zone_details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
