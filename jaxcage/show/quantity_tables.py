@@ -56,18 +56,13 @@ def head_of(name: str, unit: str) -> str:
     return name.removesuffix("_" + unit.replace(" ", "_").replace("^", "").replace("/", "_per_")).replace("_", " ")
 
 
-def labels_at(found: xr.Dataset) -> list[str]:
-    """The labels at each speed, each once."""
-    return [" or ".join(sorted(set(row) - {"failed"}) or ["failed"]) for row in found["label"].values.tolist()]
-
-
 def quantities_table(title: str, found: xr.Dataset, names: Sequence[str]) -> Table:
-    """Means over the lanes that did not fail at each speed with their standard errors, and the labels."""
+    """Means over the lanes that did not fail at each speed, with their standard errors."""
     columns = [Column("speed [rpm]", found["rpm"].values.tolist(), key="speed_rpm", digits=0)]
     for name in names:
         (unit, shown), (mean, error) = unit_of(found, name), mean_over_starts(found, name)
         columns.append(Column(head_of(name, unit), mean.tolist(), unit, shown, error.tolist(), key=name))
-    return Table(title, [*columns, Column("motion", labels_at(found))])
+    return Table(title, columns, "means")
 
 
 def quantity_beside(name: str, cases: Sequence[str], found: Sequence[xr.Dataset]) -> Table:

@@ -80,7 +80,7 @@ def beside_published(
 
 
 def zone_details(title: str, zones: Sequence[Zone], key: str = "") -> list[Table]:
-    """Mechanisms of the edges, share of chaotic initial states and mean life of chaos of each zone, if there are any."""
+    """Mechanisms of the edges, share of chaotic initial states and mean life of chaos of each zone, if any."""
     rows = [
         zone_record(zone) | {"zone": f"{i}: {zone_words(zone)}", "life": _life(zone)}
         for i, zone in enumerate(zones, start=1)
