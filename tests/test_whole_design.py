@@ -72,7 +72,9 @@ def test_shares_and_budgets():
     assert shares.total["guidance_gap"] > 3 * shares.total["pocket_clearance"] > 0 and 0 < shares.scatter < 1
     names = ("guidance_gap", "pocket_clearance")
     runs = Runs(SPEED, discard=1, revolutions=2, blocks=2, exponents=0)
-    power = mean_gradient(MODEL, runs, ["friction_power_W"], directions=names, designs=12).statistics["friction_power_W"]
+    power = mean_gradient(MODEL, runs, ["friction_power_W"], directions=names, designs=12).statistics[
+        "friction_power_W"
+    ]
     budget = tolerance_budget(power, dict.fromkeys(names, 0.02))
     expected = 0.02 * power.value * np.abs(power.elasticity)
     assert [budget.deviation[name] for name in names] == pytest.approx(expected)

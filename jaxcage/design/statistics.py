@@ -183,6 +183,8 @@ class Chaos(AbstractStatistic):
     times: float = 1.0
     softness: float = 0.02
     """Half width of the step, in exponents per revolution."""
+    measured_in: str = "1"
+    """Unit of the number."""
 
     def __post_init__(self):
         if not self.softness > 0:
@@ -197,6 +199,9 @@ class Chaos(AbstractStatistic):
     def samples(self, models: Models) -> Float[np.ndarray, "k 1 1"]:
         return self.times * self.runs.mean(self.levels(models))[:, None, None]
 
+    def unit(self, model: AbstractForcedSystem) -> str:
+        return self.measured_in
+
 
 def chaotic_width(
     first_rpm: float, last_rpm: float, count: int = 48, softness: float = Chaos.softness, **runs: Any
@@ -207,7 +212,7 @@ def chaotic_width(
 
     **Returns:** an objective in rpm, at the resolution of the grid.
     """
-    return Chaos(Runs(rpm(first_rpm, last_rpm, count), **runs), last_rpm - first_rpm, softness)
+    return Chaos(Runs(rpm(first_rpm, last_rpm, count), **runs), last_rpm - first_rpm, softness, "rpm")
 
 
 def chaotic_share(
