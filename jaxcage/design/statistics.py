@@ -347,7 +347,9 @@ def measure(runs: Runs, name: str) -> AbstractObjective:
 def relative(objective: AbstractObjective, model: AbstractForcedSystem, price: float) -> AbstractObjective:
     """`price` times an objective over its value for the model as it is, or over what is next to nothing if that is
     larger or the model fails."""
-    beside = np.fmax(float(mean_of_known(objective.samples([model]).ravel())), objective.negligible(model))
+    each = objective.samples([model])
+    now = each[np.isfinite(each)].mean() if np.isfinite(each).any() else 0.0
+    beside = max(float(now), objective.negligible(model))
     return (price / beside if beside else 0.0) * objective
 
 
