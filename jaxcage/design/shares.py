@@ -114,7 +114,7 @@ def global_sensitivity(
 def sobol_of(
     evaluate: Callable[[np.ndarray], np.ndarray], names: Sequence[str], *, samples: int, seed: int = 0
 ) -> SobolIndices:
-    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), which returns one row of values.
+    """Sobol indices of a function of places between 0 and 1, of shape (names, designs), with one row of values.
 
     Index and interval of a parameter that changes nothing in any sample are 0.
 
