@@ -10,7 +10,7 @@ from helpers import document, is_png, refused
 
 import jaxcage as jc
 from jaxcage.cli import main
-from jaxcage.design import bearing_gradient
+from jaxcage.design import Runs, mean_gradient
 from jaxcage.files import subject_of, whole_bearing_from
 from jaxcage.lanes import load, stored_configuration
 from jaxcage.show import read_columns, read_operating
@@ -81,7 +81,8 @@ def test_gradient(capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path):
     asked += ["--by", *names, "--discard", "1", "--revolutions", "2"]
     found = document(capsys, *asked, "--out", str(tmp_path))
     model = jc.replace(jc.whole_bearing("nu2310"), load=1000.0)
-    expected = bearing_gradient(model, SPEED, directions=names, designs=10, starts=1, discard=1, revolutions=2)
+    runs = Runs(SPEED, discard=1, revolutions=2, blocks=2, exponents=0)
+    expected = mean_gradient(model, runs, directions=names, designs=10)
     power, each = found["statistics"]["friction_power_W"], expected.statistics["friction_power_W"]
     assert power["value"] == pytest.approx(each.value, rel=1e-9) and is_png(found["figure"])
     for i, name in enumerate(names):
