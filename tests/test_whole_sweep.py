@@ -16,7 +16,7 @@ SIXTEENTH = 2 * np.pi / 16
 
 def an_eighth(model, states, tangents=None):
     """Lanes of one bearing from states [SI] over an eighth of a revolution, with a tangent of each, by tight steps."""
-    lanes = Lanes.of(model, np.full(len(states), SPEED))
+    lanes = Lanes.of([model], np.full(len(states), SPEED))
     which, y = np.arange(len(states)), lanes.completed(np.stack(states))
     scale, _ = lanes.begin(which, y)
     engine = lanes.engine(0 if tangents is None else 1, TIGHT, samples=16)
