@@ -304,12 +304,11 @@ class BearingModel(AbstractForcedSystem):
         )
 
 
-def slowness(
-    depth: Float[np.ndarray, "*lanes"], radial: Float[np.ndarray, "*lanes"], cage_speed: Float[np.ndarray, "*lanes"]
-) -> Float[np.ndarray, "*lanes"]:
+def slowness(depth: Any, radial: Any, cage_speed: Any) -> Any:
     """Number of a loaded roller's periods in a sixteenth of a revolution over `PERIODS`, 1 to `SLOWEST`.
 
-    **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s].
+    **Arguments:** magnitudes of a roller's depth in its raceway [m] and its radial speed [m/s]; cage speed [rad/s]:
+    numbers, or NumPy arrays of lanes.
     """
     turned = PERIODS * TURN * depth / radial * np.abs(cage_speed)
     return np.clip(SPACING / turned, 1.0, SLOWEST)
